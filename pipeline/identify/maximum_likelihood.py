@@ -1,0 +1,324 @@
+"""Maximum likelihood of eq. (16) with wind force and current as states: the default estimator.
+
+Fisher scoring with a Levenberg-Marquardt step on the compiled likelihood of `pipeline.identify.kernel`; the noise
+levels are estimated with the hull, as logarithms, inside stated bounds. Standard errors are the Cramer-Rao bound at the
+estimate. Reference: Astrom (1980), Automatica 16; Astrom and Kallstrom (1976), "Identification of ship steering
+dynamics", Automatica 12.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.identify.estimate import Estimate, Value, discrete_values, hull_values
+from pipeline.identify.fit import one_step_fit
+from pipeline.identify.kernel import N_STATE, N_THETA, likelihood, no_trace
+from pipeline.identify.record import Record
+from pipeline.identify.starts import starting_points, thinned
+from pipeline.normalise.series import Float
+from schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
+
+Mask = NDArray[np.bool_]
+
+#: with less log-likelihood than this to gain, steps tell more of the curvature than the expected information
+_NEAR = 1.0
+#: log-likelihoods this close are taken for one maximum; ones this far behind in the race cannot win it
+_SAME_HILL = 0.1
+_OUT_OF_REACH = 50.0
+
+
+@dataclass(frozen=True)
+class MaximumLikelihoodSettings:
+    """Settings of the search; every one is part of a parameter set's identity.
+
+    Attributes
+    ----------
+    max_iterations : int
+        Scoring steps per start.
+    decrement : float
+        Converged when half the squared Newton decrement, the log-likelihood still to be gained, falls below this; at
+        1e-5 the estimate lies within 0.005 standard errors of the maximum.
+    starts : int
+        How many starting points are carried to the end; the best one is kept.
+    entries, coarse_instants, coarse_iterations : int
+        The most likely starting points, so many of them, race first on the record thinned to about this many instants,
+        for so many steps.
+    sigma_low, sigma_high : tuple of float
+        Bounds of the noise levels, order of `NOISE_PARAMETERS`.
+    initial_std : tuple of float
+        Standard deviations of the state (v, r, F, psi, V_T) at the first instant, wide: the data decide.
+    discrete_step_s : float
+        Step of the discrete parameters (17) that are reported.
+    """
+
+    max_iterations: int = 80
+    decrement: float = 1e-5
+    starts: int = 2
+    entries: int = 3
+    coarse_instants: int = 600
+    coarse_iterations: int = 25
+    sigma_low: tuple[float, ...] = (1e-7, 1e-4, 1e-5, 1e-7, 1e-6)
+    sigma_high: tuple[float, ...] = (1.0, 10.0, 10.0, 0.5, 1.0)
+    initial_std: tuple[float, ...] = (2.0, 0.2, 0.1, 0.2, 2.0)
+    discrete_step_s: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Search:
+    theta: Float
+    log_likelihood: float
+    score: Float
+    information: Float
+    converged: bool
+    reason: str
+    iterations: tuple[dict[str, Any], ...]
+
+
+def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: MaximumLikelihoodSettings) -> Estimate:
+    """Estimate hull parameters and noise levels from one segment.
+
+    Parameters
+    ----------
+    record : Record
+    spec : ModelSpec
+        Disturbance model.
+    arm_per_m : float
+        l of eq. (16), 1/m.
+    settings : MaximumLikelihoodSettings
+
+    Returns
+    -------
+    Estimate
+        ``converged`` is False, with the reason in ``report``, where the search did not end at a maximum.
+    """
+    active = np.ones(N_THETA, dtype=np.bool_)
+    active[8:] = record.used
+    coarse = _Problem(thinned(record, settings.coarse_instants), spec, arm_per_m, settings, active)
+    entries = sorted(starting_points(record), key=lambda start: -coarse.value(start[1]))[: settings.entries]
+    race = [(name, coarse.search(theta, settings.coarse_iterations)) for name, theta in entries]
+    race.sort(key=lambda entry: -entry[1].log_likelihood)
+    problem = _Problem(record, spec, arm_per_m, settings, active)
+    searches = [(name, problem.search(s.theta, settings.max_iterations)) for name, s in _distinct(race, settings)]
+    best_name, best = max(searches, key=lambda s: s[1].log_likelihood)
+    return _report(problem, best_name, best, searches, race)
+
+
+def _distinct(race: list[tuple[str, _Search]], settings: MaximumLikelihoodSettings) -> list[tuple[str, _Search]]:
+    """Return the best entries of the race that ended on different hills and are not out of reach of the best one."""
+    best = race[0][1]
+    chosen = [race[0]]
+    for name, search in race[1:]:
+        gap = best.log_likelihood - search.log_likelihood
+        same = any(abs(other.log_likelihood - search.log_likelihood) < _SAME_HILL for _, other in chosen)
+        if not same and gap < _OUT_OF_REACH and len(chosen) < settings.starts:
+            chosen.append((name, search))
+    return chosen
+
+
+class _Problem:
+    """The likelihood of one record, bound once so that the search only passes theta."""
+
+    def __init__(
+        self, record: Record, spec: ModelSpec, arm: float, settings: MaximumLikelihoodSettings, active: Mask
+    ) -> None:
+        self.record, self.settings, self.active = record, settings, active
+        x0 = np.zeros(N_STATE)
+        P0 = np.diag(np.square(settings.initial_std))
+        self._fixed = (
+            *(record.time_s, record.speed_m_s, record.rudder_rad, record.measured),
+            *(arm, spec.wind_correlation_rate_per_s, spec.current_correlation_rate_per_s, x0, P0),
+        )
+        self.low = np.concatenate([np.full(6, -np.inf), np.log(settings.sigma_low)])
+        self.high = np.concatenate([np.full(6, np.inf), np.log(settings.sigma_high)])
+
+    def value(self, theta: Float) -> float:
+        """Log-likelihood alone."""
+        return float(likelihood(theta, np.zeros(N_THETA, dtype=np.bool_), *self._fixed, *no_trace())[0])
+
+    def full(self, theta: Float) -> tuple[float, Float, Float]:
+        """Log-likelihood, score and information."""
+        value, score, information = likelihood(theta, self.active, *self._fixed, *no_trace())
+        return float(value), score, information
+
+    def trace(self, theta: Float) -> tuple[Float, Float, Float]:
+        """Innovations (n, 3), their variances (n, 3) and filtered states (n, 5)."""
+        n = self.record.time_s.size
+        innovation, variance, states = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, N_STATE), np.nan)
+        likelihood(theta, np.zeros(N_THETA, dtype=np.bool_), *self._fixed, innovation, variance, states)
+        return innovation, variance, states
+
+    def free(self, theta: Float, score: Float) -> Mask:
+        """Parameters that may move: active and not pressed against a bound."""
+        at_low, at_high = theta <= self.low, theta >= self.high
+        pressed: Mask = (at_low & (score < 0)) | (at_high & (score > 0))
+        return self.active & ~pressed
+
+    def search(self, start: Float, max_iterations: int) -> _Search:
+        """Climb from one start: damped Fisher scoring far away, BFGS from the Fisher information near the top.
+
+        Where the model lacks something the expected information is not the curvature, and scoring alone creeps.
+        """
+        theta = np.clip(start, self.low, self.high)
+        value, score, information = self.full(theta)
+        curvature, damping, scale = information, 1e-3, np.abs(theta[:6])
+        converged, reason = False, "the iterations allowed ran out"
+        iterations = [_iteration(0, theta, value, np.nan, damping)]
+        for count in range(1, max_iterations + 1):
+            free = self.free(theta, score)
+            gain = newton_decrement(score, curvature, free)
+            if gain < self.settings.decrement:
+                converged, reason = True, "the log-likelihood still to be gained is below the limit"
+                break
+            step, damping = self._rising_step(theta, value, score, curvature, free, damping, scale)
+            if step is None:
+                converged, reason = gain < 1e-3, "no step raises the log-likelihood any more"
+                break
+            before, theta = score, theta + step
+            value, score, information = self.full(theta)
+            curvature = information if gain > _NEAR else bfgs(curvature, step, before - score, free)
+            iterations.append(_iteration(count, theta, value, gain, damping))
+        return _Search(theta, value, score, information, converged, reason, tuple(iterations))
+
+    @staticmethod
+    def _bounded(step: Float, theta: Float, scale: Float) -> Float:
+        """Shorten a step that would at once double a hull parameter or leave the scale of the start.
+
+        Far from the maximum the quadratic model sends the ship into regions where she answers absurdly fast.
+        """
+        reach = np.maximum(np.abs(theta[:6]), scale)
+        bounded = step * min(1.0, 1.0 / float(np.max(np.abs(step[:6]) / reach) + 1e-300))
+        bounded[6:] = np.clip(step[6:], -1.0, 1.0)
+        return bounded
+
+    def _rising_step(
+        self, theta: Float, value: float, score: Float, curvature: Float, free: Mask, damping: float, scale: Float
+    ) -> tuple[Float | None, float]:
+        """Return a step that raises the log-likelihood and the damping for the next one; None where none is found."""
+        while damping < 1e9:
+            step = self._bounded(damped_step(score, curvature, free, damping), theta, scale)
+            candidate = np.clip(theta + step, self.low, self.high)
+            if self.value(candidate) > value:
+                return candidate - theta, damping / 10.0 if damping > 1e-9 else 0.0
+            damping = max(10.0 * damping, 1e-6)
+        return None, damping
+
+
+def bfgs(curvature: Float, step: Float, fall: Float, free: Mask) -> Float:
+    """Return the curvature corrected by what one step showed (Broyden-Fletcher-Goldfarb-Shanno).
+
+    Parameters
+    ----------
+    curvature : ndarray, shape (n_theta, n_theta)
+        Positive definite over the free parameters.
+    step : ndarray, shape (n_theta,)
+        Step taken.
+    fall : ndarray, shape (n_theta,)
+        Score before less score after it.
+    free : ndarray of bool, shape (n_theta,)
+        Parameters that moved.
+    """
+    s, y = np.where(free, step, 0.0), np.where(free, fall, 0.0)
+    Bs = curvature @ s
+    if s @ y <= 1e-10 * np.linalg.norm(s) * np.linalg.norm(y) or s @ Bs <= 0.0:
+        return curvature
+    updated: Float = curvature - np.outer(Bs, Bs) / (s @ Bs) + np.outer(y, y) / (s @ y)
+    return updated
+
+
+def damped_step(score: Float, information: Float, free: Mask, damping: float) -> Float:
+    """Solve (I + damping diag I) step = score over the free parameters; 0 for the others, shape (n_theta,)."""
+    step = np.zeros(score.size)
+    index = np.flatnonzero(free)
+    block = information[np.ix_(index, index)]
+    scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    normalised = block / np.outer(scale, scale) + damping * np.eye(index.size)
+    # lstsq: a direction the data do not determine gets no step instead of an infinite one
+    solution = np.linalg.lstsq(normalised, score[index] / scale, rcond=1e-13)[0]
+    step[index] = solution / scale
+    return step
+
+
+def newton_decrement(score: Float, information: Float, free: Mask) -> float:
+    """Return the log-likelihood that the quadratic model still promises, score' I^-1 score / 2."""
+    return float(0.5 * score @ damped_step(score, information, free, 0.0))
+
+
+def _summary(searches: list[tuple[str, _Search]]) -> list[dict[str, Any]]:
+    return [{"start": n, "log_likelihood": s.log_likelihood, "converged": s.converged} for n, s in searches]
+
+
+def _iteration(count: int, theta: Float, value: float, gain: float, damping: float) -> dict[str, Any]:
+    parameters = dict(zip(HULL_PARAMETERS, (float(t) for t in theta[:6]), strict=True))
+    sigmas = dict(zip(NOISE_PARAMETERS, (float(np.exp(t)) for t in theta[6:]), strict=True))
+    return {
+        "iteration": count,
+        "log_likelihood": value,
+        "expected_gain": None if np.isnan(gain) else gain,
+        "damping": damping,
+        **parameters,
+        **sigmas,
+    }
+
+
+def _report(
+    problem: _Problem, name: str, best: _Search, searches: list[tuple[str, _Search]], race: list[tuple[str, _Search]]
+) -> Estimate:
+    record, settings = problem.record, problem.settings
+    names = [*HULL_PARAMETERS, *NOISE_PARAMETERS]
+    free = problem.free(best.theta, best.score)
+    index = np.flatnonzero(free)
+    block = best.information[np.ix_(index, index)]
+    scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    correlation = block / np.outer(scale, scale)
+    eigenvalues, directions = np.linalg.eigh(correlation)
+    covariance = np.full((N_THETA, N_THETA), np.nan)
+    if eigenvalues[0] > 1e-12:
+        covariance[np.ix_(index, index)] = np.linalg.inv(correlation) / np.outer(scale, scale)
+    weak = [
+        {"eigenvalue": float(value), "direction": {names[index[i]]: float(vector[i]) for i in np.argsort(-abs(vector))[:3]}}
+        for value, vector in zip(eigenvalues, directions.T, strict=True)
+        if value < 1e-4
+    ]
+    bounds = [names[i] for i in np.flatnonzero(problem.active & ~free)]
+    hull_covariance = covariance[:6, :6]
+    warnings = list(record.warnings)
+    if not best.converged:
+        warnings.append(f"not converged: {best.reason}")
+    if bounds:
+        warnings.append(f"at a bound, not estimated: {', '.join(bounds)}")
+    if weak:
+        warnings.append("some directions of the parameters are hardly determined by these data, see the report")
+    sigma = np.exp(best.theta[6:])
+    noise = tuple(
+        Value(key, float(sigma[i]), float(sigma[i] * np.sqrt(covariance[6 + i, 6 + i])), unit)
+        for i, (key, unit) in enumerate(NOISE_PARAMETERS.items())
+        if problem.active[6 + i]
+    )
+    innovation, variance, _ = problem.trace(best.theta)
+    return Estimate(
+        estimator="ml",
+        parameters=hull_values(best.theta[:6], hull_covariance),
+        discrete=discrete_values(best.theta[:6], hull_covariance, record.mean_speed_m_s, settings.discrete_step_s),
+        covariance=hull_covariance,
+        noise=noise,
+        converged=best.converged,
+        report={
+            "converged": best.converged,
+            "reason": best.reason,
+            "iterations": len(best.iterations) - 1,
+            "log_likelihood": best.log_likelihood,
+            "condition": float(eigenvalues[-1] / max(eigenvalues[0], 1e-300)),
+            "active_bounds": bounds,
+            "weak_directions": weak,
+            "start": name,
+            "starts": _summary(searches),
+            "race": _summary(race),
+        },
+        iterations=best.iterations,
+        fit=one_step_fit(record, innovation, variance),
+        warnings=tuple(warnings),
+    )

@@ -1,0 +1,200 @@
+"""What an estimator is given: one segment as instants, inputs and measurements."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.lateral_speed import LateralSpeed, lateral_speed, noise_std
+from pipeline.normalise.grid import gap_limit_s
+from pipeline.normalise.instruments import Instruments
+from pipeline.normalise.series import SECOND_NS, Float, Series
+from schemas.errors import DataRejected
+
+#: columns of `Record.measured`
+MEASUREMENTS = ("lateral_speed", "yaw_rate", "heading")
+#: a log slower than this changes little in between; longer gaps are refused
+_MAX_SPEED_GAP_S = 60.0
+_MIN_INSTANTS = 40
+_MIN_RUDDER_STD_RAD = np.deg2rad(0.2)
+
+
+@dataclass(frozen=True, eq=False)
+class Record:
+    """One segment, every measurement at its own instant.
+
+    Attributes
+    ----------
+    start_utc_ns : int
+        UTC of ``time_s`` = 0.
+    time_s : ndarray, shape (n,)
+        Instants at which something was measured or the rudder was read.
+    speed_m_s, rudder_rad : ndarray, shape (n,)
+        Inputs, interpolated linearly.
+    measured : ndarray, shape (n, 3)
+        Columns `MEASUREMENTS` in m/s, rad/s, rad; NaN where not measured at that instant. The heading is counted from
+        its first value.
+    heading_origin_rad : float
+        That first value.
+    lateral : LateralSpeed
+        Eq. (18) with its standard errors.
+    noise_start : ndarray, shape (3,)
+        Noise level of each measurement to start from, in its unit.
+    warnings : tuple of str
+    """
+
+    start_utc_ns: int
+    time_s: Float
+    speed_m_s: Float
+    rudder_rad: Float
+    measured: Float
+    heading_origin_rad: float
+    lateral: LateralSpeed
+    noise_start: Float
+    warnings: tuple[str, ...]
+
+    @property
+    def mean_speed_m_s(self) -> float:
+        """Mean speed through the water, m/s."""
+        return float(np.mean(self.speed_m_s))
+
+    @property
+    def used(self) -> tuple[bool, bool, bool]:
+        """Which of `MEASUREMENTS` the record holds."""
+        has = np.any(np.isfinite(self.measured), axis=0)
+        return bool(has[0]), bool(has[1]), bool(has[2])
+
+
+def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Record:
+    """Cut one segment out of a log.
+
+    The yaw rate is measured by the rate gyro where there is one, else through the heading, whose derivative it is.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        Series of the log.
+    start_utc_ns, end_utc_ns : int
+        Bounds of the segment, UTC ns.
+
+    Returns
+    -------
+    Record
+
+    Raises
+    ------
+    DataRejected
+        A channel is missing, has a gap that cannot be bridged, or the rudder did not move.
+    """
+    warnings: list[str] = []
+    heading = _need(instruments, "heading", start_utc_ns, end_utc_ns)
+    rudder = _need(instruments, "rudder_angle", start_utc_ns, end_utc_ns)
+    course = _need(instruments, "course_over_ground", start_utc_ns, end_utc_ns)
+    ground_speed = _need(instruments, "speed_over_ground", start_utc_ns, end_utc_ns)
+    lateral = lateral_speed(
+        ground_speed,
+        course,
+        heading,
+        speed_std_m_s=noise_std(ground_speed),
+        course_std_rad=noise_std(course),
+        heading_std_rad=noise_std(heading),
+    )
+    yaw = _cut(instruments.get("yaw_rate"), start_utc_ns, end_utc_ns)
+    turning = yaw if yaw is not None else heading
+    if yaw is None:
+        warnings.append("no yaw rate channel: the yaw rate is estimated through the heading")
+    instants = np.unique(np.concatenate([lateral.time_utc_ns, turning.time_utc_ns, rudder.time_utc_ns]))
+    inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
+    instants = instants[inside]
+    speed = _speed(instruments, lateral, instants, start_utc_ns, end_utc_ns, warnings)
+    instants = instants[np.isfinite(speed)]
+    speed = speed[np.isfinite(speed)]
+    delta = rudder.at(instants, gap_limit_s(rudder))
+    _check(instants, delta, rudder)
+    measured = np.full((instants.size, 3), np.nan)
+    _place(measured, 0, instants, lateral.time_utc_ns, lateral.value_m_s)
+    _place(measured, 1 if yaw is not None else 2, instants, turning.time_utc_ns, turning.value)
+    origin = float(heading.value[0])
+    measured[:, 2] -= origin
+    noise = np.array([float(np.nanmedian(lateral.std_m_s)), noise_std(yaw) if yaw else np.nan, noise_std(heading)])
+    return Record(
+        start_utc_ns=int(instants[0]),
+        time_s=(instants - instants[0]).astype(np.float64) / SECOND_NS,
+        speed_m_s=speed,
+        rudder_rad=delta,
+        measured=measured,
+        heading_origin_rad=origin,
+        lateral=lateral,
+        noise_start=noise,
+        warnings=tuple(warnings),
+    )
+
+
+def _cut(series: Series | None, start_ns: int, end_ns: int) -> Series | None:
+    if series is None:
+        return None
+    part = series.between(start_ns, end_ns)
+    return part if len(part) >= _MIN_INSTANTS // 2 else None
+
+
+def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> Series:
+    part = _cut(instruments.get(channel), start_ns, end_ns)
+    if part is None:
+        raise DataRejected(
+            "channel_missing",
+            f"The segment has no usable {channel}: identification needs heading, rudder angle and GNSS velocity.",
+            f"Log {channel}, or map it in the vessel profile if the log has it under another name.",
+            {"channel": channel, "channels_present": sorted(instruments.series)},
+        )
+    return part
+
+
+def _speed(
+    instruments: Instruments, lateral: LateralSpeed, instants: Float, start_ns: int, end_ns: int, warnings: list[str]
+) -> Float:
+    """Speed through the water at the instants: the log, else the forward part of the GNSS velocity."""
+    log = _cut(instruments.get("speed_through_water"), start_ns - 5 * SECOND_NS, end_ns + 5 * SECOND_NS)
+    if log is None:
+        good = np.isfinite(lateral.forward_m_s)
+        log = Series(lateral.time_utc_ns[good], lateral.forward_m_s[good])
+        warnings.append("no water log: speed is GNSS speed along the bow, a current along the course biases it")
+    speed = log.at(instants, _MAX_SPEED_GAP_S)
+    if np.nanmax(np.abs(speed), initial=0.0) < 0.05:
+        raise DataRejected(
+            "no_speed",
+            "The ship does not move through the water in this segment: the model of eq. (16) needs V > 0.",
+            "Check the speed channel and its unit, or choose a segment under way.",
+        )
+    return speed
+
+
+def _place(measured: Float, column: int, instants: Float, time: Float, value: Float) -> None:
+    rows = np.searchsorted(instants, time)
+    inside = (rows < instants.size) & (time >= instants[0])
+    inside[inside] = instants[rows[inside]] == time[inside]
+    measured[rows[inside], column] = value[inside]
+
+
+def _check(instants: Float, delta: Float, rudder: Series) -> None:
+    if instants.size < _MIN_INSTANTS:
+        raise DataRejected(
+            "segment_too_short",
+            f"The segment holds {instants.size} instants, identification needs {_MIN_INSTANTS}.",
+            "Log faster, or let the zigzag run for more legs.",
+            {"instants": int(instants.size), "needed": _MIN_INSTANTS},
+        )
+    if not np.all(np.isfinite(delta)):
+        worst = float(np.max(np.diff(rudder.time_utc_ns))) / SECOND_NS
+        raise DataRejected(
+            "rudder_gap",
+            f"The rudder has a gap of {worst:.1f} s inside the segment; its course in between is not known.",
+            "Repeat the manoeuvre, or identify the part of it before or after the gap.",
+            {"gap_s": worst},
+        )
+    if float(np.std(delta)) < _MIN_RUDDER_STD_RAD:
+        raise DataRejected(
+            "no_excitation",
+            f"The rudder moves by {np.rad2deg(np.std(delta)):.2f} deg rms only: nothing tells the parameters apart.",
+            "Sail a zigzag of at least 5 degrees of rudder.",
+        )

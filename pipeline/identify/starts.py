@@ -1,0 +1,62 @@
+"""Where the search begins: plausible ships of several lengths, and a regression on the smoothed record."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.identify.record import Record
+from pipeline.model.ship import mariner_like
+from pipeline.normalise.series import Float
+
+#: lengths whose Mariner-like ship is tried, m: from a harbour drone to a supertanker, a factor 1.6 apart
+_LENGTHS_M = tuple(float(f"{1.5 * 1.6**k:.4g}") for k in range(12))
+
+
+def starting_points(record: Record) -> list[tuple[str, Float]]:
+    """Return named starting values of theta (see `pipeline.identify.kernel`).
+
+    Parameters
+    ----------
+    record : Record
+
+    Returns
+    -------
+    list of (str, ndarray of shape (11,))
+    """
+    sigmas = _noise_start(record)
+    # A ship that answers faster than this cannot be told from one that answers at once, and costs most to compute.
+    shortest = 3.0 * record.mean_speed_m_s * float(np.median(np.diff(record.time_s)))
+    lengths = [length for length in _LENGTHS_M if length > shortest] or [_LENGTHS_M[-1]]
+    points = [(f"Mariner scaled to {length:g} m", mariner_like(length).array()) for length in lengths]
+    return [(name, np.concatenate([hull, np.log(sigmas)])) for name, hull in points]
+
+
+def _noise_start(record: Record) -> Float:
+    """Noise levels to start from: generous, so that a poor hull is not punished into a corner."""
+    spread = np.array([float(np.nanstd(column)) if np.isfinite(column).any() else 1.0 for column in record.measured.T])
+    floor = np.nan_to_num(record.noise_start, nan=1e-3)
+    measurement = np.maximum(floor, 0.15 * spread)
+    force = 0.1 * float(np.nanstd(record.measured[:, 0])) / 10.0 + 1e-4
+    return np.concatenate([[force, 0.1], np.maximum(measurement, 1e-5)])
+
+
+def thinned(record: Record, instants: int) -> Record:
+    """Return the record with about this many of its instants, for the race of the starting points.
+
+    Whole instants are dropped, so measurements stay where they were made; each kind of measurement keeps its share.
+    """
+    n = record.time_s.size
+    every = max(1, round(n / instants))
+    keep = np.zeros(n, dtype=np.bool_)
+    keep[[0, -1]] = True
+    for column in record.measured.T:
+        keep[np.flatnonzero(np.isfinite(column))[::every]] = True
+    return replace(
+        record,
+        time_s=record.time_s[keep],
+        speed_m_s=record.speed_m_s[keep],
+        rudder_rad=record.rudder_rad[keep],
+        measured=record.measured[keep],
+    )

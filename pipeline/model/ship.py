@@ -1,0 +1,119 @@
+"""The lateral model of the ship, eq. (16), and its discrete form, eq. (17), convertible both ways."""
+
+from __future__ import annotations
+
+from dataclasses import astuple, dataclass
+
+import numpy as np
+from scipy.linalg import expm, logm
+
+from pipeline.normalise.series import Float
+
+
+@dataclass(frozen=True)
+class Hull:
+    """The six parameters of eq. (16).
+
+    Attributes
+    ----------
+    a11, a12, a21, a22 : float
+        Hull damping: 1/m, dimensionless, 1/m^2, 1/m.
+    b1, b2 : float
+        Rudder effectiveness: 1/m, 1/m^2; positive rudder turns to starboard, so normally b1 < 0 < b2.
+    """
+
+    a11: float
+    a12: float
+    a21: float
+    a22: float
+    b1: float
+    b2: float
+
+    def array(self) -> Float:
+        """Return the parameters in the order of the fields, shape (6,)."""
+        return np.array(astuple(self), dtype=np.float64)
+
+    def continuous(self, speed_m_s: float) -> tuple[Float, Float]:
+        """Return A, shape (2, 2), and B, shape (2, 1), of d[v, r]/dt = A [v, r] + B delta at a speed."""
+        V = speed_m_s
+        A = V * np.array([[self.a11, self.a12], [self.a21, self.a22]])
+        B = V**2 * np.array([[self.b1], [self.b2]])
+        return A, B
+
+
+#: Mariner class at her design speed, nondimensional, from the linear derivatives of Chislett & Strom-Tejsen (1965):
+#: the shape of a plausible ship, scaled by length for a start. Multiply a11, a22, b1 by 1/L and a21, b2 by 1/L^2.
+MARINER_NONDIMENSIONAL = Hull(a11=-0.75, a12=-0.32, a21=-3.2, a22=-2.0, b1=-0.18, b2=1.67)
+
+
+def mariner_like(length_m: float) -> Hull:
+    """Return the Mariner's nondimensional parameters scaled to a length.
+
+    Examples
+    --------
+    >>> mariner_like(100.0).b2
+    0.000167
+    """
+    m, L = MARINER_NONDIMENSIONAL, length_m
+    return Hull(m.a11 / L, m.a12, m.a21 / L**2, m.a22 / L, m.b1 / L, m.b2 / L**2)
+
+
+def discretise(hull: Hull, speed_m_s: float, step_s: float) -> tuple[Float, Float]:
+    """Return the matrices of eq. (17) for a rudder held over the step.
+
+    Parameters
+    ----------
+    hull : Hull
+    speed_m_s : float
+        Speed through the water, held over the step, m/s.
+    step_s : float
+        Step, s.
+
+    Returns
+    -------
+    A : ndarray, shape (2, 2)
+    B : ndarray, shape (2, 1)
+    """
+    A, B = hull.continuous(speed_m_s)
+    block = np.zeros((3, 3))
+    block[:2, :2], block[:2, 2:] = A * step_s, B * step_s
+    exponential = expm(block)
+    return exponential[:2, :2], exponential[:2, 2:]
+
+
+def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float) -> Hull | None:
+    """Return the parameters of eq. (16) that give these matrices of eq. (17), or None.
+
+    Parameters
+    ----------
+    A : ndarray, shape (2, 2)
+    B : ndarray, shape (2, 1)
+    speed_m_s, step_s : float
+
+    Returns
+    -------
+    Hull or None
+        None where A has no real logarithm (an eigenvalue on the negative real axis): no continuous ship samples to
+        these matrices.
+
+    Examples
+    --------
+    >>> hull = mariner_like(150.0)
+    >>> A, B = discretise(hull, 9.0, 1.0)
+    >>> back = continuous_from_discrete(A, B, 9.0, 1.0)
+    >>> bool(np.allclose(back.array(), hull.array(), rtol=1e-9))
+    True
+    """
+    block = np.eye(3)
+    block[:2, :2], block[:2, 2:] = A, B
+    eigenvalues = np.linalg.eigvals(A)
+    if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
+        return None
+    logarithm = np.asarray(logm(block))
+    if not np.all(np.isfinite(logarithm)) or np.max(np.abs(logarithm.imag)) > 1e-8:
+        return None
+    generator = logarithm.real / step_s
+    V = speed_m_s
+    (a11, a12), (a21, a22) = generator[:2, :2] / V
+    b1, b2 = generator[:2, 2] / V**2
+    return Hull(float(a11), float(a12), float(a21), float(a22), float(b1), float(b2))

@@ -1,0 +1,133 @@
+"""From the readings of a log to one series a channel: one instrument each, at its instants of measurement.
+
+Which of several instruments serves a channel is decided here, and said; earth-fixed velocities become speed and course
+here, so that later rooms know one form only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+
+from pipeline.normalise.holds import find_held
+from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds, Series
+from schemas.channels import CHANNELS
+
+#: channels that one instrument measures at one instant, so that they share their rows
+_TOGETHER: tuple[tuple[str, ...], ...] = (
+    ("latitude", "longitude"),
+    ("speed_over_ground", "course_over_ground"),
+    ("velocity_north", "velocity_east"),
+    ("wind_speed", "wind_angle"),
+)
+#: sentences that carry the receiver's own time of the fix; preferred where two sources are equally fast
+_OWN_CLOCK = ("RMC", "GGA", "GLL")
+
+
+@dataclass(frozen=True, eq=False)
+class Instruments:
+    """The series of one log.
+
+    Attributes
+    ----------
+    series : dict of str to Series
+        By canonical channel name; only channels that the log has.
+    sources : dict of str to str
+        The log's source that serves each channel.
+    notes : tuple of str
+        Choices made, one sentence each.
+    """
+
+    series: dict[str, Series]
+    sources: dict[str, str]
+    notes: tuple[str, ...]
+
+    def get(self, channel: str) -> Series | None:
+        """Return the series of a channel, or None where the log lacks it."""
+        return self.series.get(channel)
+
+
+def from_readings(frame: pl.DataFrame) -> Instruments:
+    """Build the series of every channel from the readings of one log.
+
+    Parameters
+    ----------
+    frame : polars.DataFrame
+        Readings of one log, schema `pipeline.ingest.readings.READING_SCHEMA`.
+
+    Returns
+    -------
+    Instruments
+    """
+    grouped = {name for group in _TOGETHER for name in group}
+    groups = (*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped))
+    series: dict[str, Series] = {}
+    sources: dict[str, str] = {}
+    notes: list[str] = []
+    for group in groups:
+        columns = [CHANNELS[name].column for name in group]
+        if any(column not in frame.columns for column in columns):
+            continue
+        rows = frame.select("time_utc_ns", "source", *columns).drop_nulls()
+        if rows.is_empty():
+            continue
+        source = _choose(rows["source"], group, notes)
+        rows = rows.filter(pl.col("source") == source)
+        time = rows["time_utc_ns"].to_numpy().astype(np.int64)
+        values = rows.select(columns).to_numpy().astype(np.float64)
+        for name, one in _at_instants(group, time, values, source, notes).items():
+            series[name] = one
+            sources[name] = source
+    _add_speed_and_course(series, sources, notes)
+    return Instruments(series, sources, tuple(notes))
+
+
+def _choose(source: pl.Series, group: tuple[str, ...], notes: list[str]) -> str:
+    """Name the source with most readings; among equals (within 2 %) one with its own clock, then by name."""
+    counts = source.value_counts(name="n").sort("source")
+    most = int(np.max(counts["n"].to_numpy()))
+    close = [str(name) for name, n in counts.iter_rows() if n >= 0.98 * most]
+    chosen = min(close, key=lambda name: (name[-3:] not in _OWN_CLOCK, name))
+    others = [str(name) for name in counts["source"] if name != chosen]
+    if others:
+        notes.append(f"{' and '.join(group)} from {chosen}; also in {', '.join(others)}, not used")
+    return chosen
+
+
+def _at_instants(
+    group: tuple[str, ...], time: Nanoseconds, values: Float, source: str, notes: list[str]
+) -> dict[str, Series]:
+    order = np.argsort(time, kind="stable")
+    time, values = time[order], values[order]
+    first = np.concatenate(([True], np.diff(time) > 0))
+    time, values = time[first], values[first]
+    held = find_held(time, values)
+    if held.rows_per_value > 1:
+        notes.append(
+            f"{' and '.join(group)}: {source} holds each value for {held.rows_per_value} rows; "
+            f"kept {held.rows.size} of {time.size} rows, at their instants of measurement"
+        )
+    instants = time[held.rows] - round(held.delay_s * SECOND_NS)
+    result = {}
+    for k, name in enumerate(group):
+        value = values[held.rows, k]
+        if CHANNELS[name].wrap == "circle":
+            value = np.unwrap(value)
+        result[name] = Series(instants, value)
+    return result
+
+
+def _add_speed_and_course(series: dict[str, Series], sources: dict[str, str], notes: list[str]) -> None:
+    """Turn earth-fixed velocities into speed and course over ground where the log has only these."""
+    north, east = series.get("velocity_north"), series.get("velocity_east")
+    if north is None or east is None or "course_over_ground" in series:
+        return
+    speed = np.hypot(north.value, east.value)
+    course = np.unwrap(np.arctan2(east.value, north.value))
+    series["speed_over_ground"] = Series(north.time_utc_ns, speed)
+    series["course_over_ground"] = Series(north.time_utc_ns, course)
+    for name in ("speed_over_ground", "course_over_ground"):
+        sources[name] = sources["velocity_north"]
+    notes.append("speed and course over ground computed from the earth-fixed velocities")

@@ -1,0 +1,80 @@
+"""One channel over time: the values of one instrument at the instants they were measured."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Float = NDArray[np.float64]
+Nanoseconds = NDArray[np.int64]
+
+SECOND_NS = 1_000_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Values of one channel at their instants of measurement.
+
+    Attributes
+    ----------
+    time_utc_ns : ndarray, shape (n,)
+        Strictly increasing UTC nanoseconds.
+    value : ndarray, shape (n,)
+        Finite values in SI; angles on the circle are unwrapped, so differences and means may be taken.
+    """
+
+    time_utc_ns: Nanoseconds
+    value: Float
+
+    def __post_init__(self) -> None:
+        if self.time_utc_ns.shape != self.value.shape or self.value.ndim != 1:
+            raise ValueError(f"time has shape {self.time_utc_ns.shape}, value {self.value.shape}: expected (n,) twice")
+        if self.time_utc_ns.size > 1 and not bool(np.all(np.diff(self.time_utc_ns) > 0)):
+            raise ValueError("the instants of a series must increase strictly")
+
+    def __len__(self) -> int:
+        return int(self.value.size)
+
+    @property
+    def period_s(self) -> float:
+        """Median time between values, s; NaN for fewer than two values."""
+        if len(self) < 2:
+            return float("nan")
+        return float(np.median(np.diff(self.time_utc_ns))) / SECOND_NS
+
+    def between(self, start_ns: int, end_ns: int) -> Series:
+        """Return the values with ``start_ns <= time <= end_ns``."""
+        first, last = np.searchsorted(self.time_utc_ns, [start_ns, end_ns + 1])
+        return Series(self.time_utc_ns[first:last], self.value[first:last])
+
+    def seconds_since(self, origin_ns: int) -> Float:
+        """Return the instants as seconds after ``origin_ns``, shape (n,)."""
+        return (self.time_utc_ns - origin_ns).astype(np.float64) / SECOND_NS
+
+    def at(self, time_utc_ns: Nanoseconds, max_gap_s: float) -> Float:
+        """Interpolate linearly; NaN outside the series and across gaps.
+
+        Parameters
+        ----------
+        time_utc_ns : ndarray, shape (m,)
+            Instants asked for.
+        max_gap_s : float
+            Where two neighbours lie farther apart than this, nothing is invented between them.
+
+        Returns
+        -------
+        ndarray, shape (m,)
+        """
+        if len(self) == 0:
+            return np.full(time_utc_ns.shape, np.nan)
+        origin = int(self.time_utc_ns[0])
+        own = self.seconds_since(origin)
+        asked = (time_utc_ns - origin).astype(np.float64) / SECOND_NS
+        result = np.interp(asked, own, self.value, left=np.nan, right=np.nan)
+        after = np.clip(np.searchsorted(self.time_utc_ns, time_utc_ns, side="left"), 1, max(len(self) - 1, 1))
+        if len(self) > 1:
+            in_gap = (own[after] - own[after - 1] > max_gap_s) & (asked > own[after - 1]) & (asked < own[after])
+            result[in_gap] = np.nan
+        return result

@@ -1,0 +1,54 @@
+"""The model specification: a small YAML file that says which model is fitted and what is free in it."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+
+from pydantic import BaseModel, ConfigDict, Field
+
+#: The six parameters of eq. (16) and their units.
+HULL_PARAMETERS: dict[str, str] = {
+    "a11": "1/m",
+    "a12": "1",
+    "a21": "1/m^2",
+    "a22": "1/m",
+    "b1": "1/m",
+    "b2": "1/m^2",
+}
+
+#: Noise levels of eqs. (16) and (18) that are estimated with them, and their units (continuous time, standard
+#: deviations): wind force, unaccounted current, lateral speed, yaw rate, heading.
+NOISE_PARAMETERS: dict[str, str] = {
+    "sigma_F": "m/s^2",
+    "sigma_V": "m/s",
+    "sigma_v": "m/s",
+    "sigma_r": "rad/s",
+    "sigma_psi": "rad",
+}
+
+
+class ModelSpec(BaseModel):
+    """Which model is fitted: base, effects in order, disturbance model.
+
+    The correlation rates of the Gauss-Markov disturbances are stated, not estimated: one zigzag holds too few of their
+    correlation times to tell them.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = "linear"
+    base: str = "sway-yaw-16"
+    effects: tuple[str, ...] = ()
+    #: mu_F and mu_V of eq. (16), 1/s
+    wind_correlation_rate_per_s: float = Field(default=1 / 300.0, gt=0)
+    current_correlation_rate_per_s: float = Field(default=1 / 1800.0, gt=0)
+    #: l of eq. (16), 1/m; None takes the vessel profile's
+    wind_arm_per_m: float | None = None
+    parent: str | None = None
+
+    @property
+    def sha256(self) -> str:
+        """Hash of the specification's sorted JSON."""
+        text = json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+        return hashlib.sha256(text.encode()).hexdigest()

@@ -1,0 +1,206 @@
+"""The vessel profile: what a person writes once about a ship and how her logger names things.
+
+The file is YAML (JSON is YAML). Particulars and sources may stand in one file or in several that are laid over each
+other; two files that disagree are refused, see `merge`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from datetime import datetime
+from fnmatch import fnmatch
+from typing import Any, Literal
+
+from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+
+from schemas.channels import CHANNELS
+from schemas.errors import UsageError
+from schemas.units import factor_to_si
+
+
+class _Frozen(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class ChannelMap(_Frozen):
+    """How one column or topic field becomes a canonical channel."""
+
+    channel: str
+    unit: str
+    #: which side counts as positive in the log; ``port`` turns the sign
+    positive: Literal["starboard", "port"] = "starboard"
+    #: added after the sign is turned, in ``unit``: a known mounting or index error
+    offset: float = 0.0
+
+    @model_validator(mode="after")
+    def _known(self) -> ChannelMap:
+        if self.channel not in CHANNELS:
+            raise ValueError(f"unknown channel {self.channel!r}; known: {', '.join(CHANNELS)}")
+        factor_to_si(self.unit, CHANNELS[self.channel].unit, self.channel)
+        return self
+
+    @property
+    def factor(self) -> float:
+        """Factor from the log's unit and sign to SI."""
+        sign = -1.0 if self.positive == "port" else 1.0
+        return sign * factor_to_si(self.unit, CHANNELS[self.channel].unit, self.channel)
+
+    @property
+    def offset_si(self) -> float:
+        """Offset in SI, added after the factor."""
+        return self.offset * factor_to_si(self.unit, CHANNELS[self.channel].unit, self.channel)
+
+
+class TimeColumn(_Frozen):
+    """Where the time of a delimited log stands: UTC text, or elapsed time since a stated start."""
+
+    column: str
+    #: None for ISO 8601 text; else the unit of an elapsed or epoch number
+    unit: Literal["s", "ms", "us", "ns"] | None = None
+    #: start of the elapsed time; without it a number counts from 1970-01-01 UTC
+    start: AwareDatetime | None = None
+
+
+class Source(_Frozen):
+    """How the files of one kind are read; the first source whose pattern matches the file name is used."""
+
+    match: str
+    format: Literal["delimited", "mcap", "nmea"] | None = None
+    time: TimeColumn | None = None
+    channels: dict[str, ChannelMap] = Field(default_factory=dict)
+    encoding: str = "utf-8"
+    #: one character, or ``whitespace`` for any run of blanks; None reads it from the header
+    separator: str | None = None
+    #: lines before the data that are not column names
+    header_lines: int = Field(default=0, ge=0)
+    #: names of the columns where the file has no line that names them
+    columns: list[str] | None = None
+
+    @field_validator("separator")
+    @classmethod
+    def _one_character(cls, value: str | None) -> str | None:
+        if value is not None and value != "whitespace" and len(value) != 1:
+            raise ValueError("separator is one character or 'whitespace'")
+        return value
+
+
+class Antenna(_Frozen):
+    """Position of the GNSS antenna from midships on the centre line at the keel, m."""
+
+    forward_m: float = 0.0
+    starboard_m: float = 0.0
+    up_m: float = 0.0
+
+
+class VesselProfile(_Frozen):
+    """A ship's particulars and the sources of her logs."""
+
+    vessel: str | None = None
+    length_m: float | None = Field(default=None, gt=0)
+    beam_m: float | None = Field(default=None, gt=0)
+    draught_m: float | None = Field(default=None, gt=0)
+    block_coefficient: float | None = Field(default=None, gt=0, le=1)
+    trial_speed_m_s: float | None = Field(default=None, gt=0)
+    #: l of eq. (16): yaw acceleration per unit of lateral acceleration that the wind causes, 1/m
+    wind_arm_per_m: float | None = None
+    antenna: Antenna = Antenna()
+    sources: list[Source] = Field(default_factory=list)
+
+    def source_for(self, file_name: str) -> Source | None:
+        """Return the first source whose pattern matches the file's name (without its folder), or None."""
+        return next((s for s in self.sources if fnmatch(file_name, s.match)), None)
+
+    def canonical_json(self) -> str:
+        """Return the profile as one line of sorted JSON, the form that is hashed and stored."""
+        return json.dumps(self.model_dump(mode="json"), sort_keys=True, separators=(",", ":"))
+
+    @property
+    def sha256(self) -> str:
+        """Hash of `canonical_json`."""
+        return hashlib.sha256(self.canonical_json().encode()).hexdigest()
+
+
+def parse(mapping: Any, where: str) -> VesselProfile:
+    """Check a mapping read from YAML and return the profile.
+
+    Parameters
+    ----------
+    mapping : Any
+        What the YAML reader gave.
+    where : str
+        Name of the file, for the message.
+
+    Raises
+    ------
+    UsageError
+        The content is not a profile; every fault is named with its place.
+    """
+    if not isinstance(mapping, dict):
+        raise UsageError(
+            "profile_not_a_mapping",
+            f"{where} is not a vessel profile: expected keys such as 'vessel' and 'sources', "
+            f"found {type(mapping).__name__}.",
+            "See docs/profile.md for a profile that works.",
+        )
+    try:
+        return VesselProfile.model_validate(mapping)
+    except ValidationError as error:
+        faults = [f"{'.'.join(str(p) for p in e['loc']) or 'profile'}: {e['msg']}" for e in error.errors()]
+        raise UsageError(
+            "profile_invalid",
+            f"{where} is not a valid vessel profile: {'; '.join(faults)}.",
+            "Mend these keys; docs/profile.md lists every key with its unit.",
+            {"faults": faults},
+        ) from error
+
+
+def merge(profiles: list[tuple[str, VesselProfile]]) -> VesselProfile:
+    """Lay profiles over each other; keys may repeat only where they agree.
+
+    Parameters
+    ----------
+    profiles : list of (str, VesselProfile)
+        Where each came from, and the profile. At least one.
+
+    Returns
+    -------
+    VesselProfile
+        The union of all keys; sources in the order given, repeated ones once.
+
+    Raises
+    ------
+    UsageError
+        Two of them give one key different values, or one file pattern different sources.
+    """
+    values: dict[str, Any] = {}
+    told_by: dict[str, str] = {}
+    sources: dict[str, tuple[str, Source]] = {}
+    for where, profile in profiles:
+        given = profile.model_dump(exclude_unset=True, exclude={"sources"})
+        for key, value in given.items():
+            if key in values and values[key] != value:
+                raise UsageError(
+                    "profiles_disagree",
+                    f"Two profiles disagree on {key}: {told_by[key]} says {values[key]!r}, {where} says {value!r}.",
+                    "Make the two files agree, or give only one of them.",
+                    {"key": key, told_by[key]: values[key], where: value},
+                )
+            values.setdefault(key, value)
+            told_by.setdefault(key, where)
+        for source in profile.sources:
+            other = sources.setdefault(source.match, (where, source))
+            if other[1] != source:
+                raise UsageError(
+                    "profiles_disagree",
+                    f"Two profiles disagree on how files matching {source.match!r} are read: {other[0]} and {where}.",
+                    "Make the two sources agree, or give only one of the files.",
+                    {"match": source.match, "files": [other[0], where]},
+                )
+    return VesselProfile.model_validate({**values, "sources": [s for _, s in sources.values()]})
+
+
+def start_ns(start: datetime) -> int:
+    """Return a zoned datetime as UTC nanoseconds, without rounding through a float."""
+    whole = int(start.replace(microsecond=0).timestamp())
+    return whole * 1_000_000_000 + start.microsecond * 1_000

@@ -1,0 +1,230 @@
+"""Every table of the warehouse: its columns, units and plain words, and the Arrow schema made of them.
+
+The unit stands in the metadata of each Parquet field, so that a file read without this project still says what it
+holds. Times are UTC nanoseconds as integers, because the timestamps of Delta Lake have only microseconds. A vessel's
+name never becomes a path: tables are partitioned by ``vessel_key``, a hash of the name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+from schemas.channels import CHANNELS
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+Kind = Literal["text", "texts", "integer", "integers", "real", "reals", "matrix", "estimates", "counts"]
+
+
+@dataclass(frozen=True)
+class Column:
+    """One column: name, kind of content, what it means, unit ("" where it has none)."""
+
+    name: str
+    kind: Kind
+    words: str
+    unit: str = ""
+
+
+@dataclass(frozen=True)
+class Table:
+    """One table: name, what one row is, columns in order, and the columns it is partitioned by."""
+
+    name: str
+    words: str
+    columns: tuple[Column, ...]
+    partition_by: tuple[str, ...] = ()
+
+
+_VESSEL = (
+    Column("vessel_key", "text", "first 16 hex digits of the SHA-256 of the vessel's name; partition"),
+    Column("vessel", "text", "name of the vessel"),
+)
+_INGEST = Column("ingest_id", "text", "one log read with one profile by one version of the code")
+_LOG = Column("log_id", "text", "SHA-256 of the log as delivered")
+_CODE = Column("code_version", "text", "hash of the source that made the row")
+_START = Column("start_utc_ns", "integer", "first instant", "ns")
+_END = Column("end_utc_ns", "integer", "last instant", "ns")
+_PROFILE = Column("profile_sha256", "text", "hash of the vessel profile")
+_SET = Column("parameter_set_id", "text", "hash of what produced the parameter set")
+
+_TALLY = tuple(
+    Column(f"{what}_{done}", "integer", f"{what} {done}", "1")
+    for what in ("records", "values")
+    for done in ("read", "kept", "rejected")
+)
+
+_ALL = (
+    Table(
+        "vessels",
+        "one version of a vessel's profile; the highest revision is the current one",
+        (
+            *_VESSEL,
+            Column("revision", "integer", "1 for the first profile of the vessel, then 2, 3, ..."),
+            _PROFILE,
+            Column("profile_json", "text", "the profile as sorted JSON"),
+        ),
+    ),
+    Table(
+        "logs",
+        "one ingest of a log; the highest revision of a log is the current one",
+        (
+            _LOG,
+            Column("revision", "integer", "1 for the first ingest of the log, then 2, 3, ..."),
+            _INGEST,
+            *_VESSEL,
+            Column("file_name", "text", "name of the file as delivered, without its folder"),
+            Column("format", "text", "how the log was read: nmea, delimited, mcap"),
+            Column("size_bytes", "integer", "size as delivered", "B"),
+            _PROFILE,
+            _CODE,
+            _START,
+            _END,
+            *_TALLY,
+            Column("rejected_by_reason", "counts", "rejected records and values by reason", "1"),
+            Column("notes", "texts", "how the file was read, a sentence each"),
+        ),
+    ),
+    Table(
+        "readings",
+        "one record of a log at its native rate; a channel is null where the record does not carry it",
+        (
+            *_VESSEL,
+            _INGEST,
+            Column("record", "integer", "number of the line, row or message in the log"),
+            Column("time_utc_ns", "integer", "instant of measurement", "ns"),
+            Column("source", "text", "instrument: sentence, topic or row"),
+            *(Column(channel.column, "real", channel.words, channel.unit) for channel in CHANNELS.values()),
+        ),
+        partition_by=("vessel_key", "ingest_id"),
+    ),
+    Table(
+        "rejected",
+        "one refused record, or one refused value of a kept record, with its reason",
+        (
+            *_VESSEL,
+            _INGEST,
+            Column("record", "integer", "number of the line, row or message in the log"),
+            Column("time_utc_ns", "integer", "instant of measurement, null where unknown", "ns"),
+            Column("source", "text", "instrument: sentence, topic or row"),
+            Column("channel", "text", "refused channel; null where the whole record is refused"),
+            Column("reason", "text", "why it is refused"),
+            Column("raw", "text", "the line, row or message as it came"),
+        ),
+        partition_by=("vessel_key", "ingest_id"),
+    ),
+    Table(
+        "segments",
+        "one manoeuvre found in one ingest",
+        (
+            *_VESSEL,
+            _INGEST,
+            Column("segment_id", "text", "hash of the log and the bounds"),
+            _LOG,
+            Column("kind", "text", "zigzag, zigzag_broken_off, ..."),
+            Column("psi0_deg", "real", "nominal heading deviation at which the rudder is reversed", "deg"),
+            Column("delta0_deg", "real", "nominal rudder angle", "deg"),
+            Column("first_side", "text", "side of the first execute: starboard or port"),
+            Column("base_heading_deg", "real", "heading before the first execute", "deg"),
+            _START,
+            _END,
+            Column("executes_utc_ns", "integers", "instants at which the rudder is ordered over", "ns"),
+            Column("overshoots_deg", "reals", "overshoot angles beyond the nominal heading deviation", "deg"),
+            Column("imo_json", "text", "criteria of IMO MSC.137(76): value, limit, passed"),
+            Column("quality_json", "text", "how well the manoeuvre was carried out"),
+            Column("detail_json", "text", "phases and measured values"),
+            _CODE,
+        ),
+        partition_by=("vessel_key",),
+    ),
+    Table(
+        "parameter_sets",
+        "one identified model; never changed once written",
+        (
+            *_VESSEL,
+            _SET,
+            _START,
+            Column("model_name", "text", "name of the model"),
+            Column("estimator", "text", "how the parameters were estimated"),
+            Column("parameters", "estimates", "parameters in continuous time, each with its unit"),
+            Column("model_json", "text", "model specification as sorted JSON"),
+            Column("model_sha256", "text", "hash of the model specification"),
+            Column("settings_json", "text", "settings of the estimator"),
+            Column("segment_ids", "texts", "segments it was identified from"),
+            Column("log_ids", "texts", "logs it was identified from, SHA-256"),
+            Column("discrete", "estimates", "parameters of the discrete model, eq. (17)"),
+            Column("noise", "estimates", "noise levels, each with its unit"),
+            Column("covariance_names", "texts", "what the rows and columns of the covariance are"),
+            Column("covariance", "matrix", "covariance of the estimates, in products of their units"),
+            Column("fit_json", "text", "fit and residual statistics"),
+            Column("iterations_json", "text", "every iteration of the estimator"),
+            Column("convergence_json", "text", "whether and how it converged"),
+            Column("warnings", "texts", "what a person should know, a sentence each"),
+            Column("parent", "text", "parameter set this one grew from; null for none"),
+            Column("provenance_json", "text", "what produced it"),
+        ),
+        partition_by=("vessel_key",),
+    ),
+    Table(
+        "aliases",
+        "a name, such as current, that points to a parameter set of a vessel",
+        (*_VESSEL, Column("alias", "text", "the name"), _SET),
+    ),
+    Table(
+        "runs",
+        "one run of a flow; its time is the time of the commit",
+        (
+            Column("run_id", "text", "hash of the flow and its inputs"),
+            Column("flow", "text", "name of the flow"),
+            Column("vessel", "text", "vessel, null for a whole fleet"),
+            Column("status", "text", "running, completed, failed, ..."),
+            Column("counts_json", "text", "how many of what"),
+            Column("message_json", "text", "what happened, for a person"),
+        ),
+    ),
+)
+
+#: Every table by name.
+TABLES: dict[str, Table] = {table.name: table for table in _ALL}
+
+
+def arrow_schema(table: Table) -> pa.Schema:
+    """Return the Arrow schema of a table, each field with its unit and description as metadata.
+
+    Parameters
+    ----------
+    table : Table
+        One of `TABLES`.
+
+    Examples
+    --------
+    >>> arrow_schema(TABLES["readings"]).field("yaw_rate_rad_s").metadata[b"unit"]
+    b'rad/s'
+    """
+    import pyarrow as pa
+
+    real, integer, text = pa.float64(), pa.int64(), pa.string()
+    estimate = [("name", text), ("value", real), ("std", real), ("unit", text)]
+    kinds: dict[Kind, Any] = {
+        "text": text,
+        "texts": pa.list_(text),
+        "integer": integer,
+        "integers": pa.list_(integer),
+        "real": real,
+        "reals": pa.list_(real),
+        "matrix": pa.list_(pa.list_(real)),
+        "estimates": pa.list_(pa.struct(estimate)),
+        "counts": pa.list_(pa.struct([("reason", text), ("count", integer)])),
+    }
+    return pa.schema(
+        [
+            pa.field(
+                c.name,
+                kinds[c.kind],
+                metadata={"unit": c.unit, "description": c.words} if c.unit else {"description": c.words},
+            )
+            for c in table.columns
+        ]
+    )
