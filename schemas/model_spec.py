@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from typing import Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -40,6 +41,9 @@ class ModelSpec(BaseModel):
     name: str = "linear"
     base: str = "sway-yaw-16"
     effects: tuple[str, ...] = ()
+    #: ``earth``: two current states towards north and east; ``lateral``: the paper's single V_T, which takes the
+    #: current's lateral part for constant while the heading swings
+    current: Literal["earth", "lateral"] = "earth"
     #: mu_F and mu_V of eq. (16), 1/s
     wind_correlation_rate_per_s: float = Field(default=1 / 300.0, gt=0)
     current_correlation_rate_per_s: float = Field(default=1 / 1800.0, gt=0)

@@ -1,6 +1,8 @@
 """The compiled likelihood of eq. (16) over one segment, with its score and Fisher information.
 
-State x = (v, r, F, psi, V_T); measurements y_v = v + V_T (eq. (18)), y_r = r, y_psi = psi, each at its own instants.
+State x = (v, r, F, psi, c_1, c_2); measurements y_v = v + h_1 c_1 + h_2 c_2 (eq. (18)), y_r = r, y_psi = psi, each at
+its own instants. With h = (1, 0) the first current state is the paper's V_T; with h = (-sin K, cos K) the two are the
+current towards north and east, and eq. (19) holds without its small angle.
 Between two instants the model is discretised exactly for a constant speed and a rudder that moves linearly; the
 matrix exponential and its derivatives come from one Taylor series, summed to the last bit of a double on steps short
 enough for it. Sensitivities are carried forward with the filter (Astrom 1980, "Maximum likelihood and prediction
@@ -16,7 +18,7 @@ from pipeline.normalise.series import Float
 
 #: theta = (a11, a12, a21, a22, b1, b2, log sigma_F, log sigma_V, log sigma_v, log sigma_r, log sigma_psi)
 N_THETA = 11
-N_STATE = 5
+N_STATE = 6
 _ORDER = 14  # Taylor terms: 0.5^15/15! is below the last bit of a double
 _LONGEST = 0.5  # largest |A| h of one step
 _FASTEST_PER_S = 20.0  # no vessel answers her rudder faster; beyond it only the cost grows
@@ -112,7 +114,7 @@ def _discretise(A, b, h, u0, u1, V, active, Phi, g, Q, dPhi, dg, dQ, work):  # t
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _predict_tangent(F, P, x, dF, dx, dP, work):  # type: ignore[no-untyped-def]
-    """dx <- dF x + F dx, dP <- F dP F' + dF P F' + (dF P F')', all (5, 5)."""
+    """dx <- dF x + F dx, dP <- F dP F' + dF P F' + (dF P F')', all (6, 6)."""
     A, B = work[0], work[1]
     for i in range(N_STATE):
         total = 0.0
@@ -141,7 +143,7 @@ def _predict_tangent(F, P, x, dF, dx, dP, work):  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def likelihood(  # type: ignore[no-untyped-def]
-    theta, active, time_s, speed, rudder, measured, arm, mu_F, mu_V, x0, P0, innovation, variance, states
+    theta, active, time_s, speed, rudder, measured, current_row, arm, mu_F, mu_V, x0, P0, innovation, variance, states
 ):
     """Log-likelihood of one segment, its score and its expected Fisher information.
 
@@ -157,13 +159,15 @@ def likelihood(  # type: ignore[no-untyped-def]
         Speed through the water, m/s, and rudder angle, rad, at the instants.
     measured : ndarray, shape (n, 3)
         y_v, y_r, y_psi at the instants, NaN where not measured then.
+    current_row : ndarray, shape (n, 2)
+        h_1 and h_2 at the instants; used where y_v is measured.
     arm, mu_F, mu_V : float
         l, 1/m, and the correlation rates of eq. (16), 1/s.
-    x0 : ndarray, shape (5,); P0 : ndarray, shape (5, 5)
+    x0 : ndarray, shape (6,); P0 : ndarray, shape (6, 6)
         Mean and covariance of the state at the first instant.
     innovation, variance : ndarray, shape (n, 3)
         Filled with the one-step innovations and their variances (NaN where not measured); may have 0 rows.
-    states : ndarray, shape (n, 5)
+    states : ndarray, shape (n, 6)
         Filled with the filtered states; may have 0 rows.
 
     Returns
@@ -211,7 +215,7 @@ def likelihood(  # type: ignore[no-untyped-def]
                 for i in range(4):
                     for c in range(4):
                         F[i, c] = Phi[i, c]
-                F[4, 4] = decay
+                F[4, 4], F[5, 5] = decay, decay
                 force = 2.0 * mu_F * qF
                 current = qV * (1.0 - decay * decay)
                 if any_active:
@@ -235,6 +239,7 @@ def likelihood(  # type: ignore[no-untyped-def]
                                     dP[j, i, c] += 2.0 * force * Q[i, c]
                         elif j == 7:
                             dP[j, 4, 4] += 2.0 * current
+                            dP[j, 5, 5] += 2.0 * current
                 # x <- F x + g, P <- F P F' + Q
                 W = work5[0]
                 for i in range(N_STATE):
@@ -257,6 +262,7 @@ def likelihood(  # type: ignore[no-untyped-def]
                         P[i, c] = total
                         P[c, i] = total
                 P[4, 4] += current
+                P[5, 5] += current
         for channel in range(3):
             y = measured[k, channel]
             if np.isnan(y):
@@ -264,11 +270,12 @@ def likelihood(  # type: ignore[no-untyped-def]
             first = 0 if channel == 0 else (1 if channel == 1 else 3)
             level = 8 + channel
             noise = np.exp(2.0 * theta[level])
+            h1, h2 = current_row[k, 0], current_row[k, 1]
             if channel == 0:
-                e = y - x[0] - x[4]
+                e = y - x[0] - h1 * x[4] - h2 * x[5]
                 for i in range(N_STATE):
-                    Ph[i] = P[i, 0] + P[i, 4]
-                S = Ph[0] + Ph[4] + noise
+                    Ph[i] = P[i, 0] + h1 * P[i, 4] + h2 * P[i, 5]
+                S = Ph[0] + h1 * Ph[4] + h2 * Ph[5] + noise
             else:
                 e = y - x[first]
                 for i in range(N_STATE):
@@ -285,10 +292,10 @@ def likelihood(  # type: ignore[no-untyped-def]
                     if not active[j]:
                         continue
                     if channel == 0:
-                        de[j] = -dx[j, 0] - dx[j, 4]
+                        de[j] = -dx[j, 0] - h1 * dx[j, 4] - h2 * dx[j, 5]
                         for i in range(N_STATE):
-                            dPh[j, i] = dP[j, i, 0] + dP[j, i, 4]
-                        dS[j] = dPh[j, 0] + dPh[j, 4]
+                            dPh[j, i] = dP[j, i, 0] + h1 * dP[j, i, 4] + h2 * dP[j, i, 5]
+                        dS[j] = dPh[j, 0] + h1 * dPh[j, 4] + h2 * dPh[j, 5]
                     else:
                         de[j] = -dx[j, first]
                         for i in range(N_STATE):

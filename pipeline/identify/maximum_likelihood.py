@@ -50,7 +50,7 @@ class MaximumLikelihoodSettings:
     sigma_low, sigma_high : tuple of float
         Bounds of the noise levels, order of `NOISE_PARAMETERS`.
     initial_std : tuple of float
-        Standard deviations of the state (v, r, F, psi, V_T) at the first instant, wide: the data decide.
+        Standard deviations of the state (v, r, F, psi, c_1, c_2) at the first instant, wide: the data decide.
     discrete_step_s : float
         Step of the discrete parameters (17) that are reported.
     """
@@ -63,7 +63,7 @@ class MaximumLikelihoodSettings:
     coarse_iterations: int = 25
     sigma_low: tuple[float, ...] = (1e-7, 1e-4, 1e-5, 1e-7, 1e-6)
     sigma_high: tuple[float, ...] = (1.0, 10.0, 10.0, 0.5, 1.0)
-    initial_std: tuple[float, ...] = (2.0, 0.2, 0.1, 0.2, 2.0)
+    initial_std: tuple[float, ...] = (2.0, 0.2, 0.1, 0.2, 2.0, 2.0)
     discrete_step_s: float = 1.0
 
 
@@ -127,9 +127,13 @@ class _Problem:
     ) -> None:
         self.record, self.settings, self.active = record, settings, active
         x0 = np.zeros(N_STATE)
+        if spec.current == "earth":
+            current_row = np.column_stack([-np.sin(record.heading_rad), np.cos(record.heading_rad)])
+        else:
+            current_row = np.tile([1.0, 0.0], (record.time_s.size, 1))
         P0 = np.diag(np.square(settings.initial_std))
         self._fixed = (
-            *(record.time_s, record.speed_m_s, record.rudder_rad, record.measured),
+            *(record.time_s, record.speed_m_s, record.rudder_rad, record.measured, current_row),
             *(arm, spec.wind_correlation_rate_per_s, spec.current_correlation_rate_per_s, x0, P0),
         )
         self.low = np.concatenate([np.full(6, -np.inf), np.log(settings.sigma_low)])
@@ -145,7 +149,7 @@ class _Problem:
         return float(value), score, information
 
     def trace(self, theta: Float) -> tuple[Float, Float, Float]:
-        """Innovations (n, 3), their variances (n, 3) and filtered states (n, 5)."""
+        """Innovations (n, 3), their variances (n, 3) and filtered states (n, 6)."""
         n = self.record.time_s.size
         innovation, variance, states = np.full((n, 3), np.nan), np.full((n, 3), np.nan), np.full((n, N_STATE), np.nan)
         likelihood(theta, np.zeros(N_THETA, dtype=np.bool_), *self._fixed, innovation, variance, states)

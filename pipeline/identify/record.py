@@ -35,8 +35,10 @@ class Record:
     measured : ndarray, shape (n, 3)
         Columns `MEASUREMENTS` in m/s, rad/s, rad; NaN where not measured at that instant. The heading is counted from
         its first value.
+    heading_rad : ndarray, shape (n,)
+        True heading interpolated to the instants, not counted from anything; NaN in its gaps.
     heading_origin_rad : float
-        That first value.
+        The heading's first value.
     lateral : LateralSpeed
         Eq. (18) with its standard errors.
     noise_start : ndarray, shape (3,)
@@ -49,6 +51,7 @@ class Record:
     speed_m_s: Float
     rudder_rad: Float
     measured: Float
+    heading_rad: Float
     heading_origin_rad: float
     lateral: LateralSpeed
     noise_start: Float
@@ -124,6 +127,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         speed_m_s=speed,
         rudder_rad=delta,
         measured=measured,
+        heading_rad=heading.at(instants, gap_limit_s(heading)),
         heading_origin_rad=origin,
         lateral=lateral,
         noise_start=noise,

@@ -59,4 +59,5 @@ def thinned(record: Record, instants: int) -> Record:
         speed_m_s=record.speed_m_s[keep],
         rudder_rad=record.rudder_rad[keep],
         measured=record.measured[keep],
+        heading_rad=record.heading_rad[keep],
     )

@@ -1,0 +1,159 @@
+"""The first approximation, eqs. (11)-(14): disturbances taken as zero, the previous measurement as the state."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.identify.estimate import Estimate, Value, hull_values
+from pipeline.identify.record import Record
+from pipeline.identify.sampled import Sampled, sample
+from pipeline.model.ship import Hull, continuous_from_discrete
+from pipeline.normalise.series import Float
+
+
+@dataclass(frozen=True)
+class LeastSquaresSettings:
+    """Settings of the first approximation.
+
+    Attributes
+    ----------
+    step_s : float or None
+        Step of eq. (17), s; None takes the GNSS period.
+    """
+
+    step_s: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Regression:
+    """Solution of eq. (14).
+
+    Attributes
+    ----------
+    A : ndarray, shape (n_state, n_state)
+    B : ndarray, shape (n_state, n_input)
+    std : ndarray, shape (n_state, n_state + n_input)
+        Standard errors of [A B] as least squares sees them, blind to the noise in the regressors.
+    rank : int
+        Of the regressor matrix; below n_state + n_input the minimum-norm solution stands.
+    """
+
+    A: Float
+    B: Float
+    std: Float
+    rank: int
+
+
+def regress(states: Float, inputs: Float, targets: Float) -> Regression:
+    """Solve [A B] = YN Z0' (Z0 Z0')^-1, eq. (14), minimum norm where Z0 Z0' is singular.
+
+    Parameters
+    ----------
+    states : ndarray, shape (n, n_state)
+        State before each step.
+    inputs : ndarray, shape (n, n_input)
+        Input over each step.
+    targets : ndarray, shape (n, n_state)
+        State after each step.
+
+    Returns
+    -------
+    Regression
+    """
+    regressors = np.column_stack([states, inputs])
+    # Columns differ by orders of magnitude (m/s against rad/s): scaled, the rank decision is about directions.
+    scale = np.maximum(np.linalg.norm(regressors, axis=0), 1e-300)
+    solution, _, rank, _ = np.linalg.lstsq(regressors / scale, targets, rcond=1e-10)
+    solution = solution / scale[:, None]
+    residual = targets - regressors @ solution
+    degrees = max(1, targets.shape[0] - regressors.shape[1])
+    inverse = np.linalg.pinv((regressors / scale).T @ (regressors / scale)) / np.outer(scale, scale)
+    std = np.sqrt(np.outer(np.sum(residual**2, axis=0) / degrees, np.diag(inverse)))
+    n_state = states.shape[1]
+    return Regression(solution[:n_state].T, solution[n_state:].T, std, int(rank))
+
+
+def identify(record: Record, settings: LeastSquaresSettings) -> Estimate:
+    """Estimate eq. (17) by one regression on the measurements.
+
+    It is an errors-in-variables estimator without a remedy: measurement noise biases it towards zero and its standard
+    errors do not show that. Kept as the paper's first approximation and as a rival.
+    """
+    sampled = sample(record, settings.step_s)
+    now, after = whole_pairs(sampled)
+    found = regress(sampled.measured[now], sampled.rudder[now, None], sampled.measured[after])
+    return estimate_from_discrete("least-squares", sampled, found, record.warnings, converged=True)
+
+
+def whole_pairs(sampled: Sampled) -> tuple[Float, Float]:
+    """Return the indices k and k + 1 of all steps with no gap, each shape (n_pairs,)."""
+    whole = np.all(np.isfinite(sampled.measured), axis=1)
+    now = np.flatnonzero(whole[:-1] & whole[1:])
+    return now, now + 1
+
+
+def estimate_from_discrete(
+    name: str,
+    sampled: Sampled,
+    found: Regression,
+    warnings: tuple[str, ...],
+    *,
+    converged: bool,
+    reason: str = "a regression has a closed form",
+    iterations: tuple[dict[str, object], ...] = (),
+) -> Estimate:
+    """Turn matrices of eq. (17) into an `Estimate` with the parameters of eq. (16) at the mean speed."""
+    told = list(warnings)
+    hull = continuous_from_discrete(found.A, found.B, sampled.speed_m_s, sampled.step_s)
+    if found.rank < 3:
+        told.append(f"the regressor matrix is singular (rank {found.rank} of 3): minimum-norm solution")
+    if hull is None:
+        told.append("the discrete matrices belong to no continuous ship: an eigenvalue is not positive")
+    told.append("standard errors leave out the bias that noise in the regressors causes")
+    values = hull.array() if hull is not None else np.full(6, np.nan)
+    covariance = _continuous_covariance(found, hull, sampled) if hull is not None else np.full((6, 6), np.nan)
+    names = ("A11", "A12", "A21", "A22", "B1", "B2")
+    units = ("1", "m/rad", "rad/m", "1", "m/s/rad", "1/s")
+    flat = np.concatenate([found.A.ravel(), found.B.ravel()])
+    std = np.concatenate([found.std[:, :2].ravel(), found.std[:, 2]])
+    return Estimate(
+        estimator=name,
+        parameters=hull_values(values, covariance),
+        discrete=tuple(Value(n, float(f), float(s), u) for n, f, s, u in zip(names, flat, std, units, strict=True)),
+        covariance=covariance,
+        noise=(),
+        converged=converged and hull is not None,
+        report={
+            "converged": converged and hull is not None,
+            "reason": reason,
+            "rank": found.rank,
+            "step_s": sampled.step_s,
+            "speed_m_s": sampled.speed_m_s,
+            "iterations": max(0, len(iterations) - 1),
+        },
+        iterations=iterations,
+        fit={},
+        warnings=tuple(told),
+    )
+
+
+def _continuous_covariance(found: Regression, hull: Hull, sampled: Sampled) -> Float:
+    """Carry the discrete standard errors to continuous time, first order, central differences, shape (6, 6)."""
+    flat = np.concatenate([found.A.ravel(), found.B.ravel()])
+    std = np.concatenate([found.std[:, :2].ravel(), found.std[:, 2]])
+    jacobian = np.empty((6, 6))
+    for i in range(6):
+        step = 1e-6 * max(abs(flat[i]), 1e-6)
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = flat.copy()
+            moved[i] += sign * step
+            other = continuous_from_discrete(
+                moved[:4].reshape(2, 2), moved[4:].reshape(2, 1), sampled.speed_m_s, sampled.step_s
+            )
+            sides.append((other or hull).array())
+        jacobian[:, i] = (sides[0] - sides[1]) / (2.0 * step)
+    covariance: Float = jacobian @ np.diag(std**2) @ jacobian.T
+    return covariance

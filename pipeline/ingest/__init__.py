@@ -1,0 +1,1 @@
+"""Raw bytes in, readings in canonical channels out, with everything that was refused and why."""

@@ -1,0 +1,250 @@
+"""Delimited text: one row a record, columns named by the file or by the profile."""
+
+from __future__ import annotations
+
+import codecs
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from pipeline.ingest import decimal_time, iso_time
+from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Nanoseconds, Values
+from pipeline.ingest.mapping import check_once
+from pipeline.ingest.numerals import number
+from pipeline.ingest.readings import Reason
+from pipeline.ingest.sniff import separator_of
+from pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, spans_of, trimmed
+from schemas.errors import DataRejected, UsageError
+from schemas.profile import Source, TimeColumn, start_ns
+
+_QUOTE, _TAB, _FEED = 34, 9, 10
+
+#: Stands for a separator within quotation marks while the rows are split.
+_HIDDEN = 31
+
+#: Largest count of nanoseconds that is added to a start, so that the sum is an int64.
+_FARTHEST = 1 << 62
+
+
+@dataclass(frozen=True, eq=False)
+class Layout:
+    """How the lines of a file are laid out.
+
+    Attributes
+    ----------
+    rows : Spans
+        Every line of data that is not blank, shape (n,).
+    columns : tuple of str
+        Names of the columns.
+    separator : str or None
+        One character, ``whitespace``, or None for a single column.
+    """
+
+    rows: Spans
+    columns: tuple[str, ...]
+    separator: str | None
+
+
+def decode(name: str, data: bytes, source: Source) -> Decoded:
+    """Decode delimited text as the profile's source describes it.
+
+    Parameters
+    ----------
+    name : str
+        Name of the file, for messages.
+    data : bytes
+        The whole file, decompressed.
+    source : Source
+        With ``time`` and ``channels``.
+
+    Returns
+    -------
+    Decoded
+
+    Raises
+    ------
+    UsageError
+        The encoding is unknown.
+    DataRejected
+        A column that the profile maps is not in the file, or two columns bear its name.
+    """
+    if source.time is None:
+        raise UsageError("no_time_column", f"The source for {name} names no time column.", "Add 'time' to the source.")
+    layout = _layout(data, source)
+    wanted = [source.time.column, *source.channels]
+    _check_columns(name, layout, wanted)
+    check_once(name, source.channels)
+    whole, cells = _cells(layout)
+    n = len(layout.rows)
+    reason = np.zeros(n, dtype=np.int8)
+    reason[~whole] = CODE[Reason.MALFORMED]
+    record = np.flatnonzero(whole)
+    place = {column: f"c{k}" for k, column in enumerate(layout.columns)}
+    text = cells[place[source.time.column]]
+    instant, good, notes = _times(text, source.time)
+    time = np.full(n, NO_TIME, dtype=np.int64)
+    time[record[good]] = instant[good]
+    reason[record[~good & text.is_not_null().to_numpy()]] = CODE[Reason.MALFORMED]
+    channels: dict[str, Values] = {}
+    for column, mapped in source.channels.items():
+        value = cells[place[column]]
+        there = value.is_not_null().to_numpy()
+        values = channels.setdefault(mapped.channel, Values.empty(n))
+        values.put(record[there], (number(value) * mapped.factor + mapped.offset_si)[there])
+    return Decoded(layout.rows, layout.rows, time, np.zeros(n, dtype=np.int64), ("row",), reason, channels, notes)
+
+
+def columns_found(data: bytes, source: Source | None) -> list[str]:
+    """Return the names of the columns that a file's header shows, for a person who writes its profile."""
+    layout = _layout(data, source or Source(match="*"))
+    return list(layout.columns)
+
+
+def _layout(data: bytes, source: Source) -> Layout:
+    lines = trimmed(lines_of(as_bytes(_as_utf8(data, source.encoding))))
+    behind_header = np.arange(len(lines)) >= source.header_lines
+    lines = lines.take(behind_header & (lines.stop > lines.start))
+    first = lines.take(np.arange(min(1, len(lines)))).text(limit=1 << 20).to_list()
+    separator = source.separator or separator_of(first[0] if first else "")
+    if source.columns is not None:
+        return Layout(_untrimmed(lines, separator), tuple(source.columns), separator)
+    header = first[0] if first else ""
+    parts = header.split() if separator == "whitespace" else header.split(separator) if separator else [header]
+    names = tuple(part.strip().strip('"').strip() for part in parts) if first else ()
+    return Layout(_untrimmed(lines.take(np.arange(1, len(lines))), separator), names, separator)
+
+
+def _untrimmed(lines: Spans, separator: str | None) -> Spans:
+    """Give back the tabs at the end of the lines where the tab is the separator: they stand for empty cells."""
+    if separator != "\t" or len(lines) == 0:
+        return lines
+    full = lines_of(lines.buffer)
+    at = np.searchsorted(full.start, lines.start, side="right") - 1
+    return full.take(at)
+
+
+def _as_utf8(data: bytes, encoding: str) -> bytes:
+    try:
+        known = codecs.lookup(encoding).name
+        if known != "utf-8":
+            data = data.decode(encoding, errors="replace").encode("utf-8")
+    except (LookupError, TypeError, UnicodeError) as error:
+        raise UsageError(
+            "unknown_encoding",
+            f"The profile's encoding {encoding!r} cannot be used: {error}.",
+            "Write one that Python knows, such as utf-8, cp1252 or utf-16.",
+            {"encoding": encoding},
+        ) from error
+    return data.removeprefix(codecs.BOM_UTF8)
+
+
+def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
+    found = list(layout.columns)
+    missing = [column for column in wanted if column not in found]
+    if missing:
+        raise DataRejected(
+            "columns_missing",
+            f"{name} lacks columns that the profile maps: {', '.join(map(repr, missing))}; "
+            f"it has {', '.join(map(repr, found)) or 'none'}.",
+            "Mend the names in the profile's source, or its separator, header_lines or columns.",
+            {"name": name, "missing": missing, "found": found},
+        )
+    twice = sorted({column for column in wanted if found.count(column) > 1})
+    if twice:
+        raise DataRejected(
+            "columns_ambiguous",
+            f"{name} has more than one column named {', '.join(map(repr, twice))}.",
+            "Name the columns in the profile ('columns', with the file's own names among 'header_lines').",
+            {"name": name, "columns": twice},
+        )
+
+
+def _cells(layout: Layout) -> tuple[NDArray[np.bool_], pl.DataFrame]:
+    """Cut the rows into text cells ``c0``, ``c1`` ...; also tell which rows have as many as the header."""
+    rows, width = layout.rows, len(layout.columns)
+    buffer = np.append(rows.buffer, np.uint8(_FEED))
+    buffer[rows.stop] = _FEED
+    separator = layout.separator or "\x1f"
+    if separator == "whitespace":
+        buffer, rows = _one_tab(buffer, rows)
+        separator = "\t"
+    quote = buffer == _QUOTE
+    quoted = bool(quote.any()) and layout.separator != "whitespace"
+    mark = buffer == ord(separator) if ord(separator) < 128 else np.zeros(buffer.size, dtype=np.bool_)
+    whole = np.ones(len(rows), dtype=np.bool_)
+    if quoted:
+        inside, even = _inside_quotes(quote, rows)
+        buffer[mark & inside] = _HIDDEN
+        mark &= ~inside
+        whole &= even
+    places = np.flatnonzero(mark)
+    cells = np.searchsorted(places, rows.stop) - np.searchsorted(places, rows.start) + 1
+    whole &= cells == width
+    body = Spans(buffer, rows.start, rows.stop).take(whole).joined(extra=1).tobytes()
+    head = separator.encode() * (width - 1) + b"\n" if width > 1 else b"x\n"
+    names = [f"c{k}" for k in range(width)]
+    table = pl.read_csv(
+        head + _as_text(body),
+        has_header=False,
+        schema=dict.fromkeys(names, pl.String),
+        separator=separator,
+        quote_char=None,
+    ).slice(1)
+    assert table.height == int(whole.sum())
+    columns = [pl.col(c).str.strip_chars() for c in names]
+    if quoted:
+        columns = [_unquoted(column, separator) for column in columns]
+    return whole, table.select(column.replace("", None) for column in columns)
+
+
+def _unquoted(cell: pl.Expr, separator: str) -> pl.Expr:
+    """Take off the marks round a quoted cell; where they stand otherwise they are part of the text."""
+    inner = cell.str.slice(1, cell.str.len_chars() - 2).str.replace_all('""', '"', literal=True).str.strip_chars()
+    is_quoted = cell.str.starts_with('"') & cell.str.ends_with('"') & (cell.str.len_chars() >= 2)
+    shown = pl.when(is_quoted).then(inner).otherwise(cell)
+    return shown.str.replace_all(chr(_HIDDEN), separator, literal=True)
+
+
+def _as_text(body: bytes) -> bytes:
+    """Return the bytes with U+FFFD for what is no UTF-8."""
+    try:
+        body.decode("utf-8")
+    except UnicodeDecodeError:
+        return body.decode("utf-8", errors="replace").encode("utf-8")
+    return body
+
+
+def _inside_quotes(quote: NDArray[np.bool_], rows: Spans) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+    """Tell which bytes stand between quotation marks, and which rows close all of theirs."""
+    count = np.concatenate(([0], np.cumsum(quote)))
+    base = np.zeros(quote.size, dtype=np.int64)
+    begin = count[rows.start]
+    if begin.size:
+        base[rows.start] = np.diff(begin, prepend=0)
+    inside = (count[1:] - np.cumsum(base)) % 2 == 1
+    return inside, (count[rows.stop] - begin) % 2 == 0
+
+
+def _one_tab(buffer: Bytes, rows: Spans) -> tuple[Bytes, Spans]:
+    """Replace every run of blanks within the rows by one tab."""
+    blank = is_blank(buffer)
+    keep = ~(blank & np.append([False], blank[:-1]))
+    before: Index = np.concatenate(([0], np.cumsum(keep, dtype=np.int64)))
+    slim = np.where(blank, np.uint8(_TAB), buffer)[keep]
+    start, stop = before[rows.start], before[rows.stop]
+    slim[stop] = _FEED
+    return slim, Spans(slim, start, stop)
+
+
+def _times(text: pl.Series, column: TimeColumn) -> tuple[Nanoseconds, NDArray[np.bool_], list[str]]:
+    """Read the time column; return UTC nanoseconds, which are good, and notes."""
+    if column.unit is None:
+        instant, good, zoned = iso_time.parse(spans_of(text))
+        bare = bool(np.any(good & ~zoned))
+        return instant, good, ["Times without a zone are taken as UTC."] if bare else []
+    elapsed, good = decimal_time.to_ns(text, column.unit)
+    start = start_ns(column.start) if column.start is not None else 0
+    good &= np.abs(elapsed) < _FARTHEST
+    return np.where(good, elapsed, 0) + start, good, []

@@ -1,0 +1,91 @@
+"""What every reader returns: the readings of one log, what was refused, and the count of both.
+
+A *record* is one line, row or message of the log; a *value* is one canonical channel in one record. A record is kept
+when it gives at least one value, else it is rejected with a reason; a value of a kept record may be rejected by itself.
+The ledger of values is that of the kept records: what a refused record may have held is not guessed at.
+Both ledgers close: read = kept + rejected.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from enum import StrEnum
+
+import polars as pl
+
+from schemas.channels import CHANNEL_COLUMNS
+
+#: Columns of `Readings.frame`; the channel columns are Float64 in SI, null where the record does not carry them.
+READING_SCHEMA: dict[str, pl.DataType] = {
+    "record": pl.Int64(),
+    "time_utc_ns": pl.Int64(),
+    "source": pl.String(),
+    **{column: pl.Float64() for column in CHANNEL_COLUMNS},
+}
+
+#: Columns of `Readings.rejected`. ``channel`` is null where the whole record is refused.
+REJECTED_SCHEMA: dict[str, pl.DataType] = {
+    "record": pl.Int64(),
+    "time_utc_ns": pl.Int64(),
+    "source": pl.String(),
+    "channel": pl.String(),
+    "reason": pl.String(),
+    "raw": pl.String(),
+}
+
+
+class Reason(StrEnum):
+    """Why a record or value is refused."""
+
+    CHECKSUM = "checksum"  # the sentence's checksum is absent or wrong
+    MALFORMED = "malformed"  # it cannot be decoded: too few fields, broken JSON, cut line, bad time
+    NO_CHANNEL = "no_channel"  # whole, but it carries none of the canonical channels (AIS, satellites in view, ...)
+    VOID = "void"  # the instrument itself says that the data are not valid
+    NO_TIME = "no_time"  # no time can be given to it
+    CLOCK_UNSET = "clock_unset"  # a year in which no clock was set: before 2000 or after 2100
+    CLOCK_BACK = (
+        "clock_back"  # earlier than a record of the same source before it, or alone far ahead of its neighbours
+    )
+    DUPLICATE = "duplicate"  # same source, same time, same content as a record before it
+    SAME_INSTANT = "same_instant"  # same source, channel and time as a record before it, other content
+    NOT_A_NUMBER = "not_a_number"  # the field is there but is no finite number
+    OUT_OF_RANGE = "out_of_range"  # outside the physical range of the channel
+
+
+@dataclass(frozen=True)
+class Tally:
+    """The ledger of one log."""
+
+    records_read: int
+    records_kept: int
+    records_rejected: int
+    values_read: int
+    values_kept: int
+    values_rejected: int
+    #: number of rejected records and values by reason, sorted by reason
+    by_reason: dict[str, int] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Readings:
+    """The readings of one log.
+
+    Attributes
+    ----------
+    frame : polars.DataFrame
+        Schema `READING_SCHEMA`, sorted by record; at least one non-null channel in each row.
+    rejected : polars.DataFrame
+        Schema `REJECTED_SCHEMA`, sorted by record then channel.
+    tally : Tally
+        Closes against both frames and the number of records in the file.
+    notes : tuple of str
+        What a person should know of how the file was read, one sentence each.
+    format : {"delimited", "mcap", "nmea"}
+        How the file was read.
+    """
+
+    frame: pl.DataFrame
+    rejected: pl.DataFrame
+    tally: Tally
+    notes: tuple[str, ...] = ()
+    format: str = ""

@@ -1,0 +1,196 @@
+"""The checks that every record of every format passes, in columns: clock, repetition, numbers, physical range.
+
+Here the readings of a log are told from what is refused, and both ledgers are drawn up. Whether a channel makes sense
+as a whole is the doctor's question, not one of this room.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import polars as pl
+from numpy.typing import NDArray
+
+from pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Float, Values
+from pipeline.ingest.iso_time import DAY_NS, SECOND_NS, days_since_1970
+from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Reason, Tally
+from pipeline.ingest.spans import Index
+from schemas.channels import CHANNELS
+
+Code = NDArray[np.int8]
+
+_YEARS, _ = days_since_1970(np.array([2000, 2100]), np.array([1, 1]), np.array([1, 1]))
+
+#: No clock was set before the first of these instants or after the second.
+CLOCK_FIRST_NS, CLOCK_LAST_NS = (int(day) * DAY_NS for day in _YEARS)
+
+#: A record this far ahead of both its neighbours has a damaged time, ns; without this rule it would make every record
+#: behind it look late.
+SPIKE_NS = 10 * SECOND_NS
+
+
+def screen(decoded: Decoded, log_format: str) -> Readings:
+    """Check all records of a log and split them into readings and refusals.
+
+    Parameters
+    ----------
+    decoded : Decoded
+    log_format : {"delimited", "mcap", "nmea"}
+
+    Returns
+    -------
+    Readings
+        With both ledgers closed.
+    """
+    reason = decoded.reason.copy()
+    _check_clock(decoded, reason)
+    shared = _sharing_an_instant(decoded, reason)
+    if shared.size:
+        content = decoded.content.take(shared).binary()
+        repeated = ~_first_of(decoded, shared, content)
+        reason[shared[repeated]] = CODE[Reason.DUPLICATE]
+        shared = shared[~repeated]
+    refused = {name: _check_values(name, v, reason, shared, decoded) for name, v in decoded.channels.items()}
+    _refuse_emptied(decoded, reason, refused)
+    return _readings(decoded, reason, refused, log_format)
+
+
+def _check_clock(decoded: Decoded, reason: Code) -> None:
+    time = decoded.time_utc_ns
+    reason[(reason == 0) & (time == NO_TIME)] = CODE[Reason.NO_TIME]
+    unset = (time < CLOCK_FIRST_NS) | (time >= CLOCK_LAST_NS)
+    reason[(reason == 0) & unset] = CODE[Reason.CLOCK_UNSET]
+    for own in _by_source(decoded, reason):
+        at = time[own]
+        spike = np.zeros(at.size, dtype=np.bool_)
+        spike[1:-1] = (at[1:-1] > at[2:] + SPIKE_NS) & (at[2:] >= at[:-2]) & (at[1:-1] > at[:-2] + SPIKE_NS)
+        # the first record has no neighbour before it, but the two behind it may agree against it
+        if at.size > 2:
+            spike[0] = at[0] > at[1] + SPIKE_NS and at[2] >= at[1] and at[0] > at[2]
+        reason[own[spike]] = CODE[Reason.CLOCK_BACK]
+        record, at = own[~spike], at[~spike]
+        if at.size:
+            late = at < np.maximum.accumulate(at)
+            reason[record[late]] = CODE[Reason.CLOCK_BACK]
+
+
+def _by_source(decoded: Decoded, reason: Code) -> list[Index]:
+    """Return the good records of each source, in the order of the file."""
+    good = np.flatnonzero(reason == 0)
+    source = decoded.source[good]
+    order = np.argsort(source, kind="stable")
+    cuts = np.flatnonzero(np.diff(source[order])) + 1
+    return [part for part in np.split(good[order], cuts) if part.size]
+
+
+def _sharing_an_instant(decoded: Decoded, reason: Code) -> Index:
+    """Return the good records that have their source and time in common with another, ascending."""
+    found = []
+    for record in _by_source(decoded, reason):
+        same = np.diff(decoded.time_utc_ns[record]) == 0
+        found.append(record[np.append(same, [False]) | np.append([False], same)])
+    return np.sort(np.concatenate(found)) if found else np.empty(0, dtype=np.int64)
+
+
+def _first_of(decoded: Decoded, record: Index, content: pl.Series | None = None) -> NDArray[np.bool_]:
+    """Tell which records are the first of their source and time (and content)."""
+    keys = pl.DataFrame({"source": decoded.source[record], "time": decoded.time_utc_ns[record]})
+    if content is not None:
+        keys = keys.with_columns(content=content)
+    first: NDArray[np.bool_] = keys.select(pl.struct(pl.all()).is_first_distinct()).to_series().to_numpy()
+    return first
+
+
+def _check_values(name: str, values: Values, reason: Code, shared: Index, decoded: Decoded) -> Code:
+    """Return the code of the refusal of each value, 0 for one that is kept or not there, shape (n,)."""
+    refused = np.zeros(reason.shape, dtype=np.int8)
+    offered = values.present & (reason == 0)
+    channel = CHANNELS[name]
+    value = values.value
+    refused[offered & ~np.isfinite(value)] = CODE[Reason.NOT_A_NUMBER]
+    with np.errstate(invalid="ignore"):
+        outside = (value < channel.low) | (value > channel.high)
+    refused[offered & outside] = CODE[Reason.OUT_OF_RANGE]
+    standing = shared[offered[shared] & (refused[shared] == 0)]
+    if standing.size:
+        refused[standing[~_first_of(decoded, standing)]] = CODE[Reason.SAME_INSTANT]
+    return refused
+
+
+def _refuse_emptied(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> None:
+    """Refuse the records of which no value is left, for the reason of the first value in the order of the tables."""
+    kept = np.zeros(reason.shape, dtype=np.bool_)
+    why = np.zeros(reason.shape, dtype=np.int8)
+    for name in CHANNELS:
+        if name in refused:
+            kept |= decoded.channels[name].present & (refused[name] == 0)
+            why = np.where(why == 0, refused[name], why)
+    emptied = (reason == 0) & ~kept
+    reason[emptied] = np.where(why[emptied] == 0, CODE[Reason.VOID], why[emptied])
+
+
+def _readings(decoded: Decoded, reason: Code, refused: dict[str, Code], log_format: str) -> Readings:
+    kept = np.flatnonzero(reason == 0)
+    columns: dict[str, pl.Series] = {
+        "record": pl.Series(kept, dtype=pl.Int64),
+        "time_utc_ns": pl.Series(decoded.time_utc_ns[kept], dtype=pl.Int64),
+        "source": _source_names(decoded, kept),
+    }
+    values_read = values_kept = 0
+    for channel in CHANNELS.values():
+        there = np.zeros(kept.size, dtype=np.bool_)
+        value: Float = np.full(kept.size, np.nan)
+        if channel.name in refused:
+            offered = decoded.channels[channel.name].present[kept]
+            there = offered & (refused[channel.name][kept] == 0)
+            value = decoded.channels[channel.name].value[kept]
+            values_read += int(np.sum(offered))
+        values_kept += int(np.sum(there))
+        # what is kept is finite, so NaN marks exactly what is not there
+        columns[channel.column] = pl.Series(np.where(there, value, np.nan), dtype=pl.Float64).fill_nan(None)
+    frame = pl.DataFrame(columns, schema=READING_SCHEMA)
+    rejected = _rejected(decoded, reason, refused)
+    counts = rejected.group_by("reason").len().sort("reason")
+    records_rejected = int(np.sum(reason != 0))
+    tally = Tally(
+        records_read=len(decoded),
+        records_kept=frame.height,
+        records_rejected=records_rejected,
+        values_read=values_read,
+        values_kept=values_kept,
+        values_rejected=rejected.height - records_rejected,
+        by_reason=dict(counts.iter_rows()),
+    )
+    return Readings(frame, rejected, tally, tuple(decoded.notes), log_format)
+
+
+def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.DataFrame:
+    """Draw up what is refused: whole records, then values of kept records, sorted by record and channel."""
+    parts: list[tuple[Index, str | None, Code]] = [(np.flatnonzero(reason != 0), None, reason)]
+    for name, code in refused.items():
+        parts.append((np.flatnonzero((reason == 0) & (code != 0)), name, code))
+    record = np.concatenate([where for where, _, _ in parts])
+    distinct = np.unique(record)
+    text = decoded.raw.take(distinct).text()
+    time = decoded.time_utc_ns[record]
+    names = np.array([None, *(str(r) for r in REASONS)], dtype=object)
+    words = np.concatenate([names[code[where]] for where, _, code in parts])
+    table = pl.DataFrame(
+        {
+            "record": record,
+            "time_utc_ns": pl.Series(time).set(pl.Series(time == NO_TIME), None),
+            "source": _source_names(decoded, record),
+            "channel": pl.concat(
+                [pl.repeat(name, where.size, dtype=pl.String, eager=True) for where, name, _ in parts]
+            ),
+            "reason": pl.Series(words.tolist(), dtype=pl.String),
+            "raw": text.gather(np.searchsorted(distinct, record)),
+        },
+        schema=REJECTED_SCHEMA,
+    )
+    return table.sort("record", "channel", nulls_last=False, maintain_order=True)
+
+
+def _source_names(decoded: Decoded, record: Index) -> pl.Series:
+    names = pl.Series([*decoded.source_names, None], dtype=pl.String)
+    code = decoded.source[record]
+    return names.gather(np.where(code < 0, len(decoded.source_names), code)).alias("source")

@@ -1,0 +1,54 @@
+"""Which format a log has, told by its content and not by its name."""
+
+from __future__ import annotations
+
+import re
+from typing import Literal
+
+Format = Literal["delimited", "mcap", "nmea"]
+
+MCAP_MAGIC = b"\x89MCAP0\r\n"
+
+#: Bytes of the file that are looked at.
+_SAMPLE = 1 << 16
+
+#: Share of the lines that look like sentences from which a text is an NMEA log.
+_SHARE = 0.5
+
+_SENTENCE = re.compile(rb"^[^$!\\]{0,48}(?:\\[^\\]*\\)?[$!][A-Z0-9]{3,}[,*]|^#[A-Z]{5},.*\*[0-9A-F]{2}\s*$")
+
+_BOUNDARIES = (",", ";", "\t")
+
+
+def sniff(data: bytes) -> Format | None:
+    """Return the format of a log, None where it is neither MCAP, nor NMEA, nor text.
+
+    Parameters
+    ----------
+    data : bytes
+        Unpacked content.
+    """
+    if data.startswith(MCAP_MAGIC):
+        return "mcap"
+    lines = [line for line in data[:_SAMPLE].split(b"\n") if line.strip()]
+    if lines and sum(bool(_SENTENCE.match(line.lstrip(b"\0"))) for line in lines) >= _SHARE * len(lines):
+        return "nmea"
+    sample = data[:_SAMPLE].replace(b"\xef\xbb\xbf", b"", 1)
+    odd = sum(byte < 9 or 13 < byte < 32 or byte == 127 for byte in sample)
+    wide = sample.startswith((b"\xff\xfe", b"\xfe\xff"))
+    if lines and (wide or odd <= len(sample) // 1000):
+        return "delimited"
+    return None
+
+
+def separator_of(line: str) -> str | None:
+    """Return the sign that separates the cells of a line: the most frequent of comma, semicolon and tab, None for none.
+
+    Examples
+    --------
+    >>> separator_of("time;speed;course")
+    ';'
+    """
+    counts = {sign: line.count(sign) for sign in _BOUNDARIES}
+    best = max(_BOUNDARIES, key=lambda sign: counts[sign])
+    return best if counts[best] else None

@@ -1,0 +1,154 @@
+"""Delimited text: separators, headers, encodings, times, cells."""
+
+import math
+from datetime import UTC, datetime
+
+import pytest
+
+from pipeline.ingest.read import read_log
+from schemas.errors import DataRejected, UsageError
+from schemas.profile import VesselProfile
+
+
+def profile(channels=None, time=None, **source):
+    channels = channels or {
+        "sog": {"channel": "speed_over_ground", "unit": "kn"},
+        "hdg": {"channel": "heading", "unit": "deg"},
+    }
+    source = {"match": "*", "time": time or {"column": "utc"}, "channels": channels, **source}
+    return VesselProfile.model_validate({"sources": [source]})
+
+
+def read(text, given=None):
+    data = text if isinstance(text, bytes) else text.encode()
+    readings = read_log("log.csv", data, given or profile())
+    tally = readings.tally
+    assert readings.format == "delimited"
+    assert tally.records_read == tally.records_kept + tally.records_rejected
+    assert tally.values_read == tally.values_kept + tally.values_rejected
+    return readings
+
+
+T = "2025-05-03T07:47:0"
+
+
+@pytest.mark.parametrize("sign", [",", ";", "\t"])
+def test_the_separator_is_taken_from_the_header(sign):
+    readings = read(f"utc,sog,hdg\n{T}1Z,10,90\n{T}2Z,,91\n".replace(",", sign))
+    assert readings.frame["speed_over_ground_m_s"].to_list() == [pytest.approx(18520 / 3600), None]
+    assert readings.frame["heading_rad"].to_list() == [math.radians(90), math.radians(91)]
+    assert readings.frame["source"].to_list() == ["row", "row"]
+
+
+def test_cells_and_rows_have_their_reasons():
+    text = (
+        f"utc,sog,hdg\n{T}0Z,1,2\n{T}1Z,nan,2\n{T}2Z,1\n{T}3Z,1,2,3\n{T}4Z,x,y\n\n{T}5Z,,\n,1,2\n25:00,1,2\n"
+        f"{T}6Z,999,2\n{T}6Z,999,2\n1990-01-01T00:00:00Z,1,2\n{T}1Z,1,2\n{T}7Z,1;5,2"
+    )
+    readings = read(text)
+    assert readings.tally.records_read == 13
+    assert readings.rejected.select("record", "channel", "reason").rows() == [
+        (1, "speed_over_ground", "not_a_number"),
+        (2, None, "malformed"),
+        (3, None, "malformed"),
+        (4, None, "not_a_number"),
+        (5, None, "void"),
+        (6, None, "no_time"),
+        (7, None, "malformed"),
+        (8, "speed_over_ground", "out_of_range"),
+        (9, None, "duplicate"),
+        (10, None, "clock_unset"),
+        (11, None, "clock_back"),
+        (12, "speed_over_ground", "not_a_number"),
+    ]
+    assert readings.rejected["raw"][0] == f"{T}1Z,nan,2"
+
+
+def test_elapsed_times_are_exact_nanoseconds():
+    given = profile(
+        {"h": {"channel": "heading", "unit": "deg"}},
+        {"column": "t", "unit": "s", "start": "2006-01-01T00:00:00Z"},
+        encoding="cp1252",
+        header_lines=2,
+        separator="whitespace",
+        columns=["t", "h"],
+    )
+    text = "  KVLCC2 \xb0\n\n   .050000000   -1.5\n  0.1 \t 2\n  12345.678901234  3\n 2.0e4 4\n 30000.0000000005 5\n"
+    readings = read(text.encode("cp1252"), given)
+    start = int(datetime(2006, 1, 1, tzinfo=UTC).timestamp()) * 10**9
+    assert [t - start for t in readings.frame["time_utc_ns"]] == [
+        50_000_000,
+        100_000_000,
+        12_345_678_901_234,
+        20_000_000_000_000,
+        30_000_000_000_000,
+    ]
+
+
+@pytest.mark.parametrize(
+    ("unit", "text"), [("s", "1714722421.5"), ("ms", "1714722421500"), ("ns", "1714722421500000000")]
+)
+def test_epoch_numbers(unit, text):
+    given = profile(None, {"column": "utc", "unit": unit})
+    assert read(f"utc,sog,hdg\n{text},1,2\n", given).frame["time_utc_ns"].to_list() == [1714722421500000000]
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("2025-05-03T07:47:01Z", "2025-05-03T07:47:01+00:00"),
+        ("2025-05-03 07:47:01.5", "2025-05-03T07:47:01.500000+00:00"),
+        ("2025-05-03T10:47:01,25+03:00", "2025-05-03T07:47:01.250000+00:00"),
+        ("2025-05-03T02:17:01.000001-0530", "2025-05-03T07:47:01.000001+00:00"),
+        ("2024-02-29T23:59:60Z", "2024-03-01T00:00:00+00:00"),
+    ],
+)
+def test_iso_times(text, expected):
+    readings = read(f"utc;sog;hdg\n{text};1;2\n")
+    when = datetime.fromisoformat(expected)
+    assert readings.frame["time_utc_ns"].to_list() == [int(when.timestamp()) * 10**9 + when.microsecond * 1000]
+    assert bool(readings.notes) == (text == "2025-05-03 07:47:01.5")
+
+
+def test_quoted_cells_and_a_byte_order_mark():
+    text = f'\ufeffutc,"sog",note,hdg\r\n"{T}1Z",1,"a, b",3\r\n{T}2Z,1,"open,3\r\n'
+    readings = read(text)
+    assert readings.frame["heading_rad"].to_list() == [math.radians(3)]
+    assert readings.tally.by_reason == {"malformed": 1}
+
+
+def test_tabs_at_the_end_stand_for_empty_cells():
+    assert read(f"utc\tsog\thdg\n{T}1Z\t1\t\n").frame["heading_rad"].to_list() == [None]
+
+
+def test_sign_and_offset_of_the_profile():
+    given = profile({"r": {"channel": "rudder_angle", "unit": "deg", "positive": "port", "offset": 2.0}})
+    assert read(f"utc,r\n{T}1Z,10\n", given).frame["rudder_angle_rad"].to_list() == [pytest.approx(math.radians(-8))]
+
+
+def test_columns_that_are_missing_are_named_with_those_that_are_there():
+    with pytest.raises(DataRejected, match=r"'hdg'.*'utc', 'sog', 'heading'") as error:
+        read(f"utc,sog,heading\n{T}1Z,1,2\n")
+    assert error.value.details == {"name": "log.csv", "missing": ["hdg"], "found": ["utc", "sog", "heading"]}
+
+
+def test_without_a_source_the_error_names_the_columns():
+    with pytest.raises(UsageError, match="'utc', 'sog'") as error:
+        read_log("log.csv", b"utc,sog\n1,2\n", VesselProfile())
+    assert error.value.code == "no_source_for_log"
+
+
+def test_an_unknown_encoding_is_a_usage_error():
+    with pytest.raises(UsageError, match="klingon"):
+        read("utc,sog,hdg\n", profile(encoding="klingon"))
+
+
+def test_two_columns_for_one_channel_are_a_usage_error():
+    given = profile({"a": {"channel": "heading", "unit": "deg"}, "b": {"channel": "heading", "unit": "deg"}})
+    with pytest.raises(UsageError, match="'a' and 'b'"):
+        read(f"utc,a,b\n{T}1Z,1,2\n", given)
+
+
+def test_a_column_named_twice_is_refused():
+    with pytest.raises(DataRejected, match="more than one column named 'sog'"):
+        read(f"utc,sog,sog,hdg\n{T}1Z,1,2,3\n")

@@ -1,0 +1,169 @@
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from schemas.errors import KempfError, NotFound, UsageError
+from warehouse import aliases, compaction, delta, history, logs, parameter_sets, raw, runs, segments, vessels
+from warehouse.store import MARKER, Warehouse
+
+READERS = {
+    "vessels": vessels.names,
+    "logs": logs.current,
+    "segments": segments.current,
+    "sets": parameter_sets.summaries,
+    "set": lambda w: parameter_sets.get(w, "ps-1"),
+    "history": lambda w: history.of_vessel(w, "aurora"),
+    "aliases": lambda w: aliases.of_vessel(w, "aurora"),
+    "runs": runs.all_runs,
+    "raw": lambda w: raw.get(w, "a" * 64),
+    "ingest": lambda w: logs.of_ingest(w, "x"),
+    "compact": compaction.compact,
+}
+
+
+@pytest.mark.parametrize("reader", READERS.values(), ids=READERS)
+@pytest.mark.parametrize("there", ["nothing", "empty folder", "other folder", "file"])
+def test_no_warehouse_is_one_clear_error(tmp_path: Path, reader, there: str) -> None:
+    place = tmp_path / "data"
+    if there == "file":
+        place.write_text("x")
+    elif there != "nothing":
+        place.mkdir()
+        if there == "other folder":
+            (place / "letter.txt").write_text("x")
+    before = sorted(tmp_path.rglob("*"))
+    with pytest.raises(NotFound) as caught:
+        reader(Warehouse(str(place)))
+    assert caught.value.code == "no_warehouse"
+    assert "kempf ingest" in caught.value.next_step
+    assert sorted(tmp_path.rglob("*")) == before  # reading makes nothing
+
+
+def test_an_empty_warehouse_has_no_rows(warehouse: Warehouse) -> None:
+    warehouse.create()
+    assert vessels.names(warehouse) == []
+    assert logs.current(warehouse) == []
+    assert runs.all_runs(warehouse) == []
+    assert parameter_sets.summaries(warehouse).height == 0
+    assert delta.versions(warehouse) == {}
+    with pytest.raises(NotFound) as caught:
+        history.of_vessel(warehouse, "aurora")
+    assert caught.value.code == "no_vessel"
+
+
+@pytest.mark.parametrize("there", ["other folder", "file"])
+def test_a_place_with_other_things_is_not_taken(tmp_path: Path, there: str) -> None:
+    place = tmp_path / "data"
+    if there == "file":
+        place.write_text("x")
+    else:
+        place.mkdir()
+        (place / "letter.txt").write_text("x")
+    with pytest.raises(UsageError) as caught:
+        raw.put(Warehouse(str(place)), b"log")
+    assert caught.value.code == "not_a_warehouse"
+    assert not (place / MARKER).exists()
+
+
+def test_creating_twice_changes_nothing(warehouse: Warehouse) -> None:
+    warehouse.create()
+    assert warehouse.folder is not None
+    marker = warehouse.folder / MARKER
+    stamp = marker.stat().st_mtime_ns
+    (warehouse.folder / "added by someone.txt").write_text("x")
+    warehouse.create()
+    assert marker.stat().st_mtime_ns == stamp
+    assert [p.name for p in warehouse.folder.iterdir() if p.name.startswith(".")] == []
+
+
+@pytest.mark.parametrize("content", [json.dumps({"layout": 99}), "{", "[]", "null"])
+def test_a_marker_of_another_layout_is_refused(warehouse: Warehouse, content: str) -> None:
+    warehouse.create()
+    assert warehouse.folder is not None
+    (warehouse.folder / MARKER).write_text(content)
+    with pytest.raises(KempfError) as caught:
+        logs.current(warehouse)
+    assert caught.value.code == "warehouse_layout"
+
+
+@pytest.mark.parametrize("address", ["", "  ", "/data/50%20/x", "/data/a[1]/x", "/data/a=b/x", "s3://bucket/50%"])
+def test_an_address_that_cannot_be_used_is_refused(address: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        Warehouse(address)
+    assert caught.value.code == "warehouse_path"
+
+
+@pytest.mark.parametrize("name", ["a b ø", "a#b", "O'Brien", "a+b,c", "a:b", "readings/logs", "a&b", "ä~(1)"])
+def test_folders_with_odd_names_hold_a_warehouse(tmp_path: Path, name: str) -> None:
+    from tests.warehouse.samples import delivery
+    from warehouse import readings
+    from warehouse.deposit import deposit
+
+    warehouse = Warehouse(str(tmp_path / name))
+    (done,) = deposit(warehouse, [delivery()])
+    assert done.outcome == "new"
+    assert readings.read(warehouse, done.ingest_id).height == 5
+    assert [p.name for p in tmp_path.iterdir()] == [name.split("/", maxsplit=1)[0]]
+
+
+def test_a_file_address_is_the_folder(tmp_path: Path) -> None:
+    assert Warehouse(f"file://{tmp_path}/x").folder == Warehouse(f"{tmp_path}/x").folder
+    assert Warehouse("s3://bucket/x").folder is None
+    assert Warehouse("s3://bucket/x/").address("logs") == "s3://bucket/x/logs"
+
+
+def test_credentials_are_not_shown() -> None:
+    assert "secret" not in repr(Warehouse("s3://b/x", {"AWS_SECRET_ACCESS_KEY": "secret"}))
+
+
+def test_a_version_that_is_not_there_is_named(warehouse: Warehouse) -> None:
+    runs.record(warehouse, runs.Run("run-1", "ingest", None, "completed"))
+    newest = delta.versions(warehouse)["runs"]
+    assert delta.read(warehouse, "runs", version=newest).height == 1
+    assert delta.read(warehouse, "runs", version=0).height == 0
+    for version in (newest + 1, 99):
+        with pytest.raises(NotFound) as caught:
+            delta.read(warehouse, "runs", version=version)
+        assert caught.value.code == "no_table_version"
+        assert caught.value.details["newest"] == newest
+
+
+def test_a_damaged_table_log_is_one_clear_error(warehouse: Warehouse) -> None:
+    runs.record(warehouse, runs.Run("run-1", "ingest", None, "completed"))
+    assert warehouse.folder is not None
+    for commit in (warehouse.folder / "runs" / "_delta_log").glob("*.json"):
+        commit.write_bytes(b"{garbage")
+    with pytest.raises(KempfError) as caught:
+        runs.all_runs(warehouse)
+    assert caught.value.code == "table_unreadable"
+    assert caught.value.details["table"] == "runs"
+
+
+def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(KempfError) as caught:
+        Warehouse(str(tmp_path / "file" / "below")).create()
+    assert caught.value.code == "warehouse_not_writable"
+
+
+def test_a_missing_table_file_is_one_clear_error(warehouse: Warehouse) -> None:
+    runs.record(warehouse, runs.Run("run-1", "ingest", None, "completed"))
+    assert warehouse.folder is not None
+    for path in (warehouse.folder / "runs").glob("*.parquet"):
+        path.unlink()
+    with pytest.raises(KempfError) as caught:
+        runs.all_runs(warehouse)
+    assert caught.value.code == "table_unreadable"
+
+
+def test_a_full_disk_is_told(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*arguments, **options):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr("deltalake.write_deltalake", full)
+    with pytest.raises(KempfError) as caught:
+        runs.record(warehouse, runs.Run("run-1", "ingest", None, "completed"))
+    assert caught.value.code == "warehouse_not_writable"

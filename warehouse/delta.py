@@ -1,0 +1,250 @@
+"""The one place that speaks to Delta Lake: opening, reading and replacing rows of a table.
+
+Every change is one commit of `replace`: rows that a predicate names are exchanged for others, on the version that was
+read. A commit that meanwhile touched what the predicate names makes it fail, so that read, decide, write is one step
+under `warehouse.retry.with_retry`. (Merges lose the units in the field metadata; blind appends see no conflict.)
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from datetime import UTC, datetime
+from itertools import accumulate
+from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
+
+from schemas.errors import KempfError, NotFound
+from schemas.tables import TABLES, arrow_schema
+from warehouse.store import Warehouse, not_writable
+
+if TYPE_CHECKING:
+    import polars as pl
+    from deltalake import DeltaTable
+
+#: Values that a column may have, by column.
+Where = Mapping[str, str | list[str]]
+
+#: The past is kept: history as of a time and reruns read old versions.
+_CONFIGURATION = {
+    "delta.logRetentionDuration": "interval 36500 days",
+    "delta.deletedFileRetentionDuration": "interval 36500 days",
+    "delta.enableExpiredLogCleanup": "false",
+}
+
+
+def open_table(warehouse: Warehouse, name: str, version: int | None = None) -> DeltaTable | None:
+    """Open a table for reading, None where it was never written.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Where it is.
+    name : str
+        Key of `schemas.tables.TABLES`.
+    version : int, optional
+        Version to pin; the newest by default.
+
+    Raises
+    ------
+    NotFound
+        ``no_table_version``: the table has no such version.
+    KempfError
+        ``table_unreadable``: its log or its storage is damaged.
+    """
+    from deltalake import DeltaTable
+    from deltalake.exceptions import DeltaError, TableNotFoundError
+
+    class _Table(DeltaTable):
+        """A table whose files polars finds also where the folder's path holds blanks or letters beyond ASCII."""
+
+        def file_uris(self, *args: Any, **kwargs: Any) -> list[str]:
+            found = super().file_uris(*args, **kwargs)
+            return [unquote(uri) for uri in found] if warehouse.folder is not None else found
+
+    address = warehouse.address(name)
+    if warehouse.folder is not None and not (warehouse.folder / name / "_delta_log").is_dir():
+        return None
+    try:
+        return _Table(address, version=version, storage_options=warehouse.options)
+    except TableNotFoundError:
+        newest = _newest(warehouse, name)
+        if newest is None:
+            return None
+        raise _no_version(name, version, newest) from None
+    except (DeltaError, OSError, ValueError) as error:
+        newest = _newest(warehouse, name)
+        if version is not None and newest is not None and not 0 <= version <= newest:
+            raise _no_version(name, version, newest) from error
+        raise KempfError(
+            "table_unreadable",
+            f"The table {name} of {warehouse.uri} cannot be opened: {error}",
+            "Restore the folder from a copy; the raw logs in it stay readable.",
+            {"table": name, "version": version},
+        ) from error
+
+
+def _newest(warehouse: Warehouse, name: str) -> int | None:
+    from deltalake import DeltaTable
+    from deltalake.exceptions import DeltaError
+
+    try:
+        return DeltaTable(warehouse.address(name), storage_options=warehouse.options).version()
+    except (DeltaError, OSError, ValueError):
+        return None
+
+
+def _no_version(name: str, version: int | None, newest: int) -> NotFound:
+    return NotFound(
+        "no_table_version",
+        f"The table {name} has versions 0 to {newest}; version {version} is not among them.",
+        f"Ask for one of 0 to {newest}.",
+        {"table": name, "version": version, "newest": newest},
+    )
+
+
+def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
+    """Open a table for writing; make it, and the warehouse, where they are not there."""
+    from deltalake import DeltaTable
+    from deltalake.exceptions import DeltaError
+
+    table = open_table(warehouse, name)
+    if table is not None:
+        return table
+    warehouse.create()
+    try:
+        DeltaTable.create(
+            warehouse.address(name),
+            schema=arrow_schema(TABLES[name]),
+            mode="ignore",
+            partition_by=list(TABLES[name].partition_by) or None,
+            configuration=_CONFIGURATION,
+            storage_options=warehouse.options,
+        )
+    except DeltaError:  # another writer made it at the same moment
+        if open_table(warehouse, name) is None:
+            raise
+    made = open_table(warehouse, name)
+    assert made is not None
+    return made
+
+
+def read(
+    warehouse: Warehouse, name: str, where: Where | None = None, columns: Sequence[str] = (), version: int | None = None
+) -> pl.DataFrame:
+    """Return rows of a table, none where it was never written.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Where it is.
+    name : str
+        Key of `schemas.tables.TABLES`.
+    where : mapping of str to str or list of str, optional
+        Only rows whose column has that value, or one of those.
+    columns : sequence of str, optional
+        Only these columns; all by default.
+    version : int, optional
+        Version to pin; the newest by default.
+
+    Returns
+    -------
+    polars.DataFrame
+        The order of the rows is not defined: sort them.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_table_version``.
+    KempfError
+        ``table_unreadable``.
+    """
+    warehouse.require()
+    return rows(open_table(warehouse, name, version), name, where, columns)
+
+
+def rows(table: DeltaTable | None, name: str, where: Where | None = None, columns: Sequence[str] = ()) -> pl.DataFrame:
+    """Return rows of an open table, see `read`."""
+    import polars as pl
+
+    if table is None:
+        empty = pl.from_arrow(arrow_schema(TABLES[name]).empty_table())
+        assert isinstance(empty, pl.DataFrame)
+        lazy = empty.lazy()
+    else:
+        lazy = pl.scan_delta(table)
+    for column, value in (where or {}).items():
+        # one value prunes files by their statistics
+        lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))
+    try:
+        return (lazy.select(columns) if columns else lazy).collect()
+    except (OSError, pl.exceptions.ComputeError) as error:
+        raise KempfError(
+            "table_unreadable",
+            f"A file of the table {name} cannot be read: {error}",
+            "Restore the folder from a copy; the raw logs in it stay readable.",
+            {"table": name},
+        ) from error
+
+
+def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.DataFrame, predicate: str) -> None:
+    """Exchange the rows that ``predicate`` names for ``new``, in one commit on the version that is open.
+
+    Parameters
+    ----------
+    table : DeltaTable
+        Opened by `ensure_table`; what was read from it is what the commit rests on.
+    name : str
+        Its name.
+    new : sequence of dict, or polars.DataFrame
+        New rows, with every column of the table. All satisfy the predicate.
+    predicate : str
+        SQL; texts in it through `warehouse.keys.quoted`.
+
+    Raises
+    ------
+    deltalake.exceptions.CommitFailedError
+        Another writer changed what the predicate names: read again, see `warehouse.retry.with_retry`.
+    KempfError
+        ``warehouse_not_writable``.
+    """
+    import polars as pl
+    import pyarrow as pa
+    from deltalake import WriterProperties, write_deltalake
+
+    schema = arrow_schema(TABLES[name])
+    if isinstance(new, pl.DataFrame):
+        data = new.select(schema.names).to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema)
+    else:
+        data = pa.Table.from_pylist(list(new), schema=schema)
+    try:
+        write_deltalake(
+            table,
+            data,
+            mode="overwrite",
+            predicate=predicate,
+            writer_properties=WriterProperties(compression="ZSTD"),
+        )
+    except OSError as error:
+        raise not_writable(table.table_uri, error) from error
+
+
+def versions(warehouse: Warehouse) -> dict[str, int]:
+    """Return the newest version of every table that was written, for the provenance of what is made from them."""
+    opened = {name: open_table(warehouse, name) for name in TABLES}
+    return {name: table.version() for name, table in opened.items() if table is not None}
+
+
+def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | None:
+    """Return the newest version of a table that was committed by ``instant``; None before the first.
+
+    Commit times are those written into the commits, which copying a warehouse keeps; where clocks of two writers
+    disagree a version counts as no older than the one before it.
+    """
+    table = open_table(warehouse, name)
+    if table is None:
+        return None
+    commits = sorted((entry["version"], entry["timestamp"]) for entry in table.history())
+    limit_ms = instant.astimezone(UTC).timestamp() * 1000.0
+    known = list(accumulate((stamp for _, stamp in commits), max))
+    held = [version for (version, _), stamp in zip(commits, known, strict=True) if stamp <= limit_ms]
+    return held[-1] if held else None

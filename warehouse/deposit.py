@@ -1,0 +1,152 @@
+"""Putting logs into the warehouse: raw bytes, readings, refused records, and last the row that makes them count.
+
+A crash between the steps leaves nothing that is seen, and the same deposit again leaves one copy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.ingest.readings import Readings
+from schemas.profile import VesselProfile
+from warehouse import logs, raw, readings, vessels
+from warehouse.keys import ingest_id, vessel_key
+from warehouse.store import Warehouse
+
+Outcome = Literal["new", "reread", "unchanged"]
+
+
+@dataclass(frozen=True, eq=False)
+class Delivery:
+    """One log with what was read from it.
+
+    Attributes
+    ----------
+    vessel : str
+        Her name.
+    file_name : str
+        As delivered, without its folder.
+    data : bytes
+        The log as delivered.
+    profile : VesselProfile
+        What it was read with.
+    readings : Readings
+        What the reader returned.
+    code_version : str
+        Of the code that read it, see `warehouse.code_version.fingerprint`.
+    """
+
+    vessel: str
+    file_name: str
+    data: bytes
+    profile: VesselProfile
+    readings: Readings
+    code_version: str
+
+
+@dataclass(frozen=True)
+class Deposit:
+    """What became of a delivery: new to the warehouse, read anew (profile or code changed), or there already."""
+
+    log_id: str
+    ingest_id: str
+    outcome: Outcome
+
+
+def held(
+    warehouse: Warehouse, vessel: str, file_name: str, data: bytes, *, profile_sha256: str, code_version: str
+) -> Deposit | None:
+    """Return the deposit of a log that is there already as read with this profile and code; ask before reading it.
+
+    A raw copy that was damaged in the warehouse is mended on the way.
+
+    Raises
+    ------
+    DataRejected
+        ``log_of_another_vessel``.
+    """
+    name = raw.log_id(data)
+    row = logs.find(warehouse, [name]).get(name)
+    logs.refuse_other_vessel(row, vessel, file_name)
+    if row is None or row.ingest_id != ingest_id(name, profile_sha256, code_version):
+        return None
+    raw.put(warehouse, data)
+    return Deposit(name, row.ingest_id, "unchanged")
+
+
+def deposit(warehouse: Warehouse, deliveries: Sequence[Delivery]) -> list[Deposit]:
+    """Put logs into the warehouse, all of them in one commit a table; logs that are there already change nothing.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    deliveries : sequence of Delivery
+        The same bytes twice count once.
+
+    Returns
+    -------
+    list of Deposit
+        One a delivery, in the order given.
+
+    Raises
+    ------
+    DataRejected
+        ``log_of_another_vessel``: bytes that are kept, or given, for two vessels; then nothing is recorded.
+    """
+    rows = [_row(delivery) for delivery in deliveries]
+    known = logs.find(warehouse, [row.log_id for row in rows])
+    first: dict[str, logs.LogRow] = {}
+    fresh: dict[str, tuple[Delivery, logs.LogRow]] = {}
+    for delivery, row in zip(deliveries, rows, strict=True):
+        before = first.setdefault(row.log_id, row)
+        for other in (before, known.get(row.log_id)):
+            logs.refuse_other_vessel(other, row.vessel, row.file_name)
+        if before.ingest_id != row.ingest_id:
+            raise ValueError(f"{row.file_name}: one log with two profiles or two versions of the code in one deposit")
+        if row.log_id not in known or known[row.log_id].ingest_id != row.ingest_id:
+            fresh.setdefault(row.log_id, (delivery, row))
+    for delivery in deliveries:
+        raw.put(warehouse, delivery.data)  # mends a damaged copy of a log that is there, too
+    recorded = {row.log_id: row.revision for row in _store(warehouse, list(fresh.values()))}
+    return [Deposit(row.log_id, row.ingest_id, _outcome(recorded.pop(row.log_id, None))) for row in rows]
+
+
+def _store(warehouse: Warehouse, fresh: Sequence[tuple[Delivery, logs.LogRow]]) -> tuple[logs.LogRow, ...]:
+    if not fresh:
+        return ()
+    vessels.register_all(warehouse, [(delivery.vessel, delivery.profile) for delivery, _ in fresh])
+    batch = [(row.vessel, row.ingest_id, delivery.readings) for delivery, row in fresh]
+    readings.write(warehouse, batch)
+    readings.write_rejected(warehouse, batch)
+    return logs.record(warehouse, [row for _, row in fresh])
+
+
+def _outcome(revision: int | None) -> Outcome:
+    if revision is None:  # it was there, or another process recorded the same ingest meanwhile
+        return "unchanged"
+    return "new" if revision == 1 else "reread"
+
+
+def _row(delivery: Delivery) -> logs.LogRow:
+    vessel_key(delivery.vessel)  # refuses a name that is none before anything is written
+    name = raw.log_id(delivery.data)
+    instants = delivery.readings.frame["time_utc_ns"].to_numpy()
+    if instants.size == 0:
+        raise ValueError(f"{delivery.file_name} has no reading: the reader should have refused it")
+    return logs.LogRow(
+        log_id=name,
+        ingest_id=ingest_id(name, delivery.profile.sha256, delivery.code_version),
+        vessel=delivery.vessel,
+        file_name=delivery.file_name.encode("utf-8", "replace").decode(),
+        format=delivery.readings.format,
+        size_bytes=len(delivery.data),
+        profile_sha256=delivery.profile.sha256,
+        code_version=delivery.code_version,
+        start_utc_ns=int(instants.min()),
+        end_utc_ns=int(instants.max()),
+        tally=delivery.readings.tally,
+        notes=delivery.readings.notes,
+    )

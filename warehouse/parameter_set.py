@@ -1,0 +1,186 @@
+"""One identified model as it is kept: immutable, and named by what produced it. No storage here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from warehouse.canonical import canonical_json, plain, sha256
+from warehouse.instant import iso_utc
+
+_CONTENTS = ("model_spec", "settings", "fit", "iterations", "convergence", "provenance")
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """One parameter or noise level: value and standard error (None where there is none) in ``unit``."""
+
+    name: str
+    value: float
+    std: float | None
+    unit: str
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """Which part of which log, UTC nanoseconds."""
+
+    log_id: str
+    start_utc_ns: int
+    end_utc_ns: int
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """All that a parameter set is a function of.
+
+    Attributes
+    ----------
+    log_ids : tuple of str
+        SHA-256 of the logs; kept sorted.
+    profile_sha256 : str
+        Hash of the vessel profile.
+    bounds : tuple of Bounds
+        The segments; kept sorted by log, then start.
+    model_spec : mapping
+        The model specification as JSON content.
+    estimator : str
+        Its name.
+    settings : mapping
+        Of the estimator, JSON content.
+    code_version : str
+        Fingerprint of the source, see `warehouse.code_version.fingerprint`.
+    """
+
+    log_ids: tuple[str, ...]
+    profile_sha256: str
+    bounds: tuple[Bounds, ...]
+    model_spec: Mapping[str, Any]
+    estimator: str
+    settings: Mapping[str, Any]
+    code_version: str
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "log_ids", tuple(sorted(set(self.log_ids))))
+        ordered = sorted(self.bounds, key=lambda b: (b.log_id, b.start_utc_ns, b.end_utc_ns))
+        object.__setattr__(self, "bounds", tuple(ordered))
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the inputs as JSON content; what is not finite is named, as a bound may be infinite."""
+        content: dict[str, Any] = plain(
+            {
+                "log_ids": self.log_ids,
+                "profile_sha256": self.profile_sha256,
+                "segments": [vars(bounds) for bounds in self.bounds],
+                "model": self.model_spec,
+                "estimator": self.estimator,
+                "settings": self.settings,
+                "code_version": self.code_version,
+            },
+            name_non_finite=True,
+        )
+        return content
+
+
+def parameter_set_id(inputs: Inputs) -> str:
+    """Return the id of what these inputs produce: ``ps-`` and 16 hex digits of the SHA-256 of their canonical JSON."""
+    return "ps-" + sha256(canonical_json(inputs.as_json()))[:16]
+
+
+@dataclass(frozen=True)
+class ParameterSet:
+    """One identified model.
+
+    Attributes
+    ----------
+    parameter_set_id : str
+        See `parameter_set_id`.
+    model_spec, model_sha256 : mapping, str
+        Specification as JSON content, and its hash.
+    segment_ids, log_ids : tuple of str
+        What it was identified from.
+    start_utc_ns : int
+        Start of the first segment, UTC nanoseconds.
+    parameters, discrete, noise : tuple of Estimate
+        In continuous time; of the discrete model, eq. (17); noise levels.
+    covariance_names : tuple of str
+        What the rows and columns of the covariance are.
+    covariance : tuple of tuple of float, shape (n, n)
+        In products of the units of the estimates.
+    fit, iterations, convergence, settings, provenance : JSON content
+        What is not finite becomes null. ``provenance["inputs"]`` holds what the id is made of.
+    parent : str or None
+        Parameter set it grew from.
+
+    Raises
+    ------
+    ValueError
+        Two estimates of one group share a name, or the covariance is not square in its names.
+    """
+
+    parameter_set_id: str
+    vessel: str
+    model_name: str
+    model_spec: Mapping[str, Any]
+    model_sha256: str
+    estimator: str
+    settings: Mapping[str, Any]
+    segment_ids: tuple[str, ...]
+    log_ids: tuple[str, ...]
+    start_utc_ns: int
+    parameters: tuple[Estimate, ...]
+    discrete: tuple[Estimate, ...] = ()
+    noise: tuple[Estimate, ...] = ()
+    covariance_names: tuple[str, ...] = ()
+    covariance: tuple[tuple[float, ...], ...] = ()
+    fit: Mapping[str, Any] = field(default_factory=dict)
+    iterations: Sequence[Any] = ()
+    convergence: Mapping[str, Any] = field(default_factory=dict)
+    warnings: tuple[str, ...] = ()
+    parent: str | None = None
+    provenance: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in _CONTENTS:
+            object.__setattr__(self, name, plain(getattr(self, name)))
+        for name in ("segment_ids", "log_ids", "parameters", "discrete", "noise", "covariance_names", "warnings"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
+        rows = tuple(tuple(float(x) for x in row) for row in self.covariance)
+        object.__setattr__(self, "covariance", rows)
+        n = len(self.covariance_names)
+        if len(rows) != n or any(len(row) != n for row in rows):
+            raise ValueError(f"the covariance of {n} estimates has shape {[len(row) for row in rows]}")
+        for group in ("parameters", "discrete", "noise"):
+            names = [estimate.name for estimate in getattr(self, group)]
+            if len(set(names)) != len(names):
+                raise ValueError(f"{group} share a name: {names}")
+
+    def show(self) -> dict[str, Any]:
+        """Return the parameter set as the command line's JSON object."""
+        shown: dict[str, Any] = plain(
+            {
+                "parameter_set_id": self.parameter_set_id,
+                "vessel": self.vessel,
+                "model": {"name": self.model_name, "sha256": self.model_sha256, "spec": self.model_spec},
+                "estimator": self.estimator,
+                "settings": self.settings,
+                "segments": self.segment_ids,
+                "start": iso_utc(self.start_utc_ns),
+                "parameters": _by_name(self.parameters),
+                "discrete": _by_name(self.discrete),
+                "noise": _by_name(self.noise),
+                "covariance": {"names": self.covariance_names, "values": self.covariance},
+                "fit": self.fit,
+                "iterations": self.iterations,
+                "convergence": self.convergence,
+                "warnings": self.warnings,
+                "parent": self.parent,
+                "provenance": self.provenance,
+            }
+        )
+        return shown
+
+
+def _by_name(estimates: Sequence[Estimate]) -> dict[str, dict[str, Any]]:
+    return {e.name: {"value": e.value, "std": e.std, "unit": e.unit} for e in estimates}

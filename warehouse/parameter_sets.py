@@ -1,0 +1,142 @@
+"""The table of parameter sets: rows are added and never changed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from json import loads
+from typing import TYPE_CHECKING, Any
+
+from schemas.errors import KempfError, NotFound, UsageError
+from warehouse import delta
+from warehouse.agreement import content_digest, differences
+from warehouse.canonical import canonical_json
+from warehouse.keys import one_of, vessel_key
+from warehouse.parameter_set import Estimate, ParameterSet
+from warehouse.retry import with_retry
+from warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    import polars as pl
+
+_ESTIMATES = ("parameters", "discrete", "noise")
+_TEXTS = ("settings", "fit", "iterations", "convergence", "provenance")
+
+
+def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...]:
+    """Add parameter sets, in at most one commit; those that are there already change nothing.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    sets : sequence of ParameterSet
+        Of any vessels.
+
+    Returns
+    -------
+    tuple of str
+        Ids that were not there before, in the order given.
+
+    Raises
+    ------
+    KempfError
+        ``parameter_set_differs``: a set with this id is there and says something else; nothing is written.
+    """
+    given: dict[str, ParameterSet] = {}
+    for one in sets:
+        _refuse_other(given.setdefault(one.parameter_set_id, one), one)
+    if not given:
+        return ()
+    keys = {vessel_key(one.vessel) for one in given.values()}
+
+    def attempt() -> tuple[str, ...]:
+        table = delta.ensure_table(warehouse, "parameter_sets")
+        known = delta.rows(table, "parameter_sets", {"parameter_set_id": sorted(given)})
+        stored = [_set(r) for r in known.rows(named=True)]
+        for one in stored:
+            _refuse_other(one, given[one.parameter_set_id])
+        fresh = [name for name in given if name not in {one.parameter_set_id for one in stored}]
+        if fresh:
+            rows = [_as_columns(given[name]) for name in fresh]
+            predicate = f"{one_of('vessel_key', keys)} AND {one_of('parameter_set_id', fresh)}"
+            delta.replace(table, "parameter_sets", rows, predicate)
+        return tuple(fresh)
+
+    return with_retry(attempt)
+
+
+def get(warehouse: Warehouse, name: str) -> ParameterSet:
+    """Return a parameter set by its id, or by a beginning of it that only one has.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_parameter_set``.
+    UsageError
+        ``ambiguous_parameter_set``: several begin so.
+    """
+    whole = delta.read(warehouse, "parameter_sets", {"parameter_set_id": name})
+    if whole.height:
+        return _set(whole.rows(named=True)[0])
+    ids = delta.read(warehouse, "parameter_sets", columns=("parameter_set_id",))["parameter_set_id"].to_list()
+    found = sorted(one for one in ids if one.startswith(name))
+    if not name.strip() or not found:
+        raise NotFound(
+            "no_parameter_set",
+            f"There is no parameter set {name!r} in {warehouse.uri}.",
+            "List them with `kempf params list`, or make one with `kempf identify --vessel NAME`.",
+            {"parameter_set_id": name},
+        )
+    if len(found) > 1:
+        raise UsageError(
+            "ambiguous_parameter_set",
+            f"{len(found)} parameter sets begin with {name!r}: {', '.join(found[:5])}{' ...' if found[5:] else ''}.",
+            "Give more of the id.",
+            {"beginning": name, "found": found},
+        )
+    return get(warehouse, found[0])
+
+
+def summaries(warehouse: Warehouse, vessel: str | None = None) -> pl.DataFrame:
+    """Return vessel, id, start, model, estimator and parent of the sets of one vessel or of all.
+
+    Returns
+    -------
+    polars.DataFrame
+        Sorted by vessel, start, id.
+    """
+    where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    columns = ("vessel", "parameter_set_id", "start_utc_ns", "model_name", "estimator", "parent")
+    return delta.read(warehouse, "parameter_sets", where, columns).sort("vessel", "start_utc_ns", "parameter_set_id")
+
+
+def _refuse_other(stored: ParameterSet, given: ParameterSet) -> None:
+    if stored is given or content_digest(stored) == content_digest(given):
+        return
+    found = differences(stored, given)
+    fields = [one.field for one in found]
+    packages = [dict(s.provenance.get("packages") or {}) for s in (stored, given)]
+    changed = sorted(n for n in packages[0].keys() | packages[1].keys() if packages[0].get(n) != packages[1].get(n))
+    raise KempfError(
+        "parameter_set_differs",
+        f"{stored.parameter_set_id} is stored already and says something else in {len(fields)} fields: "
+        f"{', '.join(fields[:6])}{', ...' if fields[6:] else ''}"
+        + (f"; other versions of {', '.join(changed)}." if changed else "."),
+        f"See how far they differ with `kempf rerun {stored.parameter_set_id}`; the stored set stays as it is.",
+        {"differences": [one.as_json() for one in found], "packages": changed},
+    )
+
+
+def _as_columns(one: ParameterSet) -> dict[str, Any]:
+    columns = {**vars(one), "vessel_key": vessel_key(one.vessel)}
+    columns |= {name: [vars(estimate) for estimate in columns[name]] for name in _ESTIMATES}
+    texts = {f"{name}_json": canonical_json(columns.pop(name)) for name in _TEXTS}
+    return {**columns, **texts, "model_json": canonical_json(columns.pop("model_spec"))}
+
+
+def _set(row: dict[str, Any]) -> ParameterSet:
+    contents = {name: loads(row.pop(f"{name}_json")) for name in _TEXTS}
+    contents["model_spec"] = loads(row.pop("model_json"))
+    contents |= {name: tuple(Estimate(**item) for item in row.pop(name)) for name in _ESTIMATES}
+    del row["vessel_key"]
+    return ParameterSet(**row, **contents)

@@ -1,0 +1,54 @@
+"""What is written down of how a parameter set was made, so that it can be made again from the raw bytes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from warehouse import code_version, delta
+from warehouse.parameter_set import Inputs
+from warehouse.store import Warehouse
+
+
+def collect(
+    warehouse: Warehouse | None,
+    inputs: Inputs,
+    ingest_ids: Sequence[str],
+    flow_run: str | None = None,
+    table_versions: Mapping[str, int] | None = None,
+) -> dict[str, Any]:
+    """Return the provenance of a parameter set made now from these inputs.
+
+    Parameters
+    ----------
+    warehouse : Warehouse or None
+        Whose table versions are written down; None for none.
+    inputs : Inputs
+        What the id is made of.
+    ingest_ids : sequence of str
+        Where the readings were taken from.
+    flow_run : str, optional
+        Run that made it.
+    table_versions : mapping of str to int, optional
+        Taken before the work began; the present ones by default.
+
+    Returns
+    -------
+    dict
+        JSON content with the keys ``inputs``, ``ingest_ids``, ``profile_sha256``, ``code_version``, ``git_commit``,
+        ``packages``, ``python``, ``table_versions``, ``flow_run``.
+    """
+    if table_versions is None:
+        table_versions = delta.versions(warehouse) if warehouse is not None else {}
+    installed = code_version.packages()
+    return {
+        "inputs": inputs.as_json(),
+        "ingest_ids": sorted(set(ingest_ids)),
+        "profile_sha256": inputs.profile_sha256,
+        "code_version": inputs.code_version,
+        "git_commit": code_version.git_commit(),
+        "packages": {name: found for name, found in installed.items() if name != "python"},
+        "python": installed["python"],
+        "table_versions": dict(sorted(table_versions.items())),
+        "flow_run": flow_run,
+    }

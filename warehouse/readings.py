@@ -1,0 +1,97 @@
+"""Readings and refused records of one ingest, at native rates. Nothing here is seen before its row in ``logs``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings
+from warehouse import delta, logs
+from warehouse.keys import one_of, vessel_key
+from warehouse.retry import with_retry
+from warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, Readings]]) -> None:
+    """Put the readings of several ingests in place of what is there of them, in one commit.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    batch : sequence of (str, str, Readings)
+        Vessel, ingest id, readings.
+    """
+    _write(warehouse, "readings", [(vessel, ingest, item.frame) for vessel, ingest, item in batch])
+
+
+def write_rejected(warehouse: Warehouse, batch: Sequence[tuple[str, str, Readings]]) -> None:
+    """Put what was refused in several ingests in place of what is there of them, in one commit."""
+    _write(warehouse, "rejected", [(vessel, ingest, item.rejected) for vessel, ingest, item in batch])
+
+
+def read(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
+    """Return the readings of one ingest.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Where they are.
+    ingest_id : str
+        From a row of ``logs``.
+
+    Returns
+    -------
+    polars.DataFrame
+        Columns `pipeline.ingest.readings.READING_SCHEMA`, sorted by record.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_ingest``.
+    """
+    return _read(warehouse, "readings", ingest_id).select(list(READING_SCHEMA)).sort("record", "source", "time_utc_ns")
+
+
+def read_rejected(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
+    """Return what was refused in one ingest, columns `REJECTED_SCHEMA`, sorted by record then channel.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_ingest``.
+    """
+    return (
+        _read(warehouse, "rejected", ingest_id).select(list(REJECTED_SCHEMA)).sort("record", "channel", "reason", "raw")
+    )
+
+
+def _read(warehouse: Warehouse, name: str, ingest_id: str) -> pl.DataFrame:
+    row = logs.of_ingest(warehouse, ingest_id)
+    return delta.read(warehouse, name, {"vessel_key": vessel_key(row.vessel), "ingest_id": row.ingest_id})
+
+
+def _write(warehouse: Warehouse, name: str, batch: Sequence[tuple[str, str, pl.DataFrame]]) -> None:
+    import polars as pl
+
+    if not batch:
+        return
+    frames = [
+        frame.with_columns(
+            pl.lit(vessel_key(vessel)).alias("vessel_key"),
+            pl.lit(vessel).alias("vessel"),
+            pl.lit(ingest).alias("ingest_id"),
+        )
+        for vessel, ingest, frame in batch
+    ]
+    rows = pl.concat(frames)
+    vessels, ingests = ({vessel_key(v) for v, _, _ in batch}, {ingest for _, ingest, _ in batch})
+    predicate = f"{one_of('vessel_key', vessels)} AND {one_of('ingest_id', ingests)}"
+
+    def attempt() -> None:
+        delta.replace(delta.ensure_table(warehouse, name), name, rows, predicate)
+
+    with_retry(attempt)

@@ -1,0 +1,72 @@
+"""Runs of the flows: what ran on which inputs and how it ended. When it ran stands in the table's own commits."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from json import loads
+from typing import Any
+
+from warehouse import delta
+from warehouse.canonical import canonical_json, plain, sha256
+from warehouse.keys import quoted
+from warehouse.retry import with_retry
+from warehouse.store import Warehouse
+
+
+def run_id(flow: str, inputs: Any) -> str:
+    """Return the id of a run, ``run-`` and 16 hex digits: the flow and what it ran on (JSON content)."""
+    return "run-" + sha256(canonical_json([flow, inputs], name_non_finite=True))[:16]
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run; `counts` and `message` are JSON content."""
+
+    run_id: str
+    flow: str
+    vessel: str | None
+    status: str
+    counts: Mapping[str, int] = field(default_factory=dict)
+    message: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "counts", plain(self.counts))
+        object.__setattr__(self, "message", plain(self.message))
+
+
+def record(warehouse: Warehouse, run: Run) -> bool:
+    """Store how a run stands, in place of how it stood; no commit where it stands so already.
+
+    Returns
+    -------
+    bool
+        Whether anything changed.
+    """
+    row = {
+        "run_id": run.run_id,
+        "flow": run.flow,
+        "vessel": run.vessel,
+        "status": run.status,
+        "counts_json": canonical_json(run.counts),
+        "message_json": canonical_json(run.message),
+    }
+
+    def attempt() -> bool:
+        table = delta.ensure_table(warehouse, "runs")
+        stored = delta.rows(table, "runs", {"run_id": run.run_id})
+        if stored.rows(named=True) == [row]:
+            return False
+        delta.replace(table, "runs", [row], f"run_id = {quoted(run.run_id)}")
+        return True
+
+    return with_retry(attempt)
+
+
+def all_runs(warehouse: Warehouse, flow: str | None = None) -> list[Run]:
+    """Return every run, of one flow or of all, sorted by flow then id."""
+    frame = delta.read(warehouse, "runs", {} if flow is None else {"flow": flow}).sort("flow", "run_id")
+    return [
+        Run(r["run_id"], r["flow"], r["vessel"], r["status"], loads(r["counts_json"]), loads(r["message_json"]))
+        for r in frame.rows(named=True)
+    ]

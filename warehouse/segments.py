@@ -1,0 +1,203 @@
+"""Manoeuvres found in the logs. Finding them again in an ingest replaces what was found in it before."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass, field
+from json import loads
+from typing import Any
+
+from schemas.errors import NotFound
+from warehouse import delta, logs, vessels
+from warehouse.canonical import canonical_json, plain, sha256
+from warehouse.instant import iso_utc
+from warehouse.keys import one_of, vessel_key
+from warehouse.retry import with_retry
+from warehouse.store import Warehouse
+
+_JSON = ("imo", "quality", "detail")
+
+
+def segment_id(log_id: str, kind: str, start_utc_ns: int, end_utc_ns: int) -> str:
+    """Return the id of a segment, ``seg-`` and 16 hex digits: the log, what it is, and its bounds."""
+    return "seg-" + sha256(canonical_json([log_id, kind, start_utc_ns, end_utc_ns]))[:16]
+
+
+@dataclass(frozen=True)
+class Segment:
+    """One manoeuvre, as stored.
+
+    Attributes
+    ----------
+    psi0_deg, delta0_deg : float
+        Nominal heading deviation and rudder angle, deg.
+    base_heading_deg : float
+        Heading before the first execute, deg.
+    executes_utc_ns : tuple of int
+        Instants of the executes, UTC nanoseconds.
+    overshoots_deg : tuple of float
+        Overshoot angles beyond the nominal heading deviation, deg.
+    imo, quality, detail : mapping
+        JSON content; what is not finite becomes null.
+    """
+
+    segment_id: str
+    vessel: str
+    log_id: str
+    ingest_id: str
+    kind: str
+    psi0_deg: float
+    delta0_deg: float
+    first_side: str
+    base_heading_deg: float
+    start_utc_ns: int
+    end_utc_ns: int
+    executes_utc_ns: tuple[int, ...]
+    overshoots_deg: tuple[float, ...]
+    code_version: str
+    imo: Mapping[str, Any] = field(default_factory=dict)
+    quality: Mapping[str, Any] = field(default_factory=dict)
+    detail: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in _JSON:
+            object.__setattr__(self, name, plain(getattr(self, name)))
+        object.__setattr__(self, "executes_utc_ns", tuple(int(t) for t in self.executes_utc_ns))
+        object.__setattr__(self, "overshoots_deg", tuple(float(a) for a in self.overshoots_deg))
+
+    def show(self, file_name: str) -> dict[str, Any]:
+        """Return the segment as the command line's JSON object.
+
+        Parameters
+        ----------
+        file_name : str
+            Name of the log it was found in.
+        """
+        shown = {
+            "segment_id": self.segment_id,
+            "vessel": self.vessel,
+            "log": file_name,
+            "kind": self.kind,
+            "psi0_deg": self.psi0_deg,
+            "delta0_deg": self.delta0_deg,
+            "first_side": self.first_side,
+            "base_heading_deg": self.base_heading_deg,
+            "start": iso_utc(self.start_utc_ns),
+            "end": iso_utc(self.end_utc_ns),
+            "executes": [iso_utc(t) for t in self.executes_utc_ns],
+            "overshoots_deg": self.overshoots_deg,
+            "imo": self.imo,
+            "quality": self.quality,
+            "detail": self.detail,
+            "log_id": self.log_id,
+            "ingest_id": self.ingest_id,
+        }
+        result: dict[str, Any] = plain(shown)
+        return result
+
+
+def replace(warehouse: Warehouse, vessel: str, found: Mapping[str, Sequence[Segment]]) -> tuple[str, ...]:
+    """Put what was found in some ingests of a vessel in place of what is stored of them, in at most one commit.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    vessel : str
+        Her name.
+    found : mapping of str to sequence of Segment
+        By ingest id; an empty sequence says that nothing was found.
+
+    Returns
+    -------
+    tuple of str
+        Ingests whose segments changed, sorted; none, and no commit, where the same is stored already.
+
+    Raises
+    ------
+    ValueError
+        A segment names another vessel or ingest than it is given for.
+    """
+    key = vessel_key(vessel)
+    for ingest, segments in found.items():
+        for segment in segments:
+            if (segment.vessel, segment.ingest_id) != (vessel, ingest):
+                raise ValueError(f"{segment.segment_id} is of {segment.vessel!r}, {segment.ingest_id}: not {ingest}")
+
+    def attempt() -> tuple[str, ...]:
+        table = delta.ensure_table(warehouse, "segments")
+        known = delta.rows(table, "segments", {"vessel_key": key, "ingest_id": sorted(found)})
+        stored = [_segment(row) for row in known.rows(named=True)]
+        changed = tuple(
+            ingest
+            for ingest in sorted(found)
+            if _text(found[ingest]) != _text([s for s in stored if s.ingest_id == ingest])
+        )
+        if changed:
+            rows = [_as_columns(segment) for ingest in changed for segment in _sorted(found[ingest])]
+            delta.replace(table, "segments", rows, f"{one_of('vessel_key', [key])} AND {one_of('ingest_id', changed)}")
+        return changed
+
+    return with_retry(attempt)
+
+
+def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
+    """Return the segments found in the current ingest of each log, sorted by start then id.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Where they are.
+    vessel : str, optional
+        Of this vessel only; of all by default.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    if vessel is not None:
+        vessels.require(warehouse, vessel)
+    ingests = [row.ingest_id for row in logs.current(warehouse, vessel)]
+    hers = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    frame = delta.read(warehouse, "segments", {**hers, "ingest_id": ingests})
+    return _sorted([_segment(row) for row in frame.rows(named=True)])
+
+
+def get(warehouse: Warehouse, name: str) -> Segment:
+    """Return a segment of a current ingest by its id.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_segment``.
+    """
+    found = [segment for segment in current(warehouse) if segment.segment_id == name]
+    if not found:
+        raise NotFound(
+            "no_segment",
+            f"There is no segment {name!r} in {warehouse.uri}.",
+            "List the segments with `kempf segments`.",
+            {"segment_id": name},
+        )
+    return found[0]
+
+
+def _sorted(segments: Sequence[Segment]) -> list[Segment]:
+    return sorted(segments, key=lambda s: (s.start_utc_ns, s.segment_id))
+
+
+def _text(segments: Sequence[Segment]) -> str:
+    return canonical_json([asdict(segment) for segment in _sorted(segments)], name_non_finite=True)
+
+
+def _as_columns(segment: Segment) -> dict[str, Any]:
+    columns = {**asdict(segment), "vessel_key": vessel_key(segment.vessel)}
+    texts = {f"{name}_json": canonical_json(columns.pop(name)) for name in _JSON}
+    return {**columns, **texts}
+
+
+def _segment(row: dict[str, Any]) -> Segment:
+    contents = {name: loads(row.pop(f"{name}_json")) for name in _JSON}
+    del row["vessel_key"]
+    return Segment(**row, **contents)

@@ -1,0 +1,225 @@
+"""The place where everything is kept: a folder, or a bucket reached by the same code.
+
+Knows addresses and bytes; the tables themselves are opened in `warehouse.delta`. A folder becomes a warehouse by its
+marker file, which also says how it is laid out.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from schemas.errors import KempfError, NotFound, UsageError
+
+#: Name and content of the file that marks a warehouse.
+MARKER = "kempf-warehouse.json"
+LAYOUT = 1
+
+#: Characters that the readers of the tables give another meaning: escapes, patterns, and = as a partition's folder.
+_UNADDRESSABLE = "%=[]*?^|{}" if os.sep == "\\" else "%=[]*?^|{}\\"
+
+#: What pyarrow calls the options that object stores know by these names.
+_S3_OPTIONS = {
+    "AWS_ACCESS_KEY_ID": "access_key",
+    "AWS_SECRET_ACCESS_KEY": "secret_key",
+    "AWS_SESSION_TOKEN": "session_token",
+    "AWS_REGION": "region",
+    "AWS_ENDPOINT_URL": "endpoint_override",
+}
+
+
+@dataclass(frozen=True)
+class Warehouse:
+    """Address of a warehouse; opening it touches nothing.
+
+    Parameters
+    ----------
+    uri : str
+        A folder, ``file://...`` or ``s3://bucket/prefix``.
+    storage_options : mapping of str, optional
+        Options of the object store, such as ``AWS_ENDPOINT_URL``; never stored.
+
+    Raises
+    ------
+    UsageError
+        ``warehouse_path``: the address is empty or cannot be used.
+    """
+
+    uri: str
+    storage_options: Mapping[str, str] | None = field(default=None, repr=False, hash=False)
+
+    def __post_init__(self) -> None:
+        if not self.uri.strip():
+            raise UsageError("warehouse_path", "The address of the warehouse is empty.", "Give --warehouse FOLDER.")
+        bad = sorted(set(str(self.folder or self.uri)) & set(_UNADDRESSABLE))
+        if bad:
+            raise UsageError(
+                "warehouse_path",
+                f"{self.uri!r} cannot hold a warehouse: its path contains {' '.join(bad)}, which the readers of the "
+                "tables take for something else.",
+                "Choose a folder without these characters.",
+                {"characters": bad},
+            )
+
+    @cached_property
+    def folder(self) -> Path | None:
+        """The local folder, absolute; None for an object store."""
+        if "://" in self.uri and not self.uri.startswith("file://"):
+            return None
+        return Path(self.uri.removeprefix("file://")).expanduser().resolve()
+
+    @property
+    def options(self) -> dict[str, str] | None:
+        """Storage options as the table format wants them."""
+        return dict(self.storage_options) if self.storage_options else None
+
+    def address(self, *parts: str) -> str:
+        """Return the address of something inside, for the table format."""
+        root = str(self.folder) if self.folder is not None else self.uri.rstrip("/")
+        return "/".join((root, *parts))
+
+    @cached_property
+    def _files(self) -> tuple[Any, str]:
+        """File system of pyarrow, and the root inside it."""
+        from pyarrow import fs
+
+        if self.folder is not None:
+            return fs.LocalFileSystem(), self.folder.as_posix()
+        scheme, _, root = self.uri.rstrip("/").partition("://")
+        if scheme in ("s3", "s3a") and self.storage_options:
+            given = {_S3_OPTIONS[k.upper()]: v for k, v in self.storage_options.items() if k.upper() in _S3_OPTIONS}
+            given["scheme"] = "http" if given.get("endpoint_override", "").startswith("http://") else "https"
+            return fs.S3FileSystem(**given), root
+        files, inside = fs.FileSystem.from_uri(self.uri.rstrip("/"))
+        return files, str(inside)
+
+    def read_bytes(self, *parts: str) -> bytes | None:
+        """Return the content of a file inside, None where there is none.
+
+        Raises
+        ------
+        KempfError
+            ``warehouse_unreachable``: it may be there, but cannot be read.
+        """
+        files, root = self._files
+        try:
+            with files.open_input_file("/".join((root, *parts))) as stream:
+                return bytes(stream.readall())
+        except (FileNotFoundError, NotADirectoryError):
+            return None
+        except OSError as error:
+            raise KempfError(
+                "warehouse_unreachable",
+                f"Reading {'/'.join(parts)} of the warehouse {self.uri} failed: {error}.",
+                "Look at the permissions of the folder, or at the address and the credentials of the object store.",
+            ) from error
+
+    def write_bytes(self, data: bytes, *parts: str) -> None:
+        """Write a file inside, all of it or nothing: a reader never sees a part.
+
+        Raises
+        ------
+        KempfError
+            ``warehouse_not_writable``: the disk is full, the folder is protected, ...
+        """
+        files, root = self._files
+        target = "/".join((root, *parts))
+        try:
+            if self.folder is None:  # an object appears only when it is whole
+                with files.open_output_stream(target) as stream:
+                    stream.write(data)
+                return
+            folder, _, name = target.rpartition("/")
+            files.create_dir(folder, recursive=True)
+            passing = f"{folder}/.{name}.{secrets.token_hex(8)}"
+            try:
+                with files.open_output_stream(passing) as stream:
+                    stream.write(data)
+                files.move(passing, target)
+            except BaseException:
+                Path(passing).unlink(missing_ok=True)
+                raise
+        except OSError as error:
+            raise not_writable(self.uri, error) from error
+
+    def exists(self) -> bool:
+        """Return whether a warehouse is there.
+
+        Raises
+        ------
+        KempfError
+            ``warehouse_layout``: it is there, but was made by a newer version, or its marker is damaged.
+        """
+        marker = self.read_bytes(MARKER)
+        if marker is None:
+            return False
+        try:
+            layout = json.loads(marker)["layout"]
+        except (ValueError, KeyError, TypeError):
+            layout = None
+        if layout != LAYOUT:
+            raise KempfError(
+                "warehouse_layout",
+                f"The warehouse {self.uri} has layout {layout!r}; this version reads layout {LAYOUT}.",
+                "Update kempf, or give another folder with --warehouse.",
+                {"found": layout, "expected": LAYOUT},
+            )
+        return True
+
+    def require(self) -> None:
+        """Do nothing where a warehouse is there.
+
+        Raises
+        ------
+        NotFound
+            ``no_warehouse``: there is none.
+        """
+        if not self.exists():
+            raise NotFound(
+                "no_warehouse",
+                f"There is no warehouse at {self.uri}.",
+                "Make one with `kempf ingest PATH... --vessel NAME`, or say where it is with --warehouse.",
+                {"uri": self.uri},
+            )
+
+    def create(self) -> None:
+        """Make an empty warehouse where none is; the parents of the folder are made too.
+
+        Raises
+        ------
+        UsageError
+            ``not_a_warehouse``: it is a file, or a folder that holds other things.
+        """
+        if self.exists():
+            return
+        if self.folder is not None:
+            others = (
+                sorted(p.name for p in self.folder.iterdir() if not p.name.startswith("."))
+                if self.folder.is_dir()
+                else []
+            )
+            taken = self.folder.exists() and not self.folder.is_dir()
+            if (others or taken) and not self.exists():  # another process may have made it meanwhile
+                found = f"other files, such as {others[0]!r}" if others else "a file"
+                raise UsageError(
+                    "not_a_warehouse",
+                    f"{self.uri} is no warehouse: found {found}; expected a warehouse or an empty folder.",
+                    "Give another folder with --warehouse.",
+                    {"uri": self.uri},
+                )
+        self.write_bytes(json.dumps({"layout": LAYOUT}).encode() + b"\n", MARKER)
+
+
+def not_writable(where: str, error: OSError) -> KempfError:
+    """Return the error of a write that failed."""
+    return KempfError(
+        "warehouse_not_writable",
+        f"Writing to {where} failed: {error}.",
+        "Look at the free space and the permissions of the folder, then run the command again.",
+    )

@@ -1,0 +1,161 @@
+"""Vessels and the versions of their profiles; the latest registered is the current one."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from schemas.errors import NotFound
+from schemas.profile import VesselProfile
+from warehouse import delta
+from warehouse.keys import quoted, vessel_key
+from warehouse.retry import with_retry
+from warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class VesselVersion:
+    """One version of a vessel's profile."""
+
+    vessel: str
+    revision: int
+    profile_sha256: str
+    profile: VesselProfile
+
+
+def register(warehouse: Warehouse, vessel: str, profile: VesselProfile) -> bool:
+    """Make a profile the current one of a vessel; no commit where it is already.
+
+    Returns
+    -------
+    bool
+        Whether anything changed.
+    """
+    return bool(register_all(warehouse, [(vessel, profile)]))
+
+
+def register_all(
+    warehouse: Warehouse, profiles: Sequence[tuple[str, VesselProfile]]
+) -> tuple[tuple[str, VesselProfile], ...]:
+    """Make each profile in turn the current one of its vessel, in at most one commit.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    profiles : sequence of (str, VesselProfile)
+        Name of the vessel and profile; of several for one vessel the last stays current, all are kept.
+
+    Returns
+    -------
+    tuple of (str, VesselProfile)
+        Those that were not current when their turn came.
+    """
+    keys = {vessel: vessel_key(vessel) for vessel, _ in profiles}
+    if not keys:
+        return ()
+
+    def attempt() -> tuple[tuple[str, VesselProfile], ...]:
+        table = delta.ensure_table(warehouse, "vessels")
+        known = delta.rows(table, "vessels").sort("revision").rows(named=True)
+        last = {row["vessel"]: (row["revision"], row["profile_sha256"]) for row in known}  # the highest revision stays
+        rows: list[dict[str, Any]] = []
+        changed = []
+        for vessel, profile in profiles:
+            revision, current_sha256 = last.get(vessel, (0, ""))
+            if current_sha256 == profile.sha256:
+                continue
+            last[vessel] = (revision + 1, profile.sha256)
+            changed.append((vessel, profile))
+            rows.append(
+                {
+                    "vessel_key": keys[vessel],
+                    "vessel": vessel,
+                    "revision": revision + 1,
+                    "profile_sha256": profile.sha256,
+                    "profile_json": profile.canonical_json(),
+                }
+            )
+        if rows:
+            named = (f"(vessel_key = {quoted(row['vessel_key'])} AND revision = {row['revision']})" for row in rows)
+            delta.replace(table, "vessels", rows, " OR ".join(named))
+        return tuple(changed)
+
+    return with_retry(attempt)
+
+
+def names(warehouse: Warehouse) -> list[str]:
+    """Return the names of all vessels, sorted."""
+    frame = delta.read(warehouse, "vessels", columns=("vessel",))
+    return sorted(set(frame["vessel"].to_list()))
+
+
+def versions(warehouse: Warehouse, vessel: str) -> list[VesselVersion]:
+    """Return every version of a vessel's profile, the current one last.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    rows = delta.read(warehouse, "vessels", {"vessel_key": vessel_key(vessel)}).sort("revision")
+    if rows.height == 0:
+        raise _no_vessel(vessel, names(warehouse))
+    return [_version(row) for row in rows.rows(named=True)]
+
+
+def current(warehouse: Warehouse, vessel: str) -> VesselProfile:
+    """Return the current profile of a vessel.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    return versions(warehouse, vessel)[-1].profile
+
+
+def require(warehouse: Warehouse, vessel: str) -> None:
+    """Do nothing where the vessel is known.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    versions(warehouse, vessel)
+
+
+def get(warehouse: Warehouse, profile_sha256: str) -> VesselProfile:
+    """Return a profile by its hash.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_profile``.
+    """
+    found = delta.read(warehouse, "vessels", {"profile_sha256": profile_sha256})
+    if found.height == 0:
+        raise NotFound(
+            "no_profile",
+            f"No vessel has a profile with the hash {profile_sha256!r}.",
+            "List the profiles with `kempf vessels show NAME`.",
+            {"profile_sha256": profile_sha256},
+        )
+    return _version(found.sort("vessel", "revision").row(0, named=True)).profile
+
+
+def _version(row: Mapping[str, Any]) -> VesselVersion:
+    profile = VesselProfile.model_validate(json.loads(row["profile_json"]))
+    return VesselVersion(row["vessel"], row["revision"], row["profile_sha256"], profile)
+
+
+def _no_vessel(vessel: str, known: list[str]) -> NotFound:
+    return NotFound(
+        "no_vessel",
+        f"There is no vessel {vessel!r}; known: {', '.join(known) or 'none'}.",
+        "Give one of these with --vessel, or ingest her logs with `kempf ingest PATH... --vessel NAME`.",
+        {"vessel": vessel, "known": known},
+    )
