@@ -200,6 +200,21 @@ def merge(profiles: list[tuple[str, VesselProfile]]) -> VesselProfile:
     return VesselProfile.model_validate({**values, "sources": [s for _, s in sources.values()]})
 
 
+def overlay(below: VesselProfile, above: VesselProfile) -> VesselProfile:
+    """Lay one profile over another: what the upper one says holds, what it leaves out stays.
+
+    Parameters
+    ----------
+    below, above : VesselProfile
+        A source of ``above`` replaces the one of ``below`` with the same file pattern, and is asked first.
+    """
+    kept = below.model_dump(exclude_unset=True, exclude={"sources"})
+    given = above.model_dump(exclude_unset=True, exclude={"sources"})
+    patterns = {source.match for source in above.sources}
+    sources = [*above.sources, *(source for source in below.sources if source.match not in patterns)]
+    return VesselProfile.model_validate({**kept, **given, "sources": sources})
+
+
 def start_ns(start: datetime) -> int:
     """Return a zoned datetime as UTC nanoseconds, without rounding through a float."""
     whole = int(start.replace(microsecond=0).timestamp())

@@ -1,0 +1,92 @@
+"""The job that finds the zigzags of one ingest and stores them."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
+
+from pipeline.normalise.instruments import Instruments, from_readings
+from pipeline.segment.find import find_manoeuvres
+from pipeline.segment.imo import judge
+from pipeline.segment.lateral import lateral_summary
+from pipeline.segment.zigzag import Zigzag
+from schemas.profile import VesselProfile
+from warehouse import segments
+from warehouse.code_version import fingerprint
+from warehouse.logs import LogRow
+from warehouse.segments import Segment
+from warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+def find_segments(
+    warehouse: Warehouse, row: LogRow, profile: VesselProfile, frame: pl.DataFrame
+) -> tuple[list[Segment], tuple[str, ...]]:
+    """Find the zigzags of one ingest and put them in place of those found before.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    row : LogRow
+        The ingest.
+    profile : VesselProfile
+    frame : polars.DataFrame
+        Its readings.
+
+    Returns
+    -------
+    list of Segment
+    tuple of str
+        What a person should know: choices made in normalising, or the channel whose absence forbids the search.
+    """
+    instruments = from_readings(frame)
+    heading, rudder = instruments.get("heading"), instruments.get("rudder_angle")
+    absent = [name for name, series in (("heading", heading), ("rudder_angle", rudder)) if series is None]
+    if heading is None or rudder is None:
+        missing = " and ".join(absent)
+        note = f"no {missing} in this log: zigzags cannot be looked for; map it in the profile if the log has it"
+        segments.replace(warehouse, row.vessel, {row.ingest_id: []})
+        return [], (*instruments.notes, note)
+    speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
+    found = [
+        _segment(zigzag, row, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)
+    ]
+    segments.replace(warehouse, row.vessel, {row.ingest_id: found})
+    return found, instruments.notes
+
+
+def _segment(zigzag: Zigzag, row: LogRow, profile: VesselProfile, instruments: Instruments) -> Segment:
+    criteria = judge(zigzag, profile.length_m, profile.trial_speed_m_s)
+    return Segment(
+        segment_id=segments.segment_id(row.log_id, zigzag.kind, zigzag.start_utc_ns, zigzag.end_utc_ns),
+        vessel=row.vessel,
+        log_id=row.log_id,
+        ingest_id=row.ingest_id,
+        kind=zigzag.kind,
+        psi0_deg=zigzag.psi0_deg,
+        delta0_deg=zigzag.delta0_deg,
+        first_side=zigzag.first_side,
+        base_heading_deg=zigzag.base_heading_deg,
+        start_utc_ns=zigzag.start_utc_ns,
+        end_utc_ns=zigzag.end_utc_ns,
+        executes_utc_ns=zigzag.executes_utc_ns,
+        overshoots_deg=tuple(o.beyond_nominal_deg for o in zigzag.overshoots),
+        code_version=fingerprint(),
+        imo={criterion.name: _without_name(asdict(criterion)) for criterion in criteria},
+        quality=asdict(zigzag.quality),
+        detail={
+            "psi0_measured_deg": zigzag.psi0_measured_deg,
+            "delta0_measured_deg": zigzag.delta0_measured_deg,
+            "executes": [asdict(execute) for execute in zigzag.executes],
+            "overshoots": [asdict(overshoot) for overshoot in zigzag.overshoots],
+            "phases": [asdict(phase) for phase in zigzag.phases],
+            "speed": asdict(zigzag.speed) if zigzag.speed else None,
+            "lateral_speed": lateral_summary(instruments, zigzag),
+        },
+    )
+
+
+def _without_name(criterion: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in criterion.items() if key != "name"}

@@ -1,0 +1,226 @@
+"""The job that identifies a model from every zigzag of a vessel and stores the parameter sets."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from os import cpu_count
+from typing import Any
+
+from flows.progress import Progress, silent
+from pipeline.identify.estimate import Estimate as PipelineEstimate
+from pipeline.identify.estimate import Value
+from pipeline.identify.estimators import default_settings, estimate
+from pipeline.identify.record import make_record
+from pipeline.normalise.instruments import Instruments, from_readings
+from schemas.errors import KempfError, NotFound, UsageError
+from schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from schemas.profile import VesselProfile
+from warehouse import aliases, code_version, delta, logs, parameter_sets, provenance, readings, segments, vessels
+from warehouse.parameter_set import Bounds, Estimate, Inputs, ParameterSet, parameter_set_id
+from warehouse.segments import Segment
+from warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class Request:
+    """What a person asks for: which model, which estimator, which of its settings differ from the defaults."""
+
+    spec: ModelSpec = ModelSpec()
+    estimator: str = "ml"
+    settings: tuple[tuple[str, Any], ...] = ()
+
+    def all_settings(self) -> dict[str, Any]:
+        """Return every setting of the estimator, defaults included; they are part of a set's identity."""
+        return {**default_settings(self.estimator), **dict(self.settings)}
+
+
+@dataclass(frozen=True)
+class IdentifyOutcome:
+    """What became of one segment: a parameter set (new, or there already), or the reason why there is none."""
+
+    segment: Segment
+    parameter_set: ParameterSet | None
+    new: bool = False
+    error: KempfError | None = None
+
+
+def identify_vessel(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request = Request(),  # noqa: B008 - frozen
+    *,
+    flow_run: str | None = None,
+    progress: Progress = silent,
+) -> list[IdentifyOutcome]:
+    """Identify a model from every zigzag of a vessel.
+
+    A set whose inputs, code, model and settings are the same as before is not computed again. Segments share the cores:
+    the compiled likelihood runs outside the interpreter's lock.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    request : Request, optional
+    flow_run : str, optional
+        Run that asks, for the provenance.
+    progress : Progress, optional
+
+    Returns
+    -------
+    list of IdentifyOutcome
+        One a segment, in order of time.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``, ``no_segments``: nothing to identify from.
+    """
+    found = segments.current(warehouse, vessel)
+    if not found:
+        raise _no_segments(warehouse, vessel)
+    table_versions = delta.versions(warehouse)
+    by_ingest = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
+    profiles = {sha: vessels.get(warehouse, sha) for sha in {row.profile_sha256 for row in by_ingest.values()}}
+    outcomes: list[IdentifyOutcome] = []
+    pieces = [(ingest, [s for s in found if s.ingest_id == ingest]) for ingest in dict.fromkeys(s.ingest_id for s in found)]
+    with ThreadPoolExecutor(max_workers=cpu_count()) as pool:
+        for done, (ingest, hers) in enumerate(pieces):
+            row = by_ingest[ingest]
+            profile = profiles[row.profile_sha256]
+            progress(done, len(pieces), f"identifying {len(hers)} segments of {row.file_name}")
+            wanted = [inputs_of(segment, row.profile_sha256, request) for segment in hers]
+            missing = _missing(warehouse, wanted)
+            instruments = from_readings(readings.read(warehouse, ingest)) if missing else None
+
+            def one(segment: Segment, inputs: Inputs) -> IdentifyOutcome:
+                name = parameter_set_id(inputs)
+                if name not in missing or instruments is None:  # noqa: B023 - the pool is drained in this turn
+                    return IdentifyOutcome(segment, parameter_sets.get(warehouse, name))
+                told = provenance.collect(warehouse, inputs, [segment.ingest_id], flow_run, table_versions)
+                try:
+                    made = build(instruments, profile, inputs, vessel, (segment.segment_id,), told)  # noqa: B023
+                except KempfError as error:
+                    return IdentifyOutcome(segment, None, error=error)
+                return IdentifyOutcome(segment, made, new=True)
+
+            fresh = list(pool.map(one, hers, wanted))
+            parameter_sets.insert(warehouse, [o.parameter_set for o in fresh if o.new and o.parameter_set])
+            outcomes += fresh
+    progress(len(pieces), len(pieces), "done")
+    outcomes.sort(key=lambda o: (o.segment.start_utc_ns, o.segment.segment_id))
+    _point_to_current(warehouse, vessel, outcomes)
+    return outcomes
+
+
+def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
+    held = logs.current(warehouse, vessel)
+    return NotFound(
+        "no_segments",
+        f"No zigzag was found in the {len(held)} logs of {vessel!r}, so there is nothing to identify from.",
+        "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
+        {"vessel": vessel, "logs": [row.file_name for row in held]},
+    )
+
+
+def _missing(warehouse: Warehouse, wanted: Sequence[Inputs]) -> set[str]:
+    names = {parameter_set_id(inputs) for inputs in wanted}
+    stored = delta.read(warehouse, "parameter_sets", {"parameter_set_id": sorted(names)}, ("parameter_set_id",))
+    return names - set(stored["parameter_set_id"].to_list())
+
+
+def _point_to_current(warehouse: Warehouse, vessel: str, outcomes: Sequence[IdentifyOutcome]) -> None:
+    """Let ``current`` point to the latest whole zigzag whose identification converged."""
+    whole = [
+        o.parameter_set
+        for o in outcomes
+        if o.parameter_set is not None and o.segment.kind == "zigzag" and o.parameter_set.convergence.get("converged")
+    ]
+    if whole:
+        aliases.point(warehouse, vessel, whole[-1].parameter_set_id)
+
+
+def inputs_of(segment: Segment, profile_sha256: str, request: Request) -> Inputs:
+    """Return all that the parameter set of one segment is a function of."""
+    return Inputs(
+        log_ids=(segment.log_id,),
+        profile_sha256=profile_sha256,
+        bounds=(Bounds(segment.log_id, segment.start_utc_ns, segment.end_utc_ns),),
+        model_spec=request.spec.model_dump(mode="json"),
+        estimator=request.estimator,
+        settings=request.all_settings(),
+        code_version=code_version.fingerprint(),
+    )
+
+
+def build(
+    instruments: Instruments,
+    profile: VesselProfile,
+    inputs: Inputs,
+    vessel: str,
+    segment_ids: tuple[str, ...],
+    told: dict[str, Any],
+) -> ParameterSet:
+    """Compute the parameter set that some inputs describe; nothing is stored.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        Series of the log.
+    profile : VesselProfile
+    inputs : Inputs
+        One segment.
+    vessel : str
+    segment_ids : tuple of str
+    told : dict
+        Provenance.
+
+    Raises
+    ------
+    KempfError
+        The segment cannot be identified from; the reason says why.
+    """
+    if len(inputs.bounds) != 1:
+        raise UsageError(
+            "one_segment_at_a_time",
+            f"{len(inputs.bounds)} segments were given; a parameter set is identified from one.",
+            "Identify them one by one.",
+        )
+    bounds, spec = inputs.bounds[0], ModelSpec.model_validate(dict(inputs.model_spec))
+    arm = spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
+    record = make_record(instruments, bounds.start_utc_ns, bounds.end_utc_ns)
+    result = estimate(inputs.estimator, record, spec, arm or 0.0, dict(inputs.settings))
+    unknown_arm = ("wind_arm_per_m is not in the profile: the wind is taken to act without a moment",)
+    return ParameterSet(
+        parameter_set_id=parameter_set_id(inputs),
+        vessel=vessel,
+        model_name=spec.name,
+        model_spec=spec.model_dump(mode="json"),
+        model_sha256=spec.sha256,
+        estimator=inputs.estimator,
+        settings=dict(inputs.settings),
+        segment_ids=segment_ids,
+        log_ids=inputs.log_ids,
+        start_utc_ns=bounds.start_utc_ns,
+        parameters=_stored(result.parameters),
+        discrete=_stored(result.discrete),
+        noise=_stored(result.noise),
+        covariance_names=tuple(HULL_PARAMETERS),
+        covariance=tuple(tuple(float(x) for x in row) for row in result.covariance),
+        fit=result.fit,
+        iterations=list(result.iterations),
+        convergence=_with_grid(result),
+        warnings=(*result.warnings, *(unknown_arm if arm is None else ())),
+        parent=spec.parent,
+        provenance=told,
+    )
+
+
+def _stored(values: Sequence[Value]) -> tuple[Estimate, ...]:
+    return tuple(Estimate(v.name, v.value, v.std, v.unit) for v in values)
+
+
+def _with_grid(result: PipelineEstimate) -> dict[str, Any]:
+    return {"converged": result.converged, **result.report}

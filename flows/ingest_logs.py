@@ -1,0 +1,173 @@
+"""The job that takes raw logs in: read, deposit, find the zigzags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from flows.files import read_bytes
+from flows.find_segments import find_segments
+from flows.progress import Progress, silent
+from pipeline.ingest.read import read_log
+from pipeline.ingest.readings import Tally
+from schemas.errors import KempfError, UsageError
+from schemas.profile import VesselProfile, overlay
+from warehouse import code_version, logs, vessels
+from warehouse.deposit import Delivery, deposit, held
+from warehouse.segments import Segment
+from warehouse.segments import current as current_segments
+from warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class IngestOutcome:
+    """What became of one file.
+
+    Attributes
+    ----------
+    path : str
+        As given.
+    outcome : str
+        ``new``, ``reread``, ``unchanged`` or ``failed``.
+    log_id, ingest_id : str or None
+    tally : Tally or None
+        Records and values read, kept and rejected.
+    notes : tuple of str
+        How it was read, and why zigzags could not be looked for, where that is so.
+    segments : tuple of Segment
+        Found in this log.
+    error : KempfError or None
+        Why it failed; then nothing of the log was stored.
+    """
+
+    path: str
+    outcome: str
+    log_id: str | None = None
+    ingest_id: str | None = None
+    tally: Tally | None = None
+    notes: tuple[str, ...] = ()
+    segments: tuple[Segment, ...] = ()
+    error: KempfError | None = None
+
+    def show(self) -> dict[str, Any]:
+        """Return the outcome as JSON content."""
+        return {
+            "path": self.path,
+            "outcome": self.outcome,
+            "log_id": self.log_id,
+            "ingest_id": self.ingest_id,
+            "records": _ledger(self.tally, "records"),
+            "values": _ledger(self.tally, "values"),
+            "rejected_by_reason": dict(self.tally.by_reason) if self.tally else {},
+            "notes": list(self.notes),
+            "segments": [segment.segment_id for segment in self.segments],
+            **(self.error.to_json() if self.error else {}),
+        }
+
+
+def _ledger(tally: Tally | None, of: str) -> dict[str, int] | None:
+    if tally is None:
+        return None
+    return {part: getattr(tally, f"{of}_{part}") for part in ("read", "kept", "rejected")}
+
+
+def settle_vessel(
+    warehouse: Warehouse, vessel: str | None, given: VesselProfile | None
+) -> tuple[str, VesselProfile]:
+    """Say whose logs they are and with which profile they are read.
+
+    A given profile is laid over the stored one: what it says is new, what it leaves out stays.
+
+    Raises
+    ------
+    UsageError
+        ``no_vessel_named``, or ``profiles_disagree``: the option and the profile name different vessels.
+    """
+    told = given.vessel if given else None
+    if vessel is not None and told is not None and vessel != told:
+        raise UsageError(
+            "profiles_disagree",
+            f"--vessel says {vessel!r}, the profile says {told!r}.",
+            "Make them agree, or leave one of them out.",
+            {"option": vessel, "profile": told},
+        )
+    name = vessel if vessel is not None else told
+    if name is None:
+        raise UsageError(
+            "no_vessel_named",
+            "Whose logs are these? Neither --vessel nor a profile names the vessel.",
+            "Add --vessel NAME.",
+        )
+    known = warehouse.exists() and name in vessels.names(warehouse)
+    stored = vessels.current(warehouse, name) if known else VesselProfile()
+    return name, overlay(stored, given or VesselProfile()).model_copy(update={"vessel": name})
+
+
+def ingest(
+    warehouse: Warehouse,
+    paths: Sequence[Path],
+    vessel: str | None = None,
+    given: VesselProfile | None = None,
+    progress: Progress = silent,
+) -> list[IngestOutcome]:
+    """Take logs in; one that fails does not stop the others, and leaves nothing behind.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none, with the first log that can be read.
+    paths : sequence of Path
+        Raw logs.
+    vessel : str, optional
+        Whose they are; else the profile tells.
+    given : VesselProfile, optional
+        Laid over the stored profile of the vessel.
+    progress : Progress, optional
+
+    Returns
+    -------
+    list of IngestOutcome
+        One a path, in order.
+
+    Raises
+    ------
+    UsageError
+        Nobody says whose the logs are, or two say different things.
+    """
+    name, profile = settle_vessel(warehouse, vessel, given)
+    outcomes = []
+    for done, path in enumerate(paths):
+        progress(done, len(paths), f"reading {path.name}")
+        try:
+            outcomes.append(ingest_bytes(warehouse, name, path.name, read_bytes(path, "raw log"), profile, str(path)))
+        except KempfError as error:
+            outcomes.append(IngestOutcome(str(path), "failed", error=error))
+    progress(len(paths), len(paths), "done")
+    return outcomes
+
+
+def ingest_bytes(
+    warehouse: Warehouse, vessel: str, file_name: str, data: bytes, profile: VesselProfile, path: str
+) -> IngestOutcome:
+    """Take one log in.
+
+    Raises
+    ------
+    KempfError
+        The log cannot be read, or is another vessel's; nothing of it was stored.
+    """
+    code = code_version.fingerprint()
+    there = held(warehouse, vessel, file_name, data, profile_sha256=profile.sha256, code_version=code)
+    if there is not None:
+        row = logs.of_ingest(warehouse, there.ingest_id)
+        found = tuple(s for s in current_segments(warehouse, vessel) if s.ingest_id == there.ingest_id)
+        return IngestOutcome(path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found)
+    readings = read_log(file_name, data, profile)
+    stored = deposit(warehouse, [Delivery(vessel, file_name, data, profile, readings, code)])[0]
+    row = logs.of_ingest(warehouse, stored.ingest_id)
+    segments, notes = find_segments(warehouse, row, profile, readings.frame)
+    return IngestOutcome(
+        path, stored.outcome, row.log_id, row.ingest_id, row.tally, (*row.notes, *notes), tuple(segments)
+    )

@@ -1,0 +1,92 @@
+"""The job that builds a stored parameter set again from the raw bytes and compares every bit."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from flows.identify_vessel import build
+from pipeline.ingest.read import read_log
+from pipeline.normalise.instruments import from_readings
+from warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
+from warehouse.agreement import Difference
+from warehouse.parameter_set import Bounds, Inputs, ParameterSet
+from warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """The verdict on one parameter set.
+
+    Attributes
+    ----------
+    parameter_set_id : str
+    verdict : str
+        ``bit-identical``, ``equal within tolerance`` or ``different``.
+    differences : list of Difference
+        Fields that differ.
+    code_changed, packages_changed : bool, dict
+        Whether the code, and which packages, are others than when the set was made.
+    """
+
+    parameter_set_id: str
+    verdict: str
+    differences: list[Difference]
+    code_changed: bool
+    packages_changed: dict[str, list[str | None]]
+
+    def show(self) -> dict[str, Any]:
+        """Return the verdict as JSON content."""
+        return {
+            "parameter_set_id": self.parameter_set_id,
+            "verdict": self.verdict,
+            "differences": [difference.as_json() for difference in self.differences],
+            "code_changed": self.code_changed,
+            "packages_changed": self.packages_changed,
+        }
+
+
+def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
+    """Build a parameter set again from the raw bytes; nothing is stored.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    name : str
+        Its id, or a beginning of it.
+    tolerance : float, optional
+        Largest relative difference that still counts as equal.
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter_set``, ``no_raw_log``, ``no_profile``.
+    KempfError
+        ``raw_bytes_damaged``.
+    """
+    stored = parameter_sets.get(warehouse, name)
+    inputs = _inputs(stored)
+    profile = vessels.get(warehouse, inputs.profile_sha256)
+    log_id = inputs.log_ids[0]
+    file_name = logs.of_ingest(warehouse, str(stored.provenance["ingest_ids"][0])).file_name
+    instruments = from_readings(read_log(file_name, raw.get(warehouse, log_id), profile).frame)
+    rebuilt = build(instruments, profile, inputs, stored.vessel, stored.segment_ids, dict(stored.provenance))
+    verdict, differences = agreement.verdict(stored, rebuilt, tolerance)
+    now, then = code_version.packages(), dict(stored.provenance.get("packages") or {})
+    changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}
+    return Rerun(
+        stored.parameter_set_id, verdict, differences, inputs.code_version != code_version.fingerprint(), changed
+    )
+
+
+def _inputs(stored: ParameterSet) -> Inputs:
+    told = stored.provenance["inputs"]
+    return Inputs(
+        log_ids=tuple(told["log_ids"]),
+        profile_sha256=told["profile_sha256"],
+        bounds=tuple(Bounds(**bounds) for bounds in told["segments"]),
+        model_spec=told["model"],
+        estimator=told["estimator"],
+        settings=told["settings"],
+        code_version=told["code_version"],
+    )

@@ -1,0 +1,73 @@
+"""The entry of the room: all zigzags of one log, found without being told what was ordered.
+
+Rudder legs that alternate are candidates (`legs`), the headings at which they switch decide (`switching`), what is told
+of them is measured in `describe`.
+"""
+
+from __future__ import annotations
+
+from pipeline.normalise.series import Series
+from pipeline.segment.describe import describe
+from pipeline.segment.legs import find_chains
+from pipeline.segment.measured import Signals, measure
+from pipeline.segment.settings import SegmentSettings
+from pipeline.segment.short import is_trial
+from pipeline.segment.switching import Chain, Switching, zigzags_in
+from pipeline.segment.zigzag import Zigzag
+
+_DEFAULT = SegmentSettings()
+
+
+def find_manoeuvres(
+    heading: Series, rudder: Series, speed: Series | None = None, settings: SegmentSettings = _DEFAULT
+) -> list[Zigzag]:
+    """Find every zigzag in a log.
+
+    Parameters
+    ----------
+    heading : Series
+        Unwrapped heading at its own rate, rad.
+    rudder : Series
+        Rudder angle at its own rate, rad, positive to starboard. Samples that a logger merely held should be left out.
+    speed : Series, optional
+        Speed through the water, m/s.
+    settings : SegmentSettings, optional
+        Thresholds.
+
+    Returns
+    -------
+    list of Zigzag
+        In order of time, none overlapping another; empty where there is none.
+
+    References
+    ----------
+    IMO MSC.137(76), Standards for ship manoeuvrability, and MSC/Circ.1053, its explanatory notes; ITTC 7.5-04-02-01.
+    """
+    if len(heading) < 5 or len(rudder) < 5:
+        return []
+    signals = Signals.of(heading, rudder)
+    candidates: list[tuple[Chain, Switching, float]] = []
+    for legs in find_chains(signals.rudder_s, signals.rudder, settings):
+        chain, window_s = measure(signals, legs, settings)
+        candidates += [
+            (chain, found, window_s)
+            for found in zigzags_in(chain, settings)
+            if is_trial(signals, chain, found, window_s)
+        ]
+    # the same manoeuvre is seen at several rudder bands: the longest view of it, then the most regular one
+    candidates.sort(key=lambda c: (c[1].first - c[1].last, c[1].scatter, _span(c[0], c[1])))
+    taken: list[tuple[Chain, Switching, float]] = []
+    for candidate in candidates:
+        begin, end = _span(candidate[0], candidate[1])
+        spans = (_span(chain, found) for chain, found, _ in taken)
+        if all(end <= other_begin or begin >= other_end for other_begin, other_end in spans):
+            taken.append(candidate)
+    taken.sort(key=lambda c: _span(c[0], c[1]))
+    return [
+        describe(signals, chain, found, window_s, speed=speed, settings=settings) for chain, found, window_s in taken
+    ]
+
+
+def _span(chain: Chain, found: Switching) -> tuple[float, float]:
+    """Return from when to when the rudder is held in the zigzag, s."""
+    return chain.legs[found.first].start_s, chain.legs[found.last].end_s

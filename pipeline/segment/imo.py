@@ -1,0 +1,157 @@
+"""The zigzag criteria of IMO resolution MSC.137(76), section 5.3.3, on one zigzag.
+
+Overshoots beyond the nominal heading are judged, the larger of the two readings: a late helmsman does not help a ship.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from pipeline.segment.zigzag import Zigzag
+
+#: The standards apply to ships of this length and more, and to chemical tankers and gas carriers of any length, m.
+SHORTEST_SHIP_M = 100.0
+
+#: The test speed is at least this share of the speed at 85 % of the engine's output.
+SLOWEST_SHARE = 0.9
+
+
+@dataclass(frozen=True)
+class Criterion:
+    """One criterion and how the zigzag did.
+
+    Attributes
+    ----------
+    name : str
+        ``10/10 first overshoot``, ``10/10 second overshoot`` or ``20/20 first overshoot``.
+    value_deg : float or None
+        Measured overshoot beyond the nominal heading; None where its peak was not reached.
+    limit_deg : float or None
+        Largest overshoot allowed; None where length or speed is missing.
+    passed : bool or None
+        None where the criterion is not applicable.
+    why : str
+        Why it is not applicable; empty where it is.
+    """
+
+    name: str
+    value_deg: float | None
+    limit_deg: float | None
+    passed: bool | None
+    why: str
+
+
+def first_overshoot_limit(length_m: float, speed_m_s: float) -> float:
+    """Return the limit of the first overshoot of a 10/10 zigzag, deg.
+
+    Parameters
+    ----------
+    length_m : float
+        Length between perpendiculars.
+    speed_m_s : float
+        Test speed.
+
+    Returns
+    -------
+    float
+        10 deg below ``L/V = 10 s``, 20 deg from 30 s, ``5 + L/V / 2`` between.
+
+    Examples
+    --------
+    >>> first_overshoot_limit(160.0, 8.0)
+    15.0
+    """
+    ratio = length_m / speed_m_s
+    return 10.0 if ratio < 10.0 else 20.0 if ratio >= 30.0 else 5.0 + 0.5 * ratio
+
+
+def second_overshoot_limit(length_m: float, speed_m_s: float) -> float:
+    """Return the limit of the second overshoot of a 10/10 zigzag, deg.
+
+    Parameters
+    ----------
+    length_m : float
+        Length between perpendiculars.
+    speed_m_s : float
+        Test speed.
+
+    Returns
+    -------
+    float
+        25 deg below ``L/V = 10 s``, 40 deg from 30 s, ``17.5 + 0.75 L/V`` between.
+
+    Examples
+    --------
+    >>> second_overshoot_limit(160.0, 8.0)
+    32.5
+    """
+    ratio = length_m / speed_m_s
+    return 25.0 if ratio < 10.0 else 40.0 if ratio >= 30.0 else 17.5 + 0.75 * ratio
+
+
+def judge(zigzag: Zigzag, length_m: float | None, trial_speed_m_s: float | None) -> tuple[Criterion, ...]:
+    """Judge a zigzag by the criteria.
+
+    Parameters
+    ----------
+    zigzag : Zigzag
+        The manoeuvre.
+    length_m : float or None
+        Length between perpendiculars, from the vessel's profile.
+    trial_speed_m_s : float or None
+        Speed at 85 % of the engine's output, from the vessel's profile. L/V takes the speed measured in the approach,
+        and this one where none was measured.
+
+    Returns
+    -------
+    tuple of Criterion
+        Two for a 10/10, one for a 20/20; one that says why nothing applies for any other.
+
+    References
+    ----------
+    IMO MSC.137(76), 5.3.3; MSC/Circ.1053.
+    """
+    angles = (zigzag.psi0_deg, zigzag.delta0_deg)
+    measured = zigzag.speed.approach_m_s if zigzag.speed is not None else None
+    speed = measured or trial_speed_m_s
+    names: tuple[str, ...] = ("20/20 first overshoot",)
+    limits: tuple[float, ...] = (25.0,)
+    if angles == (10.0, 10.0):
+        names = ("10/10 first overshoot", "10/10 second overshoot")
+        if not length_m or not speed:
+            why = f"the {'length' if not length_m else 'speed'} of the ship is not known"
+            return tuple(Criterion(name, _overshoot(zigzag, k), None, None, why) for k, name in enumerate(names))
+        limits = (first_overshoot_limit(length_m, speed), second_overshoot_limit(length_m, speed))
+    elif angles != (20.0, 20.0):
+        why = f"the standard knows 10/10 and 20/20 zigzags, this is a {angles[0]:g}/{angles[1]:g} one"
+        return (Criterion("overshoot", _overshoot(zigzag, 0), None, None, why),)
+    obstacle = _obstacle(zigzag, length_m, measured, trial_speed_m_s)
+    return tuple(
+        _one(zigzag, k, name, limit, obstacle) for k, (name, limit) in enumerate(zip(names, limits, strict=True))
+    )
+
+
+def _one(zigzag: Zigzag, number: int, name: str, limit: float, obstacle: str) -> Criterion:
+    value = _overshoot(zigzag, number)
+    why = obstacle or ("the manoeuvre was broken off before this overshoot" if value is None else "")
+    return Criterion(name, value, limit, None if why or value is None else value <= limit, why)
+
+
+def _overshoot(zigzag: Zigzag, number: int) -> float | None:
+    return zigzag.overshoots[number].beyond_nominal_deg if number < len(zigzag.overshoots) else None
+
+
+def _obstacle(zigzag: Zigzag, length_m: float | None, measured_m_s: float | None, trial_m_s: float | None) -> str:
+    """Return why the trial is none in the sense of the standard, or an empty text."""
+    if zigzag.quality.start != "steady":
+        return "the approach was not steady"
+    if not length_m:
+        return "the length of the ship is not known"
+    if length_m < SHORTEST_SHIP_M:
+        return f"the ship is {length_m:g} m long, the standard begins at {SHORTEST_SHIP_M:g} m"
+    if measured_m_s and trial_m_s and measured_m_s < SLOWEST_SHARE * trial_m_s:
+        return (
+            f"the approach speed of {measured_m_s:.1f} m/s is below {100 * SLOWEST_SHARE:.0f} % of the trial speed "
+            f"{trial_m_s:g} m/s"
+        )
+    return ""

@@ -1,0 +1,77 @@
+"""Whether two or three legs are a short zigzag, or hand steering and course changes that look like one.
+
+Three legs hold two switchings, which nearly always lie symmetric about something, and two legs only one, which agrees
+with itself. So more is asked: round angles, as they are ordered for a trial, and of two legs that the second one is
+held until the ship has swung back. On a new course the counter rudder is taken off when the swing stops.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.segment.local_fit import peak, value_and_rate
+from pipeline.segment.measured import Signals
+from pipeline.segment.nominal import HEADING_TOLERANCE, RUDDER_TOLERANCE, is_customary, measured_angles
+from pipeline.segment.switching import Chain, Switching
+
+#: Largest difference between the two rudder angles, as a share and at least in rad: both were ordered alike.
+_ALIKE_SHARE = 0.04
+_ALIKE_RAD = float(np.deg2rad(0.3))
+
+#: Longest leg that may follow, as a share of the second: the rudder of the autopilot that takes over passes the angle.
+_PASSING_SHARE = 0.5
+
+#: How far past the opposite switching heading the ship may swing under the second leg, as a share of psi0.
+_PAST_SHARE = 0.5
+
+
+def is_trial(signals: Signals, chain: Chain, found: Switching, window_s: float) -> bool:
+    """Whether a zigzag of few legs was run as one.
+
+    Parameters
+    ----------
+    signals : Signals
+        Heading and rudder.
+    chain : Chain
+        The chain of legs.
+    found : Switching
+        Part of it.
+    window_s : float
+        Half width of the local cubic, s.
+
+    Returns
+    -------
+    bool
+        True for more than three legs. For fewer, where rudder and heading change are customary angles; for two,
+        where moreover no other leg follows, the approach is steady, both rudder angles are alike, and the ship swung
+        back past where the rudder was reversed, but no farther than in a zigzag.
+    """
+    if found.last - found.first > 2:
+        return True
+    psi0, delta0, late = measured_angles(chain, found)
+    if not (is_customary(delta0, 0.0, RUDDER_TOLERANCE) and is_customary(psi0, late, HEADING_TOLERANCE)):
+        return False
+    return found.last - found.first > 1 or _swung_back(signals, chain, found, window_s)
+
+
+def _swung_back(signals: Signals, chain: Chain, found: Switching, window_s: float) -> bool:
+    """Whether the second of two legs was held until the ship had swung back."""
+    first, second = chain.legs[found.first], chain.legs[found.last]
+    follows = chain.legs[found.last + 1 :]
+    if found.start != "steady" or any(leg.duration_s > _PASSING_SHARE * second.duration_s for leg in follows):
+        return False
+    offset = abs(abs(first.rudder) - abs(second.rudder))
+    if offset > max(_ALIKE_SHARE * (abs(first.rudder) + abs(second.rudder)) / 2, _ALIKE_RAD):
+        return False
+    ramp = chain.ramps[found.last]
+    if ramp is None:
+        return False
+    turned = peak(
+        signals.heading_s, signals.heading, ramp.start_s, second.end_s, side=first.side, half_window_s=window_s
+    )
+    if turned is None:
+        return False
+    at_end = value_and_rate(signals.heading_s, signals.heading, min(second.end_s, signals.heading_s[-1]), window_s)[0]
+    swung = first.side * (at_end - found.base_heading)
+    back = first.side * (float(chain.heading[found.last]) - found.base_heading)
+    return bool(-(1.0 + _PAST_SHARE) * found.heading_change <= swung <= back)

@@ -1,0 +1,188 @@
+"""Which part of a chain of rudder legs is one zigzag: the heading must switch the rudder at K0 + psi0 and K0 - psi0.
+
+Overshoots may grow and the speed may fall: that is the ship's answer, the manoeuvre is a zigzag for as long as the
+order was carried out. It is none where no course was steady before and too few switchings agree to tell K0 instead, as
+when a ship that no longer obeys is given the next order. Overshoots and phases are measured later.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.normalise.series import Float
+from pipeline.segment.legs import Leg
+from pipeline.segment.ramps import Ramp
+from pipeline.segment.settings import SegmentSettings
+
+#: How the first leg of a zigzag begins, see `Switching.start`.
+Start = Literal["steady", "turning", "switching", "unknown"]
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """A chain of legs with what was measured at its executes.
+
+    Attributes
+    ----------
+    legs : list of Leg
+        The legs, alternating.
+    ramps : list of (Ramp or None)
+        The movement that begins each leg; None where the log begins with the rudder over.
+    heading : ndarray, shape (n,)
+        Heading at each execute, rad; NaN where there is none.
+    yaw_rate : ndarray, shape (n,)
+        Yaw rate at each execute, rad/s.
+    unbroken : ndarray of bool, shape (n - 1,)
+        Whether heading and rudder were recorded from each leg to the next.
+    """
+
+    legs: list[Leg]
+    ramps: list[Ramp | None]
+    heading: Float
+    yaw_rate: Float
+    unbroken: list[bool]
+
+
+@dataclass(frozen=True)
+class Switching:
+    """A zigzag within a chain.
+
+    Attributes
+    ----------
+    first, last : int
+        First and last leg in the chain.
+    start : {"steady", "turning", "switching", "unknown"}
+        How the first leg begins: from a steady course; from K0 with the ship still turning; at the opposite switching
+        heading, so that the log or another manoeuvre hides the approach; or unseen.
+    base_heading : float
+        K0: the heading at the first execute where it starts from K0, else the middle of both switching headings, rad.
+    centre : float
+        Middle of the switching headings, rad.
+    heading_change : float
+        Measured psi0: half the distance of the switching headings, or the only one's from K0, rad.
+    scatter : float
+        Largest difference of a switching heading from ``centre +- heading_change``, rad.
+    """
+
+    first: int
+    last: int
+    start: Start
+    base_heading: float
+    centre: float
+    heading_change: float
+    scatter: float
+
+
+def zigzags_in(chain: Chain, settings: SegmentSettings) -> list[Switching]:
+    """Find the zigzags in a chain, from the left, each as long as it goes.
+
+    One that starts from a steady approach is looked for first. What is left over may be one whose approach was not
+    steady or not recorded; since K0 is then told by the switchings alone, more of them must agree.
+
+    Parameters
+    ----------
+    chain : Chain
+        Legs and what was measured at their executes.
+    settings : SegmentSettings
+        Thresholds.
+
+    Returns
+    -------
+    list of Switching
+        In order of time, without common legs.
+    """
+    steady = _scan(chain, 0, len(chain.legs) - 1, settings, steady=True)
+    borders = [-1, *(k for s in steady for k in (s.first, s.last)), len(chain.legs)]
+    others = [
+        found
+        for begin, end in zip(borders[::2], borders[1::2], strict=True)
+        for found in _scan(chain, begin + 1, end - 1, settings, steady=False)
+    ]
+    return sorted(steady + others, key=lambda s: s.first)
+
+
+def _scan(chain: Chain, first: int, last: int, settings: SegmentSettings, *, steady: bool) -> list[Switching]:
+    """Go through a range of legs and take the longest zigzag that starts at each."""
+    found: list[Switching] = []
+    leg = first
+    while leg < last:
+        best = _longest(chain, leg, last, settings, steady=steady)
+        if best is None:
+            leg += 1
+            continue
+        found.append(best)
+        leg = best.last + 1
+    return found
+
+
+def _longest(chain: Chain, leg: int, last: int, settings: SegmentSettings, *, steady: bool) -> Switching | None:
+    """Return the longest zigzag from a leg on, if it starts in the way that is looked for."""
+    candidates: list[Switching] = []
+    for end in range(leg + 1, last + 1):
+        if not chain.unbroken[end - 1] or not np.isfinite(chain.heading[end]):
+            break
+        candidate = _judge(chain, leg, end, settings)
+        if candidate is not None:
+            candidates.append(candidate)
+        elif end >= leg + 3:
+            break
+    from_steady = [c for c in candidates if c.start == "steady"]
+    # a long zigzag from a course that was not quite steady is not cut down to a short one that was
+    long = bool(candidates) and candidates[-1].last - leg >= settings.switchings_without_approach
+    if long and candidates[-1].start != "steady":
+        return None if steady else candidates[-1]
+    return from_steady[-1] if steady and from_steady else None
+
+
+def _judge(chain: Chain, first: int, last: int, settings: SegmentSettings) -> Switching | None:
+    """Whether the executes after the first one switch symmetrically about a heading, and how the first one starts."""
+    switched = np.arange(first + 1, last + 1)
+    heading = chain.heading[switched]
+    side = np.array([chain.legs[k - 1].side for k in switched])
+    start = float(chain.heading[first])
+    if switched.size == 1:
+        centre, change = start, float(side[0] * (heading[0] - start))
+    else:
+        starboard, port = float(np.mean(heading[side > 0])), float(np.mean(heading[side < 0]))
+        centre, change = (starboard + port) / 2, (starboard - port) / 2
+    # written so that NaN fails
+    if not np.deg2rad(settings.smallest_heading_deg) <= change <= np.deg2rad(settings.largest_heading_deg):
+        return None
+    slack = float(np.deg2rad(settings.switching_slack_deg))
+    tolerance = max(settings.switching_scatter * change, slack)
+    scatter = float(np.max(np.abs(heading - centre - side * change)))
+    if scatter > tolerance or not _one_rate(chain.ramps[first + 1 : last + 1], settings):
+        return None
+    swing = float(np.mean(np.abs(chain.yaw_rate[switched])))
+    how = _start(chain, first, settings, centre=centre, change=change, swing=swing)
+    base = start if how in ("steady", "turning") else centre
+    return Switching(first, last, how, base, centre, change, scatter)
+
+
+def _start(chain: Chain, first: int, settings: SegmentSettings, *, centre: float, change: float, swing: float) -> Start:
+    """Tell how the first leg begins."""
+    ramp, leg = chain.ramps[first], chain.legs[first]
+    if ramp is None or not np.isfinite(chain.heading[first]):
+        return "unknown"
+    away = float(chain.heading[first]) - centre
+    slack = float(np.deg2rad(settings.switching_slack_deg))
+    if abs(away + leg.side * change) <= max(settings.switching_scatter * change, slack):
+        return "switching"
+    other = chain.legs[first + 1]
+    offset, amplitude = (leg.rudder + other.rudder) / 2, abs(leg.rudder - other.rudder) / 2
+    if not _one_rate([ramp, *chain.ramps[first + 1 : first + 3]], settings):
+        return "unknown"
+    # a helmsman starts from a steady course with the rudder about amidships
+    amidships = abs(ramp.held_before - offset) <= settings.approach_rudder_share * amplitude
+    if not amidships or abs(away) > max(settings.approach_share * change, slack):
+        return "unknown"
+    return "steady" if abs(float(chain.yaw_rate[first])) <= settings.steady_share * swing else "turning"
+
+
+def _one_rate(ramps: list[Ramp | None], settings: SegmentSettings) -> bool:
+    """Whether the rudder moved at one rate, as a steering gear does when ordered over; an autopilot's is any."""
+    rates = [abs(ramp.rate) for ramp in ramps if ramp is not None and np.isfinite(ramp.rate)]
+    return not rates or min(rates) >= settings.rate_share * max(rates)

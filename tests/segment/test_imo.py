@@ -1,0 +1,74 @@
+"""The IMO criteria: limits by the resolution's table, and when they do not apply."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from pipeline.segment.find import find_manoeuvres
+from pipeline.segment.imo import first_overshoot_limit, judge, second_overshoot_limit
+from pipeline.segment.zigzag import SpeedConstancy, Zigzag
+from tests.segment.nomoto import Instruments, Ship, measure
+
+
+def zigzag(psi0: float, delta0: float, legs: int = 5) -> Zigzag:
+    ship = Ship()
+    ship.wait(0.0, 60.0)
+    ship.zigzag(psi0, delta0, 1, legs)
+    return find_manoeuvres(*measure(ship, Instruments()))[0]
+
+
+@pytest.mark.parametrize(
+    ("ratio", "first", "second"),
+    [
+        (5.0, 10.0, 25.0),
+        (9.999, 10.0, 25.0),
+        (10.0, 10.0, 25.0),
+        (20.0, 15.0, 32.5),
+        (30.0, 20.0, 40.0),
+        (50.0, 20.0, 40.0),
+    ],
+)
+def test_limits_of_the_resolution(ratio: float, first: float, second: float) -> None:
+    assert first_overshoot_limit(8.0 * ratio, 8.0) == pytest.approx(first)
+    assert second_overshoot_limit(8.0 * ratio, 8.0) == pytest.approx(second)
+
+
+def test_ten_ten_and_twenty_twenty() -> None:
+    ten = judge(zigzag(10, 10), 160.0, 8.0)
+    assert [c.name for c in ten] == ["10/10 first overshoot", "10/10 second overshoot"]
+    assert [c.limit_deg for c in ten] == [15.0, 32.5]
+    assert [c.passed for c in ten] == [True, True]
+    (twenty,) = judge(zigzag(20, 20), 160.0, None)
+    assert (twenty.limit_deg, twenty.passed, twenty.why) == (25.0, True, "")
+
+
+def test_too_large_an_overshoot_fails() -> None:
+    good = zigzag(20, 20)
+    bad = replace(good, overshoots=(replace(good.overshoots[0], beyond_nominal_deg=25.1), *good.overshoots[1:]))
+    assert judge(bad, 160.0, 8.0)[0].passed is False
+    edge = replace(good, overshoots=(replace(good.overshoots[0], beyond_nominal_deg=25.0), *good.overshoots[1:]))
+    assert judge(edge, 160.0, 8.0)[0].passed is True
+
+
+def test_not_applicable_says_why() -> None:
+    ten = zigzag(10, 10)
+    assert "length" in judge(ten, None, 8.0)[0].why
+    assert "speed" in judge(ten, 160.0, None)[0].why
+    assert "100 m" in judge(ten, 88.0, 6.0)[0].why
+    assert "10/20" in judge(zigzag(10, 20), 160.0, 8.0)[0].why
+    turning = replace(ten, quality=replace(ten.quality, start="turning"))
+    assert "steady" in judge(turning, 160.0, 8.0)[0].why
+    slow = replace(ten, speed=SpeedConstancy(approach_m_s=7.0, mean_m_s=6.5, std_m_s=0.1, trend_percent=0.0))
+    assert "90 %" in judge(slow, 160.0, 8.0)[0].why
+    short = replace(ten, overshoots=ten.overshoots[:1])
+    assert "broken off" in judge(short, 160.0, 8.0)[1].why
+    for case in (judge(ten, 88.0, 6.0), judge(turning, 160.0, 8.0), judge(slow, 160.0, 8.0)):
+        assert all(c.passed is None for c in case)
+
+
+def test_speed_of_the_approach_counts() -> None:
+    ten = zigzag(10, 10)
+    fast = replace(ten, speed=SpeedConstancy(approach_m_s=16.0, mean_m_s=15.0, std_m_s=0.1, trend_percent=0.0))
+    assert judge(fast, 160.0, 8.0)[0].limit_deg == 10.0
