@@ -50,9 +50,7 @@ def find_segments(
         segments.replace(warehouse, row.vessel, {row.ingest_id: []})
         return [], (*instruments.notes, note)
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
-    found = [
-        _segment(zigzag, row, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)
-    ]
+    found = [_segment(zigzag, row, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)]
     segments.replace(warehouse, row.vessel, {row.ingest_id: found})
     return found, instruments.notes
 

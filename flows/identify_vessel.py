@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from os import cpu_count
 from typing import Any
 
@@ -27,7 +27,7 @@ from warehouse.store import Warehouse
 class Request:
     """What a person asks for: which model, which estimator, which of its settings differ from the defaults."""
 
-    spec: ModelSpec = ModelSpec()
+    spec: ModelSpec = field(default_factory=ModelSpec)
     estimator: str = "ml"
     settings: tuple[tuple[str, Any], ...] = ()
 
@@ -49,7 +49,7 @@ class IdentifyOutcome:
 def identify_vessel(
     warehouse: Warehouse,
     vessel: str,
-    request: Request = Request(),  # noqa: B008 - frozen
+    request: Request = Request(),
     *,
     flow_run: str | None = None,
     progress: Progress = silent,
@@ -85,7 +85,8 @@ def identify_vessel(
     by_ingest = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
     profiles = {sha: vessels.get(warehouse, sha) for sha in {row.profile_sha256 for row in by_ingest.values()}}
     outcomes: list[IdentifyOutcome] = []
-    pieces = [(ingest, [s for s in found if s.ingest_id == ingest]) for ingest in dict.fromkeys(s.ingest_id for s in found)]
+    ingests = dict.fromkeys(segment.ingest_id for segment in found)
+    pieces = [(ingest, [s for s in found if s.ingest_id == ingest]) for ingest in ingests]
     with ThreadPoolExecutor(max_workers=cpu_count()) as pool:
         for done, (ingest, hers) in enumerate(pieces):
             row = by_ingest[ingest]

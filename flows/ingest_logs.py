@@ -73,9 +73,7 @@ def _ledger(tally: Tally | None, of: str) -> dict[str, int] | None:
     return {part: getattr(tally, f"{of}_{part}") for part in ("read", "kept", "rejected")}
 
 
-def settle_vessel(
-    warehouse: Warehouse, vessel: str | None, given: VesselProfile | None
-) -> tuple[str, VesselProfile]:
+def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile | None) -> tuple[str, VesselProfile]:
     """Say whose logs they are and with which profile they are read.
 
     A given profile is laid over the stored one: what it says is new, what it leaves out stays.

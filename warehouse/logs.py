@@ -10,7 +10,7 @@ from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 from pipeline.ingest.readings import Tally
-from schemas.errors import DataRejected, NotFound
+from schemas.errors import DataRejected, NotFound, UsageError
 from warehouse import delta
 from warehouse.keys import one_of, vessel_key
 from warehouse.retry import with_retry
@@ -172,3 +172,33 @@ def _row(row: dict[str, Any]) -> LogRow:
     reasons = {str(item["reason"]): item["count"] for item in row.pop("rejected_by_reason")}
     del row["vessel_key"]
     return LogRow(**{**row, "tally": Tally(**counts, by_reason=reasons), "notes": tuple(row["notes"])})
+
+
+def by_prefix(warehouse: Warehouse, name: str) -> LogRow:
+    """Return the current ingest of a log by a beginning of its log id, its ingest id or its file name.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_log``.
+    UsageError
+        ``ambiguous_log``: several fit.
+    """
+    rows = current(warehouse)
+    found = [row for row in rows if name and name in (row.log_id, row.ingest_id, row.file_name)]
+    found = found or [row for row in rows if name and (row.log_id.startswith(name) or row.ingest_id.startswith(name))]
+    if not found:
+        raise NotFound(
+            "no_log",
+            f"There is no log {name!r} in {warehouse.uri}.",
+            "List them with `kempf logs list`.",
+            {"log": name},
+        )
+    if len(found) > 1:
+        raise UsageError(
+            "ambiguous_log",
+            f"{len(found)} logs fit {name!r}: {', '.join(row.log_id[:16] for row in found[:5])}.",
+            "Give more of the id.",
+            {"log": name, "found": [row.log_id for row in found]},
+        )
+    return found[0]

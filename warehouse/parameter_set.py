@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import hypot, nan
 from typing import Any
 
 from warehouse.canonical import canonical_json, plain, sha256
@@ -184,3 +185,30 @@ class ParameterSet:
 
 def _by_name(estimates: Sequence[Estimate]) -> dict[str, dict[str, Any]]:
     return {e.name: {"value": e.value, "std": e.std, "unit": e.unit} for e in estimates}
+
+
+def compare(first: ParameterSet, second: ParameterSet) -> dict[str, dict[str, Any]]:
+    """Return how the parameters of two sets differ, by name.
+
+    Returns
+    -------
+    dict
+        For each parameter that both have: ``first``, ``second``, ``difference`` (second less first), ``in_std``: the
+        difference over its standard error, the two sets taken as independent; None where it is unknown.
+    """
+    others = {p.name: p for p in second.parameters}
+    found: dict[str, dict[str, Any]] = {}
+    for p in first.parameters:
+        if p.name not in others:
+            continue
+        q = others[p.name]
+        spread = hypot(p.std or nan, q.std or nan)
+        difference = q.value - p.value
+        found[p.name] = {
+            "first": p.value,
+            "second": q.value,
+            "difference": difference,
+            "in_std": difference / spread if spread > 0 else None,
+            "unit": p.unit,
+        }
+    return found

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any, Literal, get_args
+from typing import Any
 
 from pipeline.identify import least_squares, maximum_likelihood, paper
 from pipeline.identify.estimate import Estimate
@@ -12,9 +12,6 @@ from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.paper import PaperSettings
 from pipeline.identify.record import Record
 from schemas.model_spec import ModelSpec
-
-Name = Literal["ml", "paper", "least-squares"]
-NAMES: tuple[Name, ...] = get_args(Name)
 
 _SETTINGS: dict[str, type[MaximumLikelihoodSettings] | type[PaperSettings] | type[LeastSquaresSettings]] = {
     "ml": MaximumLikelihoodSettings,
@@ -34,7 +31,7 @@ def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, setti
     Parameters
     ----------
     name : str
-        One of `NAMES`.
+        One of `pipeline.identify.names.NAMES`.
     record : Record
     spec : ModelSpec
     arm_per_m : float
@@ -46,7 +43,7 @@ def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, setti
     -------
     Estimate
     """
-    given = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
+    given: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
     chosen = _SETTINGS[name](**given)
     if isinstance(chosen, MaximumLikelihoodSettings):
         return maximum_likelihood.identify(record, spec, arm_per_m, chosen)

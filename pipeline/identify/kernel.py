@@ -21,7 +21,7 @@ N_THETA = 11
 N_STATE = 6
 _ORDER = 14  # Taylor terms: 0.5^15/15! is below the last bit of a double
 _LONGEST = 0.5  # largest |A| h of one step
-_FASTEST_PER_S = 20.0  # no vessel answers her rudder faster; beyond it only the cost grows
+_FASTEST_PER_S = 10.0  # no vessel answers her rudder faster; beyond it only the cost grows
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
@@ -114,7 +114,7 @@ def _discretise(A, b, h, u0, u1, V, active, Phi, g, Q, dPhi, dg, dQ, work):  # t
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _predict_tangent(F, P, x, dF, dx, dP, work):  # type: ignore[no-untyped-def]
-    """dx <- dF x + F dx, dP <- F dP F' + dF P F' + (dF P F')', all (6, 6)."""
+    """Dx <- dF x + F dx, dP <- F dP F' + dF P F' + (dF P F')', all (6, 6)."""
     A, B = work[0], work[1]
     for i in range(N_STATE):
         total = 0.0
@@ -139,6 +139,104 @@ def _predict_tangent(F, P, x, dF, dx, dP, work):  # type: ignore[no-untyped-def]
     for i in range(N_STATE):
         for c in range(N_STATE):
             dP[i, c] = B[i, c] + B[c, i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _rates(theta, V, arm, mu_F, A, b):  # type: ignore[no-untyped-def]
+    """Fill A and b of the chain at a speed; return the size of A in 1/s."""
+    A[0, 0], A[0, 1], A[0, 2] = theta[0] * V, theta[1] * V, 1.0
+    A[1, 0], A[1, 1], A[1, 2] = theta[2] * V, theta[3] * V, arm
+    A[2, 2], A[3, 1] = -mu_F, 1.0
+    b[0], b[1] = theta[4] * V * V, theta[5] * V * V
+    # a balanced norm: the off-diagonal entries count by their product, which no choice of units changes
+    return abs(A[0, 0]) + abs(A[1, 1]) + np.sqrt(abs(A[0, 1] * A[1, 0])) + mu_F
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _advance(x, P, dx, dP, F, dF, active, any_active, step, force, current, work):  # type: ignore[no-untyped-def]
+    """Let x <- F x + g, P <- F P F' + Q, and their derivatives; step = (g, Q, dPhi, dg, dQ) of the chain."""
+    g, Q, dPhi, dg, dQ = step
+    if any_active:
+        for j in range(N_THETA):
+            if not active[j]:
+                continue
+            for i in range(4):
+                for c in range(4):
+                    dF[i, c] = dPhi[j, i, c] if j < 4 else 0.0
+            _predict_tangent(F, P, x, dF, dx[j], dP[j], work)
+            if j < 6:
+                for i in range(4):
+                    dx[j, i] += dg[j, i]
+            for i in range(4):
+                for c in range(4):
+                    if j < 4:
+                        dP[j, i, c] += force * dQ[j, i, c]
+                    elif j == 6:
+                        dP[j, i, c] += 2.0 * force * Q[i, c]
+            if j == 7:
+                dP[j, 4, 4] += 2.0 * current
+                dP[j, 5, 5] += 2.0 * current
+    W, moved = work[0], work[1, 0]
+    for i in range(N_STATE):
+        moved[i] = g[i] if i < 4 else 0.0
+        for c in range(N_STATE):
+            moved[i] += F[i, c] * x[c]
+            W[i, c] = 0.0
+            for m in range(N_STATE):
+                W[i, c] += F[i, m] * P[m, c]
+    for i in range(N_STATE):
+        x[i] = moved[i]
+        for c in range(i + 1):
+            total = force * Q[i, c] if i < 4 and c < 4 else 0.0
+            for m in range(N_STATE):
+                total += W[i, m] * F[c, m]
+            P[i, c] = total
+            P[c, i] = total
+    P[4, 4] += current
+    P[5, 5] += current
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _update(y, h, noise, level, x, P, dx, dP, active, score, information, work):  # type: ignore[no-untyped-def]
+    """Take in one scalar y = h x + noise; return innovation and variance, add to score and information."""
+    Ph, dPh, de, dS = work
+    e, S = y, noise
+    for i in range(N_STATE):
+        e -= h[i] * x[i]
+        Ph[i] = 0.0
+        for c in range(N_STATE):
+            Ph[i] += P[i, c] * h[c]
+    for i in range(N_STATE):
+        S += h[i] * Ph[i]
+    if not (S > 0.0) or not np.isfinite(e):
+        return e, -1.0
+    for j in range(N_THETA):
+        if not active[j]:
+            continue
+        de[j] = 0.0
+        dS[j] = 2.0 * noise if j == level else 0.0
+        for i in range(N_STATE):
+            de[j] -= h[i] * dx[j, i]
+            dPh[j, i] = 0.0
+            for c in range(N_STATE):
+                dPh[j, i] += dP[j, i, c] * h[c]
+            dS[j] += h[i] * dPh[j, i]
+        score[j] += -e * de[j] / S + 0.5 * (e * e / S - 1.0) * dS[j] / S
+        for m in range(j + 1):
+            if active[m]:
+                information[j, m] += de[j] * de[m] / S + 0.5 * dS[j] * dS[m] / (S * S)
+        for i in range(N_STATE):
+            # the gain is Ph / S: its derivative times e, and itself times the derivative of e
+            dx[j, i] += (dPh[j, i] - Ph[i] * dS[j] / S) / S * e + Ph[i] * de[j] / S
+            for c in range(N_STATE):
+                dP[j, i, c] -= (dPh[j, i] * Ph[c] + Ph[i] * dPh[j, c] - Ph[i] * Ph[c] * dS[j] / S) / S
+    for i in range(N_STATE):
+        x[i] += Ph[i] * e / S
+        for c in range(i + 1):
+            value = P[i, c] - Ph[i] * Ph[c] / S
+            P[i, c] = value
+            P[c, i] = value
+    return e, S
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -176,161 +274,53 @@ def likelihood(  # type: ignore[no-untyped-def]
     score : ndarray, shape (11,)
     information : ndarray, shape (11, 11)
     """
-    n = time_s.size
-    score = np.zeros(N_THETA)
-    information = np.zeros((N_THETA, N_THETA))
+    score, information = np.zeros(N_THETA), np.zeros((N_THETA, N_THETA))
     log_likelihood = 0.0
     x, P = x0.copy(), P0.copy()
     dx, dP = np.zeros((N_THETA, N_STATE)), np.zeros((N_THETA, N_STATE, N_STATE))
-    A, b = np.zeros((4, 4)), np.zeros(2)
-    Phi, Q, g = np.zeros((4, 4)), np.zeros((4, 4)), np.zeros(4)
-    dPhi, dQ, dg = np.zeros((4, 4, 4)), np.zeros((4, 4, 4)), np.zeros((6, 4))
-    work4, work5 = np.zeros((11, 4, 4)), np.zeros((2, N_STATE, N_STATE))
-    F, dF = np.zeros((N_STATE, N_STATE)), np.zeros((N_STATE, N_STATE))
-    Ph, dPh, de, dS = np.zeros(N_STATE), np.zeros((N_THETA, N_STATE)), np.zeros(N_THETA), np.zeros(N_THETA)
-    any_active = False
-    for j in range(N_THETA):
-        any_active = any_active or active[j]
-    qF = np.exp(2.0 * theta[6])
-    qV = np.exp(2.0 * theta[7])
-    for k in range(n):
+    A, b, F, dF = np.zeros((4, 4)), np.zeros(2), np.zeros((N_STATE, N_STATE)), np.zeros((N_STATE, N_STATE))
+    Phi, g, Q = np.zeros((4, 4)), np.zeros(4), np.zeros((4, 4))
+    dPhi, dg, dQ = np.zeros((4, 4, 4)), np.zeros((6, 4)), np.zeros((4, 4, 4))
+    work4, work6 = np.zeros((11, 4, 4)), np.zeros((2, N_STATE, N_STATE))
+    update_work = (np.zeros(N_STATE), np.zeros((N_THETA, N_STATE)), np.zeros(N_THETA), np.zeros(N_THETA))
+    h = np.zeros((3, N_STATE))
+    h[0, 0], h[1, 1], h[2, 3] = 1.0, 1.0, 1.0
+    any_active = bool(np.any(active))
+    force, spread = 2.0 * mu_F * np.exp(2.0 * theta[6]), np.exp(2.0 * theta[7])
+    for k in range(time_s.size):
         if k > 0 and time_s[k] > time_s[k - 1]:
-            span = time_s[k] - time_s[k - 1]
-            V = 0.5 * (speed[k] + speed[k - 1])
-            A[0, 0], A[0, 1], A[0, 2] = theta[0] * V, theta[1] * V, 1.0
-            A[1, 0], A[1, 1], A[1, 2] = theta[2] * V, theta[3] * V, arm
-            A[2, 2], A[3, 1] = -mu_F, 1.0
-            b[0], b[1] = theta[4] * V * V, theta[5] * V * V
-            # balanced norm: r is weighed by the length scale sqrt|a12/a21|, so that units do not lengthen the series
-            size = abs(A[0, 0]) + abs(A[1, 1]) + np.sqrt(abs(A[0, 1] * A[1, 0])) + mu_F
+            span, V = time_s[k] - time_s[k - 1], 0.5 * (speed[k] + speed[k - 1])
+            size = _rates(theta, V, arm, mu_F, A, b)
             if not (size <= _FASTEST_PER_S):
                 return -np.inf, score, information
             n_sub = max(1, int(np.ceil(size * span / _LONGEST)))
-            h = span / n_sub
+            decay = np.exp(-mu_V * span / n_sub)
+            F[4, 4], F[5, 5] = decay, decay
+            slope = (rudder[k] - rudder[k - 1]) / n_sub
             for sub in range(n_sub):
-                u0 = rudder[k - 1] + (rudder[k] - rudder[k - 1]) * sub / n_sub
-                u1 = rudder[k - 1] + (rudder[k] - rudder[k - 1]) * (sub + 1) / n_sub
-                _discretise(A, b, h, u0, u1, V, active, Phi, g, Q, dPhi, dg, dQ, work4)
-                decay = np.exp(-mu_V * h)
-                for i in range(4):
-                    for c in range(4):
-                        F[i, c] = Phi[i, c]
-                F[4, 4], F[5, 5] = decay, decay
-                force = 2.0 * mu_F * qF
-                current = qV * (1.0 - decay * decay)
-                if any_active:
-                    for j in range(N_THETA):
-                        if not active[j]:
-                            continue
-                        for i in range(4):
-                            for c in range(4):
-                                dF[i, c] = dPhi[j, i, c] if j < 4 else 0.0
-                        _predict_tangent(F, P, x, dF, dx[j], dP[j], work5)
-                        if j < 6:
-                            for i in range(4):
-                                dx[j, i] += dg[j, i]
-                        if j < 4:
-                            for i in range(4):
-                                for c in range(4):
-                                    dP[j, i, c] += force * dQ[j, i, c]
-                        elif j == 6:
-                            for i in range(4):
-                                for c in range(4):
-                                    dP[j, i, c] += 2.0 * force * Q[i, c]
-                        elif j == 7:
-                            dP[j, 4, 4] += 2.0 * current
-                            dP[j, 5, 5] += 2.0 * current
-                # x <- F x + g, P <- F P F' + Q
-                W = work5[0]
-                for i in range(N_STATE):
-                    total = 0.0
-                    for c in range(N_STATE):
-                        total += F[i, c] * x[c]
-                        inner = 0.0
-                        for m in range(N_STATE):
-                            inner += F[i, m] * P[m, c]
-                        W[i, c] = inner
-                    work5[1, 0, i] = total
-                for i in range(N_STATE):
-                    x[i] = work5[1, 0, i] + (g[i] if i < 4 else 0.0)
-                    for c in range(i + 1):
-                        total = 0.0
-                        for m in range(N_STATE):
-                            total += W[i, m] * F[c, m]
-                        if i < 4 and c < 4:
-                            total += force * Q[i, c]
-                        P[i, c] = total
-                        P[c, i] = total
-                P[4, 4] += current
-                P[5, 5] += current
+                u0, u1 = rudder[k - 1] + slope * sub, rudder[k - 1] + slope * (sub + 1)
+                _discretise(A, b, span / n_sub, u0, u1, V, active, Phi, g, Q, dPhi, dg, dQ, work4)
+                F[:4, :4] = Phi
+                step = (g, Q, dPhi, dg, dQ)
+                current = spread * (1.0 - decay * decay)
+                _advance(x, P, dx, dP, F, dF, active, any_active, step, force, current, work6)
+        h[0, 4], h[0, 5] = current_row[k, 0], current_row[k, 1]
         for channel in range(3):
-            y = measured[k, channel]
-            if np.isnan(y):
+            if np.isnan(measured[k, channel]):
                 continue
-            first = 0 if channel == 0 else (1 if channel == 1 else 3)
             level = 8 + channel
             noise = np.exp(2.0 * theta[level])
-            h1, h2 = current_row[k, 0], current_row[k, 1]
-            if channel == 0:
-                e = y - x[0] - h1 * x[4] - h2 * x[5]
-                for i in range(N_STATE):
-                    Ph[i] = P[i, 0] + h1 * P[i, 4] + h2 * P[i, 5]
-                S = Ph[0] + h1 * Ph[4] + h2 * Ph[5] + noise
-            else:
-                e = y - x[first]
-                for i in range(N_STATE):
-                    Ph[i] = P[i, first]
-                S = Ph[first] + noise
-            if not (S > 0.0) or not np.isfinite(e):
+            e, S = _update(
+                measured[k, channel], h[channel], noise, level, x, P, dx, dP, active, score, information, update_work
+            )
+            if S < 0.0:
                 return -np.inf, score, information
             log_likelihood -= 0.5 * (_LOG_2PI + np.log(S) + e * e / S)
             if innovation.shape[0] > 0:
                 innovation[k, channel] = e
                 variance[k, channel] = S
-            if any_active:
-                for j in range(N_THETA):
-                    if not active[j]:
-                        continue
-                    if channel == 0:
-                        de[j] = -dx[j, 0] - h1 * dx[j, 4] - h2 * dx[j, 5]
-                        for i in range(N_STATE):
-                            dPh[j, i] = dP[j, i, 0] + h1 * dP[j, i, 4] + h2 * dP[j, i, 5]
-                        dS[j] = dPh[j, 0] + h1 * dPh[j, 4] + h2 * dPh[j, 5]
-                    else:
-                        de[j] = -dx[j, first]
-                        for i in range(N_STATE):
-                            dPh[j, i] = dP[j, i, first]
-                        dS[j] = dPh[j, first]
-                    if j == level:
-                        dS[j] += 2.0 * noise
-                    score[j] += -e * de[j] / S + 0.5 * (e * e / S - 1.0) * dS[j] / S
-                for j in range(N_THETA):
-                    if active[j]:
-                        for m in range(j + 1):
-                            if active[m]:
-                                information[j, m] += de[j] * de[m] / S + 0.5 * dS[j] * dS[m] / (S * S)
-                for j in range(N_THETA):
-                    if not active[j]:
-                        continue
-                    for i in range(N_STATE):
-                        # dK e + K de with K = Ph / S
-                        dK = (dPh[j, i] - Ph[i] * dS[j] / S) / S
-                        dx[j, i] += dK * e + Ph[i] * de[j] / S
-                    for i in range(N_STATE):
-                        for c in range(N_STATE):
-                            dP[j, i, c] -= (
-                                dPh[j, i] * Ph[c] + Ph[i] * dPh[j, c] - Ph[i] * Ph[c] * dS[j] / S
-                            ) / S
-            for i in range(N_STATE):
-                x[i] += Ph[i] * e / S
-            for i in range(N_STATE):
-                for c in range(i + 1):
-                    value = P[i, c] - Ph[i] * Ph[c] / S
-                    P[i, c] = value
-                    P[c, i] = value
         if states.shape[0] > 0:
-            for i in range(N_STATE):
-                states[k, i] = x[i]
+            states[k] = x
     for j in range(N_THETA):
         for m in range(j):
             information[m, j] = information[j, m]

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pipeline.identify.estimate import Estimate, Value, hull_values
 from pipeline.identify.record import Record
@@ -65,14 +66,18 @@ def regress(states: Float, inputs: Float, targets: Float) -> Regression:
     regressors = np.column_stack([states, inputs])
     # Columns differ by orders of magnitude (m/s against rad/s): scaled, the rank decision is about directions.
     scale = np.maximum(np.linalg.norm(regressors, axis=0), 1e-300)
-    solution, _, rank, _ = np.linalg.lstsq(regressors / scale, targets, rcond=1e-10)
-    solution = solution / scale[:, None]
+    left, singular, right = np.linalg.svd(regressors / scale, full_matrices=False)
+    rank = int(np.count_nonzero(singular > 1e-10 * singular[0]))
+    inverted = right[:rank].T / singular[:rank] / scale[:, None]
+    solution = inverted @ (left[:, :rank].T @ targets)
+    # What the data do not determine is taken out in the units of [A B] itself, whose norm eq. (14) makes least.
+    undetermined = np.linalg.qr(right[rank:].T / scale[:, None] * np.min(scale))[0]
+    solution -= undetermined @ (undetermined.T @ solution)
     residual = targets - regressors @ solution
     degrees = max(1, targets.shape[0] - regressors.shape[1])
-    inverse = np.linalg.pinv((regressors / scale).T @ (regressors / scale)) / np.outer(scale, scale)
-    std = np.sqrt(np.outer(np.sum(residual**2, axis=0) / degrees, np.diag(inverse)))
+    std = np.sqrt(np.outer(np.sum(residual**2, axis=0) / degrees, np.sum(inverted**2, axis=1)))
     n_state = states.shape[1]
-    return Regression(solution[:n_state].T, solution[n_state:].T, std, int(rank))
+    return Regression(solution[:n_state].T, solution[n_state:].T, std, rank)
 
 
 def identify(record: Record, settings: LeastSquaresSettings) -> Estimate:
@@ -87,7 +92,7 @@ def identify(record: Record, settings: LeastSquaresSettings) -> Estimate:
     return estimate_from_discrete("least-squares", sampled, found, record.warnings, converged=True)
 
 
-def whole_pairs(sampled: Sampled) -> tuple[Float, Float]:
+def whole_pairs(sampled: Sampled) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return the indices k and k + 1 of all steps with no gap, each shape (n_pairs,)."""
     whole = np.all(np.isfinite(sampled.measured), axis=1)
     now = np.flatnonzero(whole[:-1] & whole[1:])

@@ -251,6 +251,11 @@ def newton_decrement(score: Float, information: Float, free: Mask) -> float:
     return float(0.5 * score @ damped_step(score, information, free, 0.0))
 
 
+def _largest(vector: Float, names: list[str]) -> dict[str, float]:
+    """Return the three largest components of a direction by name."""
+    return {names[i]: float(vector[i]) for i in np.argsort(-np.abs(vector), kind="stable")[:3]}
+
+
 def _summary(searches: list[tuple[str, _Search]]) -> list[dict[str, Any]]:
     return [{"start": n, "log_likelihood": s.log_likelihood, "converged": s.converged} for n, s in searches]
 
@@ -283,7 +288,7 @@ def _report(
     if eigenvalues[0] > 1e-12:
         covariance[np.ix_(index, index)] = np.linalg.inv(correlation) / np.outer(scale, scale)
     weak = [
-        {"eigenvalue": float(value), "direction": {names[index[i]]: float(vector[i]) for i in np.argsort(-abs(vector))[:3]}}
+        {"eigenvalue": float(value), "direction": _largest(vector, [names[i] for i in index])}
         for value, vector in zip(eigenvalues, directions.T, strict=True)
         if value < 1e-4
     ]

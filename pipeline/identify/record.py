@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.instruments import Instruments
-from pipeline.normalise.series import SECOND_NS, Float, Series
+from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds, Series
 from schemas.errors import DataRejected
 
 #: columns of `Record.measured`
@@ -155,7 +155,12 @@ def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) ->
 
 
 def _speed(
-    instruments: Instruments, lateral: LateralSpeed, instants: Float, start_ns: int, end_ns: int, warnings: list[str]
+    instruments: Instruments,
+    lateral: LateralSpeed,
+    instants: Nanoseconds,
+    start_ns: int,
+    end_ns: int,
+    warnings: list[str],
 ) -> Float:
     """Speed through the water at the instants: the log, else the forward part of the GNSS velocity."""
     log = _cut(instruments.get("speed_through_water"), start_ns - 5 * SECOND_NS, end_ns + 5 * SECOND_NS)
@@ -173,14 +178,14 @@ def _speed(
     return speed
 
 
-def _place(measured: Float, column: int, instants: Float, time: Float, value: Float) -> None:
+def _place(measured: Float, column: int, instants: Nanoseconds, time: Nanoseconds, value: Float) -> None:
     rows = np.searchsorted(instants, time)
     inside = (rows < instants.size) & (time >= instants[0])
     inside[inside] = instants[rows[inside]] == time[inside]
     measured[rows[inside], column] = value[inside]
 
 
-def _check(instants: Float, delta: Float, rudder: Series) -> None:
+def _check(instants: Nanoseconds, delta: Float, rudder: Series) -> None:
     if instants.size < _MIN_INSTANTS:
         raise DataRejected(
             "segment_too_short",

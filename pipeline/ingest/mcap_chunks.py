@@ -212,7 +212,7 @@ def _decompressed(name: str, packed: bytes, size: int) -> bytes:
     if name == "":
         return packed
     if name == "zstd":
-        import zstandard  # noqa: PLC0415 - each only where a file uses it
+        import zstandard
 
         try:
             with zstandard.ZstdDecompressor().stream_reader(packed) as reader:
@@ -220,7 +220,7 @@ def _decompressed(name: str, packed: bytes, size: int) -> bytes:
         except zstandard.ZstdError as error:
             raise _DamagedChunkError(f"zstd: {error}") from error
     if name == "lz4":
-        import lz4.frame  # noqa: PLC0415
+        import lz4.frame
 
         try:
             return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=size + 1))

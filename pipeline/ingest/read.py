@@ -63,14 +63,14 @@ def read_log(name: str, data: bytes, profile: VesselProfile) -> Readings:
 def _decode(log_format: str, name: str, data: bytes, profile: VesselProfile, source: Source | None) -> Decoded:
     """Call the reader of the format; each is imported where it is used, `kempf --help` pays for none."""
     if log_format == "nmea":
-        from pipeline.ingest import nmea  # noqa: PLC0415
+        from pipeline.ingest import nmea
 
         return nmea.decode(data, name, source)
     if log_format == "mcap":
-        from pipeline.ingest import mcap_log  # noqa: PLC0415
+        from pipeline.ingest import mcap_log
 
         return mcap_log.decode(name, data, source, [s.match for s in profile.sources])
-    from pipeline.ingest import delimited  # noqa: PLC0415
+    from pipeline.ingest import delimited
 
     if source is None or source.time is None or not source.channels:
         found = delimited.columns_found(data, source)

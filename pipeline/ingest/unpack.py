@@ -64,7 +64,7 @@ def _gzip(name: str, data: bytes, limit: int) -> tuple[bytes, list[str]]:
 
 
 def _zstd(name: str, data: bytes, limit: int) -> tuple[bytes, list[str]]:
-    import zstandard  # noqa: PLC0415 - only compressed logs pay for it
+    import zstandard
 
     parts: list[bytes] = []
     size, notes = 0, []

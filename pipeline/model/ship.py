@@ -93,8 +93,8 @@ def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float
     Returns
     -------
     Hull or None
-        None where A has no real logarithm (an eigenvalue on the negative real axis): no continuous ship samples to
-        these matrices.
+        None where A has no real logarithm (an eigenvalue that is zero or on the negative real axis) or the matrices
+        are not finite: no continuous ship samples to them.
 
     Examples
     --------
@@ -104,6 +104,8 @@ def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float
     >>> bool(np.allclose(back.array(), hull.array(), rtol=1e-9))
     True
     """
+    if not (np.all(np.isfinite(A)) and np.all(np.isfinite(B))):
+        return None
     block = np.eye(3)
     block[:2, :2], block[:2, 2:] = A, B
     eigenvalues = np.linalg.eigvals(A)

@@ -29,7 +29,8 @@ class Grid:
     @property
     def seconds(self) -> Float:
         """Time since the first instant, s, shape (n,)."""
-        return (self.time_utc_ns - self.time_utc_ns[0]).astype(np.float64) / SECOND_NS
+        since: Nanoseconds = self.time_utc_ns - self.time_utc_ns[0]
+        return since.astype(np.float64) / SECOND_NS
 
 
 def gap_limit_s(series: Series) -> float:

@@ -16,34 +16,38 @@ from pipeline.normalise.series import Float, Nanoseconds
 
 #: fewer runs than this tell nothing about an instrument's period
 _MIN_RUNS = 20
-#: a run this much shorter than the period cannot be one whole hold
-_SHORT = 0.6
+#: share of the runs that must be as long as the period, give or take the row that a sample near a row's edge may slip
+_REGULAR = 0.9
+#: samples over which an instrument's clock is taken for steady
+_BLOCK = 400
 
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Which rows carry a new measurement.
+    """Which rows carry a new measurement, and when it was made.
 
     Attributes
     ----------
     rows : ndarray of int, shape (m,)
         Rows to keep.
-    delay_s : float
-        Mean time between measurement and the row that first shows it, s: half a row where values are held, else 0.
+    time_utc_ns : ndarray, shape (m,)
+        Instants of measurement, strictly increasing.
     rows_per_value : int
         Rows that one measurement is held for; 1 where nothing is held.
     """
 
     rows: NDArray[np.int64]
-    delay_s: float
+    time_utc_ns: Nanoseconds
     rows_per_value: int
 
 
 def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
-    """Find the rows at which the instrument behind one or more columns measured.
+    """Find the rows at which the instrument behind one or more columns measured, and when.
 
     The period is the commonest length of the runs of equal rows. A channel at rest and quantised also repeats itself:
-    a run of several periods keeps one row a period, so that a rudder standing still stays sampled.
+    a run of several periods keeps one row a period, so that a rudder standing still stays sampled. A measurement was
+    made within the row that ends where its value first shows: the middle of it is taken, and where the instrument
+    keeps a steady clock, the straight line through these middles.
 
     Parameters
     ----------
@@ -60,11 +64,11 @@ def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
     --------
     >>> rows = np.arange(200)
     >>> held = find_held(rows * 100_000_000, np.sin(rows // 5)[:, None])
-    >>> held.rows_per_value, held.rows[:3].tolist(), held.delay_s
-    (5, [0, 5, 10], 0.05)
+    >>> held.rows_per_value, held.rows[:3].tolist(), held.time_utc_ns[:3].tolist()
+    (5, [0, 5, 10], [-50000000, 450000000, 950000000])
     """
     n_rows = time_utc_ns.size
-    everything = Held(np.arange(n_rows, dtype=np.int64), 0.0, 1)
+    everything = Held(np.arange(n_rows, dtype=np.int64), time_utc_ns, 1)
     if n_rows < 2:
         return everything
     changed = np.concatenate(([True], np.any(values[1:] != values[:-1], axis=1)))
@@ -73,13 +77,41 @@ def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
     if starts.size < _MIN_RUNS:
         return everything
     period = int(np.bincount(lengths).argmax())
-    near = np.abs(lengths - period) <= max(1.0, 0.2 * period)
-    # The first and last run may be cut by the ends of the log.
-    short = np.mean(lengths[1:-1] < _SHORT * period)
-    if period < 2 or np.mean(near) < 0.3 or short > 0.05:
+    inner = lengths[1:-1]  # the first and last run may be cut by the ends of the log
+    single = inner[inner < 1.5 * period + 1]
+    regular = np.abs(single - period) <= max(1.0, 0.2 * period)
+    if period < 2 or single.size < 0.3 * inner.size or np.mean(regular) < _REGULAR:
         return everything
-    copies = np.maximum(1, np.floor(lengths / period + (1.0 - _SHORT)).astype(np.int64))
+    copies = np.maximum(1, np.floor(lengths / period + 0.4).astype(np.int64))
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
     rows = np.repeat(starts, copies) + within * period
-    row_s = float(np.median(np.diff(time_utc_ns))) * 1e-9
-    return Held(rows, 0.5 * row_s, period)
+    return Held(rows, _instants(time_utc_ns, rows, period), period)
+
+
+def _instants(time_utc_ns: Nanoseconds, rows: NDArray[np.int64], period: int) -> Nanoseconds:
+    """Return when the values that first show in these rows were measured, shape (m,)."""
+    row_ns = float(np.median(np.diff(time_utc_ns)))
+    shown = time_utc_ns[rows]
+    middle = shown - round(0.5 * row_ns)
+    instants = middle.copy()
+    # By blocks: a sample that equals its neighbour to the last digit is lost, and shifts the count from there on.
+    for first in range(0, rows.size, _BLOCK):
+        block = slice(first, first + _BLOCK)
+        instants[block] = _steady(middle[block], period * row_ns, row_ns)
+    return instants if bool(np.all(np.diff(instants) > 0)) else middle
+
+
+def _steady(middle: Nanoseconds, period_ns: float, row_ns: float) -> Nanoseconds:
+    """Return the instants of a steady clock that explain the middles of the rows, or these where there is none."""
+    if middle.size < _MIN_RUNS:
+        return middle
+    elapsed = (middle - middle[0]).astype(np.float64)
+    apart = np.diff(elapsed) / period_ns
+    # neighbours are one tick apart even where a sample slipped into the next row; a longer pause lost samples
+    ticks = np.concatenate(([0.0], np.cumsum(np.where(apart < 1.75, 1.0, np.round(apart)))))
+    slope, offset = np.polyfit(ticks, elapsed, 1)
+    steady = slope * ticks + offset
+    if np.max(np.abs(steady - elapsed)) > 1.2 * row_ns:
+        return middle
+    result: Nanoseconds = middle[0] + np.round(steady).astype(np.int64)
+    return result

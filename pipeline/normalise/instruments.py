@@ -12,7 +12,7 @@ import numpy as np
 import polars as pl
 
 from pipeline.normalise.holds import find_held
-from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds, Series
+from pipeline.normalise.series import Float, Nanoseconds, Series
 from schemas.channels import CHANNELS
 
 #: channels that one instrument measures at one instant, so that they share their rows
@@ -109,13 +109,12 @@ def _at_instants(
             f"{' and '.join(group)}: {source} holds each value for {held.rows_per_value} rows; "
             f"kept {held.rows.size} of {time.size} rows, at their instants of measurement"
         )
-    instants = time[held.rows] - round(held.delay_s * SECOND_NS)
     result = {}
     for k, name in enumerate(group):
         value = values[held.rows, k]
         if CHANNELS[name].wrap == "circle":
             value = np.unwrap(value)
-        result[name] = Series(instants, value)
+        result[name] = Series(held.time_utc_ns, value)
     return result
 
 

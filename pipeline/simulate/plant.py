@@ -69,7 +69,7 @@ def derivative(state: Float, rudder: float, forcing: Float, constants: Float, ou
 
 
 @compiled
-def advance(  # noqa: PLR0917 (compiled functions take no keywords)
+def advance(
     state: Float,
     rudder: float,
     rudder_speed: float,
@@ -116,7 +116,7 @@ def slopes(states: Float, rudder: Float, forcing: Float, constants: Float) -> Fl
 
 
 @compiled
-def autopilot_order(  # noqa: PLR0917
+def autopilot_order(
     heading_error: float, yaw_rate: float, integral: float, tick_s: float, gains: Float, limit: float
 ) -> tuple[float, float]:
     """Return the rudder order of a PID course keeper and its new integral, rad and rad s.
@@ -140,7 +140,7 @@ def autopilot_order(  # noqa: PLR0917
 
 
 @compiled
-def cell(  # noqa: PLR0917
+def cell(
     state: Float,
     rudder: float,
     order: float,
@@ -191,7 +191,7 @@ def cell(  # noqa: PLR0917
 
 
 @compiled
-def through_cell(  # noqa: PLR0917
+def through_cell(
     state: Float,
     helm: Float,
     zigzag: Float,
@@ -240,7 +240,7 @@ def through_cell(  # noqa: PLR0917
 
 
 @compiled
-def steer(  # noqa: PLR0917
+def steer(
     kind: int,
     settings: Float,
     orders: Float,

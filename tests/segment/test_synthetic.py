@@ -258,7 +258,7 @@ def test_empty_and_short_series_hold_no_zigzag() -> None:
 
 
 def test_an_hour_at_ten_hertz_is_quick() -> None:
-    from time import perf_counter  # noqa: PLC0415
+    from time import perf_counter
 
     vessel = Ship()
     vessel.autopilot(10.0, 1200.0)

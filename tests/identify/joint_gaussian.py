@@ -1,0 +1,198 @@
+"""The likelihood by brute force: the joint normal density of all measurements of a record at once.
+
+Nothing of `pipeline` is used: matrix exponentials by `scipy.linalg.expm`, process noise by Van Loan's block matrix, the
+input by adaptive quadrature of its convolution, the density by one Cholesky factor.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.integrate import quad_vec
+from scipy.linalg import cho_factor, cho_solve, expm
+
+Float = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """The arguments of the likelihood, by name."""
+
+    theta: Float
+    time_s: Float
+    speed: Float
+    rudder: Float
+    measured: Float
+    current_row: Float
+    arm: float
+    wind_rate: float
+    current_rate: float
+    x0: Float
+    P0: Float
+
+    def arguments(self) -> tuple[Any, ...]:
+        """In the order of the kernel, after theta and active."""
+        inputs = (self.time_s, self.speed, self.rudder, self.measured, self.current_row)
+        return (*inputs, self.arm, self.wind_rate, self.current_rate, self.x0, self.P0)
+
+
+def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:
+    """Transition (6, 6), input (6,) and process noise (6, 6) from instant k - 1 to k."""
+    a11, a12, a21, a22, b1, b2 = theta[:6]
+    dt = case.time_s[k] - case.time_s[k - 1]
+    V = 0.5 * (case.speed[k] + case.speed[k - 1])
+    A = np.zeros((6, 6))
+    A[0, :3] = a11 * V, a12 * V, 1.0
+    A[1, :3] = a21 * V, a22 * V, case.arm
+    A[2, 2], A[3, 1] = -case.wind_rate, 1.0
+    A[4, 4] = A[5, 5] = -case.current_rate
+    B = np.array([b1 * V**2, b2 * V**2, 0.0, 0.0, 0.0, 0.0])
+    sigma_F, sigma_V = np.exp(theta[6:8])
+    intensity = np.diag(
+        [
+            0.0,
+            0.0,
+            2 * case.wind_rate * sigma_F**2,
+            0.0,
+            2 * case.current_rate * sigma_V**2,
+            2 * case.current_rate * sigma_V**2,
+        ]
+    )
+    if dt == 0.0:
+        return np.eye(6), np.zeros(6), np.zeros((6, 6))
+    block = np.zeros((12, 12))
+    block[:6, :6], block[:6, 6:], block[6:, 6:] = -A, intensity, A.T
+    exponential = expm(block * dt)
+    Phi = exponential[6:, 6:].T
+    Q = Phi @ exponential[:6, 6:]
+
+    def integrand(s: float) -> Float:
+        u = case.rudder[k - 1] + (case.rudder[k] - case.rudder[k - 1]) * s / dt
+        result: Float = expm(A * (dt - s)) @ B * u
+        return result
+
+    g = quad_vec(integrand, 0.0, dt, epsabs=1e-14, epsrel=1e-12)[0]
+    return Phi, g, 0.5 * (Q + Q.T)
+
+
+def moments(case: Case, theta: Float) -> tuple[Float, Float, Float, Float]:
+    """Mean and covariance of all measured values in order of time, then of (last state, all measured values).
+
+    Returns
+    -------
+    mean : ndarray, shape (m,)
+    covariance : ndarray, shape (m, m)
+    last_mean : ndarray, shape (6,)
+    cross : ndarray, shape (6, m)
+        Covariance of the last state with the measured values.
+    """
+    n = case.time_s.size
+    means, covariance = np.zeros((n, 6)), np.zeros((n, n, 6, 6))
+    means[0], covariance[0, 0] = case.x0, case.P0
+    for k in range(1, n):
+        Phi, g, Q = step(case, theta, k)
+        means[k] = Phi @ means[k - 1] + g
+        for j in range(k):
+            covariance[k, j] = Phi @ covariance[k - 1, j]
+            covariance[j, k] = covariance[k, j].T
+        covariance[k, k] = Phi @ covariance[k - 1, k - 1] @ Phi.T + Q
+    which = [(k, c) for k in range(n) for c in range(3) if np.isfinite(case.measured[k, c])]
+    H = np.zeros((len(which), n * 6))
+    for row, (k, c) in enumerate(which):
+        H[row, 6 * k + (0, 1, 3)[c]] = 1.0
+        if c == 0:
+            H[row, 6 * k + 4 : 6 * k + 6] = case.current_row[k]
+    noise = np.exp(2.0 * theta[8:])[[c for _, c in which]]
+    stacked = covariance.transpose(0, 2, 1, 3).reshape(6 * n, 6 * n)
+    return H @ means.ravel(), H @ stacked @ H.T + np.diag(noise), means[-1], stacked[-6:] @ H.T
+
+
+def values(case: Case) -> Float:
+    """All measured values in the order of `moments`."""
+    result: Float = case.measured[np.isfinite(case.measured)]
+    return result
+
+
+def log_density(case: Case, theta: Float) -> float:
+    """Log of the joint normal density of all measured values."""
+    mean, covariance, _, _ = moments(case, theta)
+    error = values(case) - mean
+    factor = cho_factor(covariance, lower=True)
+    logdet = 2.0 * np.sum(np.log(np.diag(factor[0])))
+    return float(-0.5 * (error @ cho_solve(factor, error) + logdet + error.size * np.log(2 * np.pi)))
+
+
+def fisher(case: Case, theta: Float) -> Float:
+    """Exact expected information of all 11 parameters, by central differences of the moments, shape (11, 11)."""
+    _, covariance, _, _ = moments(case, theta)
+    factor = cho_factor(covariance, lower=True)
+    dm, dC = [], []
+    for j in range(theta.size):
+        h = 1e-5 * max(abs(theta[j]), 1e-7)
+        up, down = theta.copy(), theta.copy()
+        up[j] += h
+        down[j] -= h
+        m_up, C_up, _, _ = moments(case, up)
+        m_down, C_down, _, _ = moments(case, down)
+        dm.append((m_up - m_down) / (2 * h))
+        dC.append(cho_solve(factor, (C_up - C_down) / (2 * h)))
+    weighted = [cho_solve(factor, m) for m in dm]
+    return np.array(
+        [
+            [a @ wb + 0.5 * np.sum(Ca * Cb.T) for wb, Cb in zip(weighted, dC, strict=True)]
+            for a, Ca in zip(dm, dC, strict=True)
+        ]
+    )
+
+
+def make_case(
+    *,
+    n: int = 24,
+    seed: int = 0,
+    current: str = "earth",
+    prime: tuple[float, ...] = (-0.8, -0.36, -3.6, -2.4, -0.17, 1.5),
+    length_m: float = 100.0,
+    speed_m_s: float = 7.0,
+    mean_interval_s: float = 2.0,
+    arm: float = 0.01,
+    same_instant: bool = True,
+) -> Case:
+    """Draw a record from the model: irregular instants, two shared, values missing at random, varying speed and rudder.
+
+    ``prime`` are the six parameters made dimensionless with length and speed.
+    """
+    random = np.random.default_rng(seed)
+    L = length_m
+    hull = np.array(prime) / np.array([L, 1.0, L**2, L, L, L**2])
+    theta = np.concatenate([hull, np.log([2e-3, 0.15, 0.05, 5e-4, 1e-3])])
+    gaps = random.exponential(mean_interval_s, n - 1) + 0.01
+    if same_instant:
+        gaps[n // 3] = 0.0
+    time = np.concatenate([[0.0], np.cumsum(gaps)])
+    heading = 0.4 + 0.35 * np.sin(0.05 * time)
+    row = np.column_stack([-np.sin(heading), np.cos(heading)]) if current == "earth" else np.tile([1.0, 0.0], (n, 1))
+    measured = np.zeros((n, 3))
+    measured[random.random((n, 3)) < 0.35] = np.nan
+    measured[n // 2] = np.nan
+    spread = random.standard_normal((6, 6))
+    scale = np.array([0.5, 0.02, 0.01, 0.1, 0.3, 0.3])
+    P0 = np.outer(scale, scale) * (0.2 * spread @ spread.T + np.eye(6))
+    case = Case(
+        theta,
+        time,
+        speed_m_s * (1.0 + 0.1 * np.sin(0.11 * time)),
+        0.35 * np.sign(np.sin(0.13 * time)) + 0.02 * random.standard_normal(n),
+        measured,
+        row,
+        arm,
+        1 / 300.0,
+        1 / 1800.0,
+        scale * random.standard_normal(6),
+        P0,
+    )
+    mean, covariance, _, _ = moments(case, theta)
+    measured[np.isfinite(measured)] = mean + np.linalg.cholesky(covariance) @ random.standard_normal(mean.size)
+    return replace(case, measured=measured)

@@ -1,0 +1,76 @@
+"""``kempf identify``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from flows.identify_vessel import IdentifyOutcome
+from pipeline.identify.names import NAMES
+from warehouse.parameter_set import ParameterSet
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table, progress
+
+
+@click.command("identify")
+@vessel_option(required=True)
+@click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Model specification in YAML.")
+@click.option("--estimator", type=click.Choice(NAMES), default="ml", show_default=True, help="How it is estimated.")
+@warehouse_option
+@json_option
+def command(vessel: str, model: Path | None, estimator: str, uri: str, as_json: bool) -> None:
+    """Identify a model from every zigzag of a vessel and store it as a parameter set.
+
+    What was identified before from the same inputs, with the same code and settings, is not computed again.
+    """
+    from flows.files import read_model
+    from flows.identify_vessel import Request, identify_vessel
+    from schemas.model_spec import ModelSpec
+    from warehouse.store import Warehouse
+
+    request = Request(read_model(model) if model else ModelSpec(), estimator)
+    with progress() as tell:
+        outcomes = identify_vessel(Warehouse(uri), vessel, request, progress=tell)
+    if as_json:
+        print_json([_show(outcome) for outcome in outcomes])
+    else:
+        for outcome in outcomes:
+            _tell(outcome)
+        click.echo(f"next: kempf history --vessel {vessel}, kempf params show ID, kempf rerun ID")
+    failed = [outcome.error for outcome in outcomes if outcome.error is not None]
+    if failed and len(failed) == len(outcomes):
+        sys.exit(max(error.exit_code for error in failed))
+
+
+def _show(outcome: IdentifyOutcome) -> object:
+    if outcome.parameter_set is not None:
+        return outcome.parameter_set.show()
+    assert outcome.error is not None
+    return {"segment_id": outcome.segment.segment_id, **outcome.error.to_json()}
+
+
+def _tell(outcome: IdentifyOutcome) -> None:
+    segment = outcome.segment
+    named = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} zigzag {segment.segment_id}"
+    if outcome.parameter_set is None:
+        assert outcome.error is not None
+        click.echo(f"{named}: not identified [{outcome.error.code}] {outcome.error}", err=True)
+        return
+    tell_set(outcome.parameter_set, f"{named}: {outcome.parameter_set.parameter_set_id}")
+
+
+def tell_set(one: ParameterSet, title: str) -> None:
+    """Print a parameter set for a person: values with standard errors, noise levels, fit, warnings."""
+    rows = [[p.name, number(p.value), number(p.std, 2), p.unit] for p in (*one.parameters, *one.noise)]
+    print_table(["", "value", "std", "unit"], rows, title)
+    converged = one.convergence.get("converged")
+    click.echo(f"  {'converged' if converged else 'NOT CONVERGED'}: {one.convergence.get('reason')}")
+    for name, fit in dict(one.fit.get("channels", {})).items():
+        click.echo(
+            f"  {name}: fit {fit['fit_percent']:.1f} % one step ahead, in sample; "
+            f"{100 * fit['inside_95_percent']:.0f} % inside the 95 % interval"
+        )
+    for warning in one.warnings:
+        click.echo(f"  warning: {warning}")

@@ -1,0 +1,69 @@
+"""``kempf ingest``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+import click
+
+from flows.ingest_logs import IngestOutcome
+from workbench.cli.options import json_option, profile_option, vessel_option, warehouse_option
+from workbench.terminal import print_json, progress
+
+
+@click.command("ingest")
+@click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path))
+@vessel_option()
+@profile_option
+@warehouse_option
+@json_option
+def command(paths: tuple[Path, ...], vessel: str | None, profiles: tuple[Path, ...], uri: str, as_json: bool) -> None:
+    """Take raw logs in: MCAP, NMEA 0183 or delimited text, also compressed.
+
+    Each log is read, checked, kept byte for byte and searched for zigzags. A log that is in already changes nothing.
+    One that cannot be read stops none of the others, and leaves nothing behind.
+    """
+    from flows.files import read_profiles
+    from flows.ingest_logs import ingest
+    from warehouse.store import Warehouse
+
+    given = read_profiles(profiles) if profiles else None
+    with progress() as tell:
+        outcomes = ingest(Warehouse(uri), paths, vessel, given, tell)
+    failed = [outcome.error for outcome in outcomes if outcome.error is not None]
+    if len(outcomes) == 1 and failed:
+        raise failed[0]
+    if as_json:
+        print_json([outcome.show() for outcome in outcomes])
+    else:
+        for outcome in outcomes:
+            _tell(outcome)
+        if any(outcome.segments for outcome in outcomes):
+            click.echo("next: kempf segments, kempf identify --vessel NAME")
+    if failed:
+        sys.exit(max(error.exit_code for error in failed))
+
+
+def _tell(outcome: IngestOutcome) -> None:
+    name = Path(outcome.path).name
+    if outcome.error is not None or outcome.tally is None:
+        assert outcome.error is not None
+        click.echo(f"{name}: {click.style('failed', fg='red')} [{outcome.error.code}] {outcome.error}", err=True)
+        return
+    tally = outcome.tally
+    reasons = ", ".join(f"{count} {reason}" for reason, count in tally.by_reason.items())
+    click.echo(
+        f"{name}: {outcome.outcome}, {tally.records_read} records read = {tally.records_kept} kept + "
+        f"{tally.records_rejected} rejected{f' ({reasons})' if reasons else ''}; {_zigzags(outcome)}"
+    )
+    for note in outcome.notes:
+        click.echo(f"  note: {note}")
+
+
+def _zigzags(outcome: IngestOutcome) -> str:
+    found = [
+        f"{s.psi0_deg:g}/{s.delta0_deg:g} to {s.first_side}{' (broken off)' if s.kind != 'zigzag' else ''}"
+        for s in outcome.segments
+    ]
+    return f"{len(found)} zigzags: {', '.join(found)}" if found else "no zigzag"

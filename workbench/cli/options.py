@@ -1,0 +1,55 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import click
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+DEFAULT_WAREHOUSE = "kempf-data"
+
+
+def warehouse_option(function: F) -> F:
+    """Add ``--warehouse``."""
+    return click.option(
+        "--warehouse",
+        "uri",
+        envvar="KEMPF_WAREHOUSE",
+        default=DEFAULT_WAREHOUSE,
+        show_default="KEMPF_WAREHOUSE, else ./kempf-data",
+        metavar="URI",
+        help="Where everything is kept: a folder or s3://bucket/prefix.",
+    )(function)
+
+
+def json_option(function: F) -> F:
+    """Add ``--json``."""
+    return click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")(function)
+
+
+def vessel_option(*, required: bool = False, multiple: bool = False) -> Callable[[F], F]:
+    """Add ``--vessel``."""
+    return click.option(
+        "--vessel",
+        "vessel",
+        required=required,
+        multiple=multiple,
+        metavar="NAME",
+        help="Name of the vessel." + (" May be repeated." if multiple else ""),
+    )
+
+
+def profile_option(function: F) -> F:
+    """Add ``--profile``, which may be repeated."""
+    return click.option(
+        "--profile",
+        "profiles",
+        multiple=True,
+        type=click.Path(path_type=Path),
+        metavar="FILE",
+        help="Vessel profile in YAML or JSON; several are laid over each other and must not disagree.",
+    )(function)

@@ -1,0 +1,123 @@
+"""``kempf params list|show|diff|export``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from schemas.errors import UsageError
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table
+
+
+@click.group("params")
+def command() -> None:
+    """List, show, compare and export parameter sets."""
+
+
+@command.command("list")
+@vessel_option()
+@warehouse_option
+@json_option
+def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
+    """List parameter sets, of one vessel or of all."""
+    from warehouse import aliases, parameter_sets, vessels
+    from warehouse.instant import iso_utc
+    from warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    if vessel is not None:
+        vessels.require(warehouse, vessel)
+    found = parameter_sets.summaries(warehouse, vessel).rows(named=True)
+    pointed: dict[str, list[str]] = {}
+    for name in sorted({row["vessel"] for row in found}):
+        for alias, target in aliases.of_vessel(warehouse, name).items():
+            pointed.setdefault(target, []).append(alias)
+    listed = [
+        {**row, "start": iso_utc(row["start_utc_ns"]), "aliases": pointed.get(row["parameter_set_id"], [])}
+        for row in found
+    ]
+    if as_json:
+        print_json(listed)
+        return
+    rows = [
+        [r["parameter_set_id"], r["vessel"], r["start"][:19], r["model_name"], r["estimator"], ", ".join(r["aliases"])]
+        for r in listed
+    ]
+    print_table(["parameter set", "vessel", "start UTC", "model", "estimator", "alias"], rows)
+
+
+@command.command("show")
+@click.argument("set_id")
+@warehouse_option
+@json_option
+def show(set_id: str, uri: str, as_json: bool) -> None:
+    """Show a parameter set whole; a unique beginning of its id is enough."""
+    from warehouse import parameter_sets
+    from warehouse.store import Warehouse
+    from workbench.cli.identify import tell_set
+
+    one = parameter_sets.get(Warehouse(uri), set_id)
+    if as_json:
+        print_json(one.show())
+        return
+    tell_set(one, f"{one.parameter_set_id}: {one.vessel}, model {one.model_name}, estimator {one.estimator}")
+    print_table(
+        ["", "value", "std", "unit"],
+        [[p.name, number(p.value), number(p.std, 2), p.unit] for p in one.discrete],
+        "Discrete, eq. (17)",
+    )
+    told = one.provenance
+    click.echo(f"  log {', '.join(one.log_ids)}")
+    click.echo(f"  profile {told['profile_sha256']}, code {told['code_version']}, commit {told['git_commit']}")
+
+
+@command.command("diff")
+@click.argument("first")
+@click.argument("second")
+@warehouse_option
+@json_option
+def diff(first: str, second: str, uri: str, as_json: bool) -> None:
+    """Compare the parameters of two sets: difference, and the same in standard errors of the difference."""
+    from warehouse import parameter_sets
+    from warehouse.parameter_set import compare
+    from warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    one, other = parameter_sets.get(warehouse, first), parameter_sets.get(warehouse, second)
+    found = compare(one, other)
+    if as_json:
+        print_json({"first": one.parameter_set_id, "second": other.parameter_set_id, "parameters": found})
+        return
+    rows = [
+        [name, number(d["first"]), number(d["second"]), number(d["difference"]), number(d["in_std"], 3), d["unit"]]
+        for name, d in found.items()
+    ]
+    print_table(["", "first", "second", "difference", "in std errors", "unit"], rows)
+
+
+@command.command("export")
+@click.argument("set_id")
+@click.option("--format", "form", type=click.Choice(["yaml", "csv", "json"]), default="yaml", show_default=True)
+@click.option("--output", type=click.Path(path_type=Path), metavar="FILE", help="Write here instead of to stdout.")
+@warehouse_option
+def export(set_id: str, form: str, output: Path | None, uri: str) -> None:
+    """Export a parameter set with values, units, standard errors, covariance, inputs by hash and fit."""
+    from warehouse import parameter_sets
+    from warehouse.store import Warehouse
+    from workbench.export import as_text
+
+    text = as_text(parameter_sets.get(Warehouse(uri), set_id), form)
+    if output is None:
+        click.echo(text, nl=False)
+        return
+    try:
+        with output.open("x", encoding="utf-8") as stream:
+            stream.write(text)
+    except OSError as error:
+        raise UsageError(
+            "cannot_write",
+            f"Writing {output} failed: {error.strerror}.",
+            "Give another file with --output; nothing is overwritten.",
+        ) from error

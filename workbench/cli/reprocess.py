@@ -1,0 +1,62 @@
+"""``kempf reprocess``."""
+
+from __future__ import annotations
+
+import sys
+from typing import Any
+
+import click
+
+from schemas.errors import DataRejected
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import print_json, print_table, progress
+
+
+@click.command("reprocess")
+@vessel_option(multiple=True)
+@click.option(
+    "--changed-only/--everything",
+    default=True,
+    show_default=True,
+    help="Only what changed, or also verify every kept parameter set from the raw bytes.",
+)
+@warehouse_option
+@json_option
+def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool) -> None:
+    """Bring the whole fleet, or some vessels, up to date with their profiles and the code.
+
+    Several vessels run as the Prefect flow `reprocess`, on the server that PREFECT_API_URL names or on one of its own;
+    a single one runs at once.
+    """
+    from warehouse import vessels
+    from warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    warehouse.require()
+    for name in vessel:
+        vessels.require(warehouse, name)
+    reports: list[dict[str, Any]]
+    if len(vessel) == 1:
+        from flows.reprocess_vessel import reprocess_vessel
+
+        with progress() as tell:
+            reports = [reprocess_vessel(warehouse, vessel[0], changed_only=changed_only, progress=tell).show()]
+    else:
+        from flows.fleet import reprocess
+
+        reports = reprocess(uri, list(vessel) or None, changed_only)
+    if as_json:
+        print_json(reports)
+    else:
+        head = ["vessel", "status", "logs", "reread", "segments", "new_sets", "kept_sets", "verified", "failures"]
+        rows = [[str(r[k]) for k in head[:-2]] + [_counts(r["verified"]), str(len(r["failures"]))] for r in reports]
+        print_table([name.replace("_", " ") for name in head], rows)
+        for report in reports:
+            for failure in report["failures"]:
+                click.echo(f"{report['vessel']}, {failure['what']}: {failure['error']['message']}", err=True)
+    if any(report["failures"] for report in reports):
+        sys.exit(DataRejected.exit_code)
+
+
+def _counts(verdicts: dict[str, int]) -> str:
+    return ", ".join(f"{count} {verdict}" for verdict, count in sorted(verdicts.items())) or "-"

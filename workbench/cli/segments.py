@@ -1,0 +1,53 @@
+"""``kempf segments``."""
+
+from __future__ import annotations
+
+import click
+
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table
+
+
+@click.command("segments")
+@vessel_option()
+@warehouse_option
+@json_option
+def command(vessel: str | None, uri: str, as_json: bool) -> None:
+    """List the zigzags found, with their executes, overshoots and IMO criteria."""
+    from warehouse import logs, segments
+    from warehouse.instant import iso_utc
+    from warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    warehouse.require()
+    names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
+    found = segments.current(warehouse, vessel)
+    if as_json:
+        print_json([segment.show(names[segment.ingest_id]) for segment in found])
+        return
+    if not found:
+        click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
+        return
+    rows = [
+        [
+            s.segment_id,
+            s.vessel,
+            f"{s.psi0_deg:g}/{s.delta0_deg:g}",
+            s.kind.replace("_", " "),
+            s.first_side,
+            number(s.base_heading_deg),
+            iso_utc(s.start_utc_ns)[:19],
+            str(len(s.executes_utc_ns)),
+            " ".join(f"{angle:.1f}" for angle in s.overshoots_deg[:4]),
+            _imo(s.imo),
+        ]
+        for s in found
+    ]
+    head = ["segment", "vessel", "psi0/delta0", "kind", "first side", "K0 deg", "start UTC", "executes"]
+    print_table([*head, "overshoots deg", "IMO"], rows)
+
+
+def _imo(criteria: object) -> str:
+    assert isinstance(criteria, dict)
+    judged = [c["passed"] for c in criteria.values() if c["passed"] is not None]
+    return "n/a" if not judged else "passed" if all(judged) else "FAILED"

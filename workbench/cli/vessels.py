@@ -1,0 +1,76 @@
+"""``kempf vessels list|show|set``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from workbench.cli.options import json_option, profile_option, warehouse_option
+from workbench.terminal import number, print_json, print_table
+
+
+@click.group("vessels")
+def command() -> None:
+    """List vessels, show and set their profiles."""
+
+
+@command.command("list")
+@warehouse_option
+@json_option
+def list_vessels(uri: str, as_json: bool) -> None:
+    """List the vessels with their logs, zigzags and parameter sets."""
+    from warehouse import logs, parameter_sets, segments, vessels
+    from warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    warehouse.require()
+    held = [row.vessel for row in logs.current(warehouse)]
+    found = [segment.vessel for segment in segments.current(warehouse)]
+    sets = parameter_sets.summaries(warehouse)["vessel"].to_list()
+    listed = [
+        {"vessel": name, "logs": held.count(name), "segments": found.count(name), "parameter_sets": sets.count(name)}
+        for name in vessels.names(warehouse)
+    ]
+    if as_json:
+        print_json(listed)
+        return
+    print_table(["vessel", "logs", "zigzags", "parameter sets"], [[str(v) for v in row.values()] for row in listed])
+
+
+@command.command("show")
+@click.argument("name")
+@warehouse_option
+@json_option
+def show(name: str, uri: str, as_json: bool) -> None:
+    """Show a vessel's current profile and how often it changed."""
+    import yaml
+
+    from warehouse import vessels
+    from warehouse.store import Warehouse
+
+    versions = vessels.versions(Warehouse(uri), name)
+    profile = versions[-1].profile.model_dump(mode="json", exclude_none=True)
+    shown = {"vessel": name, "profile": profile, "versions": [v.profile_sha256 for v in versions]}
+    if as_json:
+        print_json(shown)
+        return
+    click.echo(yaml.safe_dump(profile, sort_keys=False, allow_unicode=True), nl=False)
+    click.echo(f"# version {number(len(versions))} of the profile, {versions[-1].profile_sha256}")
+
+
+@command.command("set")
+@click.argument("name")
+@profile_option
+@warehouse_option
+@json_option
+def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) -> None:
+    """Put a profile in place of the vessel's current one; `kempf reprocess` then applies it to her logs."""
+    from flows.register_vessel import set_vessel
+    from warehouse.store import Warehouse
+
+    changed = set_vessel(Warehouse(uri), name, profiles)
+    if as_json:
+        print_json({"vessel": name, "changed": changed})
+    else:
+        click.echo(f"{name}: " + ("profile set; next: kempf reprocess" if changed else "the profile is the same"))
