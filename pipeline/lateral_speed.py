@@ -42,8 +42,8 @@ class CurrentCheck:
     Attributes
     ----------
     current_speed_m_s, current_direction_rad : float
-        Mean current over the segment from GNSS velocity less log speed along the heading, and where it flows to; NaN
-        without a log.
+        Mean current over the segment from forward GNSS speed less log speed, and where it flows to; NaN without a log.
+        On a heading that does not swing only the part along it is seen.
     constant_m_s : float
         V_cur sin(K_cur - K_0), the constant that V_T absorbs, m/s.
     heading_term_m_s : float
@@ -128,8 +128,9 @@ def check_current(
     """Check how well the segment lies to the stream, eq. (19).
 
     y_v = V_0 sin(drift) + V_cur sin(K_cur - K_0 - psi): to first order the constant V_cur sin(K_cur - K_0), which V_T
-    absorbs, less V_cur cos(K_cur - K_0) psi, which vanishes when K_0 lies across the stream. The ship's own drift
-    averages out over whole zigzag cycles.
+    absorbs, less V_cur cos(K_cur - K_0) psi, which vanishes when K_0 lies across the stream. The current is the one
+    that explains forward GNSS speed less log speed while the heading swings; the lateral speed is left out, because
+    sway and heading swing together and their product does not average out.
 
     Parameters
     ----------
@@ -152,12 +153,12 @@ def check_current(
     psi = heading.at(time, gap_limit_s(heading))
     log = speed_through_water.at(time, gap_limit_s(speed_through_water))
     surplus = lateral.forward_m_s - log
-    north = surplus * np.cos(psi) - lateral.value_m_s * np.sin(psi)
-    east = surplus * np.sin(psi) + lateral.value_m_s * np.cos(psi)
-    good = np.isfinite(north)
+    good = np.isfinite(surplus) & np.isfinite(psi)
     if not good.any():
         return unknown
-    current_north, current_east = float(np.mean(north[good])), float(np.mean(east[good]))
+    # Along the bow the ship's own drift does not show: surplus = V_N cos K + V_E sin K, and K swings.
+    bow = np.column_stack([np.cos(psi[good]), np.sin(psi[good])])
+    current_north, current_east = np.linalg.lstsq(bow, surplus[good], rcond=1e-6)[0]
     speed = float(np.hypot(current_north, current_east))
     direction = float(np.arctan2(current_east, current_north))
     swing = float(np.max(np.abs(psi[good] - base_heading_rad)))

@@ -16,6 +16,8 @@ from pipeline.normalise.series import Float, Nanoseconds
 
 #: fewer runs than this tell nothing about an instrument's period
 _MIN_RUNS = 20
+#: a channel that knows no more values than this is an order (starboard, port, amidships), not a measurement
+_ORDERS = 5
 #: share of the runs that must be as long as the period, give or take the row that a sample near a row's edge may slip
 _REGULAR = 0.9
 #: samples over which an instrument's clock is taken for steady
@@ -82,6 +84,8 @@ def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
     regular = np.abs(single - period) <= max(1.0, 0.2 * period)
     if period < 2 or single.size < 0.3 * inner.size or np.mean(regular) < _REGULAR:
         return everything
+    if np.unique(values[starts], axis=0).shape[0] <= _ORDERS:
+        return everything  # the legs of a regular zigzag are equally long too
     copies = np.maximum(1, np.floor(lengths / period + 0.4).astype(np.int64))
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
     rows = np.repeat(starts, copies) + within * period

@@ -62,7 +62,7 @@ def from_readings(frame: pl.DataFrame) -> Instruments:
     Instruments
     """
     grouped = {name for group in _TOGETHER for name in group}
-    groups = (*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped))
+    groups = [*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped)]
     series: dict[str, Series] = {}
     sources: dict[str, str] = {}
     notes: list[str] = []
@@ -72,6 +72,8 @@ def from_readings(frame: pl.DataFrame) -> Instruments:
             continue
         rows = frame.select("time_utc_ns", "source", *columns).drop_nulls()
         if rows.is_empty():
+            # messages of their own, such as a topic for the speed and one for the course
+            groups += [(name,) for name in group if len(group) > 1]
             continue
         source = _choose(rows["source"], group, notes)
         rows = rows.filter(pl.col("source") == source)

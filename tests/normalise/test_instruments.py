@@ -129,7 +129,8 @@ def test_the_towing_tank_gives_speed_and_course_from_its_velocities() -> None:
     readings = read_log(path.name, path.read_bytes(), parse(yaml.safe_load(text), "hsva_kvlcc2.yaml"))
     found = from_readings(readings.frame)
     speed = found.series["speed_over_ground"]
-    assert 0.9 < np.median(speed.value) < 1.25  # 1.179 m/s less what the zigzag costs
+    assert speed.value[0] == pytest.approx(1.179, abs=0.01)
+    assert 0.8 < np.median(speed.value) < 1.0  # the zigzag costs a quarter of it
     drift = found.series["course_over_ground"].at(speed.time_utc_ns, 1.0) - found.series["heading"].at(
         speed.time_utc_ns, 1.0
     )

@@ -38,14 +38,15 @@ def command(paths: tuple[Path, ...], vessel: str | None, profiles: tuple[Path, .
         print_json([outcome.show() for outcome in outcomes])
     else:
         for outcome in outcomes:
-            _tell(outcome)
+            tell_outcome(outcome)
         if any(outcome.segments for outcome in outcomes):
             click.echo("next: kempf segments, kempf identify --vessel NAME")
     if failed:
         sys.exit(max(error.exit_code for error in failed))
 
 
-def _tell(outcome: IngestOutcome) -> None:
+def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
+    """Print what became of one log."""
     name = Path(outcome.path).name
     if outcome.error is not None or outcome.tally is None:
         assert outcome.error is not None
@@ -57,7 +58,7 @@ def _tell(outcome: IngestOutcome) -> None:
         f"{name}: {outcome.outcome}, {tally.records_read} records read = {tally.records_kept} kept + "
         f"{tally.records_rejected} rejected{f' ({reasons})' if reasons else ''}; {_zigzags(outcome)}"
     )
-    for note in outcome.notes:
+    for note in outcome.notes if notes else ():
         click.echo(f"  note: {note}")
 
 

@@ -1,0 +1,99 @@
+"""``kempf demo``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from flows.demonstrate import Demonstration
+from warehouse.parameter_set import ParameterSet
+from workbench.cli.options import json_option
+from workbench.terminal import number, print_json, print_table, progress
+
+
+@click.command("demo")
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path),
+    default=Path("kempf-demo"),
+    show_default=True,
+    help="Where the logs and the warehouse go.",
+)
+@json_option
+def command(folder: Path, as_json: bool) -> None:
+    """Simulate three trial days of one ship, run the main job on the raw logs, compare with the truth.
+
+    The logs are NMEA 0183, delimited text and MCAP with noise, wind, current and damaged lines; the pipeline is told
+    nothing but the vessel's profile.
+    """
+    from flows.demonstrate import demonstrate
+
+    with progress() as tell:
+        shown = demonstrate(folder, tell)
+    if as_json:
+        print_json(
+            {
+                "folder": str(shown.folder),
+                "vessel": shown.vessel,
+                "truth": shown.truth,
+                "ingested": [o.show() for o in shown.ingested],
+                "parameter_sets": [o.parameter_set.show() for o in shown.identified if o.parameter_set],
+                "reruns": [r.show() for r in shown.reruns],
+            }
+        )
+        return
+    _tell(shown)
+
+
+def _tell(shown: Demonstration) -> None:
+    from workbench.cli.ingest import tell_outcome
+
+    click.echo(click.style("Raw logs", bold=True) + f" in {shown.folder / 'logs'}")
+    for outcome in shown.ingested:
+        tell_outcome(outcome, notes=False)
+    click.echo()
+    zigzags = [
+        [
+            f"{s.psi0_deg:g}/{s.delta0_deg:g}",
+            s.first_side,
+            number(s.base_heading_deg),
+            str(len(s.executes_utc_ns)),
+            " ".join(f"{angle:.1f}" for angle in s.overshoots_deg[:4]),
+        ]
+        for s in (o.segment for o in shown.identified)
+    ]
+    print_table(["psi0/delta0", "first side", "K0 deg", "executes", "overshoots deg"], zigzags, "Zigzags found")
+    click.echo()
+    for outcome in shown.identified:
+        segment = outcome.segment
+        title = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} zigzag of {segment.segment_id}"
+        if outcome.parameter_set is None:
+            click.echo(f"{title}: not identified, {outcome.error}")
+            continue
+        _compare(outcome.parameter_set, shown.truth, title)
+    same = sum(r.verdict == "bit-identical" for r in shown.reruns)
+    click.echo(f"Rebuilt from the raw bytes: {same} of {len(shown.reruns)} parameter sets bit-identical.")
+    tables = shown.folder / "warehouse"
+    click.echo(f"Tables (Delta Lake, plain Parquet inside): {tables}")
+    click.echo("\nnext:")
+    click.echo(f"  export KEMPF_WAREHOUSE={tables}")
+    click.echo(f"  kempf segments\n  kempf history --vessel {shown.vessel} --parameter b2\n  kempf --help")
+
+
+def _compare(one: ParameterSet, truth: dict[str, float], title: str) -> None:
+    rows = [
+        [
+            p.name,
+            number(p.value),
+            number(p.std, 2),
+            p.unit,
+            number(truth[p.name]),
+            f"{(p.value - truth[p.name]) / p.std:+.1f}" if p.std else "-",
+        ]
+        for p in one.parameters
+    ]
+    converged = "converged" if one.convergence.get("converged") else "NOT CONVERGED"
+    head = ["", "value", "std", "unit", "truth", "error in std"]
+    print_table(head, rows, f"{title}: {one.parameter_set_id}, {converged}")
+    click.echo()
