@@ -10,6 +10,7 @@ DEVELOP := $(VENV)/.develop
 
 demo: $(RUNTIME)
 	$(BIN)/kempf demo
+	@echo "  (first: source $(BIN)/activate)"
 
 test: check
 	$(BIN)/python -m pytest

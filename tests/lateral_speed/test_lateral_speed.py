@@ -141,7 +141,7 @@ def test_the_current_of_a_zigzag_is_found(north: float, east: float, heading_deg
     # the largest psi of a 20/20 zigzag is 20 deg and the overshoot
     swing = np.deg2rad(20.0) + max(trial.truth.zigzags[0].overshoots_rad)
     assert found.heading_term_m_s == pytest.approx(abs(speed * np.cos(direction - base)) * swing, abs=0.04)
-    assert found.heading_term_over_noise == pytest.approx(found.heading_term_m_s / 0.05, rel=0.1)
+    assert found.heading_term_over_noise == pytest.approx(found.heading_term_m_s / 0.05, rel=0.2)
 
 
 def test_the_heading_term_vanishes_across_the_stream_and_not_along_it() -> None:

@@ -50,8 +50,8 @@ def _tell(shown: Demonstration) -> None:
     from workbench.cli.ingest import tell_outcome
 
     click.echo(click.style("Raw logs", bold=True) + f" in {shown.folder / 'logs'}")
-    for outcome in shown.ingested:
-        tell_outcome(outcome, notes=False)
+    for log in shown.ingested:
+        tell_outcome(log, notes=False)
     click.echo()
     zigzags = [
         [
