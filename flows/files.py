@@ -14,6 +14,9 @@ from schemas.errors import KempfError, NotFound, UsageError
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 
+#: Keys and values in a file that a person wrote; a few hundred bytes of nested aliases can stand for billions.
+_MOST_NODES = 100_000
+
 
 def read_bytes(path: Path, what: str) -> bytes:
     """Return the bytes of a file.
@@ -59,11 +62,14 @@ def read_yaml(path: Path, what: str) -> Any:
     Raises
     ------
     UsageError
-        ``not_yaml``: it is no YAML; the place is named.
+        ``not_yaml``: it is no YAML; the place is named. ``yaml_too_large``: its aliases stand for more than a person
+        writes.
     """
     data = read_bytes(path, what)
     try:
-        return yaml.safe_load(data)
+        root = yaml.compose(data, Loader=yaml.SafeLoader)
+        too_large = root is not None and _written_out(root, {}) > _MOST_NODES
+        content = None if too_large else yaml.safe_load(data)
     except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
         told = " ".join(str(error).split())
         raise UsageError(
@@ -72,6 +78,29 @@ def read_yaml(path: Path, what: str) -> Any:
             "Mend the line it names.",
             {"path": str(path)},
         ) from error
+    except RecursionError as error:
+        raise UsageError(
+            "not_yaml", f"The {what} {path} is nested too deep to be read.", "Write it flat.", {"path": str(path)}
+        ) from error
+    if too_large:
+        raise UsageError(
+            "yaml_too_large",
+            f"The {what} {path} stands for more than {_MOST_NODES} keys and values once its aliases are written out.",
+            "Write it without nested aliases.",
+            {"path": str(path)},
+        )
+    return content
+
+
+def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
+    """Return how many keys and values a node stands for, each alias counted as what it stands for."""
+    if id(node) not in known:
+        known[id(node)] = _MOST_NODES + 1  # what a node counts for that holds itself
+        below = node.value if isinstance(node, yaml.SequenceNode) else []
+        if isinstance(node, yaml.MappingNode):
+            below = [one for pair in node.value for one in pair]
+        known[id(node)] = 1 + sum(_written_out(one, known) for one in below)
+    return known[id(node)]
 
 
 def read_profiles(paths: Sequence[Path]) -> VesselProfile:
@@ -95,7 +124,7 @@ def read_model(path: Path) -> ModelSpec:
     """
     content = read_yaml(path, "model specification")
     try:
-        return ModelSpec.model_validate(content)
+        spec = ModelSpec.model_validate(content)
     except ValidationError as error:
         faults = [f"{'.'.join(str(p) for p in e['loc']) or 'model'}: {e['msg']}" for e in error.errors()]
         raise UsageError(
@@ -104,3 +133,13 @@ def read_model(path: Path) -> ModelSpec:
             f"Its keys are {', '.join(ModelSpec.model_fields)}.",
             {"faults": faults},
         ) from error
+    known = ModelSpec()
+    if spec.base != known.base or spec.effects:
+        asked = [f"base {spec.base!r}"] * (spec.base != known.base) + [f"effect {name!r}" for name in spec.effects]
+        raise UsageError(
+            "model_unknown",
+            f"{path} asks for {', '.join(asked)}, which this version cannot identify.",
+            f"Use base {known.base!r} without effects.",
+            {"base": spec.base, "effects": list(spec.effects)},
+        )
+    return spec

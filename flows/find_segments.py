@@ -1,8 +1,8 @@
-"""The job that finds the zigzags of one ingest and stores them."""
+"""The job that finds the zigzags of one ingest, as they are stored."""
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 from pipeline.normalise.instruments import Instruments, from_readings
@@ -11,26 +11,28 @@ from pipeline.segment.imo import judge
 from pipeline.segment.lateral import lateral_summary
 from pipeline.segment.zigzag import Zigzag
 from schemas.profile import VesselProfile
-from warehouse import segments
 from warehouse.code_version import fingerprint
-from warehouse.logs import LogRow
-from warehouse.segments import Segment
-from warehouse.store import Warehouse
+from warehouse.segments import Segment, segment_id
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-def find_segments(
-    warehouse: Warehouse, row: LogRow, profile: VesselProfile, frame: pl.DataFrame
-) -> tuple[list[Segment], tuple[str, ...]]:
-    """Find the zigzags of one ingest and put them in place of those found before.
+@dataclass(frozen=True)
+class Ingest:
+    """Whose log it is, and the ids of the log and of this reading of it."""
+
+    vessel: str
+    log_id: str
+    ingest_id: str
+
+
+def find_segments(ingest: Ingest, profile: VesselProfile, frame: pl.DataFrame) -> tuple[list[Segment], tuple[str, ...]]:
+    """Find the zigzags of one ingest; nothing is stored.
 
     Parameters
     ----------
-    warehouse : Warehouse
-    row : LogRow
-        The ingest.
+    ingest : Ingest
     profile : VesselProfile
     frame : polars.DataFrame
         Its readings.
@@ -47,21 +49,19 @@ def find_segments(
     if heading is None or rudder is None:
         missing = " and ".join(absent)
         note = f"no {missing} in this log: zigzags cannot be looked for; map it in the profile if the log has it"
-        segments.replace(warehouse, row.vessel, {row.ingest_id: []})
         return [], (*instruments.notes, note)
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
-    found = [_segment(zigzag, row, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)]
-    segments.replace(warehouse, row.vessel, {row.ingest_id: found})
+    found = [_segment(zigzag, ingest, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)]
     return found, instruments.notes
 
 
-def _segment(zigzag: Zigzag, row: LogRow, profile: VesselProfile, instruments: Instruments) -> Segment:
+def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
     criteria = judge(zigzag, profile.length_m, profile.trial_speed_m_s)
     return Segment(
-        segment_id=segments.segment_id(row.log_id, zigzag.kind, zigzag.start_utc_ns, zigzag.end_utc_ns),
-        vessel=row.vessel,
-        log_id=row.log_id,
-        ingest_id=row.ingest_id,
+        segment_id=segment_id(ingest.log_id, zigzag.kind, zigzag.start_utc_ns, zigzag.end_utc_ns),
+        vessel=ingest.vessel,
+        log_id=ingest.log_id,
+        ingest_id=ingest.ingest_id,
         kind=zigzag.kind,
         psi0_deg=zigzag.psi0_deg,
         delta0_deg=zigzag.delta0_deg,

@@ -23,7 +23,7 @@ from flows import ingest_logs
 from flows.files import read_profiles
 from flows.identify_vessel import Request, identify_vessel
 from flows.reprocess_vessel import VesselReport, reprocess_vessel
-from schemas.errors import KempfError
+from flows.unforeseen import as_told
 from schemas.model_spec import ModelSpec
 from warehouse import vessels as vessel_table
 from warehouse.instant import iso_utc
@@ -79,7 +79,8 @@ def ingest(
 def identify_task(warehouse: str, vessel: str, estimator: str, spec: dict[str, Any]) -> list[dict[str, Any]]:
     """Identify every zigzag of one vessel."""
     request = Request(ModelSpec.model_validate(spec), estimator)
-    outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=str(flow_run.get_id()))
+    run = flow_run.get_id()
+    outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=str(run) if run else None)
     return [
         {
             "segment": o.segment.segment_id,
@@ -129,13 +130,6 @@ def reprocess_batch(warehouse: str, vessels: list[str], changed_only: bool, run:
     return reports
 
 
-def as_told(error: Exception) -> KempfError:
-    """Return an error as one that can be told; an unexpected one keeps its kind and words."""
-    if isinstance(error, KempfError):
-        return error
-    return KempfError("internal", f"{type(error).__name__}: {error}", "Report it with the log that it happened on.")
-
-
 #: Typed here because the runner's own parameter cannot be told from its arguments.
 _THREADS: Any = ThreadPoolTaskRunner(max_workers=_WORKERS)
 
@@ -162,7 +156,7 @@ def reprocess(
     """
     store = Warehouse(warehouse)
     store.require()
-    names = sorted(vessels) if vessels else vessel_table.names(store)
+    names = sorted(set(vessels)) if vessels else vessel_table.names(store)
     run = str(flow_run.get_id()) if flow_run.get_id() else None
     n_batches = min(len(names), _WORKERS * _BATCHES_A_WORKER)
     batches = [names[k::n_batches] for k in range(n_batches)]

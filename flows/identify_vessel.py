@@ -213,7 +213,7 @@ def build(
         fit=result.fit,
         iterations=list(result.iterations),
         convergence=_with_grid(result),
-        warnings=(*result.warnings, *(unknown_arm if arm is None else ())),
+        warnings=(*result.warnings, *(unknown_arm if arm is None and spec.wind == "force" else ())),
         parent=spec.parent,
         provenance=told,
     )

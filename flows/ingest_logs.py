@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from flows.files import read_bytes
-from flows.find_segments import find_segments
+from flows.find_segments import Ingest, find_segments
 from flows.progress import Progress, silent
+from flows.unforeseen import as_told
 from pipeline.ingest.read import read_log
 from pipeline.ingest.readings import Tally
 from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
-from warehouse import code_version, logs, vessels
+from warehouse import code_version, logs, raw, segments, vessels
 from warehouse.deposit import Delivery, deposit, held
+from warehouse.keys import ingest_id
 from warehouse.segments import Segment
-from warehouse.segments import current as current_segments
 from warehouse.store import Warehouse
 
 
@@ -140,8 +141,8 @@ def ingest(
         progress(done, len(paths), f"reading {path.name}")
         try:
             outcomes.append(ingest_bytes(warehouse, name, path.name, read_bytes(path, "raw log"), profile, str(path)))
-        except KempfError as error:
-            outcomes.append(IngestOutcome(str(path), "failed", error=error))
+        except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
+            outcomes.append(IngestOutcome(str(path), "failed", error=as_told(error)))
     progress(len(paths), len(paths), "done")
     return outcomes
 
@@ -160,12 +161,15 @@ def ingest_bytes(
     there = held(warehouse, vessel, file_name, data, profile_sha256=profile.sha256, code_version=code)
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
-        found = tuple(s for s in current_segments(warehouse, vessel) if s.ingest_id == there.ingest_id)
+        found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
         return IngestOutcome(path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found)
     readings = read_log(file_name, data, profile)
-    stored = deposit(warehouse, [Delivery(vessel, file_name, data, profile, readings, code)])[0]
+    log = raw.log_id(data)
+    one = Ingest(vessel, log, ingest_id(log, profile.sha256, code))
+    zigzags, notes = find_segments(one, profile, readings.frame)
+    # the zigzags before the row that makes the log count: what a crash leaves in between is not seen, and is not missed
+    segments.replace(warehouse, vessel, {one.ingest_id: zigzags})
+    noted = replace(readings, notes=(*readings.notes, *notes))
+    stored = deposit(warehouse, [Delivery(vessel, file_name, data, profile, noted, code)])[0]
     row = logs.of_ingest(warehouse, stored.ingest_id)
-    segments, notes = find_segments(warehouse, row, profile, readings.frame)
-    return IngestOutcome(
-        path, stored.outcome, row.log_id, row.ingest_id, row.tally, (*row.notes, *notes), tuple(segments)
-    )
+    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, tuple(zigzags))

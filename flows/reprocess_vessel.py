@@ -129,5 +129,9 @@ def _verify(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
     for name in parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list():
         if parameter_sets.get(warehouse, name).provenance["code_version"] != code:
             continue
-        verdict = rerun(warehouse, name).verdict
+        try:
+            verdict = rerun(warehouse, name).verdict
+        except KempfError as error:
+            report.fail(name, error)
+            continue
         report.verified[verdict] = report.verified.get(verdict, 0) + 1

@@ -41,9 +41,11 @@ class ModelSpec(BaseModel):
     name: str = "linear"
     base: str = "sway-yaw-16"
     effects: tuple[str, ...] = ()
+    #: ``force``: the normalised lateral force F of eq. (16) with its moment l F; ``none``: no wind, as in a tank
+    wind: Literal["force", "none"] = "force"
     #: ``earth``: two current states towards north and east; ``lateral``: the paper's single V_T, which takes the
-    #: current's lateral part for constant while the heading swings
-    current: Literal["earth", "lateral"] = "earth"
+    #: current's lateral part for constant while the heading swings; ``none``: still water, as in a tank
+    current: Literal["earth", "lateral", "none"] = "earth"
     #: mu_F and mu_V of eq. (16), 1/s
     wind_correlation_rate_per_s: float = Field(default=1 / 300.0, gt=0)
     current_correlation_rate_per_s: float = Field(default=1 / 1800.0, gt=0)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.identify.doubts import doubts
 from pipeline.identify.estimate import Estimate, Value, discrete_values, hull_values
 from pipeline.identify.fit import one_step_fit
 from pipeline.identify.kernel import N_STATE, N_THETA, likelihood, no_trace
@@ -26,6 +27,8 @@ Mask = NDArray[np.bool_]
 
 #: with less log-likelihood than this to gain, steps tell more of the curvature than the expected information
 _NEAR = 1.0
+#: logarithm of a noise level whose square is 0 to a double
+_NOTHING = -400.0
 #: log-likelihoods this close are taken for one maximum; ones this far behind in the race cannot win it
 _SAME_HILL = 0.1
 _OUT_OF_REACH = 50.0
@@ -96,7 +99,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Maximu
         ``converged`` is False, with the reason in ``report``, where the search did not end at a maximum.
     """
     active = np.ones(N_THETA, dtype=np.bool_)
-    active[8:] = record.used
+    active[6:] = (spec.wind != "none", spec.current != "none", *record.used)
     coarse = _Problem(thinned(record, settings.coarse_instants), spec, arm_per_m, settings, active)
     entries = sorted(starting_points(record), key=lambda start: -coarse.value(start[1]))[: settings.entries]
     race = [(name, coarse.search(theta, settings.coarse_iterations)) for name, theta in entries]
@@ -131,13 +134,19 @@ class _Problem:
             current_row = np.column_stack([-np.sin(record.heading_rad), np.cos(record.heading_rad)])
         else:
             current_row = np.tile([1.0, 0.0], (record.time_s.size, 1))
-        P0 = np.diag(np.square(settings.initial_std))
+        std = np.array(settings.initial_std)
+        std[2] *= spec.wind != "none"
+        std[4:] *= spec.current != "none"
+        P0 = np.diag(std**2)
         self._fixed = (
             *(record.time_s, record.speed_m_s, record.rudder_rad, record.measured, current_row),
             *(arm, spec.wind_correlation_rate_per_s, spec.current_correlation_rate_per_s, x0, P0),
         )
         self.low = np.concatenate([np.full(6, -np.inf), np.log(settings.sigma_low)])
         self.high = np.concatenate([np.full(6, np.inf), np.log(settings.sigma_high)])
+        # a disturbance that the specification leaves out has no intensity at all
+        absent = np.flatnonzero(~active[6:8]) + 6
+        self.low[absent], self.high[absent] = _NOTHING, _NOTHING
 
     def value(self, theta: Float) -> float:
         """Log-likelihood alone."""
@@ -308,6 +317,7 @@ def _report(
         if problem.active[6 + i]
     )
     innovation, variance, _ = problem.trace(best.theta)
+    fit = one_step_fit(record, innovation, variance)
     return Estimate(
         estimator="ml",
         parameters=hull_values(best.theta[:6], hull_covariance),
@@ -328,6 +338,6 @@ def _report(
             "race": _summary(race),
         },
         iterations=best.iterations,
-        fit=one_step_fit(record, innovation, variance),
-        warnings=tuple(warnings),
+        fit=fit,
+        warnings=(*warnings, *doubts(best.theta[:6], fit)),
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from scipy.linalg import expm, logm
+from scipy.linalg import expm
 
 from pipeline.normalise.series import Float
 
@@ -106,16 +106,28 @@ def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float
     """
     if not (np.all(np.isfinite(A)) and np.all(np.isfinite(B))):
         return None
-    block = np.eye(3)
-    block[:2, :2], block[:2, 2:] = A, B
-    eigenvalues = np.linalg.eigvals(A)
-    if np.any((np.abs(eigenvalues.imag) < 1e-12) & (eigenvalues.real <= 0.0)):
+    # A = m I + N with N N = d I, so that its logarithm is a multiple of I and one of N.
+    m = 0.5 * (A[0, 0] + A[1, 1])
+    N = A - m * np.eye(2)
+    d = -float(np.linalg.det(N))
+    determinant = m * m - d
+    s = np.sqrt(abs(d))
+    if determinant <= 0.0 or (d >= 0.0 and m <= 0.0):
         return None
-    logarithm = np.asarray(logm(block))
-    if not np.all(np.isfinite(logarithm)) or np.max(np.abs(logarithm.imag)) > 1e-8:
+    if s < 1e-8 * abs(m):
+        factor = 1.0 / m
+    else:
+        factor = (np.arctanh(s / m) if d > 0.0 else np.arctan2(s, m)) / s
+    generator = 0.5 * np.log(determinant) * np.eye(2) + factor * N
+    # B = integral of e^{A_c t} over the step times B_c: the same integral, undone
+    block = np.zeros((4, 4))
+    block[:2, :2], block[:2, 2:] = generator, np.eye(2)
+    integral = expm(block)[:2, 2:]
+    if not np.all(np.isfinite(generator)) or np.linalg.cond(integral) > 1e12:
         return None
-    generator = logarithm.real / step_s
+    inputs = np.linalg.solve(integral, B) / step_s
+    generator = generator / step_s
     V = speed_m_s
-    (a11, a12), (a21, a22) = generator[:2, :2] / V
-    b1, b2 = generator[:2, 2] / V**2
+    (a11, a12), (a21, a22) = generator / V
+    b1, b2 = inputs[:, 0] / V**2
     return Hull(float(a11), float(a12), float(a21), float(a22), float(b1), float(b2))

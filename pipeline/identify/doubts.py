@@ -1,0 +1,49 @@
+"""What speaks against an estimate although the search converged, in words for the person who is to trust it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from pipeline.normalise.series import Float
+
+#: lag-1 autocorrelation of whitened innovations above which the standard errors are not to be believed
+_NOT_WHITE = 0.3
+#: a 95 % interval that holds fewer than this share of the measurements is too narrow
+_TOO_FEW = 0.90
+
+
+def doubts(hull: Float, fit: dict[str, Any]) -> tuple[str, ...]:
+    """Name what is implausible about an estimate.
+
+    Parameters
+    ----------
+    hull : ndarray, shape (6,)
+        a11, a12, a21, a22, b1, b2.
+    fit : dict
+        See `pipeline.identify.fit.one_step_fit`.
+
+    Returns
+    -------
+    tuple of str
+        One sentence each; empty where nothing speaks against it.
+    """
+    a11, _, _, a22, b1, b2 = (float(p) for p in hull)
+    found = []
+    if a11 > 0:
+        found.append("a11 is positive: sway would feed itself, no hull does; something acts that the model lacks")
+    if a22 > 0:
+        found.append("a22 is positive: yaw would feed itself, no hull does; something acts that the model lacks")
+    if b2 < 0:
+        found.append("b2 is negative: the rudder turns the ship the wrong way; check the sign of the rudder channel")
+    elif b1 > 0:
+        found.append("b1 is positive: the rudder pushes the stern the wrong way; sway and yaw are hardly told apart")
+    for name, channel in fit.get("channels", {}).items():
+        lag, inside = channel["lag1_autocorrelation"], channel["inside_95_percent"]
+        if abs(lag) > _NOT_WHITE:
+            found.append(
+                f"the prediction errors of {name} are not white (lag-1 autocorrelation {lag:.2f}): "
+                "the model lacks something, and the standard errors are too small"
+            )
+        if inside < _TOO_FEW:
+            found.append(f"only {100 * inside:.0f} % of {name} lie in their 95 % prediction interval")
+    return tuple(found)
