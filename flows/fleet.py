@@ -13,6 +13,8 @@ from typing import Any
 # Before prefect is imported: nothing leaves the machine.
 os.environ.setdefault("DO_NOT_TRACK", "1")
 os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
+# A busy machine needs longer than Prefect's 20 s to start the server of a run.
+os.environ.setdefault("PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS", "180")
 
 from prefect import flow, get_run_logger, task
 from prefect.artifacts import create_table_artifact
