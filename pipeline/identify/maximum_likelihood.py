@@ -308,6 +308,11 @@ def _report(
         warnings.append(f"not converged: {best.reason}")
     if bounds:
         warnings.append(f"at a bound, not estimated: {', '.join(bounds)}")
+    if any(best.theta[i] <= problem.low[i] for i in (8, 9, 10) if problem.active[i]):
+        warnings.append(
+            "the measurements are smoother than this model can be: its wind and current states explain what the hull "
+            "should; for a tank, or still water and no wind, identify with a model without them (docs/models/tank.yaml)"
+        )
     if weak:
         warnings.append("some directions of the parameters are hardly determined by these data, see the report")
     sigma = np.exp(best.theta[6:])

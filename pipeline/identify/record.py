@@ -88,7 +88,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     Raises
     ------
     DataRejected
-        A channel is missing, has a gap that cannot be bridged, or the rudder did not move.
+        A channel is missing, not finite, has a gap that cannot be bridged, or the rudder did not move.
     """
     warnings: list[str] = []
     heading = _need(instruments, "heading", start_utc_ns, end_utc_ns)
@@ -103,7 +103,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         course_std_rad=noise_std(course),
         heading_std_rad=noise_std(heading),
     )
-    yaw = _cut(instruments.get("yaw_rate"), start_utc_ns, end_utc_ns)
+    yaw = _cut(instruments, "yaw_rate", start_utc_ns, end_utc_ns)
     turning = yaw if yaw is not None else heading
     if yaw is None:
         warnings.append("no yaw rate channel: the yaw rate is estimated through the heading")
@@ -135,15 +135,24 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     )
 
 
-def _cut(series: Series | None, start_ns: int, end_ns: int) -> Series | None:
+def _cut(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> Series | None:
+    series = instruments.get(channel)
     if series is None:
         return None
     part = series.between(start_ns, end_ns)
+    wrong = int(np.count_nonzero(~np.isfinite(part.value)))
+    if wrong:
+        raise DataRejected(
+            "not_finite",
+            f"The segment's {channel} holds {wrong} of {len(part)} values that are no finite numbers.",
+            "Ingest the log again: ingest refuses such values one by one and keeps the rest.",
+            {"channel": channel, "values": len(part), "not_finite": wrong},
+        )
     return part if len(part) >= _MIN_INSTANTS // 2 else None
 
 
 def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> Series:
-    part = _cut(instruments.get(channel), start_ns, end_ns)
+    part = _cut(instruments, channel, start_ns, end_ns)
     if part is None:
         raise DataRejected(
             "channel_missing",
@@ -163,7 +172,7 @@ def _speed(
     warnings: list[str],
 ) -> Float:
     """Speed through the water at the instants: the log, else the forward part of the GNSS velocity."""
-    log = _cut(instruments.get("speed_through_water"), start_ns - 5 * SECOND_NS, end_ns + 5 * SECOND_NS)
+    log = _cut(instruments, "speed_through_water", start_ns - 5 * SECOND_NS, end_ns + 5 * SECOND_NS)
     if log is None:
         good = np.isfinite(lateral.forward_m_s)
         log = Series(lateral.time_utc_ns[good], lateral.forward_m_s[good])

@@ -112,12 +112,10 @@ def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float
     d = -float(np.linalg.det(N))
     determinant = m * m - d
     s = np.sqrt(abs(d))
-    if determinant <= 0.0 or (d >= 0.0 and m <= 0.0):
+    if determinant <= 0.0 or (d >= 0.0 and m <= s):
         return None
-    if s < 1e-8 * abs(m):
-        factor = 1.0 / m
-    else:
-        factor = (np.arctanh(s / m) if d > 0.0 else np.arctan2(s, m)) / s
+    angle = np.arctanh(s / m) if d > 0.0 else np.arctan2(s, m)
+    factor = angle / s if s > 1e-8 * abs(m) else 1.0 / m
     generator = 0.5 * np.log(determinant) * np.eye(2) + factor * N
     # B = integral of e^{A_c t} over the step times B_c: the same integral, undone
     block = np.zeros((4, 4))

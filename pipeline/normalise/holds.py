@@ -46,10 +46,10 @@ class Held:
 def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
     """Find the rows at which the instrument behind one or more columns measured, and when.
 
-    The period is the commonest length of the runs of equal rows. A channel at rest and quantised also repeats itself:
-    a run of several periods keeps one row a period, so that a rudder standing still stays sampled. A measurement was
-    made within the row that ends where its value first shows: the middle of it is taken, and where the instrument
-    keeps a steady clock, the straight line through these middles.
+    The period is the commonest length of the runs of equal rows, give or take a row. A channel at rest and quantised
+    also repeats itself: a run of several periods keeps one row a period, so that a rudder standing still stays sampled.
+    A measurement was made within the row that ends where its value first shows: the middle of it is taken, and where
+    the instrument keeps a steady clock, the straight line through these middles.
 
     Parameters
     ----------
@@ -78,7 +78,8 @@ def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
     lengths = np.diff(np.append(starts, n_rows))
     if starts.size < _MIN_RUNS:
         return everything
-    period = int(np.bincount(lengths).argmax())
+    # smoothed, because a sample on the edge of a row slips: runs of one row less and more are of the same period
+    period = int(np.convolve(np.bincount(lengths, minlength=4), [1, 2, 1], "same").argmax())
     inner = lengths[1:-1]  # the first and last run may be cut by the ends of the log
     single = inner[inner < 1.5 * period + 1]
     regular = np.abs(single - period) <= max(1.0, 0.2 * period)

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.linalg import logm
 from scipy.signal import cont2discrete
 
 from pipeline.model.ship import Hull, continuous_from_discrete, discretise, mariner_like
@@ -104,3 +107,27 @@ def test_the_scaled_mariner_keeps_her_shape() -> None:
     # the same ship in her own time: L/V steps give the same eigenvalues
     small, large = discretise(short, 2.0, 10.0 / 2.0)[0], discretise(long, 8.0, 200.0 / 8.0)[0]
     np.testing.assert_allclose(np.sort(np.linalg.eigvals(small)), np.sort(np.linalg.eigvals(large)), rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "A",
+    [
+        [[0.9, 0.0], [0.0, 0.9]],
+        [[0.9, 0.3], [0.0, 0.9]],  # no two eigenvectors
+        [[0.9, 0.3], [1e-20, 0.9]],
+        [[1.0, 0.5], [0.0, 0.8]],  # an eigenvalue of 1: she does not answer in one direction
+        [[0.999999999, 1e-3], [1e-7, 0.99]],
+        [[30.0, 5.0], [2.0, 40.0]],
+        [[-0.3, 0.9], [-0.9, -0.3]],  # half turns in a step and more, still on the principal branch
+    ],
+)
+def test_the_logarithm_is_the_one_of_scipy(A: list[list[float]]) -> None:
+    block = np.eye(3)
+    block[:2, :2], block[:2, 2] = A, [0.2, 0.03]
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # its own doubt about the last digits
+        expected = np.real(logm(block))
+    hull = continuous_from_discrete(np.array(A), np.array([[0.2], [0.03]]), 1.0, 1.0)
+    assert hull is not None
+    found = [[hull.a11, hull.a12, hull.b1], [hull.a21, hull.a22, hull.b2]]
+    np.testing.assert_allclose(found, expected[:2], rtol=1e-7, atol=1e-9)

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import polars as pl
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.ingest.read import read_log
@@ -31,6 +31,7 @@ def logged(sampled_ns: np.ndarray, values: np.ndarray, n_rows: int) -> tuple[np.
     return time[good], values[last[good]][:, None]
 
 
+@settings(max_examples=150, deadline=None)
 @given(
     period=st.integers(2, 12),
     n_values=st.integers(30, 200),
