@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from pipeline.identify.doubts import doubts
 from pipeline.identify.estimate import Estimate, Value, discrete_values, hull_values
 from pipeline.identify.fit import one_step_fit
+from pipeline.identify.gating import gate
 from pipeline.identify.kernel import N_STATE, N_THETA, likelihood, no_trace
 from pipeline.identify.record import Record
 from pipeline.identify.starts import starting_points, thinned
@@ -54,6 +55,9 @@ class MaximumLikelihoodSettings:
         Bounds of the noise levels, order of `NOISE_PARAMETERS`.
     initial_std : tuple of float
         Standard deviations of the state (v, r, F, psi, c_1, c_2) at the first instant, wide: the data decide.
+    gate_width, gate_share, gate_rounds : float, float, int
+        Measurements farther than ``gate_width`` robust standard deviations from their prediction are gross errors and
+        are left out, unless they are more than ``gate_share`` of all; the fit and the gate take turns so many times.
     discrete_step_s : float
         Step of the discrete parameters (17) that are reported.
     """
@@ -67,6 +71,9 @@ class MaximumLikelihoodSettings:
     sigma_low: tuple[float, ...] = (1e-7, 1e-4, 1e-5, 1e-7, 1e-6)
     sigma_high: tuple[float, ...] = (1.0, 10.0, 10.0, 0.5, 1.0)
     initial_std: tuple[float, ...] = (2.0, 0.2, 0.1, 0.2, 2.0, 2.0)
+    gate_width: float = 5.0
+    gate_share: float = 0.1
+    gate_rounds: int = 5
     discrete_step_s: float = 1.0
 
 
@@ -106,8 +113,23 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Maximu
     race.sort(key=lambda entry: -entry[1].log_likelihood)
     problem = _Problem(record, spec, arm_per_m, settings, active)
     searches = [(name, problem.search(s.theta, settings.max_iterations)) for name, s in _distinct(race, settings)]
-    best_name, best = max(searches, key=lambda s: s[1].log_likelihood)
-    return _report(problem, best_name, best, searches, race)
+    name, best = max(searches, key=lambda entry: entry[1].log_likelihood)
+    taken_out: dict[str, int] = {}
+    heavy: tuple[str, ...] = ()
+    for number in range(settings.gate_rounds):
+        innovation, variance, _ = problem.trace(best.theta)
+        # wide gates first: a jump that the filter took in makes its sound neighbours look wrong
+        width = settings.gate_width * 2.0 ** max(0, 2 - number)
+        gated = gate(problem.record, innovation, variance, width, settings.gate_share)
+        heavy = gated.heavy
+        if not gated.taken_out:
+            continue
+        taken_out = {
+            key: taken_out.get(key, 0) + gated.taken_out.get(key, 0) for key in {**taken_out, **gated.taken_out}
+        }
+        problem = _Problem(gated.record, spec, arm_per_m, settings, active)
+        best = problem.search(best.theta, settings.max_iterations)
+    return _report(problem, name, best, {"starts": _summary(searches), "race": _summary(race)}, taken_out, heavy)
 
 
 def _distinct(race: list[tuple[str, _Search]], settings: MaximumLikelihoodSettings) -> list[tuple[str, _Search]]:
@@ -283,7 +305,12 @@ def _iteration(count: int, theta: Float, value: float, gain: float, damping: flo
 
 
 def _report(
-    problem: _Problem, name: str, best: _Search, searches: list[tuple[str, _Search]], race: list[tuple[str, _Search]]
+    problem: _Problem,
+    name: str,
+    best: _Search,
+    starts: dict[str, Any],
+    taken_out: dict[str, int],
+    heavy: tuple[str, ...],
 ) -> Estimate:
     record, settings = problem.record, problem.settings
     names = [*HULL_PARAMETERS, *NOISE_PARAMETERS]
@@ -304,6 +331,10 @@ def _report(
     bounds = [names[i] for i in np.flatnonzero(problem.active & ~free)]
     hull_covariance = covariance[:6, :6]
     warnings = list(record.warnings)
+    warnings += [f"{count} gross errors of {key} left out" for key, count in taken_out.items()]
+    warnings += [
+        f"many prediction errors of {key} are far too large: not gross errors, the model fails" for key in heavy
+    ]
     if not best.converged:
         warnings.append(f"not converged: {best.reason}")
     if bounds:
@@ -339,8 +370,8 @@ def _report(
             "active_bounds": bounds,
             "weak_directions": weak,
             "start": name,
-            "starts": _summary(searches),
-            "race": _summary(race),
+            "gross_errors": taken_out,
+            **starts,
         },
         iterations=best.iterations,
         fit=fit,
