@@ -1,0 +1,49 @@
+"""docs/fleet.md and prefect.yaml: what the page calls is there. The server itself is not started here."""
+
+import ast
+import re
+from pathlib import Path
+
+import yaml
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")
+SETTINGS = yaml.safe_load((ROOT / "prefect.yaml").read_text(encoding="utf-8"))
+
+
+def flows() -> dict[str, list[str]]:
+    """Return the parameters of every flow in flows/fleet.py by the flow's name, without importing Prefect."""
+    tree = ast.parse((ROOT / "flows" / "fleet.py").read_text(encoding="utf-8"))
+    found = {}
+    for node in tree.body:
+        if isinstance(node, ast.FunctionDef) and any("flow" in ast.unparse(d) for d in node.decorator_list):
+            found[node.name] = [argument.arg for argument in node.args.args]
+    return found
+
+
+def test_the_deployment_is_a_flow_and_its_parameters_are_the_flows() -> None:
+    (deployment,) = SETTINGS["deployments"]
+    path, _, name = deployment["entrypoint"].partition(":")
+    assert (ROOT / path).is_file()
+    assert set(deployment["parameters"]) <= set(flows()[name])
+    assert f"{name}/{deployment['name']}" in TEXT
+    assert deployment["parameters"]["warehouse"] == "{{ $KEMPF_WAREHOUSE }}"
+
+
+def test_the_page_names_the_pool_the_schedule_and_the_artifacts() -> None:
+    (deployment,) = SETTINGS["deployments"]
+    pool = deployment["work_pool"]["name"]
+    assert f"work-pool create {pool} --type process" in TEXT
+    assert f"worker start --pool {pool}" in TEXT
+    assert [s["cron"] for s in deployment["schedules"]] == ["0 2 * * *"]
+    assert "02:00 UTC every night" in TEXT
+    source = (ROOT / "flows" / "fleet.py").read_text(encoding="utf-8")
+    keys = re.findall(r'create_table_artifact\(key="([\w-]+)"', source)
+    assert sorted(keys) == ["kempf-identify", "kempf-ingest", "kempf-reprocess"]
+    for key in keys:
+        assert key in TEXT
+
+
+def test_nothing_is_sent_away() -> None:
+    for setting in ("DO_NOT_TRACK=1", "PREFECT_SERVER_ANALYTICS_ENABLED=false"):
+        assert f"export {setting}" in TEXT

@@ -1,0 +1,43 @@
+"""docs/model.md is true: every model in it is valid, every key is told with its default, models beside it are valid."""
+
+from pathlib import Path
+
+import pytest
+import yaml
+
+from flows.files import read_model
+from schemas.model_spec import ModelSpec
+from tests.docs.console import blocks
+
+FOLDER = Path(__file__).parents[2] / "docs"
+TEXT = (FOLDER / "model.md").read_text(encoding="utf-8")
+
+
+def test_examples_are_valid_and_named(tmp_path: Path) -> None:
+    found = []
+    for _, _, lines in blocks(TEXT):
+        path = tmp_path / "model.yaml"
+        path.write_text("\n".join(lines), encoding="utf-8")
+        found.append(read_model(path))
+    assert [(m.name, m.wind, m.current) for m in found] == [("tank", "none", "none"), ("paper", "force", "lateral")]
+
+
+def test_tank_example_is_the_file() -> None:
+    shown = next(lines for _, _, lines in blocks(TEXT) if "name: tank" in lines)
+    assert yaml.safe_load("\n".join(shown)) == yaml.safe_load((FOLDER / "models" / "tank.yaml").read_text("utf-8"))
+
+
+def test_every_key_is_told() -> None:
+    for key in ModelSpec.model_fields:
+        assert f"| `{key}` |" in TEXT, key
+
+
+@pytest.mark.parametrize(("key", "told"), [("name", "`linear`"), ("base", "`sway-yaw-16`"), ("wind", "`force`")])
+def test_defaults_are_as_told(key: str, told: str) -> None:
+    assert f"| `{key}` | {told} |" in TEXT
+    assert told.strip("`") == getattr(ModelSpec(), key)
+
+
+def test_rates_are_as_told() -> None:
+    assert ModelSpec().current == "earth"
+    assert (ModelSpec().wind_correlation_rate_per_s, ModelSpec().current_correlation_rate_per_s) == (1 / 300, 1 / 1800)

@@ -1,0 +1,62 @@
+"""The README is true: its commands run in an empty folder and print what it shows."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.docs.console import Command, Names, Shell, difference, same_line, steps
+
+README = Path(__file__).parents[2] / "README.md"
+
+
+def test_readme_shows_what_its_commands_print(tmp_path: Path) -> None:
+    names, shell = Names(), Shell(tmp_path)
+    commands = 0
+    try:
+        for step in steps(README.read_text(encoding="utf-8")):
+            if not isinstance(step, Command):
+                (tmp_path / step.name).write_text(step.content, encoding="utf-8")
+                continue
+            commands += 1
+            found, code = shell.run(names.resolved(step.line))
+            assert code == 0, (step.line, found)
+            told = difference(step.shown, found, names)
+            assert told is None, f"$ {step.line}\n{told}\nmend it by hand or with python -m benchmarks.refresh_readme"
+    finally:
+        shell.close()
+    assert commands >= 10
+
+
+@pytest.mark.parametrize(
+    ("shown", "found", "same"),
+    [
+        ("b2  6.315e-05  6.6e-07", "b2  6.316e-05   6.6e-07", True),
+        ("b2  6.315e-05", "b2  6.317e-05", False),
+        ("K0 264", "K0 263.9", True),
+        ("a 0.0003", "a 0.00031", True),
+        ("error -0.0", "error +0.1", True),
+        ("48645 records", "48646 records", False),
+        ("2 zigzags", "3 zigzags", False),
+        ("converged", "NOT CONVERGED", False),
+        ("1/m^2", "1/m", False),
+        ("-0.004754406747221156", "-0.004754406747333156", True),
+        ("-0.004754406747221156", "-0.004754506747221156", False),
+    ],
+)
+def test_numbers_may_move_by_their_last_digit_and_nothing_else(shown: str, found: str, same: bool) -> None:
+    assert same_line(shown, found, Names()) is same
+
+
+def test_an_id_stands_for_one_thing_only() -> None:
+    names = Names()
+    assert same_line("set ps-0123456789abcdef", "set ps-fedcba9876543210", names)
+    assert names.resolved("kempf rerun ps-0123456789abcdef") == "kempf rerun ps-fedcba9876543210"
+    assert not same_line("set ps-0123456789abcdef", "set ps-0000000000000000", names)
+
+
+def test_left_out_lines_may_be_any() -> None:
+    assert difference(("a", "...", "z"), ["a", "b", "c", "z"], Names()) is None
+    assert difference(("a", "...", "z"), ["a", "b", "c"], Names()) is not None
+    assert difference((), ["a"], Names()) is not None
+    assert difference(("a", ""), ["a"], Names()) is None
+    assert difference(("a",), ["a", "b"], Names()) is not None
