@@ -165,7 +165,10 @@ def reprocess(
     futures = [reprocess_batch.submit(warehouse, batch, changed_only, run) for batch in batches]
     reports: list[dict[str, Any]] = sorted((r for f in futures for r in f.result()), key=lambda r: str(r["vessel"]))
     rows = [
-        {**{k: v for k, v in report.items() if k not in ("failures", "verified")}, "failures": len(report["failures"])}
+        {
+            **{k: v for k, v in report.items() if k not in ("failures", "verified")},
+            "failures": "; ".join(f"{f['what']}: {f['error']['message']}" for f in report["failures"]),
+        }
         for report in reports
     ]
     create_table_artifact(key="kempf-reprocess", table=rows, description="The fleet")

@@ -25,8 +25,8 @@ class History:
     Attributes
     ----------
     frame : polars.DataFrame
-        One row a parameter of a set: parameter_set_id, start_utc_ns, model, estimator, parameter, value, std, unit;
-        sorted by start, then id, then as the set lists them.
+        One row a parameter of a set: parameter_set_id, start_utc_ns, model, estimator, parameter, value, std, unit,
+        superseded; sorted by start, superseded ones first, then id, then as the set lists them.
     version : int or None
         Version of the table that was read; None where there was none.
     note : str or None
@@ -45,7 +45,12 @@ class History:
 
 
 def of_vessel(
-    warehouse: Warehouse, vessel: str, parameter: str | None = None, as_of: datetime | None = None
+    warehouse: Warehouse,
+    vessel: str,
+    parameter: str | None = None,
+    as_of: datetime | None = None,
+    *,
+    superseded: bool = False,
 ) -> History:
     """Return the history of a vessel's parameters.
 
@@ -59,6 +64,8 @@ def of_vessel(
         Only this one.
     as_of : datetime, optional
         With a time zone: only what had been committed by then.
+    superseded : bool, optional
+        Also sets whose log has been read anew since, with another profile or code.
 
     Raises
     ------
@@ -79,10 +86,12 @@ def of_vessel(
         version = delta.version_as_of(warehouse, "parameter_sets", as_of)
         if version is None:
             vessels.require(warehouse, vessel)
-            nothing = _exploded(None, vessel)
+            nothing = _exploded(None, vessel, [])
             return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
     table = delta.open_table(warehouse, "parameter_sets", version)
-    frame = _exploded(table, vessel)
+    frame = _exploded(table, vessel, _past_ingests(warehouse, vessel, as_of))
+    if not superseded:
+        frame = frame.remove(frame["superseded"])
     note: str | None = None
     if frame.height == 0:
         vessels.require(warehouse, vessel)
@@ -92,10 +101,27 @@ def of_vessel(
     return History(frame, table.version() if table is not None else None, note)
 
 
-def _exploded(table: DeltaTable | None, vessel: str) -> pl.DataFrame:
-    columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters")
+def _past_ingests(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> list[str]:
+    """Return the ingests after which their logs had been read anew, by a time or by now."""
+    version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
+    if as_of is not None and version is None:
+        return []
+    table = delta.open_table(warehouse, "logs", version)
+    columns = ("log_id", "ingest_id", "revision")
+    rows = delta.rows(table, "logs", {"vessel_key": vessel_key(vessel)}, columns).sort("log_id", "revision")
+    present = {row["log_id"]: row["ingest_id"] for row in rows.rows(named=True)}
+    return [row["ingest_id"] for row in rows.rows(named=True) if present[row["log_id"]] != row["ingest_id"]]
+
+
+def _exploded(table: DeltaTable | None, vessel: str, past: list[str]) -> pl.DataFrame:
+    import polars as pl
+
+    columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters", "provenance_json")
     sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, columns)
-    each = sets.sort("start_utc_ns", "parameter_set_id").explode("parameters", empty_as_null=False)
+    ingest = pl.col("provenance_json").str.json_path_match("$.ingest_ids[0]")
+    marked = sets.with_columns(superseded=ingest.is_in(past).fill_null(value=False)).drop("provenance_json")
+    ordered = marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
+    each = ordered.explode("parameters", empty_as_null=False)
     return each.unnest("parameters").rename({"model_name": "model", "name": "parameter"})
 
 

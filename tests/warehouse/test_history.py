@@ -31,7 +31,17 @@ def test_rows_are_in_order_of_start_then_id(warehouse: Warehouse) -> None:
     found = history.of_vessel(warehouse, "aurora")
     assert found.frame["parameter_set_id"].to_list() == [name for name in (*early, late) for _ in range(2)]
     assert found.frame["parameter"].to_list() == ["a11", "b2"] * 3
-    columns = ["parameter_set_id", "start_utc_ns", "model", "estimator", "parameter", "value", "std", "unit"]
+    columns = [
+        "parameter_set_id",
+        "start_utc_ns",
+        "model",
+        "estimator",
+        "parameter",
+        "value",
+        "std",
+        "unit",
+        "superseded",
+    ]
     assert found.frame.columns == columns
     assert found.note is None
     row = history.of_vessel(warehouse, "aurora", parameter="b2").rows()[0]

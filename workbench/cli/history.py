@@ -15,14 +15,15 @@ from workbench.terminal import number, print_json, print_table
 @vessel_option(required=True)
 @click.option("--parameter", metavar="NAME", help="Only this parameter, such as b2.")
 @click.option("--as-of", metavar="TIME", help="What was known at this time, ISO 8601; without a zone it is UTC.")
+@click.option("--all", "superseded", is_flag=True, help="Also sets that a newer profile or code superseded.")
 @warehouse_option
 @json_option
-def command(vessel: str, parameter: str | None, as_of: str | None, uri: str, as_json: bool) -> None:
+def command(vessel: str, parameter: str | None, as_of: str | None, superseded: bool, uri: str, as_json: bool) -> None:
     """Show a vessel's parameters over time, as known now or at an earlier time."""
     from warehouse import history
     from warehouse.store import Warehouse
 
-    found = history.of_vessel(Warehouse(uri), vessel, parameter, _instant(as_of))
+    found = history.of_vessel(Warehouse(uri), vessel, parameter, _instant(as_of), superseded=superseded)
     if as_json:
         print_json(found.rows())
         return
@@ -38,7 +39,7 @@ def command(vessel: str, parameter: str | None, as_of: str | None, uri: str, as_
             r["unit"],
             r["estimator"],
             r["model"],
-            r["parameter_set_id"],
+            r["parameter_set_id"] + (" superseded" if r["superseded"] else ""),
         ]
         for r in found.rows()
     ]
@@ -50,10 +51,10 @@ def _instant(text: str | None) -> datetime | None:
         return None
     try:
         instant = datetime.fromisoformat(text)
-    except ValueError as error:
+        return (instant if instant.tzinfo is not None else instant.replace(tzinfo=UTC)).astimezone(UTC)
+    except (ValueError, OverflowError) as error:
         raise UsageError(
             "not_a_time",
             f"--as-of {text!r} is no time; expected ISO 8601.",
             "Write it as 2025-05-03T12:00:00Z.",
         ) from error
-    return instant if instant.tzinfo is not None else instant.replace(tzinfo=UTC)
