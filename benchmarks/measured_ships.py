@@ -1,0 +1,85 @@
+"""The measured logs as the main job takes them in: which files, which ship, which profile. No figures here."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from flows.files import read_profiles
+from flows.ingest_logs import IngestOutcome, ingest
+from schemas.errors import NotFound
+from warehouse.store import Warehouse
+
+_PROFILES = Path(__file__).parents[1] / "docs" / "profiles"
+
+
+@dataclass(frozen=True)
+class Ship:
+    """The logs of one ship.
+
+    Attributes
+    ----------
+    name : str
+    profiles : tuple of Path
+        Laid over each other.
+    logs : tuple of Path
+        In the order of their names.
+    """
+
+    name: str
+    profiles: tuple[Path, ...]
+    logs: tuple[Path, ...]
+
+
+@dataclass(frozen=True)
+class Run:
+    """What the name of a towing-tank run says was ordered."""
+
+    name: str
+    rudder_deg: float
+    heading_deg: float
+    side: str
+
+
+def _ship(name: str, profiles: Sequence[Path], logs: Sequence[Path], where: Path) -> Ship:
+    if not logs:
+        raise NotFound("no_measured_data", f"There are no logs of {name} in {where}.", "Say where with --data FOLDER.")
+    return Ship(name, tuple(profiles), tuple(sorted(logs)))
+
+
+def tank(data: Path) -> Ship:
+    """The KVLCC2 model in the towing tank."""
+    folder = data / "data" / "kvlcc2_hsva"
+    return _ship("hsva_kvlcc2", [_PROFILES / "hsva_kvlcc2.yaml"], list(folder.glob("*.dat")), folder)
+
+
+def boat(data: Path) -> Ship:
+    """The small unmanned vessel at sea."""
+    folder = data / "data" / "usv_open_water"
+    return _ship("usv_open_water", [_PROFILES / "usv_open_water.yaml"], list(folder.glob("*_xy.csv")), folder)
+
+
+def fleet(data: Path) -> list[Ship]:
+    """The eight ships of the trial logs."""
+    folders = sorted(p.parent for p in (data / "trials").glob("*/particulars.json"))
+    if not folders:
+        where = data / "trials"
+        raise NotFound("no_measured_data", f"There are no trial logs in {where}.", "Say where with --data FOLDER.")
+    return [
+        _ship(f.name, [f / "particulars.json", _PROFILES / "trial_logger.yaml"], list(f.glob("2*")), f) for f in folders
+    ]
+
+
+def take_in(warehouse: Warehouse, ship: Ship) -> list[IngestOutcome]:
+    """Ingest the logs of a ship, one outcome a log in their order."""
+    return ingest(warehouse, ship.logs, ship.name, read_profiles(ship.profiles))
+
+
+def ordered(file_name: str) -> Run:
+    """Read what was ordered off the name of a towing-tank run, rudder first, then heading."""
+    found = re.search(r"Z_(\d+)_(\d+)(_[PS])?", file_name)
+    if found is None:
+        raise ValueError(f"{file_name} does not name a towing-tank run")
+    return Run(found[0], float(found[1]), float(found[2]), "port" if found[3] == "_P" else "starboard")

@@ -1,0 +1,28 @@
+"""Every source is taken in once a session; identification, which costs, is left to the tests that look at it."""
+
+from __future__ import annotations
+
+import pytest
+
+from benchmarks import measured_ships
+from tests.real_data.voyage import SHARED, Voyage, require, sail
+from warehouse.store import Warehouse
+
+
+@pytest.fixture(scope="session")
+def tank(tmp_path_factory: pytest.TempPathFactory) -> Voyage:
+    require("data", "kvlcc2_hsva")
+    return sail(measured_ships.tank(SHARED), Warehouse(str(tmp_path_factory.mktemp("tank"))))
+
+
+@pytest.fixture(scope="session")
+def boat(tmp_path_factory: pytest.TempPathFactory) -> Voyage:
+    require("data", "usv_open_water")
+    return sail(measured_ships.boat(SHARED), Warehouse(str(tmp_path_factory.mktemp("boat"))))
+
+
+@pytest.fixture(scope="session")
+def fleet(tmp_path_factory: pytest.TempPathFactory) -> list[Voyage]:
+    require("trials")
+    warehouse = Warehouse(str(tmp_path_factory.mktemp("fleet")))
+    return [sail(ship, warehouse) for ship in measured_ships.fleet(SHARED)]
