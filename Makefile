@@ -6,7 +6,7 @@ BIN := $(VENV)/bin
 RUNTIME := $(VENV)/.runtime
 DEVELOP := $(VENV)/.develop
 
-.PHONY: demo test check docs lock clean setup
+.PHONY: demo test check bench lock clean setup
 
 demo: $(RUNTIME)
 	$(BIN)/kempf demo
@@ -19,6 +19,10 @@ check: $(DEVELOP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+# Every figure anew, each on its own page in benchmarks/results; needs the measured logs in ../shared. Minutes.
+bench: $(DEVELOP)
+	for name in hsva usv trials rerun_demo speed monte_carlo current_frame; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 setup: $(DEVELOP)
 

@@ -133,11 +133,14 @@ def _missing(warehouse: Warehouse, wanted: Sequence[Inputs]) -> set[str]:
 
 
 def _point_to_current(warehouse: Warehouse, vessel: str, outcomes: Sequence[IdentifyOutcome]) -> None:
-    """Let ``current`` point to the latest whole zigzag whose identification converged."""
+    """Let ``current`` point to the latest whole zigzag whose maximum-likelihood identification converged."""
     whole = [
         o.parameter_set
         for o in outcomes
-        if o.parameter_set is not None and o.segment.kind == "zigzag" and o.parameter_set.convergence.get("converged")
+        if o.parameter_set is not None
+        and o.segment.kind == "zigzag"
+        and o.parameter_set.convergence.get("converged")
+        and o.parameter_set.estimator == "ml"
     ]
     if whole:
         aliases.point(warehouse, vessel, whole[-1].parameter_set_id)

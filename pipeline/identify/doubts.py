@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from pipeline.normalise.series import Float
+from schemas.model_spec import HULL_PARAMETERS
 
 #: lag-1 autocorrelation of whitened innovations above which the standard errors are not to be believed
 _NOT_WHITE = 0.3
@@ -12,13 +13,15 @@ _NOT_WHITE = 0.3
 _TOO_FEW = 0.90
 
 
-def doubts(hull: Float, fit: dict[str, Any]) -> tuple[str, ...]:
+def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
     """Name what is implausible about an estimate.
 
     Parameters
     ----------
     hull : ndarray, shape (6,)
         a11, a12, a21, a22, b1, b2.
+    std : ndarray, shape (6,)
+        Their standard errors, NaN where there is none.
     fit : dict
         See `pipeline.identify.fit.one_step_fit`.
 
@@ -27,12 +30,15 @@ def doubts(hull: Float, fit: dict[str, Any]) -> tuple[str, ...]:
     tuple of str
         One sentence each; empty where nothing speaks against it.
     """
-    a11, _, _, a22, b1, b2 = (float(p) for p in hull)
-    found = []
+    a11, _, a21, a22, b1, b2 = (float(p) for p in hull)
+    vague = [name for name, value, error in zip(HULL_PARAMETERS, hull, std, strict=True) if error >= abs(value)]
+    found = [f"not determined, error as large as the value: {', '.join(vague)}"] if vague else []
     if a11 > 0:
         found.append("a11 is positive: sway would feed itself, no hull does; something acts that the model lacks")
     if a22 > 0:
         found.append("a22 is positive: yaw would feed itself, no hull does; something acts that the model lacks")
+    if a21 > 0:
+        found.append("a21 is positive: drifting turns the bow into the flow, few hulls do; something acts unmodelled")
     if b2 < 0:
         found.append("b2 is negative: the rudder turns the ship the wrong way; check the sign of the rudder channel")
     elif b1 > 0:

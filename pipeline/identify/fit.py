@@ -9,6 +9,9 @@ import numpy as np
 from pipeline.identify.record import MEASUREMENTS, Record
 from pipeline.normalise.series import Float
 
+#: a prediction counts when its variance is below this many times the median one
+_SETTLED = 3.0
+
 
 def fit_percent(measured: Float, error: Float) -> float:
     """Return 100 (1 - |y - y^| / |y - mean y|), as MATLAB's ``compare`` defines it.
@@ -40,11 +43,14 @@ def one_step_fit(record: Record, innovation: Float, variance: Float) -> dict[str
     -------
     dict
         Horizon and sample named; for each measurement rms (SI), fit %, number of values, the lag-1 autocorrelation of
-        the whitened innovations (0 for a model that lacks nothing) and the share inside the 95 % prediction interval.
+        the whitened innovations (0 for a model that lacks nothing) and the share inside the 95 % prediction interval;
+        without the first predictions, until their variance has settled.
     """
     channels: dict[str, Any] = {}
     for i, name in enumerate(MEASUREMENTS):
         good = np.isfinite(innovation[:, i])
+        # the first predictions only carry how little was known of the initial state
+        good[good] = variance[good, i] < _SETTLED * np.median(variance[good, i]) if good.any() else False
         if np.count_nonzero(good) < 3:
             continue
         e, white = innovation[good, i], innovation[good, i] / np.sqrt(variance[good, i])

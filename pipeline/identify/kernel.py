@@ -21,7 +21,8 @@ N_THETA = 11
 N_STATE = 6
 _ORDER = 14  # Taylor terms: 0.5^15/15! is below the last bit of a double
 _LONGEST = 0.5  # largest |A| h of one step
-_FASTEST_PER_S = 10.0  # no vessel answers her rudder faster; beyond it only the cost grows
+#: no vessel answers her rudder faster than this; beyond it only the cost grows
+FASTEST_PER_S = 10.0
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
@@ -291,7 +292,7 @@ def likelihood(  # type: ignore[no-untyped-def]
         if k > 0 and time_s[k] > time_s[k - 1]:
             span, V = time_s[k] - time_s[k - 1], 0.5 * (speed[k] + speed[k - 1])
             size = _rates(theta, V, arm, mu_F, A, b)
-            if not (size <= _FASTEST_PER_S):
+            if not (size <= FASTEST_PER_S):
                 return -np.inf, score, information
             n_sub = max(1, int(np.ceil(size * span / _LONGEST)))
             decay = np.exp(-mu_V * span / n_sub)

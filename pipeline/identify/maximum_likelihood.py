@@ -18,13 +18,13 @@ from pipeline.identify.doubts import doubts
 from pipeline.identify.estimate import Estimate, Value, discrete_values, hull_values
 from pipeline.identify.fit import one_step_fit
 from pipeline.identify.gating import gate
-from pipeline.identify.kernel import N_STATE, N_THETA, likelihood, no_trace
+from pipeline.identify.kernel import FASTEST_PER_S, N_STATE, N_THETA, likelihood, no_trace
 from pipeline.identify.record import Record
+from pipeline.identify.scoring import Mask, bfgs, damped_step, newton_decrement
 from pipeline.identify.starts import starting_points, thinned
 from pipeline.normalise.series import Float
+from schemas.errors import DataRejected
 from schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
-
-Mask = NDArray[np.bool_]
 
 #: with less log-likelihood than this to gain, steps tell more of the curvature than the expected information
 _NEAR = 1.0
@@ -113,7 +113,12 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Maximu
     race.sort(key=lambda entry: -entry[1].log_likelihood)
     problem = _Problem(record, spec, arm_per_m, settings, active)
     searches = [(name, problem.search(s.theta, settings.max_iterations)) for name, s in _distinct(race, settings)]
+    if not any(np.isfinite(search.log_likelihood) for _, search in searches):
+        # the race ran into ships that the whole record excludes: from the starting points themselves, then
+        searches = [(name, problem.search(theta, settings.max_iterations)) for name, theta in entries]
     name, best = max(searches, key=lambda entry: entry[1].log_likelihood)
+    if not np.isfinite(best.log_likelihood):
+        raise _no_ship(_summary(searches))
     taken_out: dict[str, int] = {}
     heavy: tuple[str, ...] = ()
     for number in range(settings.gate_rounds):
@@ -130,6 +135,16 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Maximu
         problem = _Problem(gated.record, spec, arm_per_m, settings, active)
         best = problem.search(best.theta, settings.max_iterations)
     return _report(problem, name, best, {"starts": _summary(searches), "race": _summary(race)}, taken_out, heavy)
+
+
+def _no_ship(searches: list[dict[str, Any]]) -> DataRejected:
+    return DataRejected(
+        "no_ship_explains_it",
+        f"None of {len(searches)} starting ships gives these data a finite likelihood: the motion is not that of "
+        "a ship under this rudder.",
+        "Look at the channels over the segment (heading, yaw rate, speed, rudder); shorten or repeat the manoeuvre.",
+        {"searches": searches},
+    )
 
 
 def _distinct(race: list[tuple[str, _Search]], settings: MaximumLikelihoodSettings) -> list[tuple[str, _Search]]:
@@ -186,6 +201,12 @@ class _Problem:
         likelihood(theta, np.zeros(N_THETA, dtype=np.bool_), *self._fixed, innovation, variance, states)
         return innovation, variance, states
 
+    def answers_per_s(self, theta: Float) -> float:
+        """Rate at which the ship of these parameters answers at her largest speed, 1/s; the kernel's own measure."""
+        a11, a12, a21, a22 = theta[:4]
+        rate = abs(a11) + abs(a22) + np.sqrt(abs(a12 * a21))
+        return float(rate * np.max(np.abs(self.record.speed_m_s)))
+
     def free(self, theta: Float, score: Float) -> Mask:
         """Parameters that may move: active and not pressed against a bound."""
         at_low, at_high = theta <= self.low, theta >= self.high
@@ -199,6 +220,9 @@ class _Problem:
         """
         theta = np.clip(start, self.low, self.high)
         value, score, information = self.full(theta)
+        if not np.isfinite(value):
+            reason = "the start has no likelihood"
+            return _Search(theta, -np.inf, score, information, converged=False, reason=reason, iterations=())
         curvature, damping, scale = information, 1e-3, np.abs(theta[:6])
         converged, reason = False, "the iterations allowed ran out"
         iterations = [_iteration(0, theta, value, np.nan, damping)]
@@ -242,46 +266,6 @@ class _Problem:
         return None, damping
 
 
-def bfgs(curvature: Float, step: Float, fall: Float, free: Mask) -> Float:
-    """Return the curvature corrected by what one step showed (Broyden-Fletcher-Goldfarb-Shanno).
-
-    Parameters
-    ----------
-    curvature : ndarray, shape (n_theta, n_theta)
-        Positive definite over the free parameters.
-    step : ndarray, shape (n_theta,)
-        Step taken.
-    fall : ndarray, shape (n_theta,)
-        Score before less score after it.
-    free : ndarray of bool, shape (n_theta,)
-        Parameters that moved.
-    """
-    s, y = np.where(free, step, 0.0), np.where(free, fall, 0.0)
-    Bs = curvature @ s
-    if s @ y <= 1e-10 * np.linalg.norm(s) * np.linalg.norm(y) or s @ Bs <= 0.0:
-        return curvature
-    updated: Float = curvature - np.outer(Bs, Bs) / (s @ Bs) + np.outer(y, y) / (s @ y)
-    return updated
-
-
-def damped_step(score: Float, information: Float, free: Mask, damping: float) -> Float:
-    """Solve (I + damping diag I) step = score over the free parameters; 0 for the others, shape (n_theta,)."""
-    step = np.zeros(score.size)
-    index = np.flatnonzero(free)
-    block = information[np.ix_(index, index)]
-    scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-    normalised = block / np.outer(scale, scale) + damping * np.eye(index.size)
-    # lstsq: a direction the data do not determine gets no step instead of an infinite one
-    solution = np.linalg.lstsq(normalised, score[index] / scale, rcond=1e-13)[0]
-    step[index] = solution / scale
-    return step
-
-
-def newton_decrement(score: Float, information: Float, free: Mask) -> float:
-    """Return the log-likelihood that the quadratic model still promises, score' I^-1 score / 2."""
-    return float(0.5 * score @ damped_step(score, information, free, 0.0))
-
-
 def _largest(vector: Float, names: list[str]) -> dict[str, float]:
     """Return the three largest components of a direction by name."""
     return {names[i]: float(vector[i]) for i in np.argsort(-np.abs(vector), kind="stable")[:3]}
@@ -304,6 +288,34 @@ def _iteration(count: int, theta: Float, value: float, gain: float, damping: flo
     }
 
 
+def _uncertainty(information: Float, index: NDArray[np.intp]) -> tuple[Float, Float, list[dict[str, Any]]]:
+    """Invert the information of the free parameters.
+
+    Returns
+    -------
+    covariance : ndarray, shape (11, 11)
+        NaN for parameters that are not free, and everywhere where the information is singular.
+    eigenvalues : ndarray, shape (n_free,)
+        Of the information scaled to a unit diagonal, ascending.
+    weak : list of dict
+        Directions that the data hardly determine.
+    """
+    names = [*HULL_PARAMETERS, *NOISE_PARAMETERS]
+    block = information[np.ix_(index, index)]
+    scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    correlation = block / np.outer(scale, scale)
+    eigenvalues, directions = np.linalg.eigh(correlation)
+    covariance = np.full((N_THETA, N_THETA), np.nan)
+    if eigenvalues[0] > 1e-12:
+        covariance[np.ix_(index, index)] = np.linalg.inv(correlation) / np.outer(scale, scale)
+    weak = [
+        {"eigenvalue": float(value), "direction": _largest(vector, [names[i] for i in index])}
+        for value, vector in zip(eigenvalues, directions.T, strict=True)
+        if value < 1e-4
+    ]
+    return covariance, eigenvalues, weak
+
+
 def _report(
     problem: _Problem,
     name: str,
@@ -316,19 +328,10 @@ def _report(
     names = [*HULL_PARAMETERS, *NOISE_PARAMETERS]
     free = problem.free(best.theta, best.score)
     index = np.flatnonzero(free)
-    block = best.information[np.ix_(index, index)]
-    scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-    correlation = block / np.outer(scale, scale)
-    eigenvalues, directions = np.linalg.eigh(correlation)
-    covariance = np.full((N_THETA, N_THETA), np.nan)
-    if eigenvalues[0] > 1e-12:
-        covariance[np.ix_(index, index)] = np.linalg.inv(correlation) / np.outer(scale, scale)
-    weak = [
-        {"eigenvalue": float(value), "direction": _largest(vector, [names[i] for i in index])}
-        for value, vector in zip(eigenvalues, directions.T, strict=True)
-        if value < 1e-4
-    ]
+    covariance, eigenvalues, weak = _uncertainty(best.information, index)
     bounds = [names[i] for i in np.flatnonzero(problem.active & ~free)]
+    if problem.answers_per_s(best.theta) > 0.95 * FASTEST_PER_S:
+        bounds.append(f"answers faster than {FASTEST_PER_S:g} per second")
     hull_covariance = covariance[:6, :6]
     warnings = list(record.warnings)
     warnings += [f"{count} gross errors of {key} left out" for key, count in taken_out.items()]
@@ -375,5 +378,5 @@ def _report(
         },
         iterations=best.iterations,
         fit=fit,
-        warnings=(*warnings, *doubts(best.theta[:6], fit)),
+        warnings=(*warnings, *doubts(best.theta[:6], np.sqrt(np.diag(hull_covariance)), fit)),
     )

@@ -28,7 +28,8 @@ def lateral_summary(instruments: Instruments, zigzag: Zigzag) -> dict[str, Any]:
     -------
     dict
         JSON content: ``computed``; where it is True the number of values, rms, median standard error, largest drift
-        angle, the noise of each channel and the check on eq. (19), units in the keys; where it is False, ``why``.
+        angle and how many exceed 45 deg (no ship under way drifts so: course or heading is wrong there), the noise of
+        each channel and the check on eq. (19), units in the keys; where it is False, ``why``.
     """
     cut = {
         name: series.between(zigzag.start_utc_ns, zigzag.end_utc_ns)
@@ -60,6 +61,7 @@ def lateral_summary(instruments: Instruments, zigzag: Zigzag) -> dict[str, Any]:
         "n": int(np.count_nonzero(good)),
         "rms_m_s": float(np.sqrt(np.mean(lateral.value_m_s[good] ** 2))),
         "median_std_m_s": float(np.median(lateral.std_m_s[good])),
+        "drift_beyond_45_deg": int(np.count_nonzero(np.abs(lateral.drift_rad[good]) > np.pi / 4)),
         "largest_drift_deg": float(np.rad2deg(np.max(np.abs(lateral.drift_rad[good])))),
         "noise_std": {
             "speed_over_ground_m_s": noise["speed_over_ground"],

@@ -1,0 +1,53 @@
+"""Steps of the search: damped Fisher scoring, and the curvature that steps themselves have shown.
+
+Reference: Nocedal & Wright (2006), Numerical Optimization, ch. 6 and 10.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.normalise.series import Float
+
+Mask = NDArray[np.bool_]
+
+
+def bfgs(curvature: Float, step: Float, fall: Float, free: Mask) -> Float:
+    """Return the curvature corrected by what one step showed (Broyden-Fletcher-Goldfarb-Shanno).
+
+    Parameters
+    ----------
+    curvature : ndarray, shape (n_theta, n_theta)
+        Positive definite over the free parameters.
+    step : ndarray, shape (n_theta,)
+        Step taken.
+    fall : ndarray, shape (n_theta,)
+        Score before less score after it.
+    free : ndarray of bool, shape (n_theta,)
+        Parameters that moved.
+    """
+    s, y = np.where(free, step, 0.0), np.where(free, fall, 0.0)
+    Bs = curvature @ s
+    if s @ y <= 1e-10 * np.linalg.norm(s) * np.linalg.norm(y) or s @ Bs <= 0.0:
+        return curvature
+    updated: Float = curvature - np.outer(Bs, Bs) / (s @ Bs) + np.outer(y, y) / (s @ y)
+    return updated
+
+
+def damped_step(score: Float, information: Float, free: Mask, damping: float) -> Float:
+    """Solve (I + damping diag I) step = score over the free parameters; 0 for the others, shape (n_theta,)."""
+    step = np.zeros(score.size)
+    index = np.flatnonzero(free)
+    block = information[np.ix_(index, index)]
+    scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
+    normalised = block / np.outer(scale, scale) + damping * np.eye(index.size)
+    # lstsq: a direction the data do not determine gets no step instead of an infinite one
+    solution = np.linalg.lstsq(normalised, score[index] / scale, rcond=1e-13)[0]
+    step[index] = solution / scale
+    return step
+
+
+def newton_decrement(score: Float, information: Float, free: Mask) -> float:
+    """Return the log-likelihood that the quadratic model still promises, score' I^-1 score / 2."""
+    return float(0.5 * score @ damped_step(score, information, free, 0.0))
