@@ -120,7 +120,8 @@ def read_model(path: Path) -> ModelSpec:
     Raises
     ------
     UsageError
-        ``model_invalid``: every fault is named with its place.
+        ``model_invalid``: every fault is named with its place. ``model_unknown``: it asks for a
+        base or an effect that is not there.
     """
     content = read_yaml(path, "model specification")
     try:

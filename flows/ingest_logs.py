@@ -17,7 +17,7 @@ from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
 from warehouse import code_version, logs, raw, segments, vessels
 from warehouse.deposit import Delivery, deposit, held
-from warehouse.keys import ingest_id
+from warehouse.keys import ingest_id, vessel_key
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
 
@@ -82,7 +82,8 @@ def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile
     Raises
     ------
     UsageError
-        ``no_vessel_named``, or ``profiles_disagree``: the option and the profile name different vessels.
+        ``no_vessel_named``, ``vessel_name``: the name is blank, or ``profiles_disagree``: the option and the profile
+        name different vessels.
     """
     told = given.vessel if given else None
     if vessel is not None and told is not None and vessel != told:
@@ -99,6 +100,7 @@ def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile
             "Whose logs are these? Neither --vessel nor a profile names the vessel.",
             "Add --vessel NAME.",
         )
+    vessel_key(name)  # refuses a name that is none once, not for every log
     known = warehouse.exists() and name in vessels.names(warehouse)
     stored = vessels.current(warehouse, name) if known else VesselProfile()
     return name, overlay(stored, given or VesselProfile()).model_copy(update={"vessel": name})

@@ -16,7 +16,8 @@ from flows.progress import Progress, silent
 
 def print_json(content: Any) -> None:
     """Print one JSON document on stdout; NaN becomes null."""
-    click.echo(json.dumps(_finite(content), indent=2, ensure_ascii=False))
+    everywhere = "utf" in (sys.stdout.encoding or "").lower()  # else a letter beyond ASCII would not be JSON
+    click.echo(json.dumps(_finite(content), indent=2, ensure_ascii=not everywhere))
 
 
 def _finite(value: Any) -> Any:
@@ -31,13 +32,25 @@ def _finite(value: Any) -> Any:
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
     """Print a table on stdout, numbers to the right; plain text off a terminal."""
-    widths = [max(len(str(cell)) for cell in column) for column in zip(head, *rows, strict=True)]
+    rows = [[one_line(cell) for cell in row] for row in rows]
+    widths = [max(len(cell) for cell in column) for column in zip(head, *rows, strict=True)]
     numeric = [all(_is_number(row[k]) for row in rows) and bool(rows) for k in range(len(head))]
     if title:
         click.echo(click.style(title, bold=True))
     click.echo(click.style(_line(head, widths, numeric), underline=sys.stdout.isatty()))
     for row in rows:
         click.echo(_line(row, widths, numeric))
+
+
+def one_line(text: str) -> str:
+    r"""Return a text with line ends, escape sequences and bytes that are no letters written out.
+
+    Examples
+    --------
+    >>> one_line("day 1\x1b[2J.log")
+    'day 1\\x1b[2J.log'
+    """
+    return "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in text)
 
 
 def _line(cells: Sequence[str], widths: Sequence[int], numeric: Sequence[bool]) -> str:

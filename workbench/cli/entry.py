@@ -5,10 +5,13 @@ from __future__ import annotations
 import json
 import os
 import sys
+import traceback
 from collections.abc import Sequence
+from io import TextIOWrapper
 
 import click
 
+from flows.unforeseen import as_told
 from schemas.errors import KempfError, UsageError
 from workbench.cli.lazy import LazyGroup
 
@@ -54,30 +57,47 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """
     given = list(sys.argv[1:] if arguments is None else arguments)
     as_json = "--json" in given
+    stdout = sys.stdout
+    for stream in (stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):  # a file name may hold bytes that are no letters
+            stream.reconfigure(errors="backslashreplace")
     try:
-        code = cli.main(args=given, prog_name="kempf", standalone_mode=False)
-    except KempfError as error:
-        code = _tell(error, as_json)
-    except click.Abort:
-        code = INTERRUPTED
+        code = cli.main(args=given, prog_name="kempf", standalone_mode=False, color=_color())
     except click.ClickException as error:
-        step = "See `kempf --help`."
-        if isinstance(error, click.UsageError) and error.ctx is not None:
-            step = f"See `{error.ctx.command_path} --help`."
-        code = _tell(UsageError("usage", error.format_message(), step), as_json)
-    except KeyboardInterrupt:
+        code = _tell_usage(error, as_json)
+    except (click.Abort, KeyboardInterrupt):
         click.echo("Interrupted. What was finished is kept, nothing is half in; the same command goes on.", err=True)
         code = INTERRUPTED
-    except BrokenPipeError:  # the reader of our output has seen enough
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except SystemExit:
+        if sys.stdout is stdout:
+            raise
+        # click has put something else in its place: the reader of our output has seen enough
         code = 0
+    except Exception as error:  # noqa: BLE001 - the last place where it can be told
+        code = _tell(as_told(error), as_json)
     sys.exit(code if isinstance(code, int) else 0)
 
 
+def _color() -> bool | None:
+    """Return False where https://no-color.org asks for none, else None: colour on a terminal alone."""
+    return False if os.environ.get("NO_COLOR") else None
+
+
+def _tell_usage(error: click.ClickException, as_json: bool) -> int:
+    context = error.ctx if isinstance(error, click.UsageError) else None
+    step = f"See `{context.command_path if context else 'kempf'} --help`."
+    if type(error).__name__ == "NoArgsIsHelpError" and not as_json:  # the message is the whole help page
+        click.echo(error.format_message(), err=True)
+        return UsageError.exit_code
+    return _tell(UsageError("usage", error.format_message(), step), as_json)
+
+
 def _tell(error: KempfError, as_json: bool) -> int:
+    if error.code == "internal":
+        traceback.print_exception(error)
     if as_json:
         click.echo(json.dumps(error.to_json(), indent=2, default=str))
     else:
-        click.echo(f"{click.style('error', fg='red', bold=True)} [{error.code}] {error.message}", err=True)
-        click.echo(f"  {error.next_step}", err=True)
+        named = f"{click.style('error', fg='red', bold=True)} [{error.code}]"
+        click.echo(f"{named} {error.message}\n  {error.next_step}", err=True, color=_color())
     return error.exit_code

@@ -9,7 +9,7 @@ import click
 
 from flows.ingest_logs import IngestOutcome
 from workbench.cli.options import json_option, profile_option, vessel_option, warehouse_option
-from workbench.terminal import print_json, progress
+from workbench.terminal import one_line, print_json, progress
 
 
 @click.command("ingest")
@@ -47,7 +47,7 @@ def command(paths: tuple[Path, ...], vessel: str | None, profiles: tuple[Path, .
 
 def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
     """Print what became of one log."""
-    name = Path(outcome.path).name
+    name = one_line(Path(outcome.path).name)
     if outcome.error is not None or outcome.tally is None:
         assert outcome.error is not None
         click.echo(f"{name}: {click.style('failed', fg='red')} [{outcome.error.code}] {outcome.error}", err=True)

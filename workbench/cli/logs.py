@@ -54,7 +54,7 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
 
 @command.command("rejected")
 @click.argument("log_id")
-@click.option("--limit", type=int, default=50, show_default=True, help="At most so many rows.")
+@click.option("--limit", type=click.IntRange(min=0), default=50, show_default=True, help="At most so many rows.")
 @warehouse_option
 @json_option
 def rejected(log_id: str, limit: int, uri: str, as_json: bool) -> None:

@@ -102,13 +102,17 @@ def diff(first: str, second: str, uri: str, as_json: bool) -> None:
 @click.option("--format", "form", type=click.Choice(["yaml", "csv", "json"]), default="yaml", show_default=True)
 @click.option("--output", type=click.Path(path_type=Path), metavar="FILE", help="Write here instead of to stdout.")
 @warehouse_option
-def export(set_id: str, form: str, output: Path | None, uri: str) -> None:
-    """Export a parameter set with values, units, standard errors, covariance, inputs by hash and fit."""
+@json_option
+def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool) -> None:
+    """Export a parameter set with values, units, standard errors, covariance, inputs by hash and fit.
+
+    --json is short for --format json.
+    """
     from warehouse import parameter_sets
     from warehouse.store import Warehouse
     from workbench.export import as_text
 
-    text = as_text(parameter_sets.get(Warehouse(uri), set_id), form)
+    text = as_text(parameter_sets.get(Warehouse(uri), set_id), "json" if as_json else form)
     if output is None:
         click.echo(text, nl=False)
         return

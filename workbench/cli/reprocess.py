@@ -33,18 +33,19 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
 
     warehouse = Warehouse(uri)
     warehouse.require()
-    for name in vessel:
+    names = sorted(set(vessel))
+    for name in names:
         vessels.require(warehouse, name)
     reports: list[dict[str, Any]]
-    if len(vessel) == 1:
+    if len(names) == 1:
         from flows.reprocess_vessel import reprocess_vessel
 
         with progress() as tell:
-            reports = [reprocess_vessel(warehouse, vessel[0], changed_only=changed_only, progress=tell).show()]
+            reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=tell).show()]
     else:
         from flows.fleet import reprocess
 
-        reports = reprocess(uri, list(vessel) or None, changed_only)
+        reports = reprocess(uri, names or None, changed_only)
     if as_json:
         print_json(reports)
     else:

@@ -1,0 +1,38 @@
+"""What a warehouse says, without how it came to say it: file names, commits and table versions left out."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from schemas.tables import TABLES
+from warehouse import delta
+from warehouse.store import Warehouse
+
+#: Runs tell how the work went, which an interruption changes.
+TOLD = tuple(name for name in TABLES if name != "runs")
+
+
+def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
+    """The rows of every table that can be reached from a recorded ingest, sorted; the raw logs by their hash."""
+    content: dict[str, list[dict[str, Any]]] = {name: delta.read(warehouse, name).rows(named=True) for name in TOLD}
+    ingests = {row["ingest_id"] for row in content["logs"]}
+    for name in ("readings", "rejected", "segments"):
+        content[name] = [row for row in content[name] if row["ingest_id"] in ingests]
+    for row in content["parameter_sets"]:
+        told = json.loads(row["provenance_json"])
+        row["provenance_json"] = json.dumps({k: v for k, v in told.items() if k != "table_versions"}, sort_keys=True)
+    assert warehouse.folder is not None
+    kept = [p for p in warehouse.folder.glob("raw/*/*") if not p.name.startswith(".")]
+    content["raw"] = [{"name": p.name, "size": p.stat().st_size} for p in kept]
+    return {name: sorted(rows, key=lambda row: json.dumps(row, sort_keys=True)) for name, rows in content.items()}
+
+
+def versions(warehouse: Warehouse) -> dict[str, int]:
+    """The newest version of every table but the runs."""
+    return {name: version for name, version in delta.versions(warehouse).items() if name != "runs"}
+
+
+def fresh(path: Path) -> Warehouse:
+    return Warehouse(str(path))

@@ -1,0 +1,168 @@
+"""The house stands: imports run one way, only the doors touch the world outside, plant and estimator share nothing."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+#: What each layer may import of the house.
+BELOW = {
+    "schemas": {"schemas"},
+    "pipeline": {"pipeline", "schemas"},
+    "warehouse": {"warehouse", "pipeline", "schemas"},
+    "flows": {"flows", "warehouse", "pipeline", "schemas"},
+    "workbench": {"workbench", "flows", "warehouse", "pipeline", "schemas"},
+}
+#: What the warehouse may know of the pipeline: the types that it stores.
+STORED = ("pipeline.ingest.readings.",)
+#: Libraries with one door, and the files that are it.
+DOORS = {
+    "prefect": ("flows/fleet.py",),
+    "deltalake": ("warehouse/",),
+    "click": ("workbench/",),
+    "rich": ("workbench/",),
+    "matplotlib": (),
+}
+#: Rooms that must not know the simulator, nor it them: an error that both share would hide itself.
+SIMULATOR = "pipeline.simulate"
+ESTIMATOR = ("pipeline.model", "pipeline.identify", "pipeline.segment")
+#: What opens a file or reaches outside, by name of the function or method, and the modules that exist for it.
+OPENS = {
+    *("open", "read_text", "read_bytes", "write_text", "write_bytes", "mkdir", "unlink", "touch"),
+    *("memmap", "fromfile", "tofile", "savez", "savetxt", "loadtxt", "genfromtxt"),
+    *("sink_parquet", "write_parquet", "write_csv", "scan_parquet", "scan_csv", "scan_delta", "write_delta"),
+}
+OUTSIDE = {"os", "pathlib", "shutil", "tempfile", "subprocess", "socket", "urllib", "requests", "glob"}
+
+
+def imported(path: str, tree: ast.AST) -> Iterator[tuple[int, str]]:
+    """Every module that a file imports, wherever in it, with the line."""
+    package = path.removesuffix(".py").split("/")[:-1]
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, alias.name) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            start = package[: len(package) - node.level + 1] if node.level else []
+            base = ".".join([*start, *([node.module] if node.module else [])])
+            # `from pipeline import simulate` imports a module as well
+            yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
+        elif isinstance(node, ast.Call) and _name(node.func) in ("import_module", "__import__") and node.args:
+            told = node.args[0].values[0] if isinstance(node.args[0], ast.JoinedStr) else node.args[0]
+            yield node.lineno, str(told.value) if isinstance(told, ast.Constant) else "?"
+
+
+def _name(function: ast.expr) -> str:
+    return function.attr if isinstance(function, ast.Attribute) else getattr(function, "id", "")
+
+
+def within(module: str, room: str) -> bool:
+    return module == room or module.startswith(room + ".")
+
+
+def faults(path: str, source: str) -> list[str]:
+    """What a file does that its layer may not, each with its line."""
+    tree = ast.parse(source)
+    layer = path.partition("/")[0]
+    found = [f"{path}:{line}: {fault}" for line, module in imported(path, tree) for fault in wrong(path, layer, module)]
+    if layer in ("pipeline", "schemas"):
+        for node in ast.walk(tree):
+            if isinstance(node, ast.Call) and _name(node.func) in OPENS:
+                found.append(f"{path}:{node.lineno}: {layer} calls {_name(node.func)}")
+    return found
+
+
+def wrong(path: str, layer: str, module: str) -> Iterator[str]:
+    """Why a file may not import a module, nothing where it may."""
+    top = module.partition(".")[0]
+    if top == "?":
+        yield "imports what nobody can tell"
+    if top in BELOW and top not in BELOW[layer]:
+        yield f"{layer} imports {module}"
+    if top in DOORS and not path.startswith(DOORS[top] or ("-",)):
+        yield f"{module} has another door"
+    if layer == "warehouse" and module.startswith("pipeline.") and not module.startswith(STORED):
+        yield f"the warehouse stores no {module}"
+    if layer != "pipeline":
+        return
+    room = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
+    if top in OUTSIDE:
+        yield f"pipeline reaches outside with {module}"
+    if within(room, SIMULATOR) and any(within(module, other) for other in ESTIMATOR):
+        yield f"the simulator imports {module}"
+    if not within(room, SIMULATOR) and within(module, SIMULATOR):
+        yield f"{room} imports the simulator"
+
+
+def sources() -> list[str]:
+    return sorted(p.relative_to(ROOT).as_posix() for layer in BELOW for p in (ROOT / layer).rglob("*.py"))
+
+
+def test_every_layer_is_there():
+    assert {path.split("/")[0] for path in sources()} == set(BELOW)
+    assert len(sources()) > 80
+
+
+@pytest.mark.parametrize("layer", BELOW)
+def test_a_layer_imports_only_what_is_below_it_and_keeps_its_doors(layer):
+    found = [fault for path in sources() if path.startswith(layer + "/") for fault in faults(path, read(path))]
+    assert found == []
+
+
+def read(path: str) -> str:
+    return (ROOT / path).read_text(encoding="utf-8")
+
+
+def test_only_the_fleet_knows_prefect():
+    knows = [p for p in sources() if any(within(m, "prefect") for _, m in imported(p, ast.parse(read(p))))]
+    assert knows == ["flows/fleet.py"]
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("schemas/a.py", "import pipeline.ingest.read"),
+        ("pipeline/a.py", "from warehouse import raw"),
+        ("pipeline/a.py", "def f():\n    from flows.progress import silent"),
+        ("pipeline/a.py", "import deltalake"),
+        ("pipeline/a.py", "def f(x):\n    return open(x)"),
+        ("pipeline/a.py", "def f(x):\n    return x.read_bytes()"),
+        ("pipeline/a.py", "from pathlib import Path"),
+        ("pipeline/a.py", "import prefect"),
+        ("pipeline/simulate/a.py", "from pipeline.model import ship"),
+        ("pipeline/simulate/a.py", "from pipeline import identify"),
+        ("pipeline/simulate/a.py", "from ..segment import find"),
+        ("pipeline/identify/a.py", "if True:\n    from pipeline.simulate.trial import Trial"),
+        ("pipeline/identify/a.py", "from .. import simulate"),
+        ("warehouse/a.py", "from flows import files"),
+        ("warehouse/a.py", "from pipeline.identify import estimators"),
+        ("warehouse/a.py", "import workbench"),
+        ("flows/a.py", "from workbench.terminal import number"),
+        ("flows/a.py", "from prefect import flow"),
+        ("flows/a.py", "from importlib import import_module\nimport_module('workbench.cli')"),
+        ("flows/a.py", "from importlib import import_module\nimport_module(f'workbench.{1}')"),
+        ("flows/a.py", "import importlib\nimportlib.import_module(name)"),
+        ("workbench/a.py", "import prefect.artifacts"),
+        ("workbench/a.py", "import deltalake"),
+    ],
+)
+def test_the_checker_catches_a_violation(path, source):
+    assert len(faults(path, source)) >= 1
+
+
+@pytest.mark.parametrize(
+    ("path", "source"),
+    [
+        ("workbench/a.py", "import flows.fleet, warehouse.raw, schemas.errors, click"),
+        ("flows/fleet.py", "from prefect import flow"),
+        ("warehouse/a.py", "from pipeline.ingest.readings import Readings\nimport deltalake"),
+        ("pipeline/simulate/a.py", "from pipeline.simulate.trial import Trial\nimport numpy"),
+        ("pipeline/identify/a.py", "from pipeline.segment.find import find_manoeuvres"),
+    ],
+)
+def test_the_checker_lets_good_imports_pass(path, source):
+    assert faults(path, source) == []

@@ -1,0 +1,203 @@
+"""Every command: what it says to a person, its JSON keys, its exit code."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.workbench.driving import HULL, kempf, refused, tree, versions
+from workbench.cli.entry import COMMANDS
+
+#: Keys that people script against: DESIGN's, which may be joined by more but never lost.
+SEGMENT = {
+    *("segment_id", "vessel", "log", "kind", "psi0_deg", "delta0_deg", "first_side", "base_heading_deg", "start"),
+    *("end", "executes", "overshoots_deg", "imo", "quality"),
+}
+
+
+def test_every_command_has_help_and_a_summary():
+    whole = kempf("--help")
+    assert whole.code == 0
+    for name in COMMANDS:
+        assert f"\n  {name} " in whole.out
+        told = kempf(name, "--help")
+        assert told.code == 0
+        assert told.out.startswith(f"Usage: kempf {name} ")
+
+
+def test_without_a_command_the_help_is_shown_and_it_is_a_usage_error():
+    for arguments in ((), ("params",), ("vessels",)):
+        told = kempf(*arguments)
+        assert (told.code, told.out) == (2, "")
+        assert told.err.startswith("Usage: kempf")
+        assert "error" not in told.err.split("Commands:")[0].replace("internal error", "")
+
+
+def test_ingest_tells_every_log_with_its_ledger(logs: Path, tmp_path: Path):
+    told = kempf("ingest", *sorted(logs.glob("mariner.*")), "--profile", logs / "profile.yaml", "--warehouse", tmp_path)
+    assert told.code == 0
+    lines = [line for line in told.out.splitlines() if line.startswith("mariner.")]
+    assert len(lines) == 3
+    assert all(": new, " in line and "1 zigzags: 20/20 to starboard" in line for line in lines)
+    assert "rejected (" in told.out and "next: kempf segments" in told.out
+
+
+def test_ingest_json_closes_both_ledgers(filled: Path, logs: Path):
+    profile = logs / "profile.yaml"
+    told = kempf("ingest", *sorted(logs.glob("*gz")), "--profile", profile, "--warehouse", filled, "--json").json
+    assert [one["outcome"] for one in told] == ["unchanged", "unchanged"]
+    for one in told:
+        for ledger in (one["records"], one["values"]):
+            assert ledger["read"] == ledger["kept"] + ledger["rejected"] > 0
+        assert one["segments"]
+    nmea = told[1]
+    assert sum(nmea["rejected_by_reason"].values()) == nmea["records"]["rejected"] + nmea["values"]["rejected"] > 0
+
+
+def test_segments(filled: Path):
+    found = kempf("segments", "--warehouse", filled, "--json").json
+    assert len(found) == 2
+    for one in found:
+        assert set(one) >= SEGMENT
+        assert (one["vessel"], one["kind"], one["psi0_deg"], one["delta0_deg"]) == ("mariner", "zigzag", 20.0, 20.0)
+        assert datetime.fromisoformat(one["start"]) < datetime.fromisoformat(one["executes"][0])
+        assert one["executes"] == sorted(one["executes"])
+        assert len(one["overshoots_deg"]) >= 1
+    assert kempf("segments", "--vessel", "mariner", "--warehouse", filled, "--json").json == found
+    told = kempf("segments", "--warehouse", filled)
+    assert told.code == 0
+    assert all(one["segment_id"] in told.out for one in found)
+
+
+def test_reprocess_of_one_vessel(filled: Path):
+    before = versions(filled)
+    told = kempf("reprocess", "--vessel", "mariner", "--vessel", "mariner", "--warehouse", filled.parent / "none")
+    assert told.code == 4  # before anything is done
+    assert versions(filled) == before
+
+
+def test_reprocess_of_one_vessel_changes_nothing_but_the_runs(own: Path):
+    before = versions(own)
+    told = kempf("reprocess", "--vessel", "mariner", "--warehouse", own, "--json")
+    assert told.code == 0
+    (report,) = told.json
+    assert (report["status"], report["logs"], report["reread"], report["kept_sets"]) == ("unchanged", 2, 0, 2)
+    after = versions(own)
+    assert {name: v for name, v in after.items() if name != "runs"} == before
+    human = kempf("reprocess", "--vessel", "mariner", "--warehouse", own)
+    assert human.code == 0 and "unchanged" in human.out
+    assert versions(own) == after
+
+
+def test_vessels(own: Path, logs: Path, tmp_path: Path):
+    assert kempf("vessels", "list", "--warehouse", own, "--json").json == [
+        {"vessel": "mariner", "logs": 2, "segments": 2, "parameter_sets": 4}
+    ]
+    assert "mariner" in kempf("vessels", "list", "--warehouse", own).out
+    shown = kempf("vessels", "show", "mariner", "--warehouse", own, "--json").json
+    assert shown["profile"]["vessel"] == "mariner" and len(shown["versions"]) == 1
+    human = kempf("vessels", "show", "mariner", "--warehouse", own)
+    assert yaml.safe_load(human.out) == shown["profile"]
+    same = kempf("vessels", "set", "mariner", "--profile", logs / "profile.yaml", "--warehouse", own, "--json")
+    assert same.json == {"vessel": "mariner", "changed": False}
+    wider = tmp_path / "wider.yaml"
+    wider.write_text("length_m: 200.0\n")
+    changed = kempf("vessels", "set", "mariner", "--profile", wider, "--warehouse", own, "--json")
+    assert changed.json == {"vessel": "mariner", "changed": True}
+    assert len(kempf("vessels", "show", "mariner", "--warehouse", own, "--json").json["versions"]) == 2
+
+
+def test_logs_and_what_was_refused_in_them(filled: Path):
+    listed = kempf("logs", "list", "--warehouse", filled, "--json").json
+    assert [one["format"] for one in listed] == ["nmea", "delimited"]
+    assert "mariner.nmea.gz" in kempf("logs", "list", "--vessel", "mariner", "--warehouse", filled).out
+    for name in (listed[0]["log_id"], listed[0]["log_id"][:8], listed[0]["file_name"], listed[0]["ingest_id"]):
+        told = kempf("logs", "rejected", name, "--limit", "3", "--warehouse", filled, "--json").json
+        assert told["rejected"] == sum(listed[0]["rejected_by_reason"].values())
+        assert told["shown"] == len(told["rows"]) == 3
+        assert all(row["reason"] and row["raw"] for row in told["rows"])
+    assert "more, see --limit" in kempf("logs", "rejected", name, "--limit", "1", "--warehouse", filled).out
+    refused(kempf("logs", "rejected", "nothing", "--warehouse", filled, "--json"), 4, "no_log")
+    refused(kempf("logs", "rejected", "", "--warehouse", filled, "--json"), 4, "no_log")
+    refused(kempf("logs", "rejected", name, "--limit", "-1", "--warehouse", filled, "--json"), 2, "usage")
+
+
+@pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
+def test_completion(shell: str):
+    told = kempf("completion", shell)
+    assert told.code == 0
+    assert "_KEMPF_COMPLETE" in told.out
+    refused(kempf("completion", "tcsh", "--json"), 2, "usage")
+
+
+def test_the_version_is_that_of_the_package():
+    from importlib.metadata import version
+
+    assert kempf("--version").out == f"kempf, version {version('kempf')}\n"
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("nonsense",),
+        ("segments", "--nonsense"),
+        ("segments", "extra"),
+        ("ingest",),
+        ("identify",),
+        ("identify", "--vessel", "x", "--estimator", "guess"),
+        ("history",),
+        ("rerun", "x", "--tolerance", "much"),
+        ("params", "nonsense"),
+        ("params", "export", "x", "--format", "xls"),
+        ("params", "diff", "x"),
+    ],
+)
+def test_a_wrong_request_is_told_with_where_to_look(arguments: tuple[str, ...]):
+    error = refused(kempf(*arguments, "--json"), 2, "usage")
+    assert "--help`" in error["next_step"]
+    human = kempf(*arguments)
+    assert (human.code, human.out) == (2, "")
+    assert human.err.startswith("error [usage] ")
+
+
+def test_the_warehouse_may_be_named_by_the_environment(filled: Path, monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
+    monkeypatch.chdir(tmp_path)
+    refused(kempf("segments", "--json"), 4, "no_warehouse")
+    monkeypatch.setenv("KEMPF_WAREHOUSE", str(filled))
+    assert len(kempf("segments", "--json").json) == 2
+    refused(kempf("segments", "--warehouse", tmp_path / "other", "--json"), 4, "no_warehouse")
+    assert tree(tmp_path) == {}
+
+
+def test_the_demonstration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    from flows import demonstrate
+
+    monkeypatch.setattr(demonstrate, "_DAYS", demonstrate._DAYS[1:2])  # one day is quicker than three
+    human = kempf("demo", "--folder", tmp_path / "demo")
+    assert human.code == 0
+    assert "Zigzags found" in human.out and "2 of 2 parameter sets bit-identical" in human.out
+    assert human.out.count("error in std") == 2
+    at = versions(tmp_path / "demo" / "warehouse")
+    told = kempf("demo", "--folder", tmp_path / "demo", "--json").json
+    assert set(told) == {"folder", "vessel", "truth", "ingested", "parameter_sets", "reruns"}
+    assert list(told["truth"]) == HULL
+    assert [o["outcome"] for o in told["ingested"]] == ["unchanged"]
+    assert {r["verdict"] for r in told["reruns"]} == {"bit-identical"}
+    assert versions(tmp_path / "demo" / "warehouse") == at
+
+
+def test_a_fault_of_our_own_is_told_as_one(filled: Path, monkeypatch: pytest.MonkeyPatch):
+    from warehouse import logs
+
+    def broken(*_: object) -> None:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(logs, "current", broken)
+    told = kempf("segments", "--warehouse", filled, "--json")
+    assert told.code == 1
+    assert told.json["error"]["code"] == "internal"
+    assert "ZeroDivisionError: division by zero" in told.json["error"]["message"]
+    assert "Traceback" in told.err
