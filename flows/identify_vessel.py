@@ -9,6 +9,7 @@ from os import cpu_count
 from typing import Any
 
 from flows.progress import Progress, silent
+from flows.unforeseen import as_told
 from pipeline.identify.estimate import Estimate as PipelineEstimate
 from pipeline.identify.estimate import Value
 from pipeline.identify.estimators import default_settings, estimate
@@ -103,8 +104,8 @@ def identify_vessel(
                 told = provenance.collect(warehouse, inputs, [segment.ingest_id], flow_run, table_versions)
                 try:
                     made = build(instruments, profile, inputs, vessel, (segment.segment_id,), told)  # noqa: B023
-                except KempfError as error:
-                    return IdentifyOutcome(segment, None, error=error)
+                except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
+                    return IdentifyOutcome(segment, None, error=as_told(error))
                 return IdentifyOutcome(segment, made, new=True)
 
             fresh = list(pool.map(one, hers, wanted))

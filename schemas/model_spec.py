@@ -36,7 +36,7 @@ class ModelSpec(BaseModel):
     correlation times to tell them.
     """
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     name: str = "linear"
     base: str = "sway-yaw-16"

@@ -177,7 +177,7 @@ def rows(table: DeltaTable | None, name: str, where: Where | None = None, column
         lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))
     try:
         return (lazy.select(columns) if columns else lazy).collect()
-    except (OSError, pl.exceptions.ComputeError) as error:
+    except (OSError, pl.exceptions.ComputeError, pl.exceptions.PanicException) as error:
         raise KempfError(
             "table_unreadable",
             f"A file of the table {name} cannot be read: {error}",

@@ -96,7 +96,15 @@ class Warehouse:
             given = {_S3_OPTIONS[k.upper()]: v for k, v in self.storage_options.items() if k.upper() in _S3_OPTIONS}
             given["scheme"] = "http" if given.get("endpoint_override", "").startswith("http://") else "https"
             return fs.S3FileSystem(**given), root
-        files, inside = fs.FileSystem.from_uri(self.uri.rstrip("/"))
+        try:
+            files, inside = fs.FileSystem.from_uri(self.uri.rstrip("/"))
+        except (ValueError, OSError) as error:  # pyarrow's own errors are subclasses
+            raise UsageError(
+                "warehouse_path",
+                f"{self.uri!r} is no address that can hold a warehouse: {error}",
+                "Give a folder, or s3://bucket/prefix.",
+                {"uri": self.uri},
+            ) from error
         return files, str(inside)
 
     def read_bytes(self, *parts: str) -> bytes | None:

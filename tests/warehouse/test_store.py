@@ -167,3 +167,9 @@ def test_a_full_disk_is_told(warehouse: Warehouse, monkeypatch: pytest.MonkeyPat
     with pytest.raises(KempfError) as caught:
         runs.record(warehouse, runs.Run("run-1", "ingest", None, "completed"))
     assert caught.value.code == "warehouse_not_writable"
+
+
+def test_an_address_of_an_unknown_kind_is_refused() -> None:
+    with pytest.raises(UsageError) as caught:
+        Warehouse("foo://bar").exists()
+    assert caught.value.code == "warehouse_path"

@@ -42,8 +42,8 @@ COMMANDS = {
 def cli() -> None:
     """Turn raw ship sea-trial logs into manoeuvring models one can trust.
 
-    Every command takes --warehouse URI (else KEMPF_WAREHOUSE, else ./kempf-data) and --json. Exit codes: 0 ok,
-    1 internal error, 2 usage, 3 data rejected, 4 not found, 5 threshold exceeded.
+    Every command that works on a warehouse takes --warehouse URI (else KEMPF_WAREHOUSE, else ./kempf-data) and --json.
+    Exit codes: 0 ok, 1 internal error, 2 usage, 3 data rejected, 4 not found, 5 threshold exceeded.
     """
 
 
