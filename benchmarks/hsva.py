@@ -18,7 +18,7 @@ from benchmarks.draw_parameters import Cloud, draw_parameters
 from benchmarks.measured_ships import Run, ordered
 from flows.files import read_model
 from flows.identify_vessel import IdentifyOutcome, Request, identify_vessel
-from pipeline.identify.kernel import _FASTEST_PER_S
+from pipeline.identify.kernel import FASTEST_PER_S
 from pipeline.identify.record import make_record
 from pipeline.normalise.instruments import from_readings
 from schemas.model_spec import HULL_PARAMETERS
@@ -190,7 +190,7 @@ def page(found: list[Found]) -> list[str]:
 def meaning(found: list[Found]) -> list[str]:
     """What a person should take home, with the figures that say so."""
     n = len(found)
-    swift = sum(one.size_per_s > 0.95 * _FASTEST_PER_S for one in found)
+    swift = sum(one.size_per_s > 0.95 * FASTEST_PER_S for one in found)
     loose = sum(not made.convergence["converged"] for made in _sets(found, "default"))
     bound = sum("sigma_r" in made.convergence["active_bounds"] for made in _sets(found, "default"))
     return [
@@ -204,7 +204,7 @@ def meaning(found: list[Found]) -> list[str]:
         "  wind arm in the profile the force does not turn her, so the yaw equation has no disturbance of its own. The",
         f"  noise of the yaw rate falls to its lower bound in {bound} of {n} runs, and the likelihood bends the",
         "  lateral speed, which the current may shift, until the yaw equation holds.",
-        f"- The search runs until she answers as fast as the likelihood allows ({_FASTEST_PER_S:g} 1/s; the model's",
+        f"- The search runs until she answers as fast as the likelihood allows ({FASTEST_PER_S:g} 1/s; the model's",
         f"  own V/L is 0.17 1/s): {swift} of {n} sets lie at that limit, {loose} of {n} are stored as not converged.",
         "- The model for a tank, with neither wind nor current, converges, and the 10/10 runs give a tanker. Most",
         "  others do not: without a disturbance that takes up what (16) lacks, her answers at all speeds and drift",

@@ -41,7 +41,7 @@ def signs(value: Float) -> list[str]:
 def size_per_s(value: Float, speed_m_s: Float) -> float:
     """How fast these six parameters answer, 1/s: the number that the compiled likelihood holds below its limit.
 
-    The limit is `pipeline.identify.kernel._FASTEST_PER_S`; a search that ends there has not found a maximum.
+    The limit is `pipeline.identify.kernel.FASTEST_PER_S`; a search that ends there has not found a maximum.
     """
     a11, a12, a21, a22 = value[:4]
     between = 0.5 * (speed_m_s[1:] + speed_m_s[:-1])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import stat
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -10,12 +11,16 @@ import yaml
 from pydantic import ValidationError
 
 from schemas import profile as profiles
-from schemas.errors import KempfError, NotFound, UsageError
+from schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 
 #: Keys and values in a file that a person wrote; a few hundred bytes of nested aliases can stand for billions.
 _MOST_NODES = 100_000
+
+
+#: Largest file of each kind that is read, bytes.
+LARGEST_BYTES = {"raw log": 2 << 30, "vessel profile": 1 << 20, "model specification": 1 << 20}
 
 
 def read_bytes(path: Path, what: str) -> bytes:
@@ -26,11 +31,30 @@ def read_bytes(path: Path, what: str) -> bytes:
     NotFound
         ``no_such_file``.
     UsageError
-        ``path_is_directory``: a folder was given where a file is expected.
+        ``path_is_directory``, ``not_a_file``: a folder, a device or a pipe was given where a file is expected.
+    DataRejected
+        ``file_too_large``.
     KempfError
         ``file_unreadable``: it is there but cannot be read.
     """
     try:
+        found = path.stat()
+        if stat.S_ISDIR(found.st_mode):
+            raise IsADirectoryError
+        if not stat.S_ISREG(found.st_mode):
+            raise UsageError(
+                "not_a_file",
+                f"{path} is a device, a pipe or a socket; a {what} is a file.",
+                "Write it to a file first and give that.",
+                {"path": str(path)},
+            )
+        if found.st_size > LARGEST_BYTES[what]:
+            raise DataRejected(
+                "file_too_large",
+                f"{path} has {found.st_size} bytes; a {what} of more than {LARGEST_BYTES[what]} is not read.",
+                "Split the log into shorter ones, a day each for example." if what == "raw log" else "Shorten it.",
+                {"path": str(path), "bytes": found.st_size},
+            )
         return path.read_bytes()
     except FileNotFoundError as error:
         beside = sorted(p.name for p in path.parent.iterdir())[:5] if path.parent.is_dir() else []
@@ -51,7 +75,7 @@ def read_bytes(path: Path, what: str) -> bytes:
         raise KempfError(
             "file_unreadable",
             f"Reading the {what} {path} failed: {error.strerror or error}.",
-            "Look at the file's permissions.",
+            "Look at the path and at the file's permissions.",
             {"path": str(path)},
         ) from error
 
@@ -70,7 +94,7 @@ def read_yaml(path: Path, what: str) -> Any:
         root = yaml.compose(data, Loader=yaml.SafeLoader)
         too_large = root is not None and _written_out(root, {}) > _MOST_NODES
         content = None if too_large else yaml.safe_load(data)
-    except (yaml.YAMLError, UnicodeDecodeError, ValueError) as error:
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError) as error:
         told = " ".join(str(error).split())
         raise UsageError(
             "not_yaml",

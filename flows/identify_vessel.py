@@ -9,8 +9,8 @@ from os import cpu_count
 from typing import Any
 
 from flows.progress import Progress, silent
+from flows.refresh_logs import refresh_logs
 from flows.unforeseen import as_told
-from pipeline.identify.estimate import Estimate as PipelineEstimate
 from pipeline.identify.estimate import Value
 from pipeline.identify.estimators import default_settings, estimate
 from pipeline.identify.record import make_record
@@ -52,19 +52,23 @@ def identify_vessel(
     vessel: str,
     request: Request = Request(),
     *,
+    adopt: bool = True,
     flow_run: str | None = None,
     progress: Progress = silent,
 ) -> list[IdentifyOutcome]:
     """Identify a model from every zigzag of a vessel.
 
-    A set whose inputs, code, model and settings are the same as before is not computed again. Segments share the cores:
-    the compiled likelihood runs outside the interpreter's lock.
+    Logs that were read with another profile or other code are read anew first. A set whose inputs, code, model and
+    settings are the same as before is not computed again. Segments share the cores: the compiled likelihood runs
+    outside the interpreter's lock.
 
     Parameters
     ----------
     warehouse : Warehouse
     vessel : str
     request : Request, optional
+    adopt : bool, optional
+        Whether ``current`` may move to this model from another one.
     flow_run : str, optional
         Run that asks, for the provenance.
     progress : Progress, optional
@@ -79,17 +83,22 @@ def identify_vessel(
     NotFound
         ``no_warehouse``, ``no_vessel``, ``no_segments``: nothing to identify from.
     """
-    found = segments.current(warehouse, vessel)
+    refreshed = refresh_logs(warehouse, vessel, progress)
+    by_ingest = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
+    # of the logs just listed only: another process may read one anew at any moment
+    found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in by_ingest]
     if not found:
         raise _no_segments(warehouse, vessel)
     table_versions = delta.versions(warehouse)
-    by_ingest = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
     profiles = {sha: vessels.get(warehouse, sha) for sha in {row.profile_sha256 for row in by_ingest.values()}}
     outcomes: list[IdentifyOutcome] = []
     ingests = dict.fromkeys(segment.ingest_id for segment in found)
     pieces = [(ingest, [s for s in found if s.ingest_id == ingest]) for ingest in ingests]
     with ThreadPoolExecutor(max_workers=cpu_count()) as pool:
         for done, (ingest, hers) in enumerate(pieces):
+            if ingest in refreshed.failed:
+                outcomes += [IdentifyOutcome(segment, None, error=refreshed.failed[ingest]) for segment in hers]
+                continue
             row = by_ingest[ingest]
             profile = profiles[row.profile_sha256]
             progress(done, len(pieces), f"identifying {len(hers)} segments of {row.file_name}")
@@ -113,7 +122,7 @@ def identify_vessel(
             outcomes += fresh
     progress(len(pieces), len(pieces), "done")
     outcomes.sort(key=lambda o: (o.segment.start_utc_ns, o.segment.segment_id))
-    _point_to_current(warehouse, vessel, outcomes)
+    _point_to_current(warehouse, vessel, outcomes, request.spec, adopt=adopt)
     return outcomes
 
 
@@ -133,7 +142,9 @@ def _missing(warehouse: Warehouse, wanted: Sequence[Inputs]) -> set[str]:
     return names - set(stored["parameter_set_id"].to_list())
 
 
-def _point_to_current(warehouse: Warehouse, vessel: str, outcomes: Sequence[IdentifyOutcome]) -> None:
+def _point_to_current(
+    warehouse: Warehouse, vessel: str, outcomes: Sequence[IdentifyOutcome], spec: ModelSpec, *, adopt: bool
+) -> None:
     """Let ``current`` point to the latest whole zigzag whose maximum-likelihood identification converged."""
     whole = [
         o.parameter_set
@@ -143,7 +154,14 @@ def _point_to_current(warehouse: Warehouse, vessel: str, outcomes: Sequence[Iden
         and o.parameter_set.convergence.get("converged")
         and o.parameter_set.estimator == "ml"
     ]
-    if whole:
+    if not whole:
+        return
+    pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    if (
+        adopt
+        or pointed is None
+        or ModelSpec.model_validate(dict(parameter_sets.get(warehouse, pointed).model_spec)) == spec
+    ):
         aliases.point(warehouse, vessel, whole[-1].parameter_set_id)
 
 
@@ -216,7 +234,7 @@ def build(
         covariance=tuple(tuple(float(x) for x in row) for row in result.covariance),
         fit=result.fit,
         iterations=list(result.iterations),
-        convergence=_with_grid(result),
+        convergence=result.report,
         warnings=(*result.warnings, *(unknown_arm if arm is None and spec.wind == "force" else ())),
         parent=spec.parent,
         provenance=told,
@@ -225,7 +243,3 @@ def build(
 
 def _stored(values: Sequence[Value]) -> tuple[Estimate, ...]:
     return tuple(Estimate(v.name, v.value, v.std, v.unit) for v in values)
-
-
-def _with_grid(result: PipelineEstimate) -> dict[str, Any]:
-    return {"converged": result.converged, **result.report}

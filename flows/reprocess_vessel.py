@@ -6,11 +6,13 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest_bytes
 from flows.progress import Progress, silent
+from flows.refresh_logs import refresh_logs
 from flows.rerun_set import rerun
+from flows.unforeseen import as_told
 from schemas.errors import KempfError
-from warehouse import code_version, logs, parameter_sets, raw, runs, segments, vessels
+from schemas.model_spec import ModelSpec
+from warehouse import aliases, code_version, logs, parameter_sets, runs, segments
 from warehouse.store import Warehouse
 
 
@@ -25,6 +27,8 @@ class VesselReport:
         Logs in all, logs read anew, zigzags found, parameter sets made and kept.
     verified : dict of str to int
         Verdicts on the kept sets, where everything was asked for.
+    withdrawn : str or None
+        Parameter set that ``current`` pointed to, where it no longer stands and nothing took its place.
     failures : list of dict
         What failed, each with the error's JSON; the rest was done all the same.
     """
@@ -36,6 +40,7 @@ class VesselReport:
     new_sets: int = 0
     kept_sets: int = 0
     verified: dict[str, int] = field(default_factory=dict)
+    withdrawn: str | None = None
     failures: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -57,7 +62,7 @@ class VesselReport:
 def reprocess_vessel(
     warehouse: Warehouse,
     vessel: str,
-    request: Request = Request(),  # noqa: B008 - frozen
+    request: Request | None = None,
     *,
     changed_only: bool = True,
     flow_run: str | None = None,
@@ -72,6 +77,7 @@ def reprocess_vessel(
     warehouse : Warehouse
     vessel : str
     request : Request, optional
+        Only this model and estimator; by default every one that she was identified with before.
     changed_only : bool, optional
         False also builds every kept set again from the raw bytes and counts the verdicts.
     flow_run : str, optional
@@ -84,21 +90,27 @@ def reprocess_vessel(
     """
     report = VesselReport(vessel)
     try:
-        _read_anew(warehouse, vessel, report, progress)
+        requests = _requests(warehouse, vessel, request)
+        names = {row.ingest_id: row.file_name for row in logs.current(warehouse, vessel)}
+        refreshed = refresh_logs(warehouse, vessel, progress)
+        report.logs, report.reread = refreshed.logs, refreshed.reread
+        for ingest, error in refreshed.failed.items():
+            report.fail(names[ingest], error)
         report.segments = len(segments.current(warehouse, vessel))
-        if report.segments:
-            outcomes = identify_vessel(warehouse, vessel, request, flow_run=flow_run, progress=progress)
+        for one in requests if report.segments else ():
+            outcomes = identify_vessel(warehouse, vessel, one, adopt=False, flow_run=flow_run, progress=progress)
             for outcome in outcomes:
-                if outcome.error is not None:
+                if outcome.error is not None and outcome.segment.ingest_id not in refreshed.failed:
                     report.fail(outcome.segment.segment_id, outcome.error)
                 report.new_sets += outcome.new
                 report.kept_sets += outcome.parameter_set is not None and not outcome.new
+        _withdraw(warehouse, vessel, report)
         if not changed_only:
             _verify(warehouse, vessel, report)
-    except KempfError as error:
-        report.fail(vessel, error)
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is reported and the fleet goes on
+        report.fail(vessel, as_told(error))
     counts = {k: v for k, v in vars(report).items() if isinstance(v, int)}
-    inputs = {"vessel": vessel, "changed_only": changed_only, "estimator": request.estimator}
+    inputs = {"vessel": vessel, "changed_only": changed_only, "estimator": request.estimator if request else None}
     runs.record(
         warehouse,
         runs.Run(
@@ -108,20 +120,27 @@ def reprocess_vessel(
     return report
 
 
-def _read_anew(warehouse: Warehouse, vessel: str, report: VesselReport, progress: Progress) -> None:
-    profile = vessels.current(warehouse, vessel)
-    hers, code = logs.current(warehouse, vessel), code_version.fingerprint()
-    report.logs = len(hers)
-    for done, row in enumerate(hers):
-        if (row.profile_sha256, row.code_version) == (profile.sha256, code):
-            continue
-        progress(done, len(hers), f"reading {row.file_name}")
-        try:
-            data = raw.get(warehouse, row.log_id)
-            ingest_bytes(warehouse, vessel, row.file_name, data, profile, row.file_name)
-            report.reread += 1
-        except KempfError as error:
-            report.fail(row.file_name, error)
+def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> list[Request]:
+    """Return every model and estimator that the vessel was ever identified with: all of them are kept up to date."""
+    if default is not None:
+        return [default]
+    asked: dict[str, Request] = {}
+    for name in parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list():
+        one = parameter_sets.get(warehouse, name)
+        request = Request(ModelSpec.model_validate(dict(one.model_spec)), one.estimator)
+        asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
+    return [asked[key] for key in sorted(asked)] or [Request()]
+
+
+def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
+    """Withdraw ``current`` where its set is of a profile or code that no longer stands."""
+    pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    if pointed is None:
+        return
+    standing = {row.ingest_id for row in logs.current(warehouse, vessel)}
+    if not standing.intersection(parameter_sets.get(warehouse, pointed).provenance["ingest_ids"]):
+        aliases.withdraw(warehouse, vessel)
+        report.withdrawn = pointed
 
 
 def _verify(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:

@@ -118,8 +118,12 @@ def noise_std(series: Series) -> float:
     """
     if len(series) < 8:
         return float("nan")
+    steps = np.abs(np.diff(series.value))
+    # a coarse channel that moves little repeats itself: its rounding is noise all the same
+    rounding = float(np.min(steps[steps > 0.0], initial=np.inf)) / np.sqrt(12.0) if np.mean(steps == 0.0) > 0.5 else 0.0
     difference = np.diff(series.value, n=3)
-    return float(1.4826 * np.median(np.abs(difference - np.median(difference))) / np.sqrt(20.0))
+    white = float(1.4826 * np.median(np.abs(difference - np.median(difference))) / np.sqrt(20.0))
+    return max(white, rounding) if np.isfinite(rounding) else white
 
 
 def check_current(

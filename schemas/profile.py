@@ -61,6 +61,13 @@ class TimeColumn(_Frozen):
     #: start of the elapsed time; without it a number counts from 1970-01-01 UTC
     start: AwareDatetime | None = None
 
+    @field_validator("start")
+    @classmethod
+    def _of_our_time(cls, value: datetime | None) -> datetime | None:
+        if value is not None and not 1970 <= value.year < 2200:
+            raise ValueError("start lies between the years 1970 and 2200")
+        return value
+
 
 class Source(_Frozen):
     """How the files of one kind are read; the first source whose pattern matches the file name is used."""
@@ -73,15 +80,15 @@ class Source(_Frozen):
     #: one character, or ``whitespace`` for any run of blanks; None reads it from the header
     separator: str | None = None
     #: lines before the data that are not column names
-    header_lines: int = Field(default=0, ge=0)
+    header_lines: int = Field(default=0, ge=0, le=1_000_000)
     #: names of the columns where the file has no line that names them
     columns: list[str] | None = None
 
     @field_validator("separator")
     @classmethod
     def _one_character(cls, value: str | None) -> str | None:
-        if value is not None and value != "whitespace" and len(value) != 1:
-            raise ValueError("separator is one character or 'whitespace'")
+        if value is not None and value != "whitespace" and (len(value) != 1 or not value.isascii() or value in '\r\n"'):
+            raise ValueError("separator is one ASCII character, but no quote or line end, or 'whitespace'")
         return value
 
 

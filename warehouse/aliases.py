@@ -53,3 +53,23 @@ def of_vessel(warehouse: Warehouse, vessel: str) -> dict[str, str]:
     """Return the parameter set id of every alias of a vessel, sorted by alias."""
     frame = delta.read(warehouse, "aliases", {"vessel_key": vessel_key(vessel)})
     return dict(sorted(zip(frame["alias"].to_list(), frame["parameter_set_id"].to_list(), strict=True)))
+
+
+def withdraw(warehouse: Warehouse, vessel: str, alias: str = CURRENT) -> bool:
+    """Let an alias of a vessel point to nothing.
+
+    Returns
+    -------
+    bool
+        Whether it pointed to anything before; else there is no commit.
+    """
+    key = vessel_key(vessel)
+
+    def attempt() -> bool:
+        table = delta.ensure_table(warehouse, "aliases")
+        if delta.rows(table, "aliases", {"vessel_key": key, "alias": alias}).height == 0:
+            return False
+        delta.replace(table, "aliases", [], f"vessel_key = {quoted(key)} AND alias = {quoted(alias)}")
+        return True
+
+    return with_retry(attempt)

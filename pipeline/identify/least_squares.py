@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.identify.doubts import doubts
 from pipeline.identify.estimate import Estimate, Value, hull_values
 from pipeline.identify.record import Record
 from pipeline.identify.sampled import Sampled, sample
@@ -37,6 +38,8 @@ class Regression:
     B : ndarray, shape (n_state, n_input)
     std : ndarray, shape (n_state, n_state + n_input)
         Standard errors of [A B] as least squares sees them, blind to the noise in the regressors.
+    covariance : ndarray, shape (n_state (n_state + n_input), n_state (n_state + n_input))
+        Covariance of the rows of [A B] one after the other.
     rank : int
         Of the regressor matrix; below n_state + n_input the minimum-norm solution stands.
     """
@@ -44,6 +47,7 @@ class Regression:
     A: Float
     B: Float
     std: Float
+    covariance: Float
     rank: int
 
 
@@ -75,9 +79,10 @@ def regress(states: Float, inputs: Float, targets: Float) -> Regression:
     solution -= undetermined @ (undetermined.T @ solution)
     residual = targets - regressors @ solution
     degrees = max(1, targets.shape[0] - regressors.shape[1])
-    std = np.sqrt(np.outer(np.sum(residual**2, axis=0) / degrees, np.sum(inverted**2, axis=1)))
+    covariance = np.kron(residual.T @ residual / degrees, inverted @ inverted.T)
     n_state = states.shape[1]
-    return Regression(solution[:n_state].T, solution[n_state:].T, std, rank)
+    std = np.sqrt(np.diag(covariance)).reshape(n_state, -1)
+    return Regression(solution[:n_state].T, solution[n_state:].T, std, covariance, rank)
 
 
 def identify(record: Record, settings: LeastSquaresSettings) -> Estimate:
@@ -119,6 +124,8 @@ def estimate_from_discrete(
     told.append("standard errors leave out the bias that noise in the regressors causes")
     values = hull.array() if hull is not None else np.full(6, np.nan)
     covariance = _continuous_covariance(found, hull, sampled) if hull is not None else np.full((6, 6), np.nan)
+    if hull is not None:
+        told += doubts(values, np.sqrt(np.diag(covariance)), {})
     names = ("A11", "A12", "A21", "A22", "B1", "B2")
     units = ("1", "m/rad", "rad/m", "1", "m/s/rad", "1/s")
     flat = np.concatenate([found.A.ravel(), found.B.ravel()])
@@ -147,7 +154,8 @@ def estimate_from_discrete(
 def _continuous_covariance(found: Regression, hull: Hull, sampled: Sampled) -> Float:
     """Carry the discrete standard errors to continuous time, first order, central differences, shape (6, 6)."""
     flat = np.concatenate([found.A.ravel(), found.B.ravel()])
-    std = np.concatenate([found.std[:, :2].ravel(), found.std[:, 2]])
+    order = [0, 1, 3, 4, 2, 5]  # from the rows of [A B] to A11, A12, A21, A22, B1, B2
+    of_flat = found.covariance[np.ix_(order, order)]
     jacobian = np.empty((6, 6))
     for i in range(6):
         step = 1e-6 * max(abs(flat[i]), 1e-6)
@@ -160,5 +168,5 @@ def _continuous_covariance(found: Regression, hull: Hull, sampled: Sampled) -> F
             )
             sides.append((other or hull).array())
         jacobian[:, i] = (sides[0] - sides[1]) / (2.0 * step)
-    covariance: Float = jacobian @ np.diag(std**2) @ jacobian.T
+    covariance: Float = jacobian @ of_flat @ jacobian.T
     return covariance

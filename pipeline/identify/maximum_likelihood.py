@@ -33,6 +33,8 @@ _NOTHING = -400.0
 #: log-likelihoods this close are taken for one maximum; ones this far behind in the race cannot win it
 _SAME_HILL = 0.1
 _OUT_OF_REACH = 50.0
+#: rate at which the ship answers times the rudder's period, above which its samples leave too much open
+_RUDDER_TOO_SLOW = 0.3
 
 
 @dataclass(frozen=True)
@@ -347,6 +349,11 @@ def _report(
             "the measurements are smoother than this model can be: its wind and current states explain what the hull "
             "should; for a tank, or still water and no wind, identify with a model without them (docs/models/tank.yaml)"
         )
+    if problem.answers_per_s(best.theta) * record.rudder_period_s > _RUDDER_TOO_SLOW:
+        warnings.append(
+            f"the rudder is read every {record.rudder_period_s:.2g} s, too seldom for a ship that answers so fast: "
+            "what it did in between is not known, and the standard errors do not say so; log the rudder faster"
+        )
     if weak:
         warnings.append("some directions of the parameters are hardly determined by these data, see the report")
     sigma = np.exp(best.theta[6:])
@@ -368,6 +375,8 @@ def _report(
             "converged": best.converged,
             "reason": best.reason,
             "iterations": len(best.iterations) - 1,
+            "speed_m_s": record.mean_speed_m_s,
+            "step_s": settings.discrete_step_s,
             "log_likelihood": best.log_likelihood,
             "condition": float(eigenvalues[-1] / max(eigenvalues[0], 1e-300)),
             "active_bounds": bounds,

@@ -39,6 +39,8 @@ class Record:
         True heading interpolated to the instants, not counted from anything; NaN in its gaps.
     heading_origin_rad : float
         The heading's first value.
+    rudder_period_s : float
+        Median time between readings of the rudder; in between its course is a guess, a straight line.
     lateral : LateralSpeed
         Eq. (18) with its standard errors.
     noise_start : ndarray, shape (3,)
@@ -53,6 +55,7 @@ class Record:
     measured: Float
     heading_rad: Float
     heading_origin_rad: float
+    rudder_period_s: float
     lateral: LateralSpeed
     noise_start: Float
     warnings: tuple[str, ...]
@@ -111,12 +114,18 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
     instants = instants[inside]
     speed = _speed(instruments, lateral, instants, start_utc_ns, end_utc_ns, warnings)
-    instants = instants[np.isfinite(speed)]
-    speed = speed[np.isfinite(speed)]
+    instants, speed = _trimmed(instants, speed, warnings)
     delta = rudder.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
     measured = np.full((instants.size, 3), np.nan)
     _place(measured, 0, instants, lateral.time_utc_ns, lateral.value_m_s)
+    if np.count_nonzero(np.isfinite(measured[:, 0])) < _MIN_INSTANTS // 2:
+        raise DataRejected(
+            "no_lateral_speed",
+            "GNSS velocity, heading and rudder are hardly ever there at the same time in this segment: eq. (18) gives "
+            f"{np.count_nonzero(np.isfinite(measured[:, 0]))} values, {_MIN_INSTANTS // 2} are needed.",
+            "Look at the channels' times in the log; a clock may be wrong.",
+        )
     _place(measured, 1 if yaw is not None else 2, instants, turning.time_utc_ns, turning.value)
     origin = float(heading.value[0])
     measured[:, 2] -= origin
@@ -129,6 +138,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         measured=measured,
         heading_rad=heading.at(instants, gap_limit_s(heading)),
         heading_origin_rad=origin,
+        rudder_period_s=rudder.period_s,
         lateral=lateral,
         noise_start=noise,
         warnings=tuple(warnings),
@@ -185,6 +195,24 @@ def _speed(
             "Check the speed channel and its unit, or choose a segment under way.",
         )
     return speed
+
+
+def _trimmed(instants: Nanoseconds, speed: Float, warnings: list[str]) -> tuple[Nanoseconds, Float]:
+    """Cut the ends at which the speed is not known; a hole inside would hide what the rudder did there."""
+    known = np.flatnonzero(np.isfinite(speed))
+    cut = slice(int(known[0]), int(known[-1]) + 1) if known.size else slice(0, 0)
+    if not np.all(np.isfinite(speed[cut])):
+        apart = np.diff(instants[known]).max() / SECOND_NS
+        raise DataRejected(
+            "speed_gap",
+            f"The speed has a gap of {apart:.0f} s inside the segment; up to {_MAX_SPEED_GAP_S:.0f} s are bridged.",
+            "Repeat the manoeuvre, or identify the part of it before or after the gap.",
+            {"gap_s": float(apart)},
+        )
+    lost = (instants.size - known.size) / max(instants.size, 1)
+    if lost > 0.02:
+        warnings.append(f"the speed is not known over {100 * lost:.0f} % of the segment, at its ends: left out")
+    return instants[cut], speed[cut]
 
 
 def _place(measured: Float, column: int, instants: Nanoseconds, time: Nanoseconds, value: Float) -> None:

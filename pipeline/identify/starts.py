@@ -1,4 +1,4 @@
-"""Where the search begins: plausible ships of several lengths, and a regression on the smoothed record."""
+"""Where the search begins: plausible ships of several lengths."""
 
 from __future__ import annotations
 

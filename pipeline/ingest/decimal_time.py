@@ -35,10 +35,10 @@ def to_ns(text: pl.Series, unit: str) -> tuple[NDArray[np.int64], NDArray[np.boo
     plain = (
         frame.lazy()
         .with_columns(
-            plain=pl.col("text").str.contains(r"^[+-]?(\d+\.?\d*|\.\d+)$"),
+            plain=pl.col("text").str.contains(r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)$"),
             negative=pl.col("text").str.starts_with("-"),
-            whole=pl.col("text").str.extract(r"^[+-]?(\d*)", 1).fill_null(""),
-            part=pl.col("text").str.extract(r"\.(\d*)$", 1).fill_null(""),
+            whole=pl.col("text").str.extract(r"^[+-]?([0-9]*)", 1).fill_null(""),
+            part=pl.col("text").str.extract(r"\.([0-9]*)$", 1).fill_null(""),
         )
         .with_columns(
             # more digits than a nanosecond, or than an integer holds, go the slow and exact way
@@ -64,7 +64,7 @@ def to_ns(text: pl.Series, unit: str) -> tuple[NDArray[np.int64], NDArray[np.boo
 def _exact(text: str, places: int) -> int | None:
     try:
         number = Decimal(text)
-        if not number.is_finite() or "_" in text or number.adjusted() > 20:
+        if not text.isascii() or not number.is_finite() or "_" in text or number.adjusted() > 20:
             return None
         ns = int(number.scaleb(places).to_integral_value(rounding=ROUND_HALF_EVEN))
     except (InvalidOperation, ValueError):

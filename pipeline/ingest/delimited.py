@@ -130,7 +130,7 @@ def _as_utf8(data: bytes, encoding: str) -> bytes:
         known = codecs.lookup(encoding).name
         if known != "utf-8":
             data = data.decode(encoding, errors="replace").encode("utf-8")
-    except (LookupError, TypeError, UnicodeError) as error:
+    except (LookupError, TypeError, ValueError) as error:
         raise UsageError(
             "unknown_encoding",
             f"The profile's encoding {encoding!r} cannot be used: {error}.",

@@ -9,7 +9,7 @@ from schemas.errors import DataRejected
 GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 
 #: Largest log that is unpacked, bytes: a bound against a small file that holds a huge one.
-LIMIT = 2 << 30
+LIMIT = 512 << 20
 
 
 def unpack(name: str, data: bytes, limit: int = LIMIT) -> tuple[bytes, list[str]]:
@@ -36,7 +36,7 @@ def unpack(name: str, data: bytes, limit: int = LIMIT) -> tuple[bytes, list[str]
     """
     if data.startswith(GZIP):
         return _gzip(name, data, limit)
-    if data.startswith(ZSTD):
+    if data.startswith(ZSTD) or _skippable(data):
         return _zstd(name, data, limit)
     return data, []
 
@@ -56,7 +56,8 @@ def _gzip(name: str, data: bytes, limit: int) -> tuple[bytes, list[str]]:
         if not member.eof:
             notes.append("The gzip file is cut short: what could be unpacked was read.")
             break
-        data = member.unused_data
+        # a tape or a copier may pad a member with zeros
+        data = member.unused_data.lstrip(b"\0") if member.unused_data.startswith(b"\0") else member.unused_data
     else:
         if data.strip(b"\0"):
             notes.append(f"{len(data)} bytes behind the end of the gzip data were left out.")
@@ -70,7 +71,10 @@ def _zstd(name: str, data: bytes, limit: int) -> tuple[bytes, list[str]]:
     size, notes = 0, []
     step = 1 << 24
     # the reader stops without a word at a cut: the frame is told whole by the object below
-    while data.startswith(ZSTD):
+    while data.startswith(ZSTD) or _skippable(data):
+        if length := _skippable(data):
+            data = data[length:]
+            continue
         frame = zstandard.ZstdDecompressor().decompressobj()
         try:
             for first in range(0, len(data), step // 64):
@@ -86,7 +90,17 @@ def _zstd(name: str, data: bytes, limit: int) -> tuple[bytes, list[str]]:
         if not frame.eof:
             notes.append("The zstd file is cut short: what could be unpacked was read.")
             break
+    else:
+        if data.strip(b"\0"):
+            notes.append(f"{len(data)} bytes behind the end of the zstd data were left out.")
     return b"".join(parts), notes
+
+
+def _skippable(data: bytes) -> int:
+    """Return the length of a skippable frame (RFC 8878, 3.1.2) at the beginning of the data, 0 where there is none."""
+    if len(data) < 8 or data[1:4] != b"\x2a\x4d\x18" or data[0] >> 4 != 5:
+        return 0
+    return 8 + int.from_bytes(data[4:8], "little")
 
 
 def _damaged(name: str, kind: str, why: str) -> DataRejected:

@@ -20,6 +20,8 @@ _MIN_RUNS = 20
 _ORDERS = 5
 #: share of the runs that must be as long as the period, give or take the row that a sample near a row's edge may slip
 _REGULAR = 0.9
+#: share of the changes that are of the smallest size where a channel is only rounded
+_ONE_STEP = 0.9
 #: samples over which an instrument's clock is taken for steady
 _BLOCK = 400
 
@@ -85,12 +87,24 @@ def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
     regular = np.abs(single - period) <= max(1.0, 0.2 * period)
     if period < 2 or single.size < 0.3 * inner.size or np.mean(regular) < _REGULAR:
         return everything
+    if _rounded(values[starts]):
+        return everything  # a slow channel in coarse steps repeats itself without being held
     if np.unique(values[starts], axis=0).shape[0] <= _ORDERS:
         return everything  # the legs of a regular zigzag are equally long too
     copies = np.maximum(1, np.floor(lengths / period + 0.4).astype(np.int64))
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
     rows = np.repeat(starts, copies) + within * period
     return Held(rows, _instants(time_utc_ns, rows, period), period)
+
+
+def _rounded(values: Float) -> bool:
+    """Whether the values of successive runs, shape (n, n_columns), differ by one and the same smallest step."""
+    steps = np.abs(np.diff(values, axis=0))
+    for column in steps.T:
+        moved = column[column > 0.0]
+        if moved.size and np.mean(moved < 1.5 * np.min(moved)) < _ONE_STEP:
+            return False
+    return True
 
 
 def _instants(time_utc_ns: Nanoseconds, rows: NDArray[np.int64], period: int) -> Nanoseconds:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 import polars as pl
 
+from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.holds import find_held
 from pipeline.normalise.series import Float, Nanoseconds, Series
 from schemas.channels import CHANNELS
@@ -125,10 +126,12 @@ def _add_speed_and_course(series: dict[str, Series], sources: dict[str, str], no
     north, east = series.get("velocity_north"), series.get("velocity_east")
     if north is None or east is None or "course_over_ground" in series:
         return
-    speed = np.hypot(north.value, east.value)
-    course = np.unwrap(np.arctan2(east.value, north.value))
-    series["speed_over_ground"] = Series(north.time_utc_ns, speed)
-    series["course_over_ground"] = Series(north.time_utc_ns, course)
+    # two topics need not have their values at the same instants
+    across = east.at(north.time_utc_ns, gap_limit_s(east))
+    both = np.isfinite(across)
+    time, ahead, across = north.time_utc_ns[both], north.value[both], across[both]
+    series["speed_over_ground"] = Series(time, np.hypot(ahead, across))
+    series["course_over_ground"] = Series(time, np.unwrap(np.arctan2(across, ahead)))
     for name in ("speed_over_ground", "course_over_ground"):
         sources[name] = sources["velocity_north"]
     notes.append("speed and course over ground computed from the earth-fixed velocities")

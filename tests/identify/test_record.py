@@ -135,3 +135,40 @@ def test_sampling_takes_the_mean_rudder_of_the_step() -> None:
     with pytest.raises(DataRejected) as caught:
         sample(record, 30.0)
     assert caught.value.code == "segment_too_short"
+
+
+def test_a_hole_in_the_speed_is_refused_and_a_cut_end_is_told() -> None:
+    trial = sailed(seed=2, duration_s=500.0)
+    instruments = instruments_of(trial)
+    start, end = bounds(trial)
+    log = instruments.series["speed_through_water"]
+    middle = (start + end) // 2
+    hole = np.abs(log.time_utc_ns - middle) > 40 * SECOND_NS
+    with pytest.raises(DataRejected) as caught:
+        make_record(
+            changed(instruments, "speed_through_water", Series(log.time_utc_ns[hole], log.value[hole])), start, end
+        )
+    assert caught.value.code == "speed_gap"
+    tail = log.time_utc_ns < end - 100 * SECOND_NS
+    cut = make_record(
+        changed(instruments, "speed_through_water", Series(log.time_utc_ns[tail], log.value[tail])), start, end
+    )
+    assert any("at its ends" in warning for warning in cut.warnings)
+
+
+def test_channels_that_never_meet_are_refused() -> None:
+    trial = sailed(seed=2, duration_s=500.0)
+    instruments = instruments_of(trial)
+    start, end = bounds(trial)
+    heading = instruments.series["heading"]
+    middle = (start + end) // 2
+    parts = {
+        "heading": heading.between(start, middle),
+        "course_over_ground": instruments.series["course_over_ground"].between(middle + 5 * SECOND_NS, end),
+    }
+    apart = instruments
+    for name, series in parts.items():
+        apart = changed(apart, name, series)
+    with pytest.raises(DataRejected) as caught:
+        make_record(apart, start, end)
+    assert caught.value.code in {"no_lateral_speed", "channel_missing"}

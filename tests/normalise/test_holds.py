@@ -45,12 +45,12 @@ def test_one_row_a_measurement_within_a_row_of_its_instant(
     random = np.random.default_rng(seed)
     ticks = (np.arange(n_values) + phase) * period * ROW_NS
     instants = np.round(ticks + jitter * random.uniform(-1.0, 1.0, n_values) * ROW_NS).astype(np.int64)
-    time, values = logged(np.sort(instants), np.arange(n_values, dtype=np.float64), n_values * period)
+    time, values = logged(np.sort(instants), np.arange(n_values, dtype=np.float64) ** 1.5, n_values * period)
     held = find_held(time, values)
     if period == 2 and held.rows_per_value == 1:
         return  # a jitter of 0.4 rows on holds of 2 rows: runs of 1, 2, 3; not taken for a hold, which is safe
     assert abs(held.rows_per_value - period) <= 1
-    kept = values[held.rows, 0].astype(int)
+    kept = np.round(values[held.rows, 0] ** (1.0 / 1.5)).astype(int)
     assert np.unique(kept).size == kept.size == np.unique(values).size
     assert np.all(np.diff(held.time_utc_ns) > 0)
     # the first value of the log may have been measured long before its first row
@@ -150,3 +150,13 @@ def test_settled_instants_take_the_delay_out_of_the_lateral_speed() -> None:
     # 10 Hz rows of 1 Hz GNSS and 5 Hz compass; the ship sways and turns: what is left is a fraction of a row
     assert rms_error(settled) < 0.25 * rms_error(raw)
     assert rms_error(settled) < 0.02
+
+
+def test_a_coarse_heading_that_repeats_itself_is_not_a_hold() -> None:
+    rng = np.random.default_rng(3)
+    time = np.arange(1600, dtype=np.int64) * 1_000_000_000
+    slow = np.cumsum(np.sin(np.arange(1600) / 90.0) * 0.55 + 0.05 * rng.standard_normal(1600))
+    heading = np.round(slow)
+    runs = np.diff(np.flatnonzero(np.append(True, np.diff(heading) != 0)))
+    assert np.median(runs) == 2, "the case is not the one that was meant"
+    assert find_held(time, heading[:, None]).rows_per_value == 1

@@ -14,6 +14,7 @@ import click
 from flows.unforeseen import as_told
 from schemas.errors import KempfError, UsageError
 from workbench.cli.lazy import LazyGroup
+from workbench.terminal import one_line
 
 #: Exit code of a command that a person interrupted, as shells have it.
 INTERRUPTED = 130
@@ -99,5 +100,7 @@ def _tell(error: KempfError, as_json: bool) -> int:
         click.echo(json.dumps(error.to_json(), indent=2, default=str))
     else:
         named = f"{click.style('error', fg='red', bold=True)} [{error.code}]"
-        click.echo(f"{named} {error.message}\n  {error.next_step}", err=True, color=_color())
+        click.echo(
+            f"{named} {one_line(error.message)[:2000]}\n  {one_line(error.next_step)[:2000]}", err=True, color=_color()
+        )
     return error.exit_code

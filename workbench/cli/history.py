@@ -24,11 +24,11 @@ def command(vessel: str, parameter: str | None, as_of: str | None, superseded: b
     from warehouse.store import Warehouse
 
     found = history.of_vessel(Warehouse(uri), vessel, parameter, _instant(as_of), superseded=superseded)
+    if found.note:
+        click.echo(found.note, err=as_json)
     if as_json:
         print_json(found.rows())
-        return
-    if found.note:
-        click.echo(found.note)
+    if found.note or as_json:
         return
     rows = [
         [

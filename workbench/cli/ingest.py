@@ -59,7 +59,7 @@ def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
         f"{tally.records_rejected} rejected{f' ({reasons})' if reasons else ''}; {_zigzags(outcome)}"
     )
     for note in outcome.notes if notes else ():
-        click.echo(f"  note: {note}")
+        click.echo(f"  note: {one_line(note)[:600]}")
 
 
 def _zigzags(outcome: IngestOutcome) -> str:

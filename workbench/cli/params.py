@@ -66,7 +66,8 @@ def show(set_id: str, uri: str, as_json: bool) -> None:
     print_table(
         ["", "value", "std", "unit"],
         [[p.name, number(p.value), number(p.std, 2), p.unit] for p in one.discrete],
-        "Discrete, eq. (17)",
+        f"Discrete, eq. (17), at {number(one.convergence.get('speed_m_s'))} m/s and a step of "
+        f"{number(one.convergence.get('step_s'))} s",
     )
     told = one.provenance
     click.echo(f"  log {', '.join(one.log_ids)}")

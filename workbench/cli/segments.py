@@ -21,7 +21,8 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     warehouse = Warehouse(uri)
     warehouse.require()
     names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
-    found = segments.current(warehouse, vessel)
+    # another process may read a log anew between the two questions
+    found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in names]
     if as_json:
         print_json([segment.show(names[segment.ingest_id]) for segment in found])
         return
