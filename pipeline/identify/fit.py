@@ -44,11 +44,12 @@ def one_step_fit(record: Record, innovation: Float, variance: Float) -> dict[str
     dict
         Horizon and sample named; for each measurement rms (SI), fit %, number of values, the lag-1 autocorrelation of
         the whitened innovations (0 for a model that lacks nothing) and the share inside the 95 % prediction interval;
-        without the first predictions, until their variance has settled.
+        without the first predictions, until their variance has settled (``settling`` of them).
     """
     channels: dict[str, Any] = {}
     for i, name in enumerate(MEASUREMENTS):
         good = np.isfinite(innovation[:, i])
+        measured = int(np.count_nonzero(good))
         # the first predictions only carry how little was known of the initial state
         good[good] = variance[good, i] < _SETTLED * np.median(variance[good, i]) if good.any() else False
         if np.count_nonzero(good) < 3:
@@ -58,6 +59,7 @@ def one_step_fit(record: Record, innovation: Float, variance: Float) -> dict[str
             "rms": float(np.sqrt(np.mean(e**2))),
             "fit_percent": fit_percent(record.measured[good, i], e),
             "n": int(e.size),
+            "settling": measured - int(e.size),
             "lag1_autocorrelation": float(np.sum(white[1:] * white[:-1]) / np.sum(white**2)),
             "inside_95_percent": float(np.mean(np.abs(white) < 1.96)),
         }

@@ -40,6 +40,8 @@ def test_parameters_are_stored_with_what_speaks_against_them(boat: Voyage) -> No
         assert any("not white" in warning for warning in stored.warnings)
     # the file's course was interpolated across north: what is left out as grossly wrong is counted, nothing vanishes
     left_out = stored.convergence["gross_errors"].get("lateral_speed", 0)
-    assert stored.fit["channels"]["lateral_speed"]["n"] + left_out == 420
+    lateral = stored.fit["channels"]["lateral_speed"]
+    assert lateral["settling"] < 20
+    assert lateral["n"] + lateral["settling"] + left_out == 420
     assert left_out >= 10
     assert any("gross errors of lateral_speed" in warning for warning in stored.warnings)

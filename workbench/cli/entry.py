@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import _thread
 import json
 import os
 import sys
@@ -44,7 +45,7 @@ def cli() -> None:
     """Turn raw ship sea-trial logs into manoeuvring models one can trust.
 
     Every command that works on a warehouse takes --warehouse URI (else KEMPF_WAREHOUSE, else ./kempf-data) and --json.
-    Exit codes: 0 ok, 1 internal error, 2 usage, 3 data rejected, 4 not found, 5 threshold exceeded.
+    Exit codes: 0 ok, 1 internal, 2 usage, 3 data rejected, 4 not found, 5 threshold exceeded.
     """
 
 
@@ -56,6 +57,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     arguments : sequence of str, optional
         Instead of those of the process.
     """
+    sys.unraisablehook = _unraisable
     given = list(sys.argv[1:] if arguments is None else arguments)
     as_json = "--json" in given
     stdout = sys.stdout
@@ -77,6 +79,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except Exception as error:  # noqa: BLE001 - the last place where it can be told
         code = _tell(as_told(error), as_json)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
+    """Deliver an interruption again that came where Python can only drop it, as in the callback of a weak reference."""
+    if isinstance(unraisable.exc_value, KeyboardInterrupt):
+        _thread.interrupt_main()
+    else:
+        sys.__unraisablehook__(unraisable)
 
 
 def _color() -> bool | None:
