@@ -90,39 +90,50 @@ def identify_vessel(
     if not found:
         raise _no_segments(warehouse, vessel)
     table_versions = delta.versions(warehouse)
-    profiles = {sha: vessels.get(warehouse, sha) for sha in {row.profile_sha256 for row in by_ingest.values()}}
     outcomes: list[IdentifyOutcome] = []
-    ingests = dict.fromkeys(segment.ingest_id for segment in found)
-    pieces = [(ingest, [s for s in found if s.ingest_id == ingest]) for ingest in ingests]
+    ingests = list(dict.fromkeys(segment.ingest_id for segment in found))
     with ThreadPoolExecutor(max_workers=cpu_count()) as pool:
-        for done, (ingest, hers) in enumerate(pieces):
+        for done, ingest in enumerate(ingests):
+            hers = [segment for segment in found if segment.ingest_id == ingest]
+            progress(done, len(ingests), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
             if ingest in refreshed.failed:
                 outcomes += [IdentifyOutcome(segment, None, error=refreshed.failed[ingest]) for segment in hers]
-                continue
-            row = by_ingest[ingest]
-            profile = profiles[row.profile_sha256]
-            progress(done, len(pieces), f"identifying {len(hers)} segments of {row.file_name}")
-            wanted = [inputs_of(segment, row.profile_sha256, request) for segment in hers]
-            missing = _missing(warehouse, wanted)
-            instruments = from_readings(readings.read(warehouse, ingest)) if missing else None
-
-            def one(segment: Segment, inputs: Inputs) -> IdentifyOutcome:
-                name = parameter_set_id(inputs)
-                if name not in missing or instruments is None:  # noqa: B023 - the pool is drained in this turn
-                    return IdentifyOutcome(segment, parameter_sets.get(warehouse, name))
-                told = provenance.collect(warehouse, inputs, [segment.ingest_id], flow_run, table_versions)
-                try:
-                    made = build(instruments, profile, inputs, vessel, (segment.segment_id,), told)  # noqa: B023
-                except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
-                    return IdentifyOutcome(segment, None, error=as_told(error))
-                return IdentifyOutcome(segment, made, new=True)
-
-            fresh = list(pool.map(one, hers, wanted))
-            parameter_sets.insert(warehouse, [o.parameter_set for o in fresh if o.new and o.parameter_set])
-            outcomes += fresh
-    progress(len(pieces), len(pieces), "done")
+            else:
+                outcomes += _identify_log(warehouse, by_ingest[ingest], hers, request, pool, flow_run, table_versions)
+    progress(len(ingests), len(ingests), "done")
     outcomes.sort(key=lambda o: (o.segment.start_utc_ns, o.segment.segment_id))
     _point_to_current(warehouse, vessel, outcomes, request.spec, adopt=adopt)
+    return outcomes
+
+
+def _identify_log(
+    warehouse: Warehouse,
+    row: logs.LogRow,
+    found: Sequence[Segment],
+    request: Request,
+    pool: ThreadPoolExecutor,
+    flow_run: str | None,
+    table_versions: dict[str, int],
+) -> list[IdentifyOutcome]:
+    """Identify the segments of one log, one a thread, and store the new sets in one commit."""
+    profile = vessels.get(warehouse, row.profile_sha256)
+    wanted = [inputs_of(segment, row.profile_sha256, request) for segment in found]
+    missing = _missing(warehouse, wanted)
+    instruments = from_readings(readings.read(warehouse, row.ingest_id)) if missing else None
+
+    def one(segment: Segment, inputs: Inputs) -> IdentifyOutcome:
+        name = parameter_set_id(inputs)
+        if name not in missing or instruments is None:
+            return IdentifyOutcome(segment, parameter_sets.get(warehouse, name))
+        told = provenance.collect(warehouse, inputs, [segment.ingest_id], flow_run, table_versions)
+        try:
+            made = build(instruments, profile, inputs, row.vessel, (segment.segment_id,), told)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
+            return IdentifyOutcome(segment, None, error=as_told(error))
+        return IdentifyOutcome(segment, made, new=True)
+
+    outcomes = list(pool.map(one, found, wanted))
+    parameter_sets.insert(warehouse, [o.parameter_set for o in outcomes if o.new and o.parameter_set])
     return outcomes
 
 
