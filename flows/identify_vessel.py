@@ -9,7 +9,7 @@ from os import cpu_count
 from typing import Any
 
 from flows.progress import Progress, silent
-from flows.refresh_logs import refresh_logs
+from flows.refresh_logs import Refreshed, refresh_logs
 from flows.unforeseen import as_told
 from pipeline.identify.estimate import Value
 from pipeline.identify.estimators import default_settings, estimate
@@ -52,6 +52,7 @@ def identify_vessel(
     vessel: str,
     request: Request = Request(),
     *,
+    refreshed: Refreshed | None = None,
     adopt: bool = True,
     flow_run: str | None = None,
     progress: Progress = silent,
@@ -67,6 +68,8 @@ def identify_vessel(
     warehouse : Warehouse
     vessel : str
     request : Request, optional
+    refreshed : Refreshed, optional
+        What came of reading the logs anew, where the caller has just done it; else it is done here.
     adopt : bool, optional
         Whether ``current`` may move to this model from another one.
     flow_run : str, optional
@@ -83,7 +86,7 @@ def identify_vessel(
     NotFound
         ``no_warehouse``, ``no_vessel``, ``no_segments``: nothing to identify from.
     """
-    refreshed = refresh_logs(warehouse, vessel, progress)
+    refreshed = refreshed or refresh_logs(warehouse, vessel, progress)
     by_ingest = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
     # of the logs just listed only: another process may read one anew at any moment
     found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in by_ingest]

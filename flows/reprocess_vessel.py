@@ -98,7 +98,9 @@ def reprocess_vessel(
             report.fail(names[ingest], error)
         report.segments = len(segments.current(warehouse, vessel))
         for one in requests if report.segments else ():
-            outcomes = identify_vessel(warehouse, vessel, one, adopt=False, flow_run=flow_run, progress=progress)
+            outcomes = identify_vessel(
+                warehouse, vessel, one, refreshed=refreshed, adopt=False, flow_run=flow_run, progress=progress
+            )
             for outcome in outcomes:
                 if outcome.error is not None and outcome.segment.ingest_id not in refreshed.failed:
                     report.fail(outcome.segment.segment_id, outcome.error)

@@ -74,7 +74,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 @contextmanager
-def progress(as_json: bool = False) -> Iterator[Progress]:
+def progress() -> Iterator[Progress]:
     """Give a `Progress` that draws a bar on stderr where that is a terminal, and nothing elsewhere."""
     if not sys.stderr.isatty():
         yield silent
