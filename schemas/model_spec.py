@@ -19,9 +19,10 @@ HULL_PARAMETERS: dict[str, str] = {
 }
 
 #: Noise levels of eqs. (16) and (18) that are estimated with them, and their units (continuous time, standard
-#: deviations): wind force, unaccounted current, lateral speed, yaw rate, heading.
+#: deviations): wind force, yaw acceleration beside it, unaccounted current, lateral speed, yaw rate, heading.
 NOISE_PARAMETERS: dict[str, str] = {
     "sigma_F": "m/s^2",
+    "sigma_M": "rad/s^2",
     "sigma_V": "m/s",
     "sigma_v": "m/s",
     "sigma_r": "rad/s",
@@ -43,11 +44,17 @@ class ModelSpec(BaseModel):
     effects: tuple[str, ...] = ()
     #: ``force``: the normalised lateral force F of eq. (16) with its moment l F; ``none``: no wind, as in a tank
     wind: Literal["force", "none"] = "force"
+    #: ``gauss-markov``: a slow yaw acceleration M beside l F, for what turns her and is not in the model; ``none``: the
+    #: moment is that of the wind force alone, as eq. (16) has it
+    moment: Literal["gauss-markov", "none"] = "none"
     #: ``earth``: two current states towards north and east; ``lateral``: the paper's single V_T, which takes the
     #: current's lateral part for constant while the heading swings; ``none``: still water, as in a tank
     current: Literal["earth", "lateral", "none"] = "earth"
-    #: mu_F and mu_V of eq. (16), 1/s
+    #: whether the rate gyro may have a constant bias; it takes a heading beside the yaw rate to tell
+    rate_bias: bool = True
+    #: mu_F, that of M, and mu_V of eq. (16), 1/s
     wind_correlation_rate_per_s: float = Field(default=1 / 300.0, gt=0)
+    moment_correlation_rate_per_s: float = Field(default=1 / 30.0, gt=0)
     current_correlation_rate_per_s: float = Field(default=1 / 1800.0, gt=0)
     #: l of eq. (16), 1/m; None takes the vessel profile's
     wind_arm_per_m: float | None = None

@@ -1,14 +1,35 @@
-"""A parameter set as a file that other programs read."""
+"""A parameter set as a file that other programs read: YAML, CSV, JSON, python-control, MATLAB."""
 
 from __future__ import annotations
 
 import csv
 import io
 import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import yaml
 
+from schemas.errors import UsageError
+from schemas.model_spec import HULL_PARAMETERS
 from warehouse.parameter_set import ParameterSet
+
+if TYPE_CHECKING:
+    from flows.known_ship import KnownShip
+    from pipeline.steering.state_space import StateSpace
+
+#: bytes of the description at the head of a MAT file, which scipy fills with the time of day
+_MAT_DESCRIPTION = 116
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """A ship with her state space, continuous and sampled at a step."""
+
+    ship: KnownShip
+    continuous: StateSpace
+    discrete: StateSpace
 
 
 def as_text(one: ParameterSet, form: str) -> str:
@@ -32,3 +53,150 @@ def as_text(one: ParameterSet, form: str) -> str:
     if form == "json":
         return json.dumps(content, indent=2) + "\n"
     return str(yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False, allow_unicode=True))
+
+
+def linear(ship: KnownShip, step_s: float, course_rad: float) -> Linear:
+    """Return the state space of a ship about a course, continuous and at a step.
+
+    Raises
+    ------
+    UsageError
+        The step is not positive, or the course not finite.
+    """
+    from pipeline.steering.state_space import continuous, discretised
+
+    model = continuous(
+        ship.hull, ship.spec, ship.speed_m_s, arm_per_m=ship.arm_per_m, course_rad=course_rad, noise=ship.noise
+    )
+    return Linear(ship, model, discretised(model, step_s))
+
+
+def as_control(model: Linear) -> str:
+    """Write a Python module for python-control with the continuous and the discrete system, named, and their noise."""
+    one, about = model.ship.parameter_set, model.continuous
+    names, values, spread, units = _parameters(one)
+    units_of = {**about.states, **about.inputs, **about.outputs}
+    lines = [
+        '"""A ship identified by Kempf as python-control systems: `continuous` and `discrete`."""',
+        "",
+        "import control",
+        "import numpy as np",
+        "",
+        f"VESSEL = {one.vessel!r}",
+        f"PARAMETER_SET = {one.parameter_set_id!r}",
+        f"CONVERGED = {bool(one.convergence.get('converged'))!r}",
+        f"WARNINGS = {list(model.ship.warnings)!r}",
+        f"SPEED_M_S = {about.speed_m_s!r}  # through the water; the matrices hold at this speed",
+        f"COURSE_RAD = {about.course_rad!r}  # psi is counted from it",
+        f"UNITS = {units_of!r}",
+        f"PARAMETERS = {dict(zip(names, values, strict=True))!r}",
+        f"STANDARD_ERRORS = {dict(zip(names, spread, strict=True))!r}  # None: unknown",
+        f"PARAMETER_UNITS = {dict(zip(names, units, strict=True))!r}",
+        "nan = np.nan",
+        f"COVARIANCE = {_array(model.ship.covariance)}  # of PARAMETERS, in their order",
+        "",
+        f"NAMES = dict(states={list(about.states)!r}, inputs={list(about.inputs)!r}, outputs={list(about.outputs)!r})",
+    ]
+    for name, system in (("continuous", about), ("discrete", model.discrete)):
+        matrices = ",\n".join(f"    {_array(matrix)}" for matrix in (system.A, system.B, system.C, system.D))
+        step = "" if system.step_s is None else f"    {system.step_s!r},  # s, the rudder held over the step\n"
+        lines += ["", f"{name} = control.ss(\n{matrices},\n{step}    name={name!r},\n    **NAMES,\n)"]
+    lines += [
+        "",
+        "# Noise: W per second on the states of `continuous`, Q a step on those of `discrete`; R of one measurement of",
+        "# the first three outputs. For an estimator: control.lqe(A, I, C[:3], W, R), control.dlqe(A, I, C[:3], Q, R).",
+        f"W = {_array(about.Q)}",
+        f"Q = {_array(model.discrete.Q)}",
+        f"R = {_array(about.R)}",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def as_mat(model: Linear) -> bytes:
+    """Write a MATLAB file (version 5): A, B, C, D, Ad, Bd, step_s, noise, names, units, parameters, covariance.
+
+    Equal content gives equal bytes.
+    """
+    import numpy as np
+    from scipy.io import savemat
+
+    one, about = model.ship.parameter_set, model.continuous
+    names, values, spread, units = _parameters(one)
+
+    def cells(texts: list[str]) -> Any:
+        column = np.empty((len(texts), 1), dtype=object)
+        column[:, 0] = texts
+        return column
+
+    content: dict[str, Any] = {
+        "A": about.A,
+        "B": about.B,
+        "C": about.C,
+        "D": about.D,
+        "W": about.Q,
+        "Ad": model.discrete.A,
+        "Bd": model.discrete.B,
+        "Qd": model.discrete.Q,
+        "R": about.R,
+        "step_s": model.discrete.step_s,
+        "speed_m_s": about.speed_m_s,
+        "course_rad": about.course_rad,
+        "state_names": cells(list(about.states)),
+        "state_units": cells(list(about.states.values())),
+        "input_names": cells(list(about.inputs)),
+        "input_units": cells(list(about.inputs.values())),
+        "output_names": cells(list(about.outputs)),
+        "output_units": cells(list(about.outputs.values())),
+        "parameter_names": cells(names),
+        "parameter_units": cells(units),
+        "parameter_values": np.array(values, dtype=np.float64)[:, None],
+        "parameter_std": np.array(spread, dtype=np.float64)[:, None],
+        "parameter_covariance": model.ship.covariance,
+        "parameter_set_id": one.parameter_set_id,
+        "vessel": one.vessel,
+        "converged": bool(one.convergence.get("converged")),
+        "warnings": cells(list(model.ship.warnings)),
+    }
+    stream = io.BytesIO()
+    savemat(stream, content)
+    data = stream.getvalue()
+    described = f"MATLAB 5.0 MAT-file, ship of parameter set {one.parameter_set_id}, written by Kempf"
+    return described.encode("ascii", "replace")[:_MAT_DESCRIPTION].ljust(_MAT_DESCRIPTION) + data[_MAT_DESCRIPTION:]
+
+
+def write_new(path: Path, data: str | bytes, option: str) -> None:
+    """Write a file that is not there yet.
+
+    Parameters
+    ----------
+    path : Path
+    data : str or bytes
+        Text is written as UTF-8.
+    option : str
+        Option that named the file, for the message.
+
+    Raises
+    ------
+    UsageError
+        ``cannot_write``: it is there, or cannot be written.
+    """
+    try:
+        with path.open("xb") as stream:
+            stream.write(data.encode() if isinstance(data, str) else data)
+    except OSError as error:
+        raise UsageError(
+            "cannot_write",
+            f"Writing {path} failed: {error.strerror}.",
+            f"Give another file with {option}; nothing is overwritten.",
+        ) from error
+
+
+def _parameters(one: ParameterSet) -> tuple[list[str], list[float], list[float | None], list[str]]:
+    held = {p.name: p for p in one.parameters}
+    found = [held[name] for name in HULL_PARAMETERS]
+    spread = [p.std if p.std is not None and p.std == p.std else None for p in found]
+    return [p.name for p in found], [p.value for p in found], spread, [p.unit for p in found]
+
+
+def _array(matrix: Any) -> str:
+    return f"np.array({matrix.tolist()!r})"

@@ -13,6 +13,22 @@ _NOT_WHITE = 0.3
 _TOO_FEW = 0.90
 
 
+def not_white(fit: dict[str, Any]) -> tuple[str, ...]:
+    """Return the measurements whose prediction errors resemble their predecessors.
+
+    Parameters
+    ----------
+    fit : dict
+        See `pipeline.identify.fit.one_step_fit`.
+
+    Returns
+    -------
+    tuple of str
+    """
+    channels = fit.get("channels", {})
+    return tuple(name for name, channel in channels.items() if abs(channel["lag1_autocorrelation"]) > _NOT_WHITE)
+
+
 def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
     """Name what is implausible about an estimate.
 
@@ -43,12 +59,13 @@ def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
         found.append("b2 is negative: the rudder turns the ship the wrong way; check the sign of the rudder channel")
     elif b1 > 0:
         found.append("b1 is positive: the rudder pushes the stern the wrong way; sway and yaw are hardly told apart")
+    unlike_noise = not_white(fit)
     for name, channel in fit.get("channels", {}).items():
         lag, inside = channel["lag1_autocorrelation"], channel["inside_95_percent"]
-        if abs(lag) > _NOT_WHITE:
+        if name in unlike_noise:
             found.append(
                 f"the prediction errors of {name} are not white (lag-1 autocorrelation {lag:.2f}): "
-                "the model lacks something, and the standard errors are too small"
+                "the model lacks something, or the instrument's noise is not independent"
             )
         if inside < _TOO_FEW:
             found.append(f"only {100 * inside:.0f} % of {name} lie in their 95 % prediction interval")

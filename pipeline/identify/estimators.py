@@ -2,27 +2,52 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from pipeline.identify import least_squares, maximum_likelihood, paper
 from pipeline.identify.estimate import Estimate
-from pipeline.identify.least_squares import LeastSquaresSettings
-from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
-from pipeline.identify.paper import PaperSettings
 from pipeline.identify.record import Record
+from pipeline.identify.rivals import (
+    multiple_models,
+    output_error,
+    prediction_error,
+    smoothed_regression,
+    subspace,
+)
 from schemas.model_spec import ModelSpec
 
-_SETTINGS: dict[str, type[MaximumLikelihoodSettings] | type[PaperSettings] | type[LeastSquaresSettings]] = {
-    "ml": MaximumLikelihoodSettings,
-    "paper": PaperSettings,
-    "least-squares": LeastSquaresSettings,
+#: record, model, l of eq. (16) in 1/m, the estimator's own settings
+Identify = Callable[[Record, ModelSpec, float, Any], Estimate]
+
+
+@dataclass(frozen=True)
+class _Estimator:
+    settings: Callable[..., Any]
+    identify: Identify
+
+
+def _least_squares(record: Record, spec: ModelSpec, arm_per_m: float, settings: Any) -> Estimate:
+    """Eq. (14) knows neither disturbances nor their arm."""
+    return least_squares.identify(record, settings)
+
+
+_ESTIMATORS: dict[str, _Estimator] = {
+    "ml": _Estimator(maximum_likelihood.MaximumLikelihoodSettings, maximum_likelihood.identify),
+    "paper": _Estimator(paper.PaperSettings, paper.identify),
+    "least-squares": _Estimator(least_squares.LeastSquaresSettings, _least_squares),
+    "output-error": _Estimator(output_error.OutputErrorSettings, output_error.identify),
+    "prediction-error": _Estimator(prediction_error.PredictionErrorSettings, prediction_error.identify),
+    "subspace": _Estimator(subspace.SubspaceSettings, subspace.identify),
+    "multiple-models": _Estimator(multiple_models.MultipleModelsSettings, multiple_models.identify),
+    "ekf-ols": _Estimator(smoothed_regression.SmoothedRegressionSettings, smoothed_regression.identify),
 }
 
 
 def default_settings(name: str) -> dict[str, Any]:
     """Return the settings of an estimator as JSON content, all defaults."""
-    return asdict(_SETTINGS[name]())
+    return asdict(_ESTIMATORS[name].settings())
 
 
 def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, settings: dict[str, Any]) -> Estimate:
@@ -44,9 +69,5 @@ def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, setti
     Estimate
     """
     given: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
-    chosen = _SETTINGS[name](**given)
-    if isinstance(chosen, MaximumLikelihoodSettings):
-        return maximum_likelihood.identify(record, spec, arm_per_m, chosen)
-    if isinstance(chosen, PaperSettings):
-        return paper.identify(record, spec, arm_per_m, chosen)
-    return least_squares.identify(record, chosen)
+    chosen = _ESTIMATORS[name]
+    return chosen.identify(record, spec, arm_per_m, chosen.settings(**given))

@@ -4,5 +4,14 @@ from __future__ import annotations
 
 from typing import Literal, get_args
 
-Name = Literal["ml", "paper", "least-squares"]
+Name = Literal[
+    "ml",
+    "paper",
+    "least-squares",
+    "output-error",
+    "prediction-error",
+    "subspace",
+    "multiple-models",
+    "ekf-ols",
+]
 NAMES: tuple[Name, ...] = get_args(Name)

@@ -1,9 +1,4 @@
-"""The paper's procedure, eqs. (11)-(15), for the ship of eq. (17), with every iteration recorded.
-
-The first approximation by least squares; a filter that estimates states and disturbances with it; measurements and
-dynamics corrected by the estimated disturbances; least squares again, and so on. It regresses on noisy measurements and
-need not converge: that is reported, not hidden.
-"""
+"""The paper's procedure for the ship of eq. (17): one vehicle of `pipeline.identify.procedure`."""
 
 from __future__ import annotations
 
@@ -12,13 +7,17 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.identify.estimate import Estimate
-from pipeline.identify.least_squares import Regression, estimate_from_discrete, regress, whole_pairs
+from pipeline.identify.least_squares import estimate_from_discrete
+from pipeline.identify.procedure import Course, Pass, ProcedureSettings, iterate
 from pipeline.identify.record import Record
 from pipeline.identify.sampled import Sampled, sample
-from pipeline.model.filter import Filtered, run_filter
-from pipeline.model.ship import continuous_from_discrete
+from pipeline.model.ship import Hull, continuous_from_discrete
+from pipeline.model.vehicle import LinearVehicle, SlowDisturbance
 from pipeline.normalise.series import Float
 from schemas.model_spec import HULL_PARAMETERS, ModelSpec
+
+#: What the paper reports after 25 iterations: errors in percent of the true values.
+REPORTED_PERCENT: dict[str, float] = {"a11": 10.0, "a12": 10.0, "a21": 25.0, "a22": 20.0, "b1": 20.0, "b2": 5.0}
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,12 @@ class PaperSettings:
     force_std_m_s2, current_std_m_s : float
         sigma_F and sigma_V of eq. (16); the paper's simulated trial has a force of 5e-3 m/s^2 and a current of 0.3 m/s.
     tolerance : float
-        Converged when no element of [A B] changes by more than this share of the largest in its row.
+        See `pipeline.identify.procedure.ProcedureSettings`.
+    constant : bool
+        Force and current are constants, states with zero derivative, as in the paper's simulated trial; the
+        correlation rates of the model specification are not used.
+    floor, run_on : bool
+        See `pipeline.identify.procedure.ProcedureSettings`.
     """
 
     iterations: int = 25
@@ -42,6 +46,87 @@ class PaperSettings:
     force_std_m_s2: float = 5e-3
     current_std_m_s: float = 0.3
     tolerance: float = 1e-4
+    constant: bool = False
+    floor: bool = True
+    run_on: bool = False
+
+
+def ship(step_s: float, *disturbances: SlowDisturbance) -> LinearVehicle:
+    """Return the ship as a linear vehicle: sway and yaw, the rudder, and what acts on her.
+
+    Parameters
+    ----------
+    step_s : float
+    *disturbances : SlowDisturbance
+        Made by `wind_force` and `lateral_current`.
+    """
+    return LinearVehicle(("v", "r"), ("rudder",), (1.0, 0.1), step_s, disturbances)
+
+
+def wind_force(std_m_s2: float, arm_per_m: float, rate_per_s: float = 0.0) -> SlowDisturbance:
+    """Return F of eq. (16) with its moment l F: standard deviation, l, correlation rate (0: constant)."""
+    return SlowDisturbance("F", (1.0, arm_per_m), (0.0, 0.0), std_m_s2, rate_per_s)
+
+
+def lateral_current(std_m_s: float, rate_per_s: float = 0.0) -> SlowDisturbance:
+    """Return V_T of eq. (16), which is measured with the lateral speed and does not act."""
+    return SlowDisturbance("V_T", (0.0, 0.0), (1.0, 0.0), std_m_s, rate_per_s)
+
+
+def noise_covariance(record: Record, step_s: float) -> Float:
+    """Return R for lateral speed and yaw rate from the noise levels found in the record, shape (2, 2)."""
+    lateral, yaw, heading = record.noise_start
+    turning = yaw if np.isfinite(yaw) else heading / step_s
+    return np.diag([max(lateral, 1e-6) ** 2, max(turning, 1e-8) ** 2])
+
+
+def run(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettings) -> tuple[Sampled, Course]:
+    """Run the procedure and return it whole, states and disturbances of every pass included.
+
+    Parameters
+    ----------
+    record : Record
+    spec : ModelSpec
+        Correlation rates of the disturbances.
+    arm_per_m : float
+        l of eq. (16), 1/m.
+    settings : PaperSettings
+
+    Returns
+    -------
+    sampled : Sampled
+        The record on the grid of eq. (17).
+    course : Course
+    """
+    sampled = sample(record, settings.step_s)
+    rates = (spec.wind_correlation_rate_per_s, spec.current_correlation_rate_per_s)
+    wind_rate, current_rate = (0.0, 0.0) if settings.constant else rates
+    vehicle = ship(
+        sampled.step_s,
+        wind_force(settings.force_std_m_s2, arm_per_m, wind_rate),
+        lateral_current(settings.current_std_m_s, current_rate),
+    )
+    R = noise_covariance(record, sampled.step_s)
+    given = ProcedureSettings(settings.iterations, settings.tolerance, settings.floor, settings.run_on)
+    return sampled, iterate(vehicle, sampled.measured, sampled.rudder[:, None], R, given)
+
+
+def percent_off(found: Hull, truth: Hull) -> dict[str, float]:
+    """Return the errors of the six parameters in percent of the true ones, NaN where nothing was found."""
+    errors = 100.0 * (found.array() / truth.array() - 1.0)
+    return dict(zip(HULL_PARAMETERS, (float(e) for e in errors), strict=True))
+
+
+def percent_std(found: Estimate, truth: Hull) -> dict[str, float]:
+    """Return the standard errors of the six parameters in percent of the true ones."""
+    return {p.name: 100.0 * p.std / abs(float(t)) for p, t in zip(found.parameters, truth.array(), strict=True)}
+
+
+def hull_of(one: Pass, sampled: Sampled) -> Hull:
+    """Return the continuous parameters of a pass; NaN where its matrices belong to no continuous ship."""
+    found = one.regression
+    hull = continuous_from_discrete(found.A, found.B, sampled.speed_m_s, sampled.step_s)
+    return hull if hull is not None else Hull(*[float("nan")] * 6)
 
 
 def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettings) -> Estimate:
@@ -62,98 +147,42 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperS
         ``report["reason"]`` says converged, cycling, diverged or still moving; ``iterations`` holds [A B], the
         continuous parameters and the mean disturbances of every pass, the first approximation as number 0.
     """
-    sampled = sample(record, settings.step_s)
-    now, after = whole_pairs(sampled)
-    u = sampled.rudder[:, None]
-    found = regress(sampled.measured[now], u[now], sampled.measured[after])
-    history = [found]
-    log = [_entry(0, found, sampled, None)]
-    reason, converged = "the iterations ran out while the parameters still moved", False
-    for count in range(1, settings.iterations + 1):
-        filtered = _disturbances(sampled, found, spec, arm_per_m, record.noise_start, settings)
-        if filtered is None or not np.all(np.isfinite(filtered.updated)):
-            reason = f"diverged in iteration {count}: the filter built from the last parameters does not exist"
-            break
-        force, current = filtered.updated[:, 2], filtered.updated[:, 3]
-        enters = _force_enters(found, sampled, arm_per_m)
-        corrected = sampled.measured - np.outer(current, [1.0, 0.0])  # (15)
-        target = corrected[after] - np.outer(force[now], enters)
-        found = regress(corrected[now], u[now], target)
-        history.append(found)
-        log.append(_entry(count, found, sampled, filtered))
-        if np.max(np.abs(np.linalg.eigvals(found.A))) > 1e3 or not np.all(np.isfinite(found.A)):
-            reason = f"diverged in iteration {count}"
-            break
-        change = _change(history[-1], history[-2])
-        if change < settings.tolerance:
-            reason, converged = f"converged: the last pass changed [A B] by {change:.1e}", True
-            break
-    else:
-        reason = _verdict(history, reason)
+    return estimate_of(record, *run(record, spec, arm_per_m, settings))
+
+
+def estimate_of(record: Record, sampled: Sampled, course: Course) -> Estimate:
+    """Turn what `run` returned into the estimate of its last pass.
+
+    Parameters
+    ----------
+    record : Record
+    sampled : Sampled
+    course : Course
+    """
+    warnings = list(record.warnings)
+    if course.hidden:
+        warnings.append(f"the measurements do not tell {' and '.join(course.hidden)}: the model is not observable")
     return estimate_from_discrete(
-        "paper", sampled, found, record.warnings, converged=converged, reason=reason, iterations=tuple(log)
+        "paper",
+        sampled,
+        course.passes[-1].regression,
+        tuple(warnings),
+        converged=course.end == "converged",
+        reason=course.reason,
+        iterations=tuple(_entry(count, one, sampled) for count, one in enumerate(course.passes)),
     )
 
 
-def _force_enters(found: Regression, sampled: Sampled, arm: float) -> Float:
-    """Return how a force held over a step enters (v, r), shape (2,), for small steps dt [1, l]."""
-    A, dt = found.A, sampled.step_s
-    direction = np.array([1.0, arm])
-    # Trapezoid of e^{A_c s} [1, l] over the step, from the discrete matrix alone: no logarithm is needed.
-    result: Float = 0.5 * dt * (direction + A @ direction)
-    return result
-
-
-def _disturbances(
-    sampled: Sampled, found: Regression, spec: ModelSpec, arm: float, noise: Float, settings: PaperSettings
-) -> Filtered | None:
-    """Step 2: the filter (3)-(5) over states (v, r, F, V_T) with the last parameters."""
-    dt = sampled.step_s
-    decay_F = np.exp(-spec.wind_correlation_rate_per_s * dt)
-    decay_V = np.exp(-spec.current_correlation_rate_per_s * dt)
-    A = np.zeros((4, 4))
-    A[:2, :2], A[:2, 2] = found.A, _force_enters(found, sampled, arm)
-    A[2, 2], A[3, 3] = decay_F, decay_V
-    B = np.vstack([found.B, np.zeros((2, 1))])
-    G = np.zeros((4, 2))
-    G[2, 0] = settings.force_std_m_s2 * np.sqrt(1.0 - decay_F**2)
-    G[3, 1] = settings.current_std_m_s * np.sqrt(1.0 - decay_V**2)
-    H = np.array([[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]])
-    yaw_noise = noise[1] if np.isfinite(noise[1]) else noise[2] / dt
-    R = np.diag([max(noise[0], 1e-6) ** 2, max(yaw_noise, 1e-8) ** 2])
-    P0 = np.diag([1.0, 0.01, settings.force_std_m_s2**2, settings.current_std_m_s**2])
-    try:
-        return run_filter(A, B, G, H, R, sampled.measured, sampled.rudder[:, None], np.zeros(4), P0)
-    except np.linalg.LinAlgError:
-        return None
-
-
-def _stacked(found: Regression) -> Float:
-    return np.hstack([found.A, found.B])
-
-
-def _change(one: Regression, other: Regression) -> float:
-    new, old = _stacked(one), _stacked(other)
-    return float(np.max(np.abs(new - old) / np.max(np.abs(new), axis=1, keepdims=True)))
-
-
-def _verdict(history: list[Regression], reason: str) -> str:
-    """Name a cycle: the last pass returns to an earlier one much more closely than to its predecessor."""
-    last = _change(history[-1], history[-2])
-    for period in range(2, min(7, len(history))):
-        if _change(history[-1], history[-1 - period]) < 0.05 * last:
-            return f"cycling with period {period}: the passes repeat without settling"
-    return f"{reason}, by {last:.1e} in the last one"
-
-
-def _entry(count: int, found: Regression, sampled: Sampled, filtered: Filtered | None) -> dict[str, object]:
-    hull = continuous_from_discrete(found.A, found.B, sampled.speed_m_s, sampled.step_s)
-    values = [None] * 6 if hull is None else [float(x) for x in hull.array()]
+def _entry(count: int, one: Pass, sampled: Sampled) -> dict[str, object]:
+    found = one.regression
+    values = [float(x) if np.isfinite(x) else None for x in hull_of(one, sampled).array()]
+    means = [None, None] if one.filtered is None else [float(x) for x in np.mean(one.filtered.updated[:, 2:4], axis=0)]
     return {
         "iteration": count,
         "A": [[float(x) for x in row] for row in found.A],
         "B": [float(x) for x in found.B[:, 0]],
         **dict(zip(HULL_PARAMETERS, values, strict=True)),
-        "mean_force_m_s2": None if filtered is None else float(np.mean(filtered.updated[:, 2])),
-        "mean_current_m_s": None if filtered is None else float(np.mean(filtered.updated[:, 3])),
+        "mean_force_m_s2": means[0],
+        "mean_current_m_s": means[1],
+        "change": None if count == 0 else one.change,
     }

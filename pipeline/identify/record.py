@@ -10,6 +10,7 @@ from pipeline.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.instruments import Instruments
 from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds, Series
+from pipeline.normalise.smooth import smoothed, without_spikes
 from schemas.errors import DataRejected
 
 #: columns of `Record.measured`
@@ -31,7 +32,10 @@ class Record:
     time_s : ndarray, shape (n,)
         Instants at which something was measured or the rudder was read.
     speed_m_s, rudder_rad : ndarray, shape (n,)
-        Inputs, interpolated linearly.
+        Inputs, interpolated linearly; the speed after its noise was taken out.
+    rudder_noise_rad_sqrt_s : ndarray, shape (n,)
+        Intensity of the error of the rudder's force at the instants, as if the rudder made it, rad s^0.5: the noise of
+        its readings, and that of the speed, whose square the force goes with.
     measured : ndarray, shape (n, 3)
         Columns `MEASUREMENTS` in m/s, rad/s, rad; NaN where not measured at that instant. The heading is counted from
         its first value.
@@ -56,6 +60,7 @@ class Record:
     heading_rad: Float
     heading_origin_rad: float
     rudder_period_s: float
+    rudder_noise_rad_sqrt_s: Float
     lateral: LateralSpeed
     noise_start: Float
     warnings: tuple[str, ...]
@@ -75,7 +80,8 @@ class Record:
 def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Record:
     """Cut one segment out of a log.
 
-    The yaw rate is measured by the rate gyro where there is one, else through the heading, whose derivative it is.
+    The heading is a measurement of its own beside the yaw rate, whose integral it is: it tells a bias of the rate gyro
+    from a turn, and stands in for it where there is none.
 
     Parameters
     ----------
@@ -107,13 +113,13 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         heading_std_rad=noise_std(heading),
     )
     yaw = _cut(instruments, "yaw_rate", start_utc_ns, end_utc_ns)
-    turning = yaw if yaw is not None else heading
     if yaw is None:
         warnings.append("no yaw rate channel: the yaw rate is estimated through the heading")
-    instants = np.unique(np.concatenate([lateral.time_utc_ns, turning.time_utc_ns, rudder.time_utc_ns]))
+    timed = [lateral.time_utc_ns, heading.time_utc_ns, rudder.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
+    instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
     instants = instants[inside]
-    speed = _speed(instruments, lateral, instants, start_utc_ns, end_utc_ns, warnings)
+    speed, speed_noise = _speed(instruments, lateral, instants, start_utc_ns, end_utc_ns, warnings)
     instants, speed = _trimmed(instants, speed, warnings)
     delta = rudder.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
@@ -126,7 +132,9 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
             f"{np.count_nonzero(np.isfinite(measured[:, 0]))} values, {_MIN_INSTANTS // 2} are needed.",
             "Look at the channels' times in the log; a clock may be wrong.",
         )
-    _place(measured, 1 if yaw is not None else 2, instants, turning.time_utc_ns, turning.value)
+    if yaw is not None:
+        _place(measured, 1, instants, yaw.time_utc_ns, yaw.value)
+    _place(measured, 2, instants, heading.time_utc_ns, heading.value)
     origin = float(heading.value[0])
     measured[:, 2] -= origin
     noise = np.array([float(np.nanmedian(lateral.std_m_s)), noise_std(yaw) if yaw else np.nan, noise_std(heading)])
@@ -139,6 +147,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         heading_rad=heading.at(instants, gap_limit_s(heading)),
         heading_origin_rad=origin,
         rudder_period_s=rudder.period_s,
+        rudder_noise_rad_sqrt_s=_rudder_noise(rudder, delta, speed, speed_noise),
         lateral=lateral,
         noise_start=noise,
         warnings=tuple(warnings),
@@ -180,21 +189,37 @@ def _speed(
     start_ns: int,
     end_ns: int,
     warnings: list[str],
-) -> Float:
-    """Speed through the water at the instants: the log, else the forward part of the GNSS velocity."""
+) -> tuple[Float, float]:
+    """Speed through the water at the instants and the intensity of its error, m s^-0.5.
+
+    The log, else the forward part of the GNSS velocity.
+    """
     log = _cut(instruments, "speed_through_water", start_ns - 5 * SECOND_NS, end_ns + 5 * SECOND_NS)
     if log is None:
         good = np.isfinite(lateral.forward_m_s)
         log = Series(lateral.time_utc_ns[good], lateral.forward_m_s[good])
         warnings.append("no water log: speed is GNSS speed along the bow, a current along the course biases it")
-    speed = log.at(instants, _MAX_SPEED_GAP_S)
+    log, spikes = without_spikes(log)
+    if spikes:
+        warnings.append(f"{spikes} spikes of the speed left out")
+    noise = float(np.nan_to_num(noise_std(log)))
+    speed = smoothed(log, noise).at(instants, _MAX_SPEED_GAP_S)
     if np.nanmax(np.abs(speed), initial=0.0) < 0.05:
         raise DataRejected(
             "no_speed",
             "The ship does not move through the water in this segment: the model of eq. (16) needs V > 0.",
             "Check the speed channel and its unit, or choose a segment under way.",
         )
-    return speed
+    # smoothing takes away what is fast and leaves the intensity of what is slow
+    return speed, noise * float(np.sqrt(log.period_s))
+
+
+def _rudder_noise(rudder: Series, delta: Float, speed: Float, speed_noise: float) -> Float:
+    """Intensity of the rudder's error: b V^2 delta with V off by dV is b V^2 with delta off by 2 delta dV / V."""
+    own = float(np.nan_to_num(noise_std(rudder))) * float(np.sqrt(rudder.period_s))
+    by_speed = 2.0 * np.abs(delta) / np.maximum(np.abs(speed), 0.1) * speed_noise
+    result: Float = np.sqrt(own**2 + by_speed**2)
+    return result
 
 
 def _trimmed(instants: Nanoseconds, speed: Float, warnings: list[str]) -> tuple[Nanoseconds, Float]:

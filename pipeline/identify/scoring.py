@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 from pipeline.normalise.series import Float
 
 Mask = NDArray[np.bool_]
+#: smallest pivot of a matrix with a unit diagonal that is solved as it is
+_DETERMINED = 1e-5
 
 
 def bfgs(curvature: Float, step: Float, fall: Float, free: Mask) -> Float:
@@ -42,8 +44,16 @@ def damped_step(score: Float, information: Float, free: Mask, damping: float) ->
     block = information[np.ix_(index, index)]
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
     normalised = block / np.outer(scale, scale) + damping * np.eye(index.size)
-    # lstsq: a direction the data do not determine gets no step instead of an infinite one
-    solution = np.linalg.lstsq(normalised, score[index] / scale, rcond=1e-13)[0]
+    try:
+        root = np.linalg.cholesky(normalised)
+        determined = bool(np.min(np.diag(root)) > _DETERMINED)
+    except np.linalg.LinAlgError:
+        determined = False
+    if determined:
+        solution = np.linalg.solve(normalised, score[index] / scale)
+    else:
+        # a direction the data do not determine gets no step instead of an infinite one
+        solution = np.linalg.lstsq(normalised, score[index] / scale, rcond=1e-13)[0]
     step[index] = solution / scale
     return step
 

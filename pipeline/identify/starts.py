@@ -23,7 +23,7 @@ def starting_points(record: Record) -> list[tuple[str, Float]]:
 
     Returns
     -------
-    list of (str, ndarray of shape (11,))
+    list of (str, ndarray of shape (12,))
     """
     sigmas = _noise_start(record)
     # A ship that answers faster than this cannot be told from one that answers at once, and costs most to compute.
@@ -39,7 +39,9 @@ def _noise_start(record: Record) -> Float:
     floor = np.nan_to_num(record.noise_start, nan=1e-3)
     measurement = np.maximum(floor, 0.15 * spread)
     force = 0.1 * float(np.nanstd(record.measured[:, 0])) / 10.0 + 1e-4
-    return np.concatenate([[force, 0.1], np.maximum(measurement, 1e-5)])
+    # a yaw acceleration that would turn her through her spread of headings within a minute or so
+    moment = 3e-4 * spread[2] + 1e-7
+    return np.concatenate([[force, moment, 0.1], np.maximum(measurement, 1e-5)])
 
 
 def thinned(record: Record, instants: int) -> Record:
@@ -58,6 +60,7 @@ def thinned(record: Record, instants: int) -> Record:
         time_s=record.time_s[keep],
         speed_m_s=record.speed_m_s[keep],
         rudder_rad=record.rudder_rad[keep],
+        rudder_noise_rad_sqrt_s=record.rudder_noise_rad_sqrt_s[keep],
         measured=record.measured[keep],
         heading_rad=record.heading_rad[keep],
     )

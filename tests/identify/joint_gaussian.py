@@ -25,49 +25,44 @@ class Case:
     time_s: Float
     speed: Float
     rudder: Float
+    rudder_noise: Float
     measured: Float
     current_row: Float
     arm: float
     wind_rate: float
+    moment_rate: float
     current_rate: float
     x0: Float
     P0: Float
 
     def arguments(self) -> tuple[Any, ...]:
-        """In the order of the kernel, after theta and active."""
-        inputs = (self.time_s, self.speed, self.rudder, self.measured, self.current_row)
-        return (*inputs, self.arm, self.wind_rate, self.current_rate, self.x0, self.P0)
+        """In the order of the kernel, after theta and derivatives."""
+        inputs = (self.time_s, self.speed, self.rudder, self.rudder_noise, self.measured, self.current_row)
+        return (*inputs, self.arm, self.wind_rate, self.moment_rate, self.current_rate, self.x0, self.P0)
 
 
 def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:
-    """Transition (6, 6), input (6,) and process noise (6, 6) from instant k - 1 to k."""
+    """Transition (8, 8), input (8,) and process noise (8, 8) from instant k - 1 to k."""
     a11, a12, a21, a22, b1, b2 = theta[:6]
     dt = case.time_s[k] - case.time_s[k - 1]
     V = 0.5 * (case.speed[k] + case.speed[k - 1])
-    A = np.zeros((6, 6))
+    A = np.zeros((8, 8))
     A[0, :3] = a11 * V, a12 * V, 1.0
-    A[1, :3] = a21 * V, a22 * V, case.arm
-    A[2, 2], A[3, 1] = -case.wind_rate, 1.0
-    A[4, 4] = A[5, 5] = -case.current_rate
-    B = np.array([b1 * V**2, b2 * V**2, 0.0, 0.0, 0.0, 0.0])
-    sigma_F, sigma_V = np.exp(theta[6:8])
-    intensity = np.diag(
-        [
-            0.0,
-            0.0,
-            2 * case.wind_rate * sigma_F**2,
-            0.0,
-            2 * case.current_rate * sigma_V**2,
-            2 * case.current_rate * sigma_V**2,
-        ]
-    )
+    A[1, :4] = a21 * V, a22 * V, case.arm, 1.0
+    A[2, 2], A[3, 3], A[4, 1] = -case.wind_rate, -case.moment_rate, 1.0
+    A[5, 5] = A[6, 6] = -case.current_rate
+    B = np.zeros(8)
+    B[:2] = b1 * V**2, b2 * V**2
+    rates = np.array([case.wind_rate, case.moment_rate, case.current_rate])
+    q_F, q_M, q_V = 2.0 * rates * np.exp(2.0 * theta[6:9])
+    intensity = np.diag([0.0, 0.0, q_F, q_M, 0.0, q_V, q_V, 0.0])
     if dt == 0.0:
-        return np.eye(6), np.zeros(6), np.zeros((6, 6))
-    block = np.zeros((12, 12))
-    block[:6, :6], block[:6, 6:], block[6:, 6:] = -A, intensity, A.T
+        return np.eye(8), np.zeros(8), np.zeros((8, 8))
+    block = np.zeros((16, 16))
+    block[:8, :8], block[:8, 8:], block[8:, 8:] = -A, intensity, A.T
     exponential = expm(block * dt)
-    Phi = exponential[6:, 6:].T
-    Q = Phi @ exponential[:6, 6:]
+    Phi = exponential[8:, 8:].T
+    Q = Phi @ exponential[:8, 8:]
 
     def integrand(s: float) -> Float:
         u = case.rudder[k - 1] + (case.rudder[k] - case.rudder[k - 1]) * s / dt
@@ -75,7 +70,16 @@ def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:
         return result
 
     g = quad_vec(integrand, 0.0, dt, epsabs=1e-14, epsrel=1e-12)[0]
-    return Phi, g, 0.5 * (Q + Q.T)
+    # the rudder's error is constant over each of the steps that the kernel takes
+    size = V * (abs(a11) + abs(a22) + np.sqrt(abs(a12 * a21))) + max(case.wind_rate, case.moment_rate)
+    steps = max(1, int(np.ceil(size * dt / 0.5)))
+    short = dt / steps
+    held = quad_vec(lambda s: expm(A * s) @ B, 0.0, short, epsabs=1e-14, epsrel=1e-12)[0]
+    through = expm(A * short)
+    rudder = np.zeros((8, 8))
+    for _ in range(steps):
+        rudder = through @ rudder @ through.T + case.rudder_noise[k] ** 2 / short * np.outer(held, held)
+    return Phi, g, 0.5 * (Q + Q.T) + rudder
 
 
 def moments(case: Case, theta: Float) -> tuple[Float, Float, Float, Float]:
@@ -85,12 +89,12 @@ def moments(case: Case, theta: Float) -> tuple[Float, Float, Float, Float]:
     -------
     mean : ndarray, shape (m,)
     covariance : ndarray, shape (m, m)
-    last_mean : ndarray, shape (6,)
-    cross : ndarray, shape (6, m)
+    last_mean : ndarray, shape (8,)
+    cross : ndarray, shape (8, m)
         Covariance of the last state with the measured values.
     """
     n = case.time_s.size
-    means, covariance = np.zeros((n, 6)), np.zeros((n, n, 6, 6))
+    means, covariance = np.zeros((n, 8)), np.zeros((n, n, 8, 8))
     means[0], covariance[0, 0] = case.x0, case.P0
     for k in range(1, n):
         Phi, g, Q = step(case, theta, k)
@@ -100,14 +104,16 @@ def moments(case: Case, theta: Float) -> tuple[Float, Float, Float, Float]:
             covariance[j, k] = covariance[k, j].T
         covariance[k, k] = Phi @ covariance[k - 1, k - 1] @ Phi.T + Q
     which = [(k, c) for k in range(n) for c in range(3) if np.isfinite(case.measured[k, c])]
-    H = np.zeros((len(which), n * 6))
+    H = np.zeros((len(which), n * 8))
     for row, (k, c) in enumerate(which):
-        H[row, 6 * k + (0, 1, 3)[c]] = 1.0
+        H[row, 8 * k + (0, 1, 4)[c]] = 1.0
         if c == 0:
-            H[row, 6 * k + 4 : 6 * k + 6] = case.current_row[k]
-    noise = np.exp(2.0 * theta[8:])[[c for _, c in which]]
-    stacked = covariance.transpose(0, 2, 1, 3).reshape(6 * n, 6 * n)
-    return H @ means.ravel(), H @ stacked @ H.T + np.diag(noise), means[-1], stacked[-6:] @ H.T
+            H[row, 8 * k + 5 : 8 * k + 7] = case.current_row[k]
+        if c == 1:
+            H[row, 8 * k + 7] = 1.0
+    noise = np.exp(2.0 * theta[9:])[[c for _, c in which]]
+    stacked = covariance.transpose(0, 2, 1, 3).reshape(8 * n, 8 * n)
+    return H @ means.ravel(), H @ stacked @ H.T + np.diag(noise), means[-1], stacked[-8:] @ H.T
 
 
 def values(case: Case) -> Float:
@@ -126,7 +132,7 @@ def log_density(case: Case, theta: Float) -> float:
 
 
 def fisher(case: Case, theta: Float) -> Float:
-    """Exact expected information of all 11 parameters, by central differences of the moments, shape (11, 11)."""
+    """Exact expected information of all 12 parameters, by central differences of the moments, shape (12, 12)."""
     _, covariance, _, _ = moments(case, theta)
     factor = cho_factor(covariance, lower=True)
     dm, dC = [], []
@@ -159,6 +165,7 @@ def make_case(
     mean_interval_s: float = 2.0,
     arm: float = 0.01,
     same_instant: bool = True,
+    rudder_noise: float = 0.02,
 ) -> Case:
     """Draw a record from the model: irregular instants, two shared, values missing at random, varying speed and rudder.
 
@@ -167,7 +174,7 @@ def make_case(
     random = np.random.default_rng(seed)
     L = length_m
     hull = np.array(prime) / np.array([L, 1.0, L**2, L, L, L**2])
-    theta = np.concatenate([hull, np.log([2e-3, 0.15, 0.05, 5e-4, 1e-3])])
+    theta = np.concatenate([hull, np.log([2e-3, 2e-5, 0.15, 0.05, 5e-4, 1e-3])])
     gaps = random.exponential(mean_interval_s, n - 1) + 0.01
     if same_instant:
         gaps[n // 3] = 0.0
@@ -177,20 +184,22 @@ def make_case(
     measured = np.zeros((n, 3))
     measured[random.random((n, 3)) < 0.35] = np.nan
     measured[n // 2] = np.nan
-    spread = random.standard_normal((6, 6))
-    scale = np.array([0.5, 0.02, 0.01, 0.1, 0.3, 0.3])
-    P0 = np.outer(scale, scale) * (0.2 * spread @ spread.T + np.eye(6))
+    spread = random.standard_normal((8, 8))
+    scale = np.array([0.5, 0.02, 0.01, 1e-4, 0.1, 0.3, 0.3, 2e-3])
+    P0 = np.outer(scale, scale) * (0.2 * spread @ spread.T + np.eye(8))
     case = Case(
         theta,
         time,
         speed_m_s * (1.0 + 0.1 * np.sin(0.11 * time)),
         0.35 * np.sign(np.sin(0.13 * time)) + 0.02 * random.standard_normal(n),
+        rudder_noise * (1.0 + 0.5 * np.sin(time)),
         measured,
         row,
         arm,
         1 / 300.0,
+        1 / 90.0,
         1 / 1800.0,
-        scale * random.standard_normal(6),
+        scale * random.standard_normal(8),
         P0,
     )
     mean, covariance, _, _ = moments(case, theta)

@@ -113,7 +113,7 @@ def test_a_level_that_is_zero_is_reported_at_its_bound() -> None:
     assert "sigma_v" in found.report["active_bounds"]
     assert any("at a bound" in warning and "sigma_v" in warning for warning in found.warnings)
     level = next(n for n in found.noise if n.name == "sigma_v")
-    assert level.value == pytest.approx(MaximumLikelihoodSettings().sigma_low[2])
+    assert level.value == pytest.approx(MaximumLikelihoodSettings().sigma_low[3])
     assert np.isnan(level.std)
     # the hull is still found, though the standard errors know nothing of how the rudder moved between its samples
     assert np.max(np.abs(found.hull.array() / truth_of(trial) - 1.0)) < 0.03
@@ -161,7 +161,7 @@ def test_a_tank_has_neither_wind_nor_current() -> None:
     found = identify(record_of(trial), still, trial.truth.wind_arm_per_m, MaximumLikelihoodSettings())
     assert found.converged
     assert np.max(np.abs(z(found, trial))) < 3.0
-    assert [n.name for n in found.noise] == ["sigma_v", "sigma_r"]
+    assert [n.name for n in found.noise] == ["sigma_v", "sigma_r", "sigma_psi"]
     # what need not be told apart from the hull leaves her better determined
     open_sea = fitted(trial)
     assert all(a.std < 1.01 * b.std for a, b in zip(found.parameters, open_sea.parameters, strict=True))

@@ -69,9 +69,40 @@ def test_with_the_usual_correlation_rates_it_needs_more_passes_than_the_paper_sh
     shown = paper.identify(record, ModelSpec(), arm, paper.PaperSettings())
     assert not shown.converged
     assert "still moved" in shown.report["reason"]
-    patient = paper.identify(record, ModelSpec(), arm, paper.PaperSettings(iterations=60))
+    patient = paper.identify(record, ModelSpec(), arm, paper.PaperSettings(iterations=100))
     assert patient.converged
     assert np.max(np.abs(percent(patient, truth))) < 5.0
+
+
+def test_constants_as_states_with_zero_derivative_converge_and_run_on_makes_every_pass() -> None:
+    record, arm, truth = quiet("mariner")
+    short = paper.identify(record, ModelSpec(), arm, paper.PaperSettings(constant=True))
+    whole = paper.identify(record, ModelSpec(), arm, paper.PaperSettings(constant=True, run_on=True))
+    assert short.converged and whole.converged
+    assert len(short.iterations) < len(whole.iterations) == 26
+    assert whole.iterations[: len(short.iterations)] == short.iterations
+    assert whole.iterations[-1]["change"] < 1e-9  # a fixed point, to the last bits
+    assert np.max(np.abs(percent(whole, truth))) < 7.0
+
+
+def test_a_filter_that_trusts_a_quiet_record_runs_away_and_the_bound_on_r_holds_it() -> None:
+    trial = sailed("mariner", noise_scale=0.0, environment=CONSTANT, speed_loss=0.0)
+    record = replace(record_of(trial), noise_start=0.01 * INSTRUMENTS)
+    arm, truth = trial.truth.wind_arm_per_m, truth_of(trial)
+    literal = paper.identify(record, NEARLY_CONSTANT, arm, paper.PaperSettings(floor=False))
+    assert literal.report["reason"].startswith("diverged in iteration")
+    assert "times what was measured" in literal.report["reason"]
+    held = paper.identify(record, NEARLY_CONSTANT, arm, paper.PaperSettings())
+    assert np.max(np.abs(percent(held, truth))) < 15.0
+
+
+def test_the_ship_is_a_vehicle_with_the_paper_s_observation_matrix() -> None:
+    ship = paper.ship(1.0, paper.wind_force(5e-3, 0.006), paper.lateral_current(0.3))
+    system = ship.augmented(np.array([[0.96, -2.4], [-1e-3, 0.9]]), np.array([[-0.07], [0.0036]]))
+    np.testing.assert_array_equal(system.H, [[1.0, 0.0, 0.0, 1.0], [0.0, 1.0, 0.0, 0.0]])
+    assert ship.hidden(system.A[:2, :2]) == ()
+    # the moment follows the force by its arm
+    np.testing.assert_allclose(ship.entering(np.eye(2))[:, 0], [1.0, 0.006])
 
 
 @pytest.mark.parametrize(("hull", "seed"), [("mariner", 1), ("ferry", 2), ("tanker", 3), ("container", 4)])

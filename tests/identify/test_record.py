@@ -87,7 +87,7 @@ def test_every_measurement_stands_at_its_own_instant_once() -> None:
     rate = record.measured[np.isfinite(record.measured[:, 1]), 1]
     first = LOG.series["yaw_rate"].between(record.start_utc_ns, END).value
     np.testing.assert_array_equal(rate, first[: rate.size])
-    assert record.used == (True, True, False)
+    assert record.used == (True, True, True)
     assert record.warnings == ()
     assert record.noise_start[0] == pytest.approx(0.05, rel=0.25)
     assert record.noise_start[1] == pytest.approx(np.deg2rad(0.03), rel=0.25)
@@ -104,9 +104,11 @@ def test_the_heading_is_the_measurement_where_there_is_no_yaw_rate() -> None:
 def test_a_gap_of_the_compass_costs_measurements_not_the_segment() -> None:
     record = make_record(with_gap("heading", 100.0, 130.0), START, END)
     whole = make_record(LOG, START, END)
-    lost = np.isfinite(whole.measured[:, 0]) & ~np.isfinite(record.measured[:, 0])
+    assert record.start_utc_ns == whole.start_utc_ns
+    held = {t for t, y in zip(record.time_s, record.measured[:, 0], strict=True) if np.isfinite(y)}
+    lost = np.isfinite(whole.measured[:, 0]) & np.array([t not in held for t in whole.time_s])
     assert 28 <= np.count_nonzero(lost) <= 32
-    seconds = record.time_s[lost] + (record.start_utc_ns - START) / SECOND_NS
+    seconds = whole.time_s[lost] + (record.start_utc_ns - START) / SECOND_NS
     assert seconds.min() >= 99.0 and seconds.max() <= 131.0
     assert not np.any(np.isfinite(record.measured[:, 0]) & ~np.isfinite(record.heading_rad))
 

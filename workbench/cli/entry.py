@@ -31,6 +31,7 @@ COMMANDS = {
     "vessels": "List vessels, show and set their profiles.",
     "logs": "List the logs, show what was rejected in one and why.",
     "demo": "Simulate a trial, ingest it, identify the ship and compare with the truth.",
+    "reproduce-paper": "Repeat the paper's experiment: its figures, its accuracy beside ours.",
     "completion": "Print the shell completion script.",
 }
 

@@ -12,6 +12,8 @@ import click
 class LazyGroup(click.Group):
     """Commands by name with their one-line summaries; each lives in ``workbench.cli.<name>`` as ``command``.
 
+    A hyphen in a name is an underscore in its module's.
+
     Parameters
     ----------
     summaries : mapping of str to str
@@ -30,7 +32,7 @@ class LazyGroup(click.Group):
         """Import and return a command, None where there is none of this name."""
         if cmd_name not in self.summaries:
             return None
-        command = import_module(f"workbench.cli.{cmd_name}").command
+        command = import_module(f"workbench.cli.{cmd_name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
         return command
 

@@ -1,19 +1,24 @@
-"""``kempf params list|show|diff|export``."""
+"""``kempf params list|show|diff|export|steering``."""
 
 from __future__ import annotations
 
+from math import isfinite
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from schemas.errors import UsageError
 from workbench.cli.options import json_option, vessel_option, warehouse_option
 from workbench.terminal import number, print_json, print_table
+
+if TYPE_CHECKING:
+    from pipeline.identify.estimate import Value
+    from pipeline.steering.nomoto import Constant
 
 
 @click.group("params")
 def command() -> None:
-    """List, show, compare and export parameter sets."""
+    """List, show, compare and export parameter sets, and what they say of her steering."""
 
 
 @command.command("list")
@@ -111,18 +116,71 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
     """
     from warehouse import parameter_sets
     from warehouse.store import Warehouse
-    from workbench.export import as_text
+    from workbench.export import as_text, write_new
 
     text = as_text(parameter_sets.get(Warehouse(uri), set_id), "json" if as_json else form)
     if output is None:
         click.echo(text, nl=False)
+    else:
+        write_new(output, text, "--output")
+
+
+@command.command("steering")
+@click.argument("set_id")
+@click.option("--speed", type=float, metavar="M/S", help="Speed through the water; default: that of the trial.")
+@warehouse_option
+@json_option
+def steering(set_id: str, speed: float | None, uri: str, as_json: bool) -> None:
+    """Show Nomoto's constants and whether she holds a straight course, with standard errors."""
+    from flows.known_ship import known_ship
+    from pipeline.steering.nomoto import nomoto
+    from pipeline.steering.stability import stability
+    from warehouse.store import Warehouse
+
+    ship = known_ship(Warehouse(uri), set_id, speed)
+    constants = nomoto(ship.hull, ship.covariance, ship.speed_m_s, ship.length_m)
+    judged = stability(ship.hull, ship.covariance, ship.speed_m_s)
+    warnings = [*ship.parameter_set.warnings, *constants.warnings]
+    if not ship.parameter_set.convergence.get("converged"):
+        warnings.insert(0, "the search for these parameters did not converge")
+    name = ship.parameter_set.parameter_set_id
+    if as_json:
+        print_json(
+            {
+                "parameter_set_id": name,
+                "vessel": ship.parameter_set.vessel,
+                "speed_m_s": ship.speed_m_s,
+                "length_m": ship.length_m,
+                "nomoto": {
+                    "poles": constants.poles,
+                    "constants": {n: _told(c) for n, c in constants.constants.items()},
+                },
+                "stability": {
+                    "verdict": judged.verdict,
+                    "reason": judged.reason,
+                    "probability_stable": judged.probability,
+                    "determinant": _told(judged.determinant),
+                    "eigenvalues_real_part": [_told(v) for v in judged.real_parts],
+                },
+                "warnings": warnings,
+            }
+        )
         return
-    try:
-        with output.open("x", encoding="utf-8") as stream:
-            stream.write(text)
-    except OSError as error:
-        raise UsageError(
-            "cannot_write",
-            f"Writing {output} failed: {error.strerror}.",
-            "Give another file with --output; nothing is overwritten.",
-        ) from error
+    rows = [[c.name, number(c.value), number(c.std, 2), c.unit, _interval(c)] for c in constants.constants.values()]
+    print_table(["", "value", "std", "unit", "95 % interval"], rows, f"{name} at {number(ship.speed_m_s)} m/s")
+    click.echo(f"  on a straight course: {judged.verdict}; {judged.reason}")
+    for part in judged.real_parts:
+        click.echo(f"  {part.name}: real part {number(part.value)} +- {number(part.std, 2)} {part.unit}")
+    for warning in warnings:
+        click.echo(f"  warning: {warning}")
+
+
+def _told(one: Constant | Value) -> dict[str, object]:
+    interval = {"interval_95": one.interval_95} if hasattr(one, "interval_95") else {}
+    return {"value": one.value, "std": one.std, "unit": one.unit, **interval}
+
+
+def _interval(one: Constant) -> str:
+    if one.interval_95 is None:
+        return "unbounded" if isfinite(one.std) else "-"
+    return f"{number(one.interval_95[0])} to {number(one.interval_95[1])}"

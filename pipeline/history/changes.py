@@ -1,0 +1,221 @@
+"""Did the ship change? A step, several, a drift, or nothing that these data show, each with how sure that is.
+
+Binary segmentation (Vostrikova 1981, Soviet Mathematics Doklady 24): where a stretch shows a step it is split there and
+both sides are put to the same test, at half the level.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from pipeline.history import effects
+from pipeline.history.power import smallest_steps
+from pipeline.history.scan import Stretch, judge, stretch
+from pipeline.history.sets import Mask, ParameterHistory, occasions
+from pipeline.history.settings import ChangeSettings
+from pipeline.normalise.series import Float, Nanoseconds
+
+Kind = Literal["step", "drift"]
+
+
+@dataclass(frozen=True, eq=False)
+class Change:
+    """One change of the ship.
+
+    Attributes
+    ----------
+    kind : {"step", "drift"}
+    between_utc_ns : tuple of int
+        Last occasion before and first after a step; first and last of a drift.
+    interval_utc_ns : tuple of int
+        Occasions between which a step happened, with the confidence of the level; of a drift as above.
+    p_value : float
+        Of the stretch it was found in.
+    before : ndarray, shape (n_parameter,)
+        Level before a step, or at the beginning of a drift.
+    change, std : ndarray, shape (n_parameter,)
+        In the parameters' units, of a drift per year.
+    width : float
+        Simultaneous intervals of all parameters are ``change`` +- ``width`` ``std``.
+    rival : float
+        BIC of the other form, step or drift, less that of this one; under 2 the data hardly tell which it was.
+    alone : tuple of (int, float, float)
+        Parameters that could have changed alone: index, change and standard error if they did.
+    """
+
+    kind: Kind
+    between_utc_ns: tuple[int, int]
+    interval_utc_ns: tuple[int, int]
+    p_value: float
+    before: Float
+    change: Float
+    std: Float
+    width: float
+    rival: float
+    alone: tuple[tuple[int, float, float], ...]
+
+    @property
+    def moved(self) -> Mask:
+        """Which parameters' simultaneous intervals leave out 0."""
+        moved: Mask = np.abs(self.change) > self.width * self.std
+        return moved
+
+
+@dataclass(frozen=True, eq=False)
+class Changes:
+    """What a history shows.
+
+    Attributes
+    ----------
+    verdict : str
+        ``no change seen``, ``step``, ``steps``, ``drift``, ``steps and drift``, ``not testable with these data``.
+    why : str
+        In words.
+    changes : tuple of Change
+        In the order of time.
+    p_value : float
+        Of the whole history; NaN where not testable.
+    occasion_utc_ns : ndarray, shape (n_occasion,)
+    scatter : ndarray, shape (n_parameter,)
+        Standard deviation between trials beyond their standard errors, in the parameters' units; NaN where unknown.
+    mean : ndarray, shape (n_parameter,)
+    smallest : ndarray, shape (n_parameter,)
+        Step of one parameter alone, midway, that would be seen with the power of the settings; NaN where unknown.
+    settings : ChangeSettings
+    """
+
+    verdict: str
+    why: str
+    changes: tuple[Change, ...]
+    p_value: float
+    occasion_utc_ns: Nanoseconds
+    scatter: Float
+    mean: Float
+    smallest: Float
+    settings: ChangeSettings
+
+
+def find_changes(history: ParameterHistory, settings: ChangeSettings | None = None) -> Changes:
+    """Say whether a ship changed, when, by how much and in which parameters.
+
+    Parameters
+    ----------
+    history : ParameterHistory
+    settings : ChangeSettings, optional
+    """
+    settings = settings or ChangeSettings()
+    p = len(history.names)
+    unknown = np.full(p, np.nan)
+    merged = occasions(history, settings.occasion_s)
+    mean = np.mean(merged.value, axis=0) if len(merged) else unknown
+    why = _not_testable(history, merged, settings)
+    if why:
+        return Changes(
+            "not testable with these data", why, (), np.nan, merged.time_utc_ns, unknown, mean, unknown, settings
+        )
+    whole = stretch(merged, settings)
+    p_value = judge(whole, settings.level).p_value
+    found = tuple(_search(merged, settings, settings.level))
+    steps, drifts = (sum(c.kind == kind for c in found) for kind in ("step", "drift"))
+    verdict = (
+        "no change seen"
+        if not found
+        else " and ".join([*([] if not steps else ["step" if steps == 1 else "steps"]), *(["drift"] if drifts else [])])
+    )
+    quiet = _without(merged, found)
+    rest = stretch(quiet, settings)
+    tau = np.sqrt(rest.statistics(rest.value).scatter[p:]) * rest.scale
+    smallest = smallest_steps(rest, judge(rest, settings.level)) * np.abs(rest.scale)
+    said = f"in {100 * p_value:.2g} % of histories without change something at least as remarkable is seen"
+    return Changes(verdict, said, found, p_value, merged.time_utc_ns, tau, mean, smallest, settings)
+
+
+def _not_testable(history: ParameterHistory, merged: ParameterHistory, settings: ChangeSettings) -> str:
+    if len(merged) < settings.fewest:
+        sets = f"{len(history)} parameter sets" if len(history) != 1 else "1 parameter set"
+        return (
+            f"{sets} with covariances, on {len(merged)} occasions; at least {settings.fewest} are needed, "
+            f"{settings.smallest_side} on either side of a step. Sets begun within {settings.occasion_s / 3600:g} h "
+            "are one occasion, because they share load and weather"
+        )
+    if merged.time_utc_ns[0] == merged.time_utc_ns[-1]:
+        return "all parameter sets are of one instant"
+    return ""
+
+
+def _search(history: ParameterHistory, settings: ChangeSettings, level: float) -> list[Change]:
+    if len(history) < settings.fewest or history.time_utc_ns[0] == history.time_utc_ns[-1]:
+        return []
+    one = stretch(history, settings)
+    verdict = judge(one, level)
+    if verdict.p_value > level:
+        return []
+    lead = effects.preference(one)
+    if lead > 0:
+        return [_drift(history, one, verdict.p_value, lead)]
+    k = int(np.argmax(one.statistics(one.value).step.max(axis=-1))) + settings.smallest_side
+    found = _step(history, one, k, verdict.p_value, -lead)
+    sides = [_search(part(history, which), settings, level / 2) for which in (slice(0, k), slice(k, None))]
+    return [*sides[0], found, *sides[1]]
+
+
+def part(history: ParameterHistory, which: slice) -> ParameterHistory:
+    """Return some sets of a history."""
+    h = history
+    return ParameterHistory(h.names, h.units, h.time_utc_ns[which], h.value[which], h.covariance[which])
+
+
+def _step(history: ParameterHistory, one: Stretch, k: int, p_value: float, rival: float) -> Change:
+    time, level = history.time_utc_ns, one.settings.level
+    intervals = effects.step_intervals(one, k, level)
+    between = (int(time[k - 1]), int(time[k]))
+    interval = (int(time[intervals.splits.min() - 1]), int(time[intervals.splits.max()]))
+    return _change("step", one, effects.step_at(one, one.value, k), intervals.width, between, interval, p_value, rival)
+
+
+def _drift(history: ParameterHistory, one: Stretch, p_value: float, rival: float) -> Change:
+    ends = (int(history.time_utc_ns[0]), int(history.time_utc_ns[-1]))
+    width = effects.drift_intervals(one, one.settings.level).width
+    return _change("drift", one, effects.drift_of(one, one.value), width, ends, ends, p_value, rival)
+
+
+def _change(
+    kind: Kind,
+    one: Stretch,
+    found: effects.Contrast,
+    width: float,
+    between: tuple[int, int],
+    interval: tuple[int, int],
+    p_value: float,
+    rival: float,
+) -> Change:
+    p = one.value.shape[1]
+    return Change(
+        kind,
+        between,
+        interval,
+        p_value,
+        found.before[p:] * one.scale,
+        found.change[p:] * one.scale,
+        found.std[p:] * np.abs(one.scale),
+        width,
+        rival,
+        tuple((j, size * one.scale[j], std * abs(one.scale[j])) for j, size, std in effects.alone(one, found, width)),
+    )
+
+
+def _without(history: ParameterHistory, found: tuple[Change, ...]) -> ParameterHistory:
+    """Return the history with the changes found taken off, so that what is left is scatter."""
+    value = history.value.copy()
+    for change in found:
+        time = history.time_utc_ns
+        first, last = change.between_utc_ns
+        if change.kind == "step":
+            value[time >= last] -= change.change
+        else:
+            inside = np.clip(time, first, last) - first
+            value -= inside[:, None] / (1e9 * 365.25 * 86400.0) * change.change
+    return ParameterHistory(history.names, history.units, history.time_utc_ns, value, history.covariance)

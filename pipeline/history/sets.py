@@ -1,0 +1,120 @@
+"""The parameter sets of one vessel in their order of time, as arrays; what is compared must be comparable.
+
+No estimation here and no table: which sets belong together is decided where they are stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds
+from schemas.errors import DataRejected
+
+Mask = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class ParameterHistory:
+    """Parameter vectors of one vessel, one model and one estimator, each from data of its own.
+
+    Attributes
+    ----------
+    names, units : tuple of str, length n_parameter
+    time_utc_ns : ndarray, shape (n_set,)
+        Never decreasing.
+    value : ndarray, shape (n_set, n_parameter)
+        In the units of the parameters.
+    covariance : ndarray, shape (n_set, n_parameter, n_parameter)
+        Of each set, in products of the units; positive definite.
+
+    Raises
+    ------
+    DataRejected
+        ``history_shape``, ``history_not_in_order``, ``covariance_unusable``.
+    """
+
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    time_utc_ns: Nanoseconds
+    value: Float
+    covariance: Float
+
+    def __post_init__(self) -> None:
+        n, p = self.time_utc_ns.size, len(self.names)
+        found = (self.value.shape, self.covariance.shape, len(self.units))
+        if found != ((n, p), (n, p, p), p):
+            raise DataRejected(
+                "history_shape",
+                f"{n} instants and {p} names come with values, covariances and units of shape {found}.",
+                "Give one value and one covariance a set, one unit a parameter.",
+            )
+        if bool(np.any(np.diff(self.time_utc_ns) < 0)):
+            raise DataRejected(
+                "history_not_in_order", "The parameter sets are not in the order of time.", "Sort them by their start."
+            )
+        bad = np.flatnonzero(~usable(self.value, self.covariance))
+        if bad.size:
+            raise DataRejected(
+                "covariance_unusable",
+                f"{bad.size} of {n} parameter sets have no finite values or no positive definite covariance.",
+                "Leave them out, see `usable`.",
+                {"sets": bad.tolist()},
+            )
+
+    def __len__(self) -> int:
+        return int(self.time_utc_ns.size)
+
+
+def usable(value: Float, covariance: Float) -> Mask:
+    """Return which sets have finite values and a positive definite covariance, shape (n_set,).
+
+    Parameters
+    ----------
+    value : ndarray, shape (n_set, n_parameter)
+    covariance : ndarray, shape (n_set, n_parameter, n_parameter)
+    """
+    finite = np.all(np.isfinite(value), axis=1) & np.all(np.isfinite(covariance), axis=(1, 2))
+    std = np.sqrt(np.maximum(np.einsum("ijj->ij", np.where(finite[:, None, None], covariance, 0.0)), 0.0))
+    good: Mask = finite & np.all(std > 0, axis=1)
+    for i in np.flatnonzero(good):
+        # of the correlations, because the units of the parameters differ by orders of magnitude
+        good[i] = np.linalg.eigvalsh(covariance[i] / np.outer(std[i], std[i]))[0] > 1e-12
+    return good
+
+
+def occasions(history: ParameterHistory, within_s: float) -> ParameterHistory:
+    """Merge sets begun within a time of the first of them into one.
+
+    Trials of one day share draught, trim, sea state and water: as witnesses of how well trials repeat they count once.
+    The mean is weighted by one number a set, the inverse of its average variance, not by its whole covariance: matrix
+    weights lean on combinations that the sets claim to know far better than trials repeat.
+
+    Parameters
+    ----------
+    history : ParameterHistory
+    within_s : float
+        s; 0 merges only what begins at one instant.
+    """
+    time = history.time_utc_ns
+    label, first = np.zeros(time.size, dtype=np.int64), 0
+    for i in range(1, time.size):
+        if time[i] - time[first] > within_s * SECOND_NS:
+            first = i
+        label[i] = label[i - 1] + (first == i)
+    variance = np.einsum("ijj->ij", history.covariance)
+    weight = 1.0 / np.mean(variance / np.mean(variance, axis=0), axis=1) if time.size else np.empty(0)
+    groups = [np.flatnonzero(label == g) for g in range(int(label[-1]) + 1)] if time.size else []
+    shares = [weight[g] / np.sum(weight[g]) for g in groups]
+    p = len(history.names)
+    value = [w @ history.value[g] for w, g in zip(shares, groups, strict=True)]
+    covariance = [np.einsum("i,ijk->jk", w**2, history.covariance[g]) for w, g in zip(shares, groups, strict=True)]
+    return ParameterHistory(
+        history.names,
+        history.units,
+        np.array([time[g[0]] for g in groups], dtype=np.int64),
+        np.array(value).reshape(-1, p),
+        np.array(covariance).reshape(-1, p, p),
+    )

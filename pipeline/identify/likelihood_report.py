@@ -1,0 +1,180 @@
+"""From the end of a search to an estimate: standard errors, bounds, weak directions, and what speaks against it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.identify.chain import F, M
+from pipeline.identify.doubts import doubts, not_white
+from pipeline.identify.estimate import Estimate, Value, discrete_values, hull_values
+from pipeline.identify.fit import one_step_fit
+from pipeline.identify.kernel import BIAS, C1, C2, FASTEST_PER_S, LOG_MEASUREMENT
+from pipeline.identify.likelihood import Likelihood, Trace
+from pipeline.identify.search import Pass, Search, free
+from pipeline.identify.uncertainty import from_information, sandwich
+from pipeline.normalise.series import Float
+from schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS
+
+#: rate at which the ship answers times the rudder's period, above which its samples leave too much open
+_RUDDER_TOO_SLOW = 0.3
+#: a bias of the rate gyro is told when it is so many standard errors from nothing
+_BIASED = 4.0
+_NAMES = (*HULL_PARAMETERS, *NOISE_PARAMETERS)
+
+
+def report(
+    objective: Likelihood,
+    best: Search,
+    trace: Trace,
+    discrete_step_s: float,
+    details: dict[str, Any],
+    heavy: tuple[str, ...],
+) -> Estimate:
+    """Turn the end of a search into an estimate.
+
+    Parameters
+    ----------
+    objective : Likelihood
+        What was climbed at last, gross errors taken out.
+    best : Search
+    trace : Trace
+        Of the filter at its end.
+    discrete_step_s : float
+        Step of eq. (17).
+    details : dict
+        Joins the report; holds ``gross_errors``, counts by measurement.
+    heavy : tuple of str
+        Measurements with too many large prediction errors for these to be gross errors.
+
+    Returns
+    -------
+    Estimate
+        Standard errors are the Cramer-Rao bound where the prediction errors are white, else those of the sandwich.
+    """
+    record, theta = objective.record, best.theta
+    movable = free(objective, theta, best.score)
+    index = np.flatnonzero(movable)
+    known = from_information(best.information, index)
+    fit = one_step_fit(record, trace.innovation, trace.variance)
+    covariance, kind, widened = known.covariance, "information", 1.0
+    if not_white(fit):
+        scores = objective.trace(theta, scores=True).scores.sum(axis=1)
+        robust = sandwich(known.covariance, scores, record.time_s)
+        ratio = np.sqrt(np.diag(robust)[:6] / np.diag(known.covariance)[:6])
+        if np.nanmax(ratio, initial=0.0) > 1.0:
+            covariance, kind, widened = robust, "sandwich", float(np.nanmax(ratio))
+    bounds = [_NAMES[i] for i in np.flatnonzero(objective.active & ~movable)]
+    if objective.answers_per_s(theta) > 0.95 * FASTEST_PER_S:
+        bounds.append(f"answers faster than {FASTEST_PER_S:g} per second")
+    hull_covariance = covariance[:6, :6]
+    sigma = np.exp(theta[6:])
+    noise = tuple(
+        Value(key, float(sigma[i]), float(sigma[i] * np.sqrt(covariance[6 + i, 6 + i])), unit)
+        for i, (key, unit) in enumerate(NOISE_PARAMETERS.items())
+        if objective.active[6 + i]
+    )
+    ends = _at_the_end(objective, trace)
+    warnings = _warnings(objective, best, details["gross_errors"], heavy, bounds, ends)
+    if known.weak:
+        warnings.append("some directions of the parameters are hardly determined by these data, see the report")
+    speed = record.mean_speed_m_s
+    return Estimate(
+        estimator="ml",
+        parameters=hull_values(theta[:6], hull_covariance),
+        discrete=discrete_values(theta[:6], hull_covariance, speed, discrete_step_s),
+        covariance=hull_covariance,
+        noise=noise,
+        converged=best.converged,
+        report={
+            "converged": best.converged,
+            "reason": best.reason,
+            "iterations": len(best.passes) - 1,
+            "speed_m_s": speed,
+            "step_s": discrete_step_s,
+            "log_likelihood": best.log_likelihood,
+            "condition": known.condition,
+            "active_bounds": bounds,
+            "weak_directions": [
+                {"eigenvalue": value, "direction": _largest(vector, [_NAMES[i] for i in index])}
+                for value, vector in known.weak
+            ],
+            "standard_errors": kind,
+            "widened": widened,
+            "at_the_end": ends,
+            **details,
+        },
+        iterations=tuple(_iteration(count, one) for count, one in enumerate(best.passes)),
+        fit=fit,
+        warnings=(*warnings, *doubts(theta[:6], np.sqrt(np.diag(hull_covariance)), fit)),
+    )
+
+
+def _warnings(
+    objective: Likelihood,
+    best: Search,
+    taken_out: dict[str, int],
+    heavy: tuple[str, ...],
+    bounds: list[str],
+    ends: dict[str, dict[str, Any]],
+) -> list[str]:
+    record, theta = objective.record, best.theta
+    warnings = list(record.warnings)
+    warnings += [f"{count} gross errors of {key} left out" for key, count in taken_out.items()]
+    warnings += [
+        f"many prediction errors of {key} are far too large: not gross errors, the model fails" for key in heavy
+    ]
+    if not best.converged:
+        warnings.append(f"not converged: {best.reason}")
+    if bounds:
+        warnings.append(f"at a bound, not estimated: {', '.join(bounds)}")
+    levels = range(LOG_MEASUREMENT, theta.size)
+    if any(theta[i] <= objective.low[i] for i in levels if objective.active[i]):
+        warnings.append(
+            "the measurements are smoother than this model can be: its wind and current states explain what the hull "
+            "should; for a tank, or still water and no wind, identify with a model without them (docs/models/tank.yaml)"
+        )
+    if objective.answers_per_s(theta) * record.rudder_period_s > _RUDDER_TOO_SLOW:
+        warnings.append(
+            f"the rudder is read every {record.rudder_period_s:.2g} s, too seldom for a ship that answers so fast: "
+            "what it did in between is not known, and the standard errors do not say so; log the rudder faster"
+        )
+    bias = ends.get("rate_bias")
+    if bias is not None and abs(bias["value"]) > _BIASED * bias["std"]:
+        shown = np.rad2deg([bias["value"], bias["std"]])
+        warnings.append(
+            f"the rate gyro reads {shown[0]:+.3f} +- {shown[1]:.3f} deg/s beside the heading's rate of change; "
+            "allowed for in the estimate"
+        )
+    return warnings
+
+
+def _at_the_end(objective: Likelihood, trace: Trace) -> dict[str, dict[str, Any]]:
+    """Return disturbances and bias as the filter has them at the last instant, the constant ones from all data."""
+    earth = objective.spec.current == "earth"
+    named = {
+        "wind_force": (F, "m/s^2"),
+        "yaw_acceleration": (M, "rad/s^2"),
+        "current_north" if earth else "current_lateral": (C1, "m/s"),
+        "current_east": (C2, "m/s"),
+        "rate_bias": (BIAS, "rad/s"),
+    }
+    return {
+        name: {"value": float(trace.states[-1, i]), "std": float(np.sqrt(trace.spread[-1, i])), "unit": unit}
+        for name, (i, unit) in named.items()
+        if trace.spread[-1, i] > 0.0
+    }
+
+
+def _largest(vector: Float, names: list[str]) -> dict[str, float]:
+    """Return the three largest components of a direction by name."""
+    return {names[i]: float(vector[i]) for i in np.argsort(-np.abs(vector), kind="stable")[:3]}
+
+
+def _iteration(count: int, one: Pass) -> dict[str, Any]:
+    parameters = dict(zip(HULL_PARAMETERS, (float(t) for t in one.theta[:6]), strict=True))
+    sigmas = dict(zip(NOISE_PARAMETERS, (float(np.exp(t)) for t in one.theta[6:]), strict=True))
+    gain = None if np.isnan(one.expected_gain) else one.expected_gain
+    told = {"iteration": count, "log_likelihood": one.log_likelihood, "expected_gain": gain, "damping": one.damping}
+    return {**told, **parameters, **sigmas}

@@ -1,0 +1,56 @@
+"""Output error without disturbances: the ship is simulated, and what is left over is white measurement noise.
+
+The likelihood of eq. (16) with no wind and no current is exactly that criterion, so the default estimator is asked for
+it. Reference: Ljung (1999), System Identification, 2nd ed., sec. 4.2; Jategaonkar (2015), Flight Vehicle System
+Identification, 2nd ed., ch. 4.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+from pipeline.identify import maximum_likelihood
+from pipeline.identify.estimate import Estimate
+from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
+from pipeline.identify.record import Record
+from pipeline.identify.rivals.even import without_means
+from schemas.model_spec import ModelSpec
+
+
+@dataclass(frozen=True)
+class OutputErrorSettings(MaximumLikelihoodSettings):
+    """Those of the search for maximum likelihood, and one more.
+
+    Attributes
+    ----------
+    remove_means : bool
+        Take the means off measurements and rudder first, the usual remedy against what is constant.
+    """
+
+    remove_means: bool = False
+
+
+def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: OutputErrorSettings) -> Estimate:
+    """Estimate the hull by output error.
+
+    Parameters
+    ----------
+    record : Record
+    spec : ModelSpec
+        Its wind and current are left out.
+    arm_per_m : float
+        Without meaning here: there is no wind.
+    settings : OutputErrorSettings
+
+    Returns
+    -------
+    Estimate
+        Standard errors are right where nothing acts but the ship.
+    """
+    still = spec.model_copy(update={"wind": "none", "current": "none"})
+    used = without_means(record) if settings.remove_means else record
+    found = maximum_likelihood.identify(used, still, arm_per_m, settings)
+    if still == spec:
+        return replace(found, estimator="output-error")
+    unknown = "output-error knows nothing of wind and current: what they do is taken for the ship's own, or for noise"
+    return replace(found, estimator="output-error", warnings=(unknown, *found.warnings))

@@ -1,0 +1,90 @@
+"""What a rival found, in the form that every estimator returns."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from pipeline.identify.doubts import doubts
+from pipeline.identify.estimate import Estimate, Value, discrete_values, hull_values
+from pipeline.identify.record import Record
+from pipeline.identify.rivals.even import step_of
+from pipeline.normalise.series import Float
+from schemas.model_spec import HULL_PARAMETERS, ModelSpec
+
+NO_UNCERTAINTY = np.full((6, 6), np.nan)
+
+
+def told(
+    name: str,
+    record: Record,
+    hull: Float | None,
+    covariance: Float,
+    *,
+    converged: bool,
+    reason: str,
+    report: dict[str, Any],
+    spec: ModelSpec,
+    iterations: tuple[dict[str, Any], ...] = (),
+    noise: tuple[Value, ...] = (),
+    fit: dict[str, Any] | None = None,
+    warnings: tuple[str, ...] = (),
+    blind_to: str = "wind and current",
+) -> Estimate:
+    """Return the estimate, with what every rival has to say.
+
+    Parameters
+    ----------
+    name : str
+    record : Record
+        At equal steps.
+    hull : ndarray, shape (6,), or None
+        None where the method ended at no ship.
+    covariance : ndarray, shape (6, 6)
+        NaN where the method has none.
+    converged : bool
+    reason : str
+    report : dict
+        The method's own.
+    spec : ModelSpec
+        What was asked for; disturbances in it are left out, and a warning says so.
+    blind_to : str
+        What the method leaves out, in words.
+    """
+    values = np.full(6, np.nan) if hull is None else hull
+    whole = bool(np.all(np.isfinite(values)))
+    step, speed = step_of(record), record.mean_speed_m_s
+    said = [*record.warnings]
+    if spec.wind != "none" or spec.current != "none":
+        said.append(f"{name} knows nothing of {blind_to}: what they do is taken for the ship's own, or for noise")
+    if not converged:
+        said.append(f"not converged: {reason}")
+    said += warnings
+    if whole:
+        said += doubts(values, np.sqrt(np.diag(covariance)), fit or {})
+    discrete = discrete_values(values, covariance, speed, step) if whole else ()
+    return Estimate(
+        estimator=name,
+        parameters=hull_values(values, covariance),
+        discrete=discrete,
+        covariance=covariance,
+        noise=noise,
+        converged=converged and whole,
+        report={
+            "converged": converged and whole,
+            "reason": reason,
+            "iterations": max(0, len(iterations) - 1),
+            "speed_m_s": speed,
+            "step_s": step,
+            **report,
+        },
+        iterations=iterations,
+        fit=fit or {},
+        warnings=tuple(said),
+    )
+
+
+def named(hull: Float) -> dict[str, float]:
+    """Return the six parameters by name."""
+    return dict(zip(HULL_PARAMETERS, (float(p) for p in hull), strict=True))

@@ -1,0 +1,252 @@
+"""A course-keeping law synthesised from a parameter set: rudder from estimated state and disturbances.
+
+The plant is eq. (16) with the heading; the estimator is the filter (3)-(5) at its steady gain, over the plant augmented
+with the wind force F and the current across the course V_T, both with zero derivative. Their estimates give the steady
+sway and rudder with which she holds her heading in that wind, and the regulator works on what differs from them:
+
+    delta = delta_F F^ - k (x^ - x_F F^),        x = (v, r, psi)
+
+so that a steady wind is met by a steady rudder and leaves no heading error, also where the parameters are wrong: a
+constant innovation would let F^ grow. References: Johnson (1971), "Accommodation of external disturbances in linear
+regulator and servomechanism problems", IEEE Transactions on Automatic Control 16; Kallstrom, Astrom, Thorell, Eriksson
+and Sten (1979), "Adaptive autopilots for tankers", Automatica 15; Koyama (1967) for the cost.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import radians
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import solve_discrete_are
+from scipy.signal import place_poles
+
+from pipeline.model.ship import Hull
+from pipeline.normalise.series import Float
+from pipeline.steering.nomoto import largest_rate_per_s, turning_frequency_rad_s
+from pipeline.steering.state_space import NoiseLevels, StateSpace, continuous, discretised
+from schemas.errors import DataRejected, UsageError
+from schemas.model_spec import ModelSpec
+
+#: of v, r, psi, F, V_T
+N_STATE = 5
+N_SHIP = 3
+
+
+@dataclass(frozen=True)
+class LawSettings:
+    """What a law is made to.
+
+    Attributes
+    ----------
+    method : {"lqr", "poles"}
+        ``lqr`` makes the sum of psi^2 + ``rudder_weight`` delta^2 least; ``poles`` places the poles.
+    rudder_weight : float
+        Of ``lqr``: cost of a squared radian of rudder beside one of heading.
+    bandwidth, damping : float
+        Of ``poles``: natural frequency of the heading in units of V sqrt(|b2|), and its damping; the third pole stays
+        where the ship has her faster one.
+    step_s : float or None
+        Time between two orders; None takes a fifth of her fastest time constant, between 0.1 and 1 s.
+    rudder_limit_rad, rudder_rate_rad_s : float
+        Largest angle and rate of the rudder.
+    """
+
+    method: Literal["lqr", "poles"] = "lqr"
+    rudder_weight: float = 1.0
+    bandwidth: float = 1.0
+    damping: float = 0.8
+    step_s: float | None = None
+    rudder_limit_rad: float = radians(35.0)
+    rudder_rate_rad_s: float = radians(2.5)
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """A course-keeping law, all constants.
+
+    Attributes
+    ----------
+    plant : StateSpace
+        What it takes the ship for: discrete, states v, r, psi, F, V_T.
+    gain : ndarray, shape (3,)
+        k: rudder per m/s, rad/s and rad.
+    rudder_per_force : float
+        delta_F, rad per m/s^2.
+    state_per_force : ndarray, shape (3,)
+        x_F: (v, r, psi) per m/s^2; r and psi are 0.
+    observer : ndarray, shape (5, 3)
+        Steady gain of the filter, applied to the innovation of (y_v, y_r, y_psi).
+    settings : LawSettings
+    """
+
+    plant: StateSpace
+    gain: Float
+    rudder_per_force: float
+    state_per_force: Float
+    observer: Float
+    settings: LawSettings
+
+    @property
+    def step_s(self) -> float:
+        """Time between two orders, s."""
+        assert self.plant.step_s is not None
+        return self.plant.step_s
+
+    @property
+    def feedback(self) -> Float:
+        """The whole law as one row, shape (5,): delta = -feedback x^."""
+        row = np.zeros(N_STATE)
+        row[:N_SHIP] = self.gain
+        row[N_SHIP] = -(self.rudder_per_force + self.gain @ self.state_per_force)
+        return row
+
+    def order(self, estimate: Float) -> float:
+        """Return the rudder order for an estimated state, shape (5,), within the limit, rad."""
+        limit = self.settings.rudder_limit_rad
+        return min(max(-float(self.feedback @ estimate), -limit), limit)
+
+    def predict(self, estimate: Float, rudder_rad: float) -> Float:
+        """Return the state a step later, shape (5,), for the mean rudder of the step."""
+        ahead: Float = self.plant.A @ estimate + self.plant.B[:, 0] * rudder_rad
+        return ahead
+
+    def correct(self, predicted: Float, measured: Float) -> Float:
+        """Return the state after a measurement, shape (3,); what is NaN is not corrected with."""
+        innovation = measured - self.plant.measured @ predicted
+        corrected: Float = predicted + self.observer @ np.where(np.isfinite(innovation), innovation, 0.0)
+        return corrected
+
+
+def course_law(
+    hull: Hull,
+    speed_m_s: float,
+    *,
+    arm_per_m: float = 0.0,
+    spec: ModelSpec | None = None,
+    noise: NoiseLevels | None = None,
+    settings: LawSettings | None = None,
+) -> Law:
+    """Synthesise a course-keeping law.
+
+    Parameters
+    ----------
+    hull : Hull
+        The six parameters that the ship is taken to have.
+    speed_m_s : float
+    arm_per_m : float, optional
+        l of eq. (16), 1/m.
+    spec : ModelSpec, optional
+        Correlation rates of the disturbances, which say how fast they may change.
+    noise : NoiseLevels, optional
+    settings : LawSettings, optional
+
+    Returns
+    -------
+    Law
+
+    Raises
+    ------
+    UsageError
+        A setting is out of its range.
+    DataRejected
+        These parameters allow no law: the rudder does not turn such a ship, or her wind and current cannot be told
+        from the measurements.
+    """
+    chosen = settings or LawSettings()
+    _check(chosen)
+    of_model = spec or ModelSpec()
+    lateral = of_model.model_copy(update={"wind": "force", "current": "lateral"})
+    model = continuous(hull, lateral, speed_m_s, arm_per_m=arm_per_m, noise=noise, constant_disturbances=True)
+    plant = discretised(model, chosen.step_s or default_step_s(hull, speed_m_s))
+    rudder_per_force, state_per_force = _steady(hull, speed_m_s, arm_per_m)
+    A, B = plant.A[:N_SHIP, :N_SHIP], plant.B[:N_SHIP]
+    if np.linalg.matrix_rank(_scaled(_krylov(A, B))) < N_SHIP:
+        raise _no_law("the rudder does not move every motion of such a ship")
+    try:
+        gain = _lqr(A, B, chosen) if chosen.method == "lqr" else _placed(A, B, hull, speed_m_s, plant, chosen)
+        observer = _observer(plant)
+    except (np.linalg.LinAlgError, ValueError) as error:
+        raise _no_law(f"the design equation has no solution ({error})") from error
+    return Law(plant, gain, rudder_per_force, state_per_force, observer, chosen)
+
+
+def default_step_s(hull: Hull, speed_m_s: float) -> float:
+    """Return a fifth of the ship's fastest time constant, in tenths of a second, between 0.1 and 1 s."""
+    fifth = 0.2 / max(largest_rate_per_s(hull, speed_m_s), 1e-9)
+    return float(min(max(np.floor(10.0 * fifth) / 10.0, 0.1), 1.0))
+
+
+def _steady(hull: Hull, V: float, arm_per_m: float) -> tuple[float, Float]:
+    """Solve eq. (16) at rest for r = 0: sway and rudder that hold the heading under a unit force."""
+    matrix = np.array([[hull.a11 * V, hull.b1 * V**2], [hull.a21 * V, hull.b2 * V**2]])
+    both = (matrix[0, 0] * matrix[1, 1], matrix[0, 1] * matrix[1, 0])
+    if abs(both[0] - both[1]) <= 1e-12 * (abs(both[0]) + abs(both[1])):
+        raise _no_law("no rudder angle holds such a ship against a steady wind")
+    sway, rudder = np.linalg.solve(matrix, [-1.0, -arm_per_m])
+    return float(rudder), np.array([float(sway), 0.0, 0.0])
+
+
+def _lqr(A: Float, B: Float, settings: LawSettings) -> Float:
+    cost = np.diag([0.0, 0.0, 1.0])
+    weight = np.array([[settings.rudder_weight]])
+    P = solve_discrete_are(A, B, cost, weight)
+    gain: Float = np.linalg.solve(weight + B.T @ P @ B, B.T @ P @ A)[0]
+    return gain
+
+
+def _placed(A: Float, B: Float, hull: Hull, V: float, plant: StateSpace, settings: LawSettings) -> Float:
+    assert plant.step_s is not None
+    w, z = settings.bandwidth * turning_frequency_rad_s(hull, V), settings.damping
+    swing = w * np.emath.sqrt(z**2 - 1.0)
+    fast = -max(largest_rate_per_s(hull, V), 1.1 * w)
+    wanted = np.exp(np.array([-z * w + swing, -z * w - swing, fast]) * plant.step_s)
+    gain: Float = np.real(place_poles(A, B, wanted, method="YT").gain_matrix[0])
+    return gain
+
+
+def _observer(plant: StateSpace) -> Float:
+    """Steady gain of eqs. (4)-(5), in the form that corrects the prediction."""
+    A, H, R = plant.A, plant.measured, plant.R
+    if np.linalg.matrix_rank(_scaled(_krylov(A.T, H.T))) < N_STATE:
+        raise _no_law("wind and current cannot be told apart by such a ship")
+    P = solve_discrete_are(A.T, H.T, plant.Q, R)
+    gain: Float = np.linalg.solve(H @ P @ H.T + R, H @ P).T
+    return gain
+
+
+def _krylov(A: Float, B: Float) -> Float:
+    blocks = [B]
+    for _ in range(A.shape[0] - 1):
+        blocks.append(A @ blocks[-1])
+    return np.hstack(blocks)
+
+
+def _scaled(matrix: Float) -> Float:
+    """Rows of unit length: m/s, rad and m/s^2 differ by orders of magnitude, and a rank is about directions."""
+    scaled: Float = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
+    return scaled
+
+
+def _check(settings: LawSettings) -> None:
+    positive = {
+        "rudder_weight": settings.rudder_weight,
+        "bandwidth": settings.bandwidth,
+        "damping": settings.damping,
+        "rudder_limit_rad": settings.rudder_limit_rad,
+        "rudder_rate_rad_s": settings.rudder_rate_rad_s,
+        "step_s": 1.0 if settings.step_s is None else settings.step_s,
+    }
+    for name, value in positive.items():
+        if not (np.isfinite(value) and value > 0.0):
+            raise UsageError("law_setting", f"{name} is {value:g}, expected more than 0.", f"Give a positive {name}.")
+
+
+def _no_law(why: str) -> DataRejected:
+    return DataRejected(
+        "no_course_keeping_law",
+        f"No course-keeping law follows from these parameters: {why}.",
+        "Take a parameter set whose signs are those of a ship (b2 above 0, a11 and a22 below), such as one by maximum "
+        "likelihood.",
+    )

@@ -1,0 +1,185 @@
+"""The linear ship as a controller's designer wants her: A, B, C, D with names and units, continuous or discrete.
+
+States v, r, psi and, where the model has them, the wind force F and the current: V_T of eq. (16), or c_N and c_E fixed
+over ground. psi is the heading counted from the course; with c_N and c_E the lateral speed of eq. (19) is taken at that
+course, to first order. The disturbances have the correlation rates of the model, or none at all (zero derivative, as
+an integrating controller wants them).
+Discrete matrices are exact for a rudder held over the step; the noise of the step by Van Loan (1978), "Computing
+integrals involving the matrix exponential", IEEE Transactions on Automatic Control 23.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import cos, isfinite, sin
+
+import numpy as np
+from scipy.linalg import expm
+
+from pipeline.model.ship import Hull
+from pipeline.normalise.series import Float
+from pipeline.steering.nomoto import require_numbers
+from schemas.errors import UsageError
+from schemas.model_spec import ModelSpec
+
+#: name and unit of what the model puts out, in order
+OUTPUTS = {"lateral_speed": "m/s", "yaw_rate": "rad/s", "heading": "rad", "cross_track_speed": "m/s"}
+#: how many of them an instrument measures
+N_MEASURED = 3
+
+
+@dataclass(frozen=True)
+class NoiseLevels:
+    """Standard deviations of the disturbances and the measurements.
+
+    Attributes
+    ----------
+    wind_m_s2, current_m_s : float
+        Of the wind force and the current: sigma_F and sigma_V of eq. (16).
+    lateral_speed_m_s, yaw_rate_rad_s, heading_rad : float
+        Of one measurement.
+    """
+
+    wind_m_s2: float = 1e-3
+    current_m_s: float = 0.05
+    lateral_speed_m_s: float = 0.05
+    yaw_rate_rad_s: float = 5.2e-4
+    heading_rad: float = 9e-4
+
+
+@dataclass(frozen=True, eq=False)
+class StateSpace:
+    """x' = A x + B u + noise (continuous) or x[k+1] = A x[k] + B u[k] + noise (discrete); y = C x + D u.
+
+    Attributes
+    ----------
+    A : ndarray, shape (n, n)
+    B : ndarray, shape (n, 1)
+    C : ndarray, shape (4, n)
+    D : ndarray, shape (4, 1)
+        Zero.
+    Q : ndarray, shape (n, n)
+        Covariance of the noise of a step; of a continuous model its intensity (covariance per second).
+    R : ndarray, shape (3, 3)
+        Covariance of one measurement of the first three outputs.
+    states, inputs, outputs : dict of str to str
+        Unit by name, in order.
+    speed_m_s, course_rad : float
+    step_s : float or None
+        None for a continuous model.
+    """
+
+    A: Float
+    B: Float
+    C: Float
+    D: Float
+    Q: Float
+    R: Float
+    states: dict[str, str]
+    inputs: dict[str, str]
+    outputs: dict[str, str]
+    speed_m_s: float
+    course_rad: float
+    step_s: float | None
+
+    @property
+    def measured(self) -> Float:
+        """H: the rows of C that instruments measure, shape (3, n)."""
+        return self.C[:N_MEASURED]
+
+
+def continuous(
+    hull: Hull,
+    spec: ModelSpec,
+    speed_m_s: float,
+    *,
+    arm_per_m: float = 0.0,
+    course_rad: float = 0.0,
+    noise: NoiseLevels | None = None,
+    constant_disturbances: bool = False,
+) -> StateSpace:
+    """Return the continuous model, eq. (16) with the heading and the disturbances as states.
+
+    Parameters
+    ----------
+    hull : Hull
+    spec : ModelSpec
+        Which disturbances, and their correlation rates.
+    speed_m_s : float
+        Speed through the water V.
+    arm_per_m : float, optional
+        l of eq. (16), 1/m.
+    course_rad : float, optional
+        Course round which eq. (19) is taken; matters with an earth-fixed current only.
+    noise : NoiseLevels, optional
+        Default `NoiseLevels()`.
+    constant_disturbances : bool, optional
+        Zero derivatives in place of the correlation rates; the noise that drives them stays.
+
+    Raises
+    ------
+    UsageError
+        The speed is not positive or the course not finite.
+    DataRejected
+        A parameter is not a number.
+    """
+    require_numbers(hull, speed_m_s)
+    if not isfinite(course_rad):
+        raise UsageError("course_not_finite", "The course is not a finite number.", "Give a course in degrees.")
+    told, V = noise or NoiseLevels(), speed_m_s
+    states = {"v": "m/s", "r": "rad/s", "psi": "rad"}
+    if spec.wind == "force":
+        states["F"] = "m/s^2"
+    if spec.current != "none":
+        states |= {"V_T": "m/s"} if spec.current == "lateral" else {"c_N": "m/s", "c_E": "m/s"}
+    names = list(states)
+    n = len(names)
+    A, B, C, Q = np.zeros((n, n)), np.zeros((n, 1)), np.zeros((len(OUTPUTS), n)), np.zeros((n, n))
+    A[:2, :2], B[:2] = hull.continuous(V)
+    A[2, 1] = 1.0
+    C[0, 0], C[1, 1], C[2, 2], C[3, 0], C[3, 2] = 1.0, 1.0, 1.0, 1.0, V
+    across = {"V_T": 1.0, "c_N": -sin(course_rad), "c_E": cos(course_rad)}
+    for i, name in enumerate(names[3:], start=3):
+        mu = spec.wind_correlation_rate_per_s if name == "F" else spec.current_correlation_rate_per_s
+        A[i, i] = 0.0 if constant_disturbances else -mu
+        Q[i, i] = 2.0 * mu * (told.wind_m_s2 if name == "F" else told.current_m_s) ** 2
+        if name == "F":
+            A[0, i], A[1, i] = 1.0, arm_per_m
+        else:
+            C[0, i] = C[3, i] = across[name]
+    R = np.diag(np.square([told.lateral_speed_m_s, told.yaw_rate_rad_s, told.heading_rad]))
+    D = np.zeros((len(OUTPUTS), 1))
+    return StateSpace(A, B, C, D, Q, R, states, {"rudder": "rad"}, dict(OUTPUTS), V, course_rad, None)
+
+
+def discretised(model: StateSpace, step_s: float) -> StateSpace:
+    """Return a continuous model sampled at a step, the rudder held over it.
+
+    Parameters
+    ----------
+    model : StateSpace
+        Continuous.
+    step_s : float
+        Step, s.
+
+    Raises
+    ------
+    UsageError
+        The step is not positive, or the model is discrete already.
+    """
+    if model.step_s is not None or not (isfinite(step_s) and step_s > 0.0):
+        raise UsageError(
+            "step_not_positive",
+            f"A step of {step_s:g} s cannot be sampled at (the model has the step {model.step_s}); expected a "
+            "continuous model and more than 0 s.",
+            "Give a step in seconds.",
+        )
+    n = model.A.shape[0]
+    held = np.zeros((n + 1, n + 1))
+    held[:n, :n], held[:n, n:] = model.A * step_s, model.B * step_s
+    both = expm(held)
+    A = both[:n, :n]
+    loan = np.zeros((2 * n, 2 * n))
+    loan[:n, :n], loan[:n, n:], loan[n:, n:] = -model.A * step_s, model.Q * step_s, model.A.T * step_s
+    Q = A @ expm(loan)[:n, n:]
+    return replace(model, A=A, B=both[:n, n:], Q=0.5 * (Q + Q.T), step_s=step_s)

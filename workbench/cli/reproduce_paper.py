@@ -1,0 +1,101 @@
+"""``kempf reproduce-paper``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from flows.reproduce_paper import Experiment, Reproduction
+from schemas.errors import UsageError
+from workbench.cli.options import json_option
+from workbench.terminal import number, print_json, print_table, progress
+
+
+@click.command("reproduce-paper")
+@click.option(
+    "--folder",
+    type=click.Path(path_type=Path),
+    default=Path("kempf-paper"),
+    show_default=True,
+    help="Where the figures go.",
+)
+@json_option
+def command(folder: Path, as_json: bool) -> None:
+    """Repeat the experiment of the paper that the method comes from: its three figures, its accuracy beside ours.
+
+    A zigzag is simulated under a constant wind force and current; the hull is identified by the paper's 25 iterations
+    and by maximum likelihood from the same record, once with little noise and once with that of usual instruments.
+    """
+    from flows.reproduce_paper import reproduce_paper
+
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        with progress() as tell:
+            made = reproduce_paper(tell)
+        figures = draw(made, folder)
+    except OSError as error:
+        raise UsageError(
+            "cannot_write", f"Writing to {folder} failed: {error.strerror or error}.", "Give another folder."
+        ) from error
+    if as_json:
+        print_json({**made.show(), "figures": [str(path) for path in figures]})
+        return
+    _tell(made)
+    click.echo(click.style("Figures", bold=True))
+    for path in figures:
+        click.echo(f"  {path}")
+
+
+def draw(made: Reproduction, folder: Path) -> list[Path]:
+    """Draw the paper's three figures of the experiment with the least noise into a folder; return their paths."""
+    from workbench.figures.disturbed_zigzag import draw_disturbed_zigzag
+    from workbench.figures.iterations import draw_iterations
+
+    shown = made.experiments[0]
+    figures = [folder / f"figure-{k}.png" for k in (1, 2, 3)]
+    last = len(shown.course.passes) - 1
+    noise = f"{shown.noise_factor:g} times the noise of usual instruments"
+    for path, estimated, what in (
+        (figures[0], shown.first, "after the first approximation"),
+        (figures[2], shown.last, f"after iteration {last}"),
+    ):
+        draw_disturbed_zigzag(shown.time_s, shown.true, shown.measured, estimated, path, f"{what}; {noise}")
+    draw_iterations(shown.procedure.iterations, made.discrete, figures[1], f"parameters of eq. (17); {noise}")
+    return figures
+
+
+def _tell(made: Reproduction) -> None:
+    rows = [[name, value, by] for name, (value, by) in made.conditions.items()]
+    print_table(["condition", "value", "stated by"], rows, "The experiment")
+    click.echo()
+    for one in made.experiments:
+        _tell_one(made, one)
+
+
+def _tell_one(made: Reproduction, one: Experiment) -> None:
+    shown = one.show()
+    rows = [
+        [
+            name,
+            number(made.truth[name]),
+            number(row["paper_percent"], 3),
+            *(number(row[key], 3) for key in ("first_percent", "last_percent", "ml_percent")),
+            number(row["ml_std_percent"], 2),
+        ]
+        for name, row in shown["accuracy"].items()
+    ]
+    last = len(one.course.passes) - 1
+    head = ["", "truth", "paper", "first approximation", f"iteration {last}", "maximum likelihood", "its std"]
+    print_table(head, rows, f"Noise {one.noise_factor:g} times that of usual instruments: errors in percent")
+    for name, unit, key in (("force", "m/s^2", "force_m_s2"), ("current", "m/s", "current_m_s")):
+        found = shown["disturbances_at_the_end"][key]
+        first, end, true = (number(found[which], 3) for which in ("first", "last", "true"))
+        told = f"{first} after the first approximation, {end} after iteration {last}"
+        click.echo(f"  {name} at the end: {told}; true {true} {unit}")
+    likely = one.maximum_likelihood
+    click.echo(f"  procedure: {one.course.reason}")
+    click.echo(f"  maximum likelihood: {'converged' if likely.converged else 'NOT CONVERGED'}")
+    for warning in likely.warnings:
+        click.echo(f"    warning: {warning}")
+    click.echo()

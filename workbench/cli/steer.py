@@ -1,0 +1,205 @@
+"""``kempf steer``."""
+
+from __future__ import annotations
+
+from math import degrees
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from schemas.errors import UsageError
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table
+
+if TYPE_CHECKING:
+    from flows.steer_vessel import Steered, Tried
+
+_FIGURES = (".png", ".svg", ".pdf")
+
+
+@click.command("steer")
+@vessel_option(required=True)
+@click.option("--set", "set_id", metavar="ID", help="Parameter set; default: the current one of the vessel.")
+@click.option(
+    "--wrong",
+    metavar="FACTOR|ID",
+    help="A second law from wrong parameters: the rudder taken for FACTOR times as effective, or another set.",
+)
+@click.option(
+    "--method", type=click.Choice(["lqr", "poles"]), default="lqr", show_default=True, help="How the law is made."
+)
+@click.option("--speed", type=float, metavar="M/S", help="Speed through the water; default: that of the trial.")
+@click.option("--minutes", type=float, default=20.0, show_default=True, help="Of each of the two legs of the track.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of weather and noise.")
+@click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help="Draw the tracks: .png, .svg or .pdf.")
+@warehouse_option
+@json_option
+def command(
+    vessel: str,
+    set_id: str | None,
+    wrong: str | None,
+    method: Any,
+    speed: float | None,
+    minutes: float,
+    seed: int,
+    figure: Path | None,
+    uri: str,
+    as_json: bool,
+) -> None:
+    """Make a course-keeping law from a parameter set and try it on the simulated ship in wind and stream.
+
+    The ship that is steered has the parameters of the set: the track shows what the law does to her, and what wrong
+    parameters cost. It does not show that the parameters are right.
+    """
+    from flows.steer_vessel import SteerRequest, steer_vessel
+    from pipeline.steering.course_keeping import LawSettings
+    from warehouse.store import Warehouse
+
+    if figure is not None:
+        _check_figure(figure)
+    request = SteerRequest(set_id, wrong, speed, LawSettings(method=method), leg_s=60.0 * minutes, seed=seed)
+    done = steer_vessel(Warehouse(uri), vessel, request)
+    if figure is not None:
+        _draw(done, figure)
+    if as_json:
+        print_json(_show(done, figure))
+    else:
+        _tell(done, figure)
+
+
+def _check_figure(figure: Path) -> None:
+    if figure.suffix not in _FIGURES or figure.exists():
+        raise UsageError(
+            "cannot_write",
+            f"A figure cannot be written to {figure}: "
+            + ("it is there already." if figure.exists() else f"expected a name that ends with {', '.join(_FIGURES)}."),
+            "Give another file with --figure; nothing is overwritten.",
+        )
+
+
+def _draw(done: Steered, figure: Path) -> None:
+    from workbench.figures.course_keeping import draw_course_keeping
+
+    labels = ["from the set", "from wrong parameters"]
+    tracks = [(label, one.track) for label, one in zip(labels, done.laws, strict=False)]
+    try:
+        draw_course_keeping(tracks, figure, f"{done.ship.parameter_set.vessel} at {number(done.ship.speed_m_s)} m/s")
+    except OSError as error:
+        raise UsageError(
+            "cannot_write", f"Writing {figure} failed: {error.strerror}.", "Give another file with --figure."
+        ) from error
+
+
+def _show(done: Steered, figure: Path | None) -> dict[str, Any]:
+    wind = done.request.environment
+    return {
+        "vessel": done.ship.parameter_set.vessel,
+        "parameter_set_id": done.ship.parameter_set.parameter_set_id,
+        "speed_m_s": done.ship.speed_m_s,
+        "track": {
+            "leg_s": done.request.leg_s,
+            "settle_s": done.request.settle_s,
+            "course_change_deg": degrees(done.request.change_rad),
+            "seed": done.request.seed,
+            "wind_force_m_s2": {"mean": wind.wind_force.mean, "std": wind.wind_force.std},
+            "current_m_s": {"north": wind.current_north.mean, "east": wind.current_east.mean},
+        },
+        "laws": [_law(one) for one in done.laws],
+        "figure": str(figure) if figure else None,
+        "warnings": list(done.warnings),
+    }
+
+
+def _law(one: Tried) -> dict[str, Any]:
+    p, law, loop = one.performance, one.law, one.loop
+    return {
+        "parameters": one.label,
+        "law": {
+            "method": law.settings.method,
+            "step_s": law.step_s,
+            "states": list(law.plant.states),
+            "gain": dict(zip(law.plant.states, (float(g) for g in law.feedback), strict=True)),
+            "rudder_rad_per_wind_force": law.rudder_per_force,
+            "estimator_gain": law.observer.tolist(),
+        },
+        "performance": {
+            "heading_rms_deg": degrees(p.heading_rms_rad),
+            "heading_mean_deg": degrees(p.heading_mean_rad),
+            "heading_max_deg": degrees(p.heading_max_rad),
+            "rudder_rms_deg": degrees(p.rudder_rms_rad),
+            "rudder_mean_deg": degrees(p.rudder_mean_rad),
+            "rudder_travel_deg_per_min": 60.0 * degrees(p.rudder_travel_rad_s),
+            "drift_m_s": p.drift_m_s,
+            "cross_track_rms_m": p.cross_track_rms_m,
+            "kept": p.kept,
+        },
+        "course_change": {
+            "overshoot_deg": degrees(one.change.overshoot_rad),
+            "settled_s": one.change.settled_s,
+        },
+        "closed_loop": {
+            "stable": loop.stable,
+            "poles": [[float(z.real), float(z.imag)] for z in loop.poles],
+            "slowest_s": loop.slowest_s,
+            "least_damping": loop.least_damping,
+            "modulus_margin": loop.modulus_margin,
+            "share_of_allowed_ships_held": one.held,
+        },
+    }
+
+
+def _tell(done: Steered, figure: Path | None) -> None:
+    shown = [_law(one) for one in done.laws]
+    rows = [
+        (
+            f"{key.removesuffix('_deg').replace('_', ' ')}, deg" if key.endswith("_deg") else _WORDS.get(key, key),
+            group,
+            key,
+        )
+        for group, keys in _ROWS.items()
+        for key in keys
+    ]
+    cells = [[name, *(_cell(one[group][key]) for one in shown)] for name, group, key in rows]
+    head = ["", "from the set", "from wrong parameters"][: len(shown) + 1]
+    about = f"{done.ship.parameter_set.vessel}, {done.ship.parameter_set.parameter_set_id}"
+    print_table(head, cells, f"{about} at {number(done.ship.speed_m_s)} m/s, {shown[0]['law']['method']}")
+    if len(shown) > 1:
+        click.echo(f"  wrong: {shown[1]['parameters']}")
+    gains = ", ".join(f"{name} {number(-gain)}" for name, gain in shown[0]["law"]["gain"].items() if gain)
+    click.echo(f"  rudder order in rad from the set: {gains} (SI), every {number(shown[0]['law']['step_s'])} s")
+    if figure is not None:
+        click.echo(f"  drawn: {figure}")
+    for warning in done.warnings:
+        click.echo(f"  warning: {warning}")
+
+
+_ROWS = {
+    "performance": (
+        "heading_rms_deg",
+        "heading_mean_deg",
+        "rudder_rms_deg",
+        "rudder_mean_deg",
+        "rudder_travel_deg_per_min",
+        "drift_m_s",
+        "cross_track_rms_m",
+    ),
+    "course_change": ("overshoot_deg", "settled_s"),
+    "closed_loop": ("stable", "slowest_s", "modulus_margin", "share_of_allowed_ships_held"),
+}
+_WORDS = {
+    "rudder_travel_deg_per_min": "rudder travel, deg/min",
+    "drift_m_s": "drift across the course, m/s",
+    "cross_track_rms_m": "rms beside the drift line, m",
+    "settled_s": "settled on the new course after, s",
+    "stable": "loop stable",
+    "slowest_s": "slowest pole, s",
+    "modulus_margin": "modulus margin",
+    "share_of_allowed_ships_held": "share of allowed ships held",
+}
+
+
+def _cell(value: float | bool | None) -> str:
+    if isinstance(value, bool):
+        return "yes" if value else "NO"
+    return number(value, 3)

@@ -1,0 +1,43 @@
+"""The paper's Fig. 2: the six parameters of eq. (17) against the iteration, the true values as straight lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from pipeline.identify.estimate import Value
+
+
+def draw_iterations(iterations: Sequence[dict[str, Any]], truth: Sequence[Value], path: Path, title: str) -> None:
+    """Draw one panel a parameter.
+
+    Parameters
+    ----------
+    iterations : sequence of dict
+        With ``iteration``, ``A`` and ``B``, as `pipeline.identify.paper` records them.
+    truth : sequence of Value
+        A11, A12, A21, A22, B1, B2.
+    path : Path
+        Of a PNG.
+    title : str
+        Above the figure.
+    """
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    count = [entry["iteration"] for entry in iterations]
+    found = [[*entry["A"][0], *entry["A"][1], *entry["B"]] for entry in iterations]
+    figure, axes = plt.subplots(3, 2, figsize=(10, 8), sharex=True, layout="constrained")
+    for k, (panel, true) in enumerate(zip(axes.flat, truth, strict=True)):
+        panel.axhline(true.value, color="black", lw=1.2, label="true")
+        panel.plot(count, [values[k] for values in found], "o-", ms=3, lw=1.0, color="tab:blue", label="estimated")
+        panel.set_ylabel(f"{true.name}, {true.unit}")
+        panel.grid(lw=0.3)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside upper center", ncols=2, frameon=False, title=title)
+    figure.supxlabel("iteration (0: first approximation)")
+    figure.savefig(path, dpi=90, metadata={"Software": None})
+    plt.close(figure)
