@@ -9,12 +9,14 @@ import matplotlib as mpl
 
 mpl.use("Agg")
 import matplotlib.pyplot as plt
+from matplotlib.lines import Line2D
 
 #: what is drawn above this is an arrow at the edge, percent
 _TOP = 1000.0
 #: method: colour, line style, marker
 STYLES = {
     "ml": ("black", "-", "o"),
+    "ml, without the heading": ("black", ":", "o"),
     "output-error": ("tab:blue", "-", "s"),
     "output-error, means removed": ("tab:blue", ":", "s"),
     "prediction-error": ("tab:orange", "-", "^"),
@@ -45,7 +47,7 @@ def draw(levels: Sequence[float], error: Mapping[str, Mapping[str, Sequence[floa
         for method, values in methods.items():
             colour, line, mark = STYLES[method]
             width = 2.6 if method == "ml" else 1.3
-            panel.plot(where, [min(v, _TOP) for v in values], line, color=colour, lw=width, label=method, zorder=2)
+            panel.plot(where, [min(v, _TOP) for v in values], line, color=colour, lw=width, zorder=2)
             inside = [(x, v) for x, v in zip(where, values, strict=True) if v <= _TOP]
             above = [x for x, v in zip(where, values, strict=True) if v > _TOP]
             panel.plot(*zip(*inside, strict=True), mark, color=colour, ms=6, zorder=3) if inside else None
@@ -57,7 +59,11 @@ def draw(levels: Sequence[float], error: Mapping[str, Mapping[str, Sequence[floa
         panel.set_title(ship)
         panel.grid(visible=True, which="major", lw=0.4, color="0.85")
     panels[0].set_ylabel("rms relative error of the six parameters, %, median over seeds")
-    handles, labels = panels[0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=9)
+    methods = list(dict.fromkeys(method for one in error.values() for method in one))
+    handles = [
+        Line2D([], [], color=STYLES[m][0], ls=STYLES[m][1], marker=STYLES[m][2], lw=2.6 if m == "ml" else 1.3, label=m)
+        for m in methods
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=4, fontsize=9)
     figure.savefig(path, dpi=110)
     plt.close(figure)

@@ -15,6 +15,7 @@ import sys
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from multiprocessing import get_context
+from pathlib import Path
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
@@ -24,7 +25,8 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from benchmarks import result_page
+from benchmarks import no_log_fleet, result_page
+from benchmarks.no_log_fleet import Found
 from pipeline.identify.estimate import Estimate
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings, identify
 from pipeline.identify.no_log import NoLogSettings, identify_without_log
@@ -320,7 +322,7 @@ def cases(runs: int) -> list[tuple[Case, tuple[str, ...]]]:
     wanted = [
         (Case(kind, number, current), tuple(WAYS)) for kind in KINDS for current in CURRENTS for number in range(runs)
     ]
-    few = range(min(runs, 8))
+    few = range(min(runs, 4))
     wanted += [(Case(FIRST, number, 0.3, surge_wander=True), ("log", "none")) for number in few]
     return wanted + [(Case(FIRST, n, 0.3, veering_m_s2=f), ("log", "none")) for f in VEERING for n in few]
 
@@ -330,7 +332,7 @@ FIRST = next(iter(KINDS))
 VEERING = (2e-3, 1e-2)
 
 
-def page(results: list[Result]) -> list[str]:
+def page(results: list[Result], ships: list[Found]) -> list[str]:
     """Lines of the results page."""
     head = ["run", "way", *PARAMETERS, "V: rms error, % / std, % / held, % / rms z"]
     alone = chosen(results, way="none", surge_wander=False, veering_m_s2=0.0)
@@ -354,24 +356,45 @@ def page(results: list[Result]) -> list[str]:
     for kind in KINDS:
         lines += accuracy(results, kind)
     lines += ["## What the method does not know of", "", f"{FIRST}; rms error (rms standard error), percent.", ""]
-    return [*lines, *limits(results)]
+    lines += [*limits(results), "", "## Ships that eq. (16) does not hold", ""]
+    lines += [
+        "The trial logs of eight ships, simulated by another plant with physics that the model lacks, surge among it: "
+        "the mean speed of each zigzag less that of the log, which was kept from the estimator, and b2 less that of "
+        "the fit with the log.",
+        "",
+    ]
+    return [*lines, *no_log_fleet.lines(ships)]
 
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=16, help="runs a kind and stream")
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--data", type=Path, default=result_page.DATA)
     options = parser.parse_args()
     results: list[Result] = []
+    ships: list[Found] = []
     wanted = cases(options.runs)
     with ProcessPoolExecutor(options.processes, mp_context=get_context("spawn")) as pool:
         jobs = [pool.submit(run, *one) for one in wanted]
+        every = no_log_fleet.zigzags(options.data)
+        voyages = [
+            pool.submit(
+                no_log_fleet.compare,
+                one,
+                tuple(z.blind for z in every if (z.ship, z.day) == (one.ship, one.day) and z is not one),
+            )
+            for one in every
+        ]
         for number, job in enumerate(jobs):
             results += job.result()
             case = wanted[number][0]
             print(f"{number + 1}/{len(wanted)} {case.kind}, {case.ship}, {case.current_m_s:g} m/s", file=sys.stderr)
+        for number, voyage in enumerate(voyages):
+            ships += voyage.result()
+            print(f"{number + 1}/{len(voyages)} {every[number].ship} {every[number].day}", file=sys.stderr)
     draw(results)
-    result_page.write("no_log", "What it costs to have no log", page(results), options=f"--runs {options.runs}")
+    result_page.write("no_log", "What it costs to have no log", page(results, ships), options=f"--runs {options.runs}")
 
 
 if __name__ == "__main__":

@@ -24,6 +24,7 @@ from prefect.task_runners import ThreadPoolTaskRunner
 from flows import ingest_logs
 from flows.files import read_profiles
 from flows.identify_vessel import Request, identify_vessel
+from flows.pool_vessel import pool_vessel
 from flows.reprocess_vessel import VesselReport, reprocess_vessel
 from flows.unforeseen import as_told
 from schemas.model_spec import ModelSpec
@@ -82,7 +83,9 @@ def identify_task(warehouse: str, vessel: str, estimator: str, spec: dict[str, A
     """Identify every zigzag of one vessel."""
     request = Request(ModelSpec.model_validate(spec), estimator)
     run = flow_run.get_id()
-    outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=str(run) if run else None)
+    told = str(run) if run else None
+    outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=told)
+    pool_vessel(Warehouse(warehouse), vessel, request, outcomes, flow_run=told)
     return [
         {
             "segment": o.segment.segment_id,

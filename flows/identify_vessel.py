@@ -8,18 +8,18 @@ from dataclasses import dataclass, field
 from os import cpu_count
 from typing import Any
 
+from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
 from flows.refresh_logs import Refreshed, refresh_logs
 from flows.unforeseen import as_told
-from pipeline.identify.estimate import Value
 from pipeline.identify.estimators import default_settings, estimate
 from pipeline.identify.record import make_record
 from pipeline.normalise.instruments import Instruments, from_readings
 from schemas.errors import KempfError, NotFound, UsageError
-from schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 from warehouse import aliases, code_version, delta, logs, parameter_sets, provenance, readings, segments, vessels
-from warehouse.parameter_set import Bounds, Estimate, Inputs, ParameterSet, parameter_set_id
+from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
 
@@ -222,38 +222,11 @@ def build(
     if len(inputs.bounds) != 1:
         raise UsageError(
             "one_segment_at_a_time",
-            f"{len(inputs.bounds)} segments were given; a parameter set is identified from one.",
+            f"{len(inputs.bounds)} segments were given; this estimator takes one.",
             "Identify them one by one.",
         )
     bounds, spec = inputs.bounds[0], ModelSpec.model_validate(dict(inputs.model_spec))
-    arm = spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
+    arm = arm_of(spec, profile)
     record = make_record(instruments, bounds.start_utc_ns, bounds.end_utc_ns)
-    result = estimate(inputs.estimator, record, spec, arm or 0.0, dict(inputs.settings))
-    unknown_arm = ("wind_arm_per_m is not in the profile: the wind is taken to act without a moment",)
-    return ParameterSet(
-        parameter_set_id=parameter_set_id(inputs),
-        vessel=vessel,
-        model_name=spec.name,
-        model_spec=spec.model_dump(mode="json"),
-        model_sha256=spec.sha256,
-        estimator=inputs.estimator,
-        settings=dict(inputs.settings),
-        segment_ids=segment_ids,
-        log_ids=inputs.log_ids,
-        start_utc_ns=bounds.start_utc_ns,
-        parameters=_stored(result.parameters),
-        discrete=_stored(result.discrete),
-        noise=_stored(result.noise),
-        covariance_names=tuple(HULL_PARAMETERS),
-        covariance=tuple(tuple(float(x) for x in row) for row in result.covariance),
-        fit=result.fit,
-        iterations=list(result.iterations),
-        convergence=result.report,
-        warnings=(*result.warnings, *(unknown_arm if arm is None and spec.wind == "force" else ())),
-        parent=spec.parent,
-        provenance=told,
-    )
-
-
-def _stored(values: Sequence[Value]) -> tuple[Estimate, ...]:
-    return tuple(Estimate(v.name, v.value, v.std, v.unit) for v in values)
+    result = estimate(inputs.estimator, record, spec.with_arm(arm), arm or 0.0, dict(inputs.settings))
+    return as_parameter_set(result, inputs, vessel, segment_ids, told, without_arm(spec, arm))

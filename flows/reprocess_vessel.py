@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from typing import Any
 
-from flows.identify_vessel import Request, identify_vessel
+from flows.identify_vessel import IdentifyOutcome, Request, identify_vessel
+from flows.pool_vessel import POOLED, pool_vessel
 from flows.progress import Progress, silent
 from flows.refresh_logs import refresh_logs
 from flows.rerun_set import rerun
@@ -106,6 +107,7 @@ def reprocess_vessel(
                     report.fail(outcome.segment.segment_id, outcome.error)
                 report.new_sets += outcome.new
                 report.kept_sets += outcome.parameter_set is not None and not outcome.new
+            _pool(warehouse, vessel, one, outcomes, report, flow_run, progress)
         _withdraw(warehouse, vessel, report)
         if not changed_only:
             _verify(warehouse, vessel, report)
@@ -130,8 +132,30 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
     for name in parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list():
         one = parameter_sets.get(warehouse, name)
         request = Request(ModelSpec.model_validate(dict(one.model_spec)), one.estimator)
+        if request.estimator == POOLED:
+            continue  # it comes of the separate ones
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
     return [asked[key] for key in sorted(asked)] or [Request()]
+
+
+def _pool(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request,
+    outcomes: list[IdentifyOutcome],
+    report: VesselReport,
+    flow_run: str | None,
+    progress: Progress,
+) -> None:
+    """Pool what was identified; that segments have nothing in common is no failure of the separate ones."""
+    try:
+        pooled = pool_vessel(warehouse, vessel, request, outcomes, flow_run=flow_run, progress=progress)
+    except KempfError as error:
+        report.fail(POOLED, error)
+        return
+    if pooled is not None:
+        report.new_sets += pooled[1]
+        report.kept_sets += not pooled[1]
 
 
 def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flows.identify_vessel import build
+from flows.pool_vessel import POOLED, build_pooled
 from pipeline.ingest.read import read_log
 from pipeline.normalise.instruments import from_readings
 from warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
@@ -67,10 +68,16 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
     stored = parameter_sets.get(warehouse, name)
     inputs = _inputs(stored)
     profile = vessels.get(warehouse, inputs.profile_sha256)
-    log_id = inputs.log_ids[0]
-    file_name = logs.of_ingest(warehouse, str(stored.provenance["ingest_ids"][0])).file_name
-    instruments = from_readings(read_log(file_name, raw.get(warehouse, log_id), profile).frame)
-    rebuilt = build(instruments, profile, inputs, stored.vessel, stored.segment_ids, dict(stored.provenance))
+    instruments = {}
+    for ingest_id in stored.provenance["ingest_ids"]:
+        row = logs.of_ingest(warehouse, str(ingest_id))
+        instruments[row.log_id] = from_readings(read_log(row.file_name, raw.get(warehouse, row.log_id), profile).frame)
+    told = dict(stored.provenance)
+    if inputs.estimator == POOLED:
+        rebuilt = build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, told)
+    else:
+        one = instruments[inputs.log_ids[0]]
+        rebuilt = build(one, profile, inputs, stored.vessel, stored.segment_ids, told)
     verdict, differences = agreement.verdict(stored, rebuilt, tolerance)
     now, then = code_version.packages(), dict(stored.provenance.get("packages") or {})
     changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}

@@ -45,11 +45,14 @@ class ModelSpec(BaseModel):
     #: ``force``: the normalised lateral force F of eq. (16) with its moment l F; ``none``: no wind, as in a tank
     wind: Literal["force", "none"] = "force"
     #: ``gauss-markov``: a slow yaw acceleration M beside l F, for what turns her and is not in the model; ``none``: the
-    #: moment is that of the wind force alone, as eq. (16) has it
-    moment: Literal["gauss-markov", "none"] = "none"
+    #: moment is that of the wind force alone, as eq. (16) has it; None: ``none`` where l is known, else the other
+    moment: Literal["gauss-markov", "none"] | None = None
     #: ``earth``: two current states towards north and east; ``lateral``: the paper's single V_T, which takes the
     #: current's lateral part for constant while the heading swings; ``none``: still water, as in a tank
     current: Literal["earth", "lateral", "none"] = "earth"
+    #: the rudder's force goes with V to this power, in eq. (16) with 2; with a propeller that keeps turning the rudder
+    #: stands in a race that slows less than the ship: 1 is V times the speed of the approach, at which b1 and b2 hold
+    rudder_speed_exponent: float = Field(default=2.0, ge=0.0, le=2.0)
     #: whether the rate gyro may have a constant bias; it takes a heading beside the yaw rate to tell
     rate_bias: bool = True
     #: mu_F, that of M, and mu_V of eq. (16), 1/s
@@ -59,6 +62,13 @@ class ModelSpec(BaseModel):
     #: l of eq. (16), 1/m; None takes the vessel profile's
     wind_arm_per_m: float | None = None
     parent: str | None = None
+
+    def with_arm(self, arm_per_m: float | None) -> ModelSpec:
+        """Return the specification with ``moment`` decided by whether l of eq. (16) is known."""
+        if self.moment is not None:
+            return self
+        known = arm_per_m is not None or self.wind == "none"
+        return self.model_copy(update={"moment": "none" if known else "gauss-markov"})
 
     @property
     def sha256(self) -> str:

@@ -26,7 +26,7 @@ DOORS = {
     "deltalake": ("warehouse/",),
     "click": ("workbench/",),
     "rich": ("workbench/",),
-    "matplotlib": (),
+    "matplotlib": ("workbench/figures/",),
 }
 #: Rooms that must not know the simulator, nor it them: an error that both share would hide itself.
 SIMULATOR = "pipeline.simulate"

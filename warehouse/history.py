@@ -1,9 +1,12 @@
-"""How the parameters of a vessel went over time, as known now or at an earlier time."""
+"""How the parameters of a vessel went over time, as known now or at an earlier time, and which sets may be compared."""
 
 from __future__ import annotations
 
+import json
+from collections import Counter
 from dataclasses import dataclass
 from datetime import datetime
+from math import isfinite
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import UsageError
@@ -44,6 +47,35 @@ class History:
         return result
 
 
+@dataclass(frozen=True)
+class Comparable:
+    """Sets of one vessel, one model and one estimator with its settings, each from one segment of its own.
+
+    Attributes
+    ----------
+    model, model_sha256, estimator : str
+    parameter_set_ids, starts_utc_ns : tuple of str, tuple of int
+        In the order of time.
+    names, units : tuple of str
+        Parameters that have a standard error.
+    values : tuple of tuple of float, shape (n_set, n_parameter)
+    covariances : tuple of tuple of tuple of float, shape (n_set, n_parameter, n_parameter)
+    left_out : dict of str to int
+        How many more sets there are of the kind, by the reason why they are not among these.
+    """
+
+    model: str
+    model_sha256: str
+    estimator: str
+    parameter_set_ids: tuple[str, ...]
+    starts_utc_ns: tuple[int, ...]
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    values: tuple[tuple[float, ...], ...]
+    covariances: tuple[tuple[tuple[float, ...], ...], ...]
+    left_out: dict[str, int]
+
+
 def of_vessel(
     warehouse: Warehouse,
     vessel: str,
@@ -75,20 +107,11 @@ def of_vessel(
         ``as_of_without_zone``, ``no_parameter``: none of the vessel's sets has such a parameter.
     """
     warehouse.require()
-    version = None
-    if as_of is not None:
-        if as_of.tzinfo is None:
-            raise UsageError(
-                "as_of_without_zone",
-                f"{as_of.isoformat()} names no time zone.",
-                "Write it with one, such as 2025-05-03T12:00:00Z.",
-            )
-        version = delta.version_as_of(warehouse, "parameter_sets", as_of)
-        if version is None:
-            vessels.require(warehouse, vessel)
-            nothing = _exploded(None, vessel, [])
-            return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
-    table = delta.open_table(warehouse, "parameter_sets", version)
+    table = _sets_as_of(warehouse, as_of)
+    if table is None and as_of is not None:
+        vessels.require(warehouse, vessel)
+        nothing = _exploded(None, vessel, [])
+        return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
     frame = _exploded(table, vessel, _past_ingests(warehouse, vessel, as_of))
     if not superseded:
         frame = frame.remove(frame["superseded"])
@@ -99,6 +122,102 @@ def of_vessel(
     elif parameter is not None:
         frame = _only(frame, parameter)
     return History(frame, table.version() if table is not None else None, note)
+
+
+def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None) -> list[Comparable]:
+    """Return the sets of a vessel that may be compared over time, by model and estimator; superseded ones are left out.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Where they are.
+    vessel : str
+        Her name.
+    as_of : datetime, optional
+        With a time zone: only what had been committed by then.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    UsageError
+        ``as_of_without_zone``.
+    """
+    warehouse.require()
+    table = _sets_as_of(warehouse, as_of)
+    found = _marked(table, vessel, _past_ingests(warehouse, vessel, as_of), _COMPARED)
+    kinds: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
+    for row in found.rows(named=True):
+        if not row["superseded"]:
+            kinds.setdefault((row["estimator"], row["model_sha256"], row["settings_json"]), []).append(row)
+    return [_compared(kinds[kind]) for kind in sorted(kinds)]
+
+
+_COMPARED = (
+    *("parameter_set_id", "start_utc_ns", "model_name", "model_sha256", "estimator", "settings_json", "segment_ids"),
+    *("parameters", "covariance_names", "covariance", "convergence_json", "provenance_json"),
+)
+
+
+def _compared(rows: list[dict[str, Any]]) -> Comparable:
+    """Keep of sets of one kind those that stand for themselves and can be weighed."""
+    names = {name: unit for row in rows for name, unit in _known(row).items()}
+    left_out: Counter[str] = Counter()
+    kept: list[dict[str, Any]] = []
+    seen: set[str] = set()
+    for row in rows:
+        reason = _not_comparable(row, names, seen)
+        if reason:
+            left_out[reason] += 1
+        else:
+            kept.append(row)
+            seen.add(row["segment_ids"][0])
+    places = [[row["covariance_names"].index(name) for name in names] for row in kept]
+    values = [{e["name"]: e["value"] for e in row["parameters"]} for row in kept]
+    return Comparable(
+        rows[0]["model_name"],
+        rows[0]["model_sha256"],
+        rows[0]["estimator"],
+        tuple(row["parameter_set_id"] for row in kept),
+        tuple(row["start_utc_ns"] for row in kept),
+        tuple(names),
+        tuple(names.values()),
+        tuple(tuple(value[name] for name in names) for value in values),
+        tuple(
+            tuple(tuple(row["covariance"][i][j] for j in at) for i in at) for row, at in zip(kept, places, strict=True)
+        ),
+        dict(sorted(left_out.items())),
+    )
+
+
+def _known(row: dict[str, Any]) -> dict[str, str]:
+    """Return the parameters of a set that have a standard error, with their units."""
+    among = set(row["covariance_names"] or ())
+    return {e["name"]: e["unit"] for e in row["parameters"] if e["name"] in among and e["std"] and isfinite(e["std"])}
+
+
+def _not_comparable(row: dict[str, Any], names: dict[str, str], seen: set[str]) -> str:
+    if len(row["segment_ids"]) != 1:
+        return "made of several segments"
+    if row["segment_ids"][0] in seen:
+        return "of a segment that is there already"
+    if not json.loads(row["convergence_json"]).get("converged"):
+        return "not converged"
+    # what one set knows and another does not cannot be compared
+    return "" if names and _known(row).keys() >= names.keys() else "without standard errors"
+
+
+def _sets_as_of(warehouse: Warehouse, as_of: datetime | None) -> DeltaTable | None:
+    if as_of is None:
+        return delta.open_table(warehouse, "parameter_sets")
+    if as_of.tzinfo is None:
+        raise UsageError(
+            "as_of_without_zone",
+            f"{as_of.isoformat()} names no time zone.",
+            "Write it with one, such as 2025-05-03T12:00:00Z.",
+        )
+    version = delta.version_as_of(warehouse, "parameter_sets", as_of)
+    return None if version is None else delta.open_table(warehouse, "parameter_sets", version)
 
 
 def _past_ingests(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> list[str]:
@@ -114,15 +233,19 @@ def _past_ingests(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> 
 
 
 def _exploded(table: DeltaTable | None, vessel: str, past: list[str]) -> pl.DataFrame:
+    columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters", "provenance_json")
+    each = _marked(table, vessel, past, columns).explode("parameters", empty_as_null=False)
+    return each.unnest("parameters").rename({"model_name": "model", "name": "parameter"})
+
+
+def _marked(table: DeltaTable | None, vessel: str, past: list[str], columns: tuple[str, ...]) -> pl.DataFrame:
+    """Return sets in the order of their start with a column ``superseded`` instead of the provenance."""
     import polars as pl
 
-    columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters", "provenance_json")
     sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, columns)
     ingest = pl.col("provenance_json").str.json_path_match("$.ingest_ids[0]")
     marked = sets.with_columns(superseded=ingest.is_in(past).fill_null(value=False)).drop("provenance_json")
-    ordered = marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
-    each = ordered.explode("parameters", empty_as_null=False)
-    return each.unnest("parameters").rename({"model_name": "model", "name": "parameter"})
+    return marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
 
 
 def _only(frame: pl.DataFrame, parameter: str) -> pl.DataFrame:

@@ -118,7 +118,8 @@ def find_changes(history: ParameterHistory, settings: ChangeSettings | None = No
         )
     whole = stretch(merged, settings)
     p_value = judge(whole, settings.level).p_value
-    found = tuple(_search(merged, settings, settings.level))
+    places = _search(merged, settings, settings.level, 0)
+    found = tuple(_fitted(merged, settings, places, i) for i in range(len(places)))
     steps, drifts = (sum(c.kind == kind for c in found) for kind in ("step", "drift"))
     verdict = (
         "no change seen"
@@ -146,20 +147,52 @@ def _not_testable(history: ParameterHistory, merged: ParameterHistory, settings:
     return ""
 
 
-def _search(history: ParameterHistory, settings: ChangeSettings, level: float) -> list[Change]:
+@dataclass(frozen=True)
+class _Place:
+    """Where the search found a change: sets first to last - 1, a step before set ``split``."""
+
+    kind: Kind
+    first: int
+    split: int
+    last: int
+    p_value: float
+    rival: float
+
+
+def _search(history: ParameterHistory, settings: ChangeSettings, level: float, first: int) -> list[_Place]:
+    """Search a stretch that begins at set ``first`` of the whole."""
     if len(history) < settings.fewest or history.time_utc_ns[0] == history.time_utc_ns[-1]:
         return []
     one = stretch(history, settings)
     verdict = judge(one, level)
     if verdict.p_value > level:
         return []
-    lead = effects.preference(one)
+    lead, last = effects.preference(one), first + len(history)
     if lead > 0:
-        return [_drift(history, one, verdict.p_value, lead)]
-    k = int(np.argmax(one.statistics(one.value).step.max(axis=-1))) + settings.smallest_side
-    found = _step(history, one, k, verdict.p_value, -lead)
-    sides = [_search(part(history, which), settings, level / 2) for which in (slice(0, k), slice(k, None))]
-    return [*sides[0], found, *sides[1]]
+        return [_Place("drift", first, first, last, verdict.p_value, lead)]
+    k = _likeliest(one)
+    left, right = (
+        _search(part(history, which), settings, level / 2, begin)
+        for which, begin in ((slice(0, k), first), (slice(k, None), first + k))
+    )
+    return [*left, _Place("step", first, first + k, last, verdict.p_value, -lead), *right]
+
+
+def _likeliest(one: Stretch) -> int:
+    return int(np.argmax(one.statistics(one.value).step.max(axis=-1))) + one.settings.smallest_side
+
+
+def _fitted(history: ParameterHistory, settings: ChangeSettings, places: list[_Place], i: int) -> Change:
+    """Fit one change on what lies between its neighbours: the other changes must not go into its size."""
+    place = places[i]
+    if place.kind == "drift":
+        some = part(history, slice(place.first, place.last))
+        return _drift(some, stretch(some, settings), place.p_value, place.rival)
+    before = max((q.split for q in places[:i] if q.kind == "step"), default=0)
+    after = min((q.split for q in places[i + 1 :] if q.kind == "step"), default=len(history))
+    some = part(history, slice(before, after))
+    one = stretch(some, settings)
+    return _step(some, one, _likeliest(one), place.p_value, place.rival)
 
 
 def part(history: ParameterHistory, which: slice) -> ParameterHistory:

@@ -99,22 +99,23 @@ def occasions(history: ParameterHistory, within_s: float) -> ParameterHistory:
         s; 0 merges only what begins at one instant.
     """
     time = history.time_utc_ns
+    if not time.size:
+        return history
     label, first = np.zeros(time.size, dtype=np.int64), 0
     for i in range(1, time.size):
         if time[i] - time[first] > within_s * SECOND_NS:
             first = i
         label[i] = label[i - 1] + (first == i)
     variance = np.einsum("ijj->ij", history.covariance)
-    weight = 1.0 / np.mean(variance / np.mean(variance, axis=0), axis=1) if time.size else np.empty(0)
-    groups = [np.flatnonzero(label == g) for g in range(int(label[-1]) + 1)] if time.size else []
+    weight = 1.0 / np.mean(variance / np.mean(variance, axis=0), axis=1)
+    groups = [np.flatnonzero(label == g) for g in range(int(label[-1]) + 1)]
     shares = [weight[g] / np.sum(weight[g]) for g in groups]
-    p = len(history.names)
     value = [w @ history.value[g] for w, g in zip(shares, groups, strict=True)]
     covariance = [np.einsum("i,ijk->jk", w**2, history.covariance[g]) for w, g in zip(shares, groups, strict=True)]
     return ParameterHistory(
         history.names,
         history.units,
         np.array([time[g[0]] for g in groups], dtype=np.int64),
-        np.array(value).reshape(-1, p),
-        np.array(covariance).reshape(-1, p, p),
+        np.array(value),
+        np.array(covariance),
     )

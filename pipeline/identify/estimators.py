@@ -16,6 +16,7 @@ from pipeline.identify.rivals import (
     smoothed_regression,
     subspace,
 )
+from pipeline.identify.rudder_inflow import with_rudder_inflow
 from schemas.model_spec import ModelSpec
 
 #: record, model, l of eq. (16) in 1/m, the estimator's own settings
@@ -70,4 +71,4 @@ def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, setti
     """
     given: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
     chosen = _ESTIMATORS[name]
-    return chosen.identify(record, spec, arm_per_m, chosen.settings(**given))
+    return chosen.identify(with_rudder_inflow(record, spec), spec, arm_per_m, chosen.settings(**given))

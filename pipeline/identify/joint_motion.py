@@ -1,12 +1,12 @@
 """Sway, yaw and surge of one or more runs as one linear system: what GNSS, gyro and compass say without a log.
 
-State (v, r, F, M, psi, gyro bias, c_1, c_2, V, V_0, k, path). The lateral model takes a given speed for its own, so
+State (v, r, F, M, psi, gyro bias, c_1, c_2, m, V, V_0, k, path). The lateral model takes a given speed for its own, so
 that the whole is linear; the speed it estimates is fed back by the caller. The current ties the two halves together:
 
-    y_v = v - c_N sin K + c_E cos K        y_u = V + c_N cos K + c_E sin K
+    y_v = v - c_N sin K + c_E cos K - m sin(K - K_0)        y_u = V + c_N cos K + c_E sin K
 
 A current along the course is told from the speed by the first of these while the heading swings, and by runs on other
-headings, which share V_0 and k.
+headings, which share V_0 and k. m is what the linear hull lacks and a current along the course would look like.
 """
 
 from __future__ import annotations

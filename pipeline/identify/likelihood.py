@@ -72,7 +72,7 @@ class Likelihood:
     ) -> None:
         self.record, self.spec, self.arm_per_m = record, spec, arm_per_m
         used = record.used
-        wind, moment, current = spec.wind != "none", spec.moment != "none", spec.current != "none"
+        wind, moment, current = spec.wind != "none", spec.moment == "gauss-markov", spec.current != "none"
         self.active: Mask = np.array([*[True] * 6, wind, moment, current, *used])
         present = np.array([1, 1, wind, moment, used[2], current, current, spec.rate_bias and used[1] and used[2]])
         if spec.current == "earth":

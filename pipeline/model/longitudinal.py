@@ -30,12 +30,12 @@ class Surge:
     ----------
     time_constant_s : float
         T, s.
-    wander_m_s : float
-        Standard deviation that w gives to V over a time much longer than T, m/s.
+    wander_m_s_per_root_s : float
+        Root of the intensity of w: what it lets V wander in a second.
     """
 
     time_constant_s: float
-    wander_m_s: float
+    wander_m_s_per_root_s: float
 
 
 def discretise_surge(surge: Surge, step_s: Float, squared_rate: Float) -> tuple[Float, Float]:
@@ -72,7 +72,7 @@ def discretise_surge(surge: Surge, step_s: Float, squared_rate: Float) -> tuple[
     Phi[:, PATH, SPEED] = T * gone
     Phi[:, PATH, SETTLED] = area
     Phi[:, PATH, LOSS] = -T * area * squared_rate
-    intensity = 2.0 * surge.wander_m_s**2 / T
+    intensity = surge.wander_m_s_per_root_s**2
     twice = -np.expm1(-2.0 * x)
     series = h**3 / 3.0 * (1.0 - 0.75 * x)
     Q = np.zeros((h.size, N_LONGITUDINAL, N_LONGITUDINAL))

@@ -81,4 +81,3 @@ def without_spikes(series: Series) -> tuple[Series, int]:
     scale = max(1.4826 * float(np.median(away)), 1e-2 * float(np.median(np.abs(series.value))))
     keep = away <= _SPIKE * scale
     return Series(series.time_utc_ns[keep], series.value[keep]), int(n - np.count_nonzero(keep))
-

@@ -19,7 +19,7 @@ def test_links_commands_and_modules_exist(path: Path) -> None:
     for link in LINK.findall(text):
         if "://" not in link:
             assert (path.parent / link.partition("#")[0]).exists(), link
-    for command in re.findall(r"(?:^\$ |`)kempf ([a-z]+)", text, flags=re.MULTILINE):
+    for command in re.findall(r"(?:^\$ |`)kempf ([a-z][a-z-]+)", text, flags=re.MULTILINE):
         assert command in COMMANDS, command
     for module in re.findall(r"python -m (benchmarks\.\w+)", text):
         assert (ROOT / (module.replace(".", "/") + ".py")).is_file(), module

@@ -25,8 +25,6 @@ TEXT = PAGE.read_text(encoding="utf-8")
 
 @pytest.fixture
 def warehouse(mariner: Ship, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
-    for name in ("export", "steer"):  # until workbench.cli.entry.COMMANDS lists them
-        monkeypatch.setitem(cli.summaries, name, "")
     logs, place = mariner.write(tmp_path / "logs"), tmp_path / "warehouse"
     assert kempf("ingest", logs / "mariner.csv.gz", "--profile", logs / "profile.yaml", "--warehouse", place).code == 0
     assert kempf("identify", "--vessel", "mariner", "--warehouse", place).code == 0

@@ -43,6 +43,21 @@ def off(found: Regression, settings: DepthChannel, sailed: DepthRecord) -> float
     return float(np.max(np.abs(np.hstack([found.A, found.B]) - truth) * regressors / increments[:, None]))
 
 
+def test_the_simulated_dive_solves_its_equations_and_its_step_is_fine_enough() -> None:
+    # no change of side, whose instant would hang on the step
+    coarse, fine = (sail_depth(DepthChannel(duration_s=5.0, pitch_rad=9.0, substeps=n)) for n in (10, 40))
+    np.testing.assert_allclose(coarse.state, fine.state, atol=1e-8)
+    settings = DepthChannel(duration_s=2.0, pitch_rad=1.0, plane_rate_rad_s=1e9)  # planes over at once, and no further
+    still = sail_depth(settings)
+    # closed form: x = A^-1 (e^{At} - 1) f, with the kinematic states' integrals by an augmented exponential
+    f = still.B[:, 0] * settings.planes_rad + np.array([settings.force_m_s2, settings.moment_rad_s2, 0.0, 0.0])
+    block = np.zeros((5, 5))
+    block[:4, :4], block[:4, 4] = still.A, f
+    exact = np.array([expm(block * t)[:4, 4] for t in still.time_s])
+    # the first small step is the ramp to the full angle
+    np.testing.assert_allclose(still.state[1:], exact[1:], atol=3e-3)
+
+
 @pytest.mark.parametrize("share", [0.0, 0.01])
 def test_an_underwater_vehicle_is_found_where_noise_is_small(share: float) -> None:
     settings, sailed, course = dive(share)

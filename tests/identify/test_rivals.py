@@ -77,7 +77,9 @@ def test_in_calm_water_the_standard_errors_are_honest(name: str) -> None:
 @pytest.mark.parametrize("name", RIVALS)
 def test_in_wind_and_stream_it_is_far_off_and_warns(name: str) -> None:
     trial = rough()
-    found = found_by(name, trial, spec=ModelSpec())
+    # output error creeps where its model is so wrong; that it is far off shows long before it settles
+    hurried = {"max_iterations": 20, "gate_rounds": 0} if name == "output-error" else {}
+    found = estimate(name, record_of(trial), ModelSpec(), 0.0, {**default_settings(name), **hurried})
     assert percent(found, trial) > 2.0 * percent(found_by(name, calm()), calm())
     assert percent(found, trial) > 8.0
     assert any("knows nothing" in warning for warning in found.warnings)

@@ -14,13 +14,6 @@ from scipy.io import loadmat
 
 from pipeline.model.ship import Hull, discretise
 from tests.workbench.driving import HULL, kempf, one_of, refused
-from workbench.cli.entry import cli
-
-
-@pytest.fixture(autouse=True)
-def _registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    # until workbench.cli.entry.COMMANDS lists it
-    monkeypatch.setitem(cli.summaries, "export", "")
 
 
 def exported(filled: Path, form: str, *options: object):

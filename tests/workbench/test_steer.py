@@ -7,15 +7,8 @@ from pathlib import Path
 import pytest
 
 from tests.workbench.driving import kempf, one_of, refused
-from workbench.cli.entry import cli
 
 SHORT = ("--minutes", "8")
-
-
-@pytest.fixture(autouse=True)
-def _registered(monkeypatch: pytest.MonkeyPatch) -> None:
-    # until workbench.cli.entry.COMMANDS lists it
-    monkeypatch.setitem(cli.summaries, "steer", "")
 
 
 def steered(filled: Path, *options: object):

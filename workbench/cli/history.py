@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from datetime import UTC, datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -10,22 +13,66 @@ from schemas.errors import UsageError
 from workbench.cli.options import json_option, vessel_option, warehouse_option
 from workbench.terminal import number, print_json, print_table
 
+if TYPE_CHECKING:
+    from pipeline.history.changes import Changes
+    from pipeline.history.sets import ParameterHistory
+    from warehouse.history import Comparable, History
+
 
 @click.command("history")
 @vessel_option(required=True)
 @click.option("--parameter", metavar="NAME", help="Only this parameter, such as b2.")
 @click.option("--as-of", metavar="TIME", help="What was known at this time, ISO 8601; without a zone it is UTC.")
 @click.option("--all", "superseded", is_flag=True, help="Also sets that a newer profile or code superseded.")
+@click.option("--changes", is_flag=True, help="Say whether the ship changed, when, by how much and in what.")
+@click.option(
+    "--figure", type=click.Path(path_type=Path), metavar="FILE", help="With --changes: draw it, .png or .svg."
+)
+@click.option(
+    "--occasion",
+    "occasion_h",
+    type=click.FloatRange(min=0.0, max=1e6),
+    default=12.0,
+    show_default=True,
+    metavar="HOURS",
+    help="With --changes: trials begun within this time share load and weather and count as one.",
+)
 @warehouse_option
 @json_option
-def command(vessel: str, parameter: str | None, as_of: str | None, superseded: bool, uri: str, as_json: bool) -> None:
-    """Show a vessel's parameters over time, as known now or at an earlier time."""
+def command(
+    vessel: str,
+    parameter: str | None,
+    as_of: str | None,
+    superseded: bool,
+    changes: bool,
+    figure: Path | None,
+    occasion_h: float,
+    uri: str,
+    as_json: bool,
+) -> None:
+    """Show a vessel's parameters over time, as known now or at an earlier time, and whether she changed."""
     from warehouse import history
     from warehouse.store import Warehouse
 
-    found = history.of_vessel(Warehouse(uri), vessel, parameter, _instant(as_of), superseded=superseded)
+    if figure is not None and not changes:
+        raise UsageError("figure_without_changes", "--figure draws what --changes found.", "Add --changes.")
+    warehouse, instant = Warehouse(uri), _instant(as_of)
+    found = history.of_vessel(warehouse, vessel, parameter, instant, superseded=superseded)
     if found.note:
         click.echo(found.note, err=as_json)
+    if not changes:
+        _show(found, as_json=as_json)
+        return
+    kinds = history.comparable(warehouse, vessel, instant)
+    told = [_examine(kind, occasion_h, _beside(figure, k), vessel) for k, kind in enumerate(kinds)]
+    if as_json:
+        print_json({"vessel": vessel, "history": found.rows(), "changes": told})
+        return
+    for one in told:
+        _tell(one)
+
+
+def _show(found: History, *, as_json: bool) -> None:
     if as_json:
         print_json(found.rows())
     if found.note or as_json:
@@ -44,6 +91,121 @@ def command(vessel: str, parameter: str | None, as_of: str | None, superseded: b
         for r in found.rows()
     ]
     print_table(["start UTC", "parameter", "value", "std", "unit", "estimator", "model", "parameter set"], rows)
+
+
+def _beside(figure: Path | None, k: int) -> Path | None:
+    """Return where the figure of the kth kind of sets goes: each has one of its own."""
+    return figure if figure is None or k == 0 else figure.with_stem(f"{figure.stem}-{k + 1}")
+
+
+def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: str) -> dict[str, Any]:
+    """Put the sets of one model and estimator to the tests."""
+    import numpy as np
+
+    from pipeline.history.changes import find_changes
+    from pipeline.history.pooled import pool
+    from pipeline.history.report import report
+    from pipeline.history.sets import ParameterHistory, usable
+    from pipeline.history.settings import ChangeSettings
+
+    n, p = len(kind.parameter_set_ids), len(kind.names)
+    time = np.array(kind.starts_utc_ns, dtype=np.int64)
+    value = np.array(kind.values, dtype=np.float64).reshape(n, p)
+    covariance = np.array(kind.covariances, dtype=np.float64).reshape(n, p, p)
+    good = usable(value, covariance)
+    history = ParameterHistory(kind.names, kind.units, time[good], value[good], covariance[good])
+    left_out = dict(kind.left_out)
+    if not bool(np.all(good)):
+        left_out["with a covariance that is none"] = int(np.sum(~good))
+    found = find_changes(history, replace(ChangeSettings(), occasion_s=3600.0 * occasion_h))
+    if figure is not None and len(history):
+        _draw(history, found, figure, f"{vessel}, model {kind.model}, estimator {kind.estimator}: {found.verdict}")
+    return {
+        "model": kind.model,
+        "model_sha256": kind.model_sha256,
+        "estimator": kind.estimator,
+        "parameter_set_ids": [name for name, ok in zip(kind.parameter_set_ids, good, strict=True) if ok],
+        "left_out": left_out,
+        **report(history, pool(history.value, history.covariance) if len(history) else None, found),
+        "figure": str(figure) if figure is not None and len(history) else None,
+    }
+
+
+def _draw(history: ParameterHistory, found: Changes, figure: Path, title: str) -> None:
+    from workbench.figures.history import draw_history
+
+    if figure.suffix not in (".png", ".svg", ".pdf"):
+        raise UsageError(
+            "figure_format", f"--figure {figure} ends in {figure.suffix!r}; expected .png, .svg or .pdf.", "Rename it."
+        )
+    try:
+        draw_history(history, found, figure, title)
+    except OSError as error:
+        raise UsageError(
+            "cannot_write", f"Writing {figure} failed: {error.strerror}.", "Give another file with --figure."
+        ) from error
+
+
+def _tell(one: dict[str, Any]) -> None:
+    """Print what was found of one model and estimator, for a person."""
+    left = ", ".join(f"{n} {reason}" for reason, n in one["left_out"].items())
+    title = (
+        f"model {one['model']}, estimator {one['estimator']}: {one['sets']} sets on {len(one['occasions'])} occasions"
+    )
+    click.echo(click.style(title, bold=True) + (f"; left out: {left}" if left else ""))
+    pooled = one["pooled"]
+    if pooled is not None and pooled["poolable"] is not None:
+        may = "may be pooled" if pooled["poolable"] else "are not one within their standard errors"
+        click.echo(
+            f"  the sets {may}: Q = {number(pooled['q'])} on {pooled['degrees_of_freedom']} degrees of freedom, "
+            f"p = {number(pooled['p_value'], 2)}; with standard errors {number(pooled['scale'], 3)} times as large "
+            "they would agree"
+        )
+    click.echo(f"  {click.style(one['verdict'], bold=True)}: {one['why']}")
+    for change in one["changes"]:
+        _tell_change(change)
+    if one["verdict"].startswith("not testable"):
+        return
+    smallest, scatter = one["smallest_step_seen"], one["scatter_between_trials"]
+    rows = [
+        [name, number(s["value"], 3), number(s["percent"], 2), number(scatter[name]["percent"], 2), s["unit"]]
+        for name, s in smallest.items()
+        if name != "power"
+    ]
+    click.echo(f"  seen with {100 * smallest['power']:g} % probability: a step midway, of one parameter alone, of")
+    print_table(["", "step", "%", "scatter between trials %", "unit"], rows)
+
+
+def _tell_change(change: dict[str, Any]) -> None:
+    one, other = (t[:10] for t in change["between"])
+    sure = f"{100 * change['confidence']:g} %"
+    if change["kind"] == "step":
+        low, high = (t[:10] for t in change["interval"])
+        head = f"step between {one} and {other} ({sure} interval {low} to {high})"
+    else:
+        head = f"drift from {one} to {other}, per year"
+    doubt = "; step or drift, the data hardly tell" if change["bic_ahead_of_other_form"] < 2 else ""
+    rows = [
+        [
+            name,
+            number(p["before"]),
+            number(p["change"], 3),
+            number(p["std"], 2),
+            f"{p['percent']:+.1f}",
+            f"{p['percent_std']:.1f}",
+            number(p["low"], 3),
+            number(p["high"], 3),
+            "yes" if p["moved"] else "",
+            p["unit"],
+        ]
+        for name, p in change["parameters"].items()
+    ]
+    print_table(["", "before", "change", "std", "%", "std %", "low", "high", "moved", "unit"], rows, f"  {head}{doubt}")
+    for by in change["alone"]:
+        click.echo(
+            f"  {by['parameter']} alone would explain it: {number(by['change'], 3)} +- {number(by['std'], 2)} "
+            f"{by['unit']} ({by['percent']:+.1f} %)"
+        )
 
 
 def _instant(text: str | None) -> datetime | None:

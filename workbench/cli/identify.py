@@ -7,9 +7,12 @@ from pathlib import Path
 
 import click
 
-from flows.identify_vessel import IdentifyOutcome
+from flows.identify_vessel import IdentifyOutcome, Request
+from flows.progress import Progress
 from pipeline.identify.names import NAMES
+from schemas.errors import KempfError
 from warehouse.parameter_set import ParameterSet
+from warehouse.store import Warehouse
 from workbench.cli.options import json_option, vessel_option, warehouse_option
 from workbench.terminal import number, print_json, print_table, progress
 
@@ -23,25 +26,43 @@ from workbench.terminal import number, print_json, print_table, progress
 def command(vessel: str, model: Path | None, estimator: str, uri: str, as_json: bool) -> None:
     """Identify a model from every zigzag of a vessel and store it as a parameter set.
 
+    Maximum likelihood also identifies one hull from all of them together, and tests whether they may be pooled.
+
     What was identified before from the same inputs, with the same code and settings, is not computed again.
     """
     from flows.files import read_model
-    from flows.identify_vessel import Request, identify_vessel
+    from flows.identify_vessel import identify_vessel
     from schemas.model_spec import ModelSpec
-    from warehouse.store import Warehouse
 
     request = Request(read_model(model) if model else ModelSpec(), estimator)
     with progress() as tell:
         outcomes = identify_vessel(Warehouse(uri), vessel, request, progress=tell)
+        pooled = _pooled(Warehouse(uri), vessel, request, outcomes, tell)
     if as_json:
-        print_json([_show(outcome) for outcome in outcomes])
+        print_json([*(_show(outcome) for outcome in outcomes), *([pooled.show()] if pooled else [])])
     else:
         for outcome in outcomes:
             _tell(outcome)
+        if pooled is not None:
+            tell_set(pooled, f"{len(pooled.segment_ids)} zigzags pooled: {pooled.parameter_set_id}")
         click.echo(f"next: kempf history --vessel {vessel}, kempf params show ID, kempf rerun ID")
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if failed and len(failed) == len(outcomes):
         sys.exit(max(error.exit_code for error in failed))
+
+
+def _pooled(
+    warehouse: Warehouse, vessel: str, request: Request, outcomes: list[IdentifyOutcome], tell: Progress
+) -> ParameterSet | None:
+    """Return the set that all zigzags share; where they share none the reason goes to stderr."""
+    from flows.pool_vessel import pool_vessel
+
+    try:
+        found = pool_vessel(warehouse, vessel, request, outcomes, progress=tell)
+    except KempfError as error:
+        click.echo(f"not pooled [{error.code}] {error}", err=True)
+        return None
+    return found[0] if found else None
 
 
 def _show(outcome: IdentifyOutcome) -> object:

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from pipeline.identify import maximum_likelihood
 from pipeline.identify.estimate import Estimate
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
@@ -24,7 +26,8 @@ class OutputErrorSettings(MaximumLikelihoodSettings):
     Attributes
     ----------
     remove_means : bool
-        Take the means off measurements and rudder first, the usual remedy against what is constant.
+        Take the means off measurements and rudder first, the usual remedy against what is constant. The heading is then
+        left out where there is a yaw rate: it is the integral of what lost its mean.
     """
 
     remove_means: bool = False
@@ -47,10 +50,19 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Output
     Estimate
         Standard errors are right where nothing acts but the ship.
     """
-    still = spec.model_copy(update={"wind": "none", "current": "none"})
-    used = without_means(record) if settings.remove_means else record
+    still = spec.model_copy(update={"wind": "none", "moment": "none", "current": "none"})
+    used = _without_means(record) if settings.remove_means else record
     found = maximum_likelihood.identify(used, still, arm_per_m, settings)
     if still == spec:
         return replace(found, estimator="output-error")
     unknown = "output-error knows nothing of wind and current: what they do is taken for the ship's own, or for noise"
     return replace(found, estimator="output-error", warnings=(unknown, *found.warnings))
+
+
+def _without_means(record: Record) -> Record:
+    flat = without_means(record)
+    if record.used[1] and record.used[2]:
+        measured = flat.measured.copy()
+        measured[:, 2] = np.nan
+        flat = replace(flat, measured=measured)
+    return flat

@@ -56,7 +56,7 @@ def told(
     whole = bool(np.all(np.isfinite(values)))
     step, speed = step_of(record), record.mean_speed_m_s
     said = [*record.warnings]
-    if spec.wind != "none" or spec.current != "none":
+    if spec.wind != "none" or spec.moment != "none" or spec.current != "none":
         said.append(f"{name} knows nothing of {blind_to}: what they do is taken for the ship's own, or for noise")
     if not converged:
         said.append(f"not converged: {reason}")

@@ -1,0 +1,79 @@
+"""From an estimate to the parameter set that is stored, with what the profile adds."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from pipeline.identify.estimate import Estimate, Value
+from schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from schemas.profile import VesselProfile
+from warehouse.parameter_set import Estimate as Stored
+from warehouse.parameter_set import Inputs, ParameterSet, parameter_set_id
+
+
+def arm_of(spec: ModelSpec, profile: VesselProfile) -> float | None:
+    """Return l of eq. (16), 1/m: the model's, else the profile's, None where neither has it."""
+    return spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
+
+
+def without_arm(spec: ModelSpec, arm: float | None) -> tuple[str, ...]:
+    """Return the warning that belongs to an arm that nobody knows."""
+    if arm is not None or spec.wind != "force":
+        return ()
+    acts = {
+        "none": "the wind is taken to act without a moment",
+        "gauss-markov": "the moment is a slow state of its own beside the force",
+    }
+    return (f"wind_arm_per_m is not in the profile: {acts[str(spec.with_arm(arm).moment)]}",)
+
+
+def as_parameter_set(
+    result: Estimate,
+    inputs: Inputs,
+    vessel: str,
+    segment_ids: tuple[str, ...],
+    told: dict[str, Any],
+    warnings: tuple[str, ...] = (),
+) -> ParameterSet:
+    """Return the set that an estimate from these inputs is stored as.
+
+    Parameters
+    ----------
+    result : Estimate
+    inputs : Inputs
+    vessel : str
+    segment_ids : tuple of str
+    told : dict
+        Provenance.
+    warnings : tuple of str, optional
+        Beside the estimate's own.
+    """
+    spec = ModelSpec.model_validate(dict(inputs.model_spec))
+    return ParameterSet(
+        parameter_set_id=parameter_set_id(inputs),
+        vessel=vessel,
+        model_name=spec.name,
+        model_spec=spec.model_dump(mode="json"),
+        model_sha256=spec.sha256,
+        estimator=inputs.estimator,
+        settings=dict(inputs.settings),
+        segment_ids=segment_ids,
+        log_ids=inputs.log_ids,
+        start_utc_ns=min(bounds.start_utc_ns for bounds in inputs.bounds),
+        parameters=_stored(result.parameters),
+        discrete=_stored(result.discrete),
+        noise=_stored(result.noise),
+        covariance_names=tuple(HULL_PARAMETERS),
+        covariance=tuple(tuple(float(x) for x in row) for row in result.covariance),
+        fit=result.fit,
+        iterations=list(result.iterations),
+        convergence=result.report,
+        warnings=(*result.warnings, *warnings),
+        parent=spec.parent,
+        provenance=told,
+    )
+
+
+def _stored(values: Sequence[Value]) -> tuple[Stored, ...]:
+    return tuple(Stored(v.name, v.value, v.std, v.unit) for v in values)

@@ -1,0 +1,148 @@
+"""The job that identifies one hull from all zigzags of a vessel and stores it as a parameter set of its own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from os import cpu_count
+from typing import Any
+
+from flows.identify_vessel import IdentifyOutcome, Request
+from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
+from flows.progress import Progress, silent
+from pipeline.identify import pooling
+from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
+from pipeline.identify.pooling import Member
+from pipeline.identify.record import make_record
+from pipeline.identify.rudder_inflow import with_rudder_inflow
+from pipeline.normalise.instruments import Instruments, from_readings
+from schemas.model_spec import ModelSpec
+from schemas.profile import VesselProfile
+from warehouse import aliases, code_version, logs, parameter_sets, provenance, readings, vessels
+from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
+from warehouse.store import Warehouse
+
+#: the estimator of pooled sets, and the one whose outcomes are pooled
+POOLED, SEPARATE = "ml-pooled", "ml"
+#: alias of the newest pooled set
+ALIAS = "pooled"
+
+
+def pool_vessel(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request,
+    outcomes: Sequence[IdentifyOutcome],
+    *,
+    flow_run: str | None = None,
+    progress: Progress = silent,
+) -> tuple[ParameterSet, bool] | None:
+    """Identify one hull from the segments that maximum likelihood could identify one by one.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    request : Request
+        What the segments were identified with.
+    outcomes : sequence of IdentifyOutcome
+        Of that job.
+    flow_run : str, optional
+    progress : Progress, optional
+
+    Returns
+    -------
+    (ParameterSet, bool) or None
+        The pooled set, and whether it is new; None where the estimator is another or fewer than two segments converged.
+
+    Raises
+    ------
+    KempfError
+        The segments have nothing in common.
+    """
+    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
+    chosen = [
+        o.segment
+        for o in outcomes
+        if o.parameter_set is not None
+        and o.parameter_set.convergence.get("converged")
+        and o.segment.kind == "zigzag"
+        and o.segment.ingest_id in rows
+    ]
+    if request.estimator != SEPARATE or not chosen:
+        return None
+    # one profile is one reading of the logs; a log that could not be read anew stays out
+    profile_sha256 = rows[max(chosen, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
+    chosen = [s for s in chosen if rows[s.ingest_id].profile_sha256 == profile_sha256]
+    if len(chosen) < 2:
+        return None
+    chosen.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
+    inputs = Inputs(
+        log_ids=tuple(s.log_id for s in chosen),
+        profile_sha256=profile_sha256,
+        bounds=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in chosen),
+        model_spec=request.spec.model_dump(mode="json"),
+        estimator=POOLED,
+        settings=request.all_settings(),
+        code_version=code_version.fingerprint(),
+    )
+    name = parameter_set_id(inputs)
+    known = name in set(parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list())
+    if known:
+        made = parameter_sets.get(warehouse, name)
+    else:
+        ingests = {s.log_id: s.ingest_id for s in chosen}
+        instruments = {}
+        for done, (log_id, ingest_id) in enumerate(ingests.items()):
+            progress(done, len(ingests), f"pooling {len(chosen)} segments: reading {rows[ingest_id].file_name}")
+            instruments[log_id] = from_readings(readings.read(warehouse, ingest_id))
+        progress(len(ingests), len(ingests), f"pooling {len(chosen)} segments")
+        told = provenance.collect(warehouse, inputs, list(ingests.values()), flow_run)
+        profile = vessels.get(warehouse, profile_sha256)
+        made = build_pooled(instruments, profile, inputs, vessel, tuple(s.segment_id for s in chosen), told)
+        parameter_sets.insert(warehouse, [made])
+    if made.convergence.get("converged"):
+        aliases.point(warehouse, vessel, made.parameter_set_id, alias=ALIAS)
+    return made, not known
+
+
+def build_pooled(
+    instruments: Mapping[str, Instruments],
+    profile: VesselProfile,
+    inputs: Inputs,
+    vessel: str,
+    segment_ids: tuple[str, ...],
+    told: dict[str, Any],
+) -> ParameterSet:
+    """Compute the pooled set that some inputs describe; nothing is stored.
+
+    Parameters
+    ----------
+    instruments : mapping of str to Instruments
+        Series by log.
+    profile : VesselProfile
+    inputs : Inputs
+        At least two segments.
+    vessel : str
+    segment_ids : tuple of str
+        In the order of the inputs' bounds.
+    told : dict
+        Provenance.
+
+    Raises
+    ------
+    KempfError
+        See `pipeline.identify.pooling.identify`.
+    """
+    spec = ModelSpec.model_validate(dict(inputs.model_spec))
+    arm = arm_of(spec, profile)
+    given: dict[str, Any] = {
+        key: tuple(value) if isinstance(value, list) else value for key, value in inputs.settings.items()
+    }
+    members = []
+    for name, bounds in zip(segment_ids, inputs.bounds, strict=True):
+        record = make_record(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
+        members.append(Member(name, with_rudder_inflow(record, spec), arm or 0.0))
+    with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+        result = pooling.identify(members, spec.with_arm(arm), MaximumLikelihoodSettings(**given), workers)
+    return as_parameter_set(result, inputs, vessel, segment_ids, told, without_arm(spec, arm))

@@ -1,0 +1,115 @@
+"""What was found of a history as JSON content with its units, for programs and for tables."""
+
+from __future__ import annotations
+
+from datetime import UTC, datetime, timedelta
+from typing import Any
+
+import numpy as np
+
+from pipeline.history.changes import Change, Changes
+from pipeline.history.pooled import Pooled
+from pipeline.history.sets import ParameterHistory
+from pipeline.normalise.series import Float
+
+
+def report(history: ParameterHistory, pooled: Pooled | None, found: Changes) -> dict[str, Any]:
+    """Return the answer of `pooled.pool` and `changes.find_changes` as JSON content; NaN stands for unknown.
+
+    Parameters
+    ----------
+    history : ParameterHistory
+        What they were asked of.
+    pooled : Pooled or None
+        None where there is no set.
+    found : Changes
+    """
+    settings = found.settings
+    return {
+        "sets": len(history),
+        "occasions": [instant(int(t)) for t in found.occasion_utc_ns],
+        "pooled": None if pooled is None else _pooled(history, pooled, settings.level),
+        "verdict": found.verdict,
+        "why": found.why,
+        "p_value": found.p_value,
+        "level": settings.level,
+        "changes": [_change(history, change, settings.level) for change in found.changes],
+        "scatter_between_trials": _sizes(history, found.scatter, found.mean),
+        "smallest_step_seen": {"power": settings.power, **_sizes(history, found.smallest, found.mean)},
+    }
+
+
+def instant(time_utc_ns: int) -> str:
+    """Return UTC nanoseconds as ISO 8601 text to the second.
+
+    Examples
+    --------
+    >>> instant(1_746_258_421_147_000_000)
+    '2025-05-03T07:47:01Z'
+    """
+    text = (datetime(1970, 1, 1, tzinfo=UTC) + timedelta(seconds=time_utc_ns // 1_000_000_000)).isoformat()
+    return text.removesuffix("+00:00") + "Z"
+
+
+def _pooled(history: ParameterHistory, pooled: Pooled, level: float) -> dict[str, Any]:
+    std = np.sqrt(np.diag(pooled.covariance))
+    return {
+        "poolable": pooled.poolable(level),
+        "p_value": pooled.p_value,
+        "q": pooled.q,
+        "degrees_of_freedom": pooled.dof,
+        "scale": pooled.scale,
+        "parameters": {
+            name: {"value": float(value), "std": float(error), "unit": unit}
+            for name, value, error, unit in zip(history.names, pooled.value, std, history.units, strict=True)
+        },
+        "set_p_values": [float(p) for p in pooled.set_p_value],
+    }
+
+
+def _sizes(history: ParameterHistory, size: Float, mean: Float) -> dict[str, Any]:
+    return {
+        name: {"value": float(s), "percent": _percent(s, m), "unit": unit}
+        for name, s, m, unit in zip(history.names, size, mean, history.units, strict=True)
+    }
+
+
+def _percent(part: float, whole: float) -> float:
+    return float(100.0 * part / abs(whole)) if whole else float("nan")
+
+
+def _change(history: ParameterHistory, change: Change, level: float) -> dict[str, Any]:
+    a_year = "/year" if change.kind == "drift" else ""
+    parameters = {}
+    for j, (name, unit) in enumerate(zip(history.names, history.units, strict=True)):
+        size, half = float(change.change[j]), float(change.width * change.std[j])
+        parameters[name] = {
+            "before": float(change.before[j]),
+            "change": size,
+            "std": float(change.std[j]),
+            "low": size - half,
+            "high": size + half,
+            "percent": _percent(size, change.before[j]),
+            "percent_std": _percent(float(change.std[j]), change.before[j]),
+            "unit": unit + a_year,
+            "moved": bool(change.moved[j]),
+        }
+    return {
+        "kind": change.kind,
+        "between": [instant(t) for t in change.between_utc_ns],
+        "interval": [instant(t) for t in change.interval_utc_ns],
+        "confidence": 1.0 - level,
+        "p_value": change.p_value,
+        "bic_ahead_of_other_form": change.rival,
+        "parameters": parameters,
+        "alone": [
+            {
+                "parameter": history.names[j],
+                "change": float(size),
+                "std": float(std),
+                "percent": _percent(size, change.before[j]),
+                "unit": history.units[j] + a_year,
+            }
+            for j, size, std in change.alone
+        ],
+    }

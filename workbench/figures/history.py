@@ -1,0 +1,99 @@
+"""Parameters of a vessel over time with their intervals, and the changes found."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from pipeline.history.changes import Change, Changes
+from pipeline.history.scan import YEAR_S
+from pipeline.history.sets import ParameterHistory
+from pipeline.normalise.series import Float, Nanoseconds
+
+
+def draw_history(history: ParameterHistory, found: Changes, path: Path, title: str) -> None:
+    """Draw one panel a parameter: sets with 2 standard errors, scatter between trials, steps and drifts.
+
+    Parameters
+    ----------
+    history : ParameterHistory
+    found : Changes
+        Of it.
+    path : Path
+        Ending ``.png``, ``.svg`` or ``.pdf``.
+    title : str
+        Above the figure.
+    """
+    import matplotlib as mpl
+
+    mpl.use("Agg")
+    import matplotlib.pyplot as plt
+
+    p = len(history.names)
+    rows = (p + 1) // 2
+    figure, axes = plt.subplots(
+        rows, 2, figsize=(12, 2.6 * rows + 1.2), sharex=True, layout="constrained", squeeze=False
+    )
+    std = np.sqrt(np.einsum("ijj->ij", history.covariance))
+    time = history.time_utc_ns.astype("datetime64[ns]")
+    edge = (time[-1] - time[0]) // 40 if len(history) > 1 else np.timedelta64(1, "D")
+    span = np.linspace(0.0, 1.0, 400) * float((history.time_utc_ns[-1] - history.time_utc_ns[0]) or 1)
+    fine: Nanoseconds = history.time_utc_ns[0] + span.astype(np.int64)
+    for j, panel in enumerate(axes.flat[:p]):
+        for k, change in enumerate(found.changes):
+            _mark(panel, change, j, first=k == 0)
+        level = _level(found, fine, j)
+        if np.isfinite(found.scatter[j]):
+            band = 2.0 * found.scatter[j]
+            panel.fill_between(fine.astype("datetime64[ns]"), level - band, level + band, color="0.88", lw=0)
+        panel.plot(fine.astype("datetime64[ns]"), level, color="tab:blue", lw=1.4, label="level")
+        panel.errorbar(time, history.value[:, j], 2 * std[:, j], fmt="o", ms=3.5, lw=1, color="black", capsize=2)
+        # what is certain of itself must not be hidden by what is not
+        low, high = np.percentile(
+            np.concatenate([history.value[:, j] - 2 * std[:, j], history.value[:, j] + 2 * std[:, j]]), [2, 98]
+        )
+        panel.set_ylim(low - 0.15 * (high - low), high + 0.15 * (high - low))
+        panel.set_xlim(time[0] - edge, time[-1] + edge)
+        panel.set_ylabel(f"{history.names[j]}, {history.units[j]}")
+        panel.grid(lw=0.3)
+    for panel in axes.flat[p:]:
+        panel.set_visible(False)
+    for panel in axes[-1]:
+        panel.tick_params(axis="x", rotation=25)
+    figure.suptitle(title, fontsize=11)
+    figure.supxlabel(
+        "bars: 2 standard errors; grey: 2 standard deviations of scatter between trials; "
+        "red: when it changed, solid where this parameter moved by itself",
+        fontsize=9,
+    )
+    figure.savefig(path, dpi=90, metadata={"Software": None} if path.suffix == ".png" else None)
+    plt.close(figure)
+
+
+def _mark(panel: object, change: Change, j: int, *, first: bool) -> None:
+    """Shade when a step may have happened."""
+    if change.kind != "step":
+        return
+    low, high = (np.datetime64(t, "ns") for t in change.interval_utc_ns)
+    middle = np.datetime64(sum(change.between_utc_ns) // 2, "ns")
+    panel.axvspan(low, high, color="tab:red", alpha=0.12, lw=0)  # type: ignore[attr-defined]
+    style = {"ls": "-" if change.moved[j] else ":", "lw": 1.2, "color": "tab:red"}
+    panel.axvline(middle, label="change" if first else None, **style)  # type: ignore[attr-defined]
+
+
+def _level(found: Changes, time: Nanoseconds, j: int) -> Float:
+    """Return what the changes found say the parameter was, shape (n,)."""
+    if not found.changes:
+        return np.full(time.size, found.mean[j])
+    level = np.full(time.size, found.changes[0].before[j])
+    for change in found.changes:
+        first, last = change.between_utc_ns
+        if change.kind == "step":
+            after = time >= (first + last) // 2
+            level[after] = change.before[j] + change.change[j]
+        else:
+            inside = (time >= first) & (time <= last)
+            years = (time[inside] - first) / (1e9 * YEAR_S)
+            level[inside] = change.before[j] + change.change[j] * years
+    return level
