@@ -136,13 +136,11 @@ def build_pooled(
     """
     spec = ModelSpec.model_validate(dict(inputs.model_spec))
     arm = arm_of(spec, profile)
-    given: dict[str, Any] = {
-        key: tuple(value) if isinstance(value, list) else value for key, value in inputs.settings.items()
-    }
+    settings: dict[str, Any] = {k: tuple(v) if isinstance(v, list) else v for k, v in inputs.settings.items()}
     members = []
     for name, bounds in zip(segment_ids, inputs.bounds, strict=True):
         record = make_record(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
         members.append(Member(name, with_rudder_inflow(record, spec), arm or 0.0))
     with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
-        result = pooling.identify(members, spec.with_arm(arm), MaximumLikelihoodSettings(**given), workers)
+        result = pooling.identify(members, spec.with_arm(arm), MaximumLikelihoodSettings(**settings), workers)
     return as_parameter_set(result, inputs, vessel, segment_ids, told, without_arm(spec, arm))

@@ -152,7 +152,7 @@ def _from_all_starts(
             "no_ship_explains_it",
             f"None of {len(searches)} starting ships gives these data a finite likelihood: the motion is not that of "
             "a ship under this rudder.",
-            "Look at the channels over the segment (heading, yaw rate, speed, rudder); shorten or repeat the manoeuvre.",
+            "Look at the channels over the segment (heading, yaw rate, speed, rudder); shorten or repeat it.",
             {"searches": _summary(searches)},
         )
     return name, best, {"starts": _summary(searches), "race": _summary(race)}

@@ -1,8 +1,8 @@
 """Several segments of one vessel, one hull: maximum likelihood with the six parameters shared and all else her own.
 
 Every segment keeps its disturbances, their levels, its noise levels, its initial state and its speed. Whether the
-segments may share a hull is tested by the likelihood ratio: twice what separate hulls gain, chi-squared with six degrees
-of freedom a segment beyond the first where one hull is true (Wilks 1938, Annals of Mathematical Statistics 9).
+segments may share a hull is tested by the likelihood ratio: twice what separate hulls gain, chi-squared with six
+degrees of freedom a segment beyond the first where one hull is true (Wilks 1938, Annals of Mathematical Statistics 9).
 """
 
 from __future__ import annotations
