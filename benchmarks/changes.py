@@ -312,7 +312,7 @@ def main() -> None:
     quiet, late = looks(pool, few, 0.0, 0, 24), looks(pool, few, 0.04, 10, 22)
     told = {key: accuracy(pool, few, *key) for key in (("step in b2", 0.04), ("step in a22", 0.06))}
     told["drift of all damping (fouling)", 0.1] = accuracy(pool, few, "drift of all damping (fouling)", 0.1)
-    back, days = up_and_back(pool, few, 0.04), same_days(pool, runs)
+    back, days = up_and_back(pool, few, 0.06), same_days(pool, runs)
     draw_changes(alarms, rival, curves, SIZES, SETTINGS, RESULTS / "changes.png")
     write(
         "changes",
@@ -412,7 +412,7 @@ def page(
             ],
         ),
         "",
-        f"b2 up by 4 % after 8 of 24 sets and back after 16: two steps told in {back[0]} % of {back[0].n} histories, "
+        f"b2 up by 6 % after 8 of 24 sets and back after 16: two steps told in {back[0]} % of {back[0].n} histories, "
         f"both times inside their intervals in {back[1]} % of those.",
         "",
         "## Looking again after every new set",

@@ -368,7 +368,7 @@ def page(results: list[Result], ships: list[Found]) -> list[str]:
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--runs", type=int, default=16, help="runs a kind and stream")
+    parser.add_argument("--runs", type=int, default=8, help="runs a kind and stream")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--data", type=Path, default=result_page.DATA)
     options = parser.parse_args()

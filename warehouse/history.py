@@ -243,8 +243,10 @@ def _marked(table: DeltaTable | None, vessel: str, past: list[str], columns: tup
     import polars as pl
 
     sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, columns)
-    ingest = pl.col("provenance_json").str.json_path_match("$.ingest_ids[0]")
-    marked = sets.with_columns(superseded=ingest.is_in(past).fill_null(value=False)).drop("provenance_json")
+    # a set of several logs is superseded with any of them; ids are of one length, so that none stands in another
+    ingests = pl.col("provenance_json").str.json_path_match("$.ingest_ids")
+    old = ingests.str.contains_any(past).fill_null(value=False) if past else pl.lit(value=False)
+    marked = sets.with_columns(superseded=old).drop("provenance_json")
     return marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
 
 

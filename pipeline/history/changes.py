@@ -6,7 +6,7 @@ both sides are put to the same test, at half the level.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -71,7 +71,8 @@ class Changes:
     Attributes
     ----------
     verdict : str
-        ``no change seen``, ``step``, ``steps``, ``drift``, ``steps and drift``, ``not testable with these data``.
+        ``no change seen``, ``step``, ``steps``, ``drift``, ``step and drift``, ``steps and drift``,
+        ``not testable with these data``.
     why : str
         In words.
     changes : tuple of Change
@@ -130,17 +131,18 @@ def find_changes(history: ParameterHistory, settings: ChangeSettings | None = No
     rest = stretch(quiet, settings)
     tau = np.sqrt(rest.statistics(rest.value).scatter[p:]) * rest.scale
     smallest = smallest_steps(rest, judge(rest, settings.level)) * np.abs(rest.scale)
-    said = f"in {100 * p_value:.2g} % of histories without change something at least as remarkable is seen"
+    share = f"{100 * p_value:{'.2g' if p_value < 0.99 else '.0f'}} %"
+    said = f"in {share} of histories without change something at least as remarkable is seen"
     return Changes(verdict, said, found, p_value, merged.time_utc_ns, tau, mean, smallest, settings)
 
 
 def _not_testable(history: ParameterHistory, merged: ParameterHistory, settings: ChangeSettings) -> str:
     if len(merged) < settings.fewest:
         sets = f"{len(history)} parameter sets" if len(history) != 1 else "1 parameter set"
+        shared = f"; sets begun within {settings.occasion_s / 3600:g} h are one occasion: they share load and weather"
         return (
-            f"{sets} with covariances, on {len(merged)} occasions; at least {settings.fewest} are needed, "
-            f"{settings.smallest_side} on either side of a step. Sets begun within {settings.occasion_s / 3600:g} h "
-            "are one occasion, because they share load and weather"
+            f"{sets} with covariances on {len(merged)} occasions, at least {settings.fewest} are needed, "
+            f"{settings.smallest_side} on either side of a step{shared if len(merged) < len(history) else ''}"
         )
     if merged.time_utc_ns[0] == merged.time_utc_ns[-1]:
         return "all parameter sets are of one instant"
@@ -190,9 +192,37 @@ def _fitted(history: ParameterHistory, settings: ChangeSettings, places: list[_P
         return _drift(some, stretch(some, settings), place.p_value, place.rival)
     before = max((q.split for q in places[:i] if q.kind == "step"), default=0)
     after = min((q.split for q in places[i + 1 :] if q.kind == "step"), default=len(history))
-    some = part(history, slice(before, after))
+    beside = [q for q in places if q.kind == "drift" and place.split in (q.first, q.last)]
+    level, extra = _levelled(history, settings, beside, place.split)
+    some = part(level, slice(before, after))
     one = stretch(some, settings)
-    return _step(some, one, _likeliest(one), place.p_value, place.rival)
+    # beside a drift the sides have been made level for this very split
+    k = place.split - before if beside else _likeliest(one)
+    found = _step(some, one, k, place.p_value, place.rival)
+    return replace(found, std=np.hypot(found.std, extra))
+
+
+def _levelled(
+    history: ParameterHistory, settings: ChangeSettings, drifts: list[_Place], split: int
+) -> tuple[ParameterHistory, Float]:
+    """Turn the drifts beside a step about their ends at the step, so that what is left there is the step.
+
+    Returns
+    -------
+    ParameterHistory
+    ndarray, shape (n_parameter,)
+        What the drifts' own standard errors add to that of the step.
+    """
+    value, variance = history.value.copy(), np.zeros(len(history.names))
+    for place in drifts:
+        some = part(history, slice(place.first, place.last))
+        one = stretch(some, settings)
+        rate, p = effects.drift_of(one, one.value), len(history.names)
+        ends = one.years - (one.years[-1] if place.last == split else one.years[0])
+        value[place.first : place.last] -= np.outer(ends, rate.change[p:] * one.scale)
+        variance += (np.mean(ends) * rate.std[p:] * one.scale) ** 2
+    level = ParameterHistory(history.names, history.units, history.time_utc_ns, value, history.covariance)
+    return level, np.sqrt(variance)
 
 
 def part(history: ParameterHistory, which: slice) -> ParameterHistory:

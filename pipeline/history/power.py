@@ -14,7 +14,7 @@ _DRAWS = 200
 #: How many differences of neighbours the scatter common to all directions is worth. A change shows in the direction
 #: that scatters least, so that the least of six estimates would be promised; with 30 the promise holds on average.
 _COMMON = 30.0
-_FACTORS = (0.6, 0.75, 0.9, 1.05, 1.25, 1.5, 2.0)
+_FACTORS = (0.6, 0.75, 0.9, 1.05, 1.25, 1.5, 2.0, 3.0)
 
 
 def smallest_steps(one: Stretch, verdict: Verdict) -> Float:
@@ -29,7 +29,7 @@ def smallest_steps(one: Stretch, verdict: Verdict) -> Float:
     Returns
     -------
     ndarray, shape (n_parameter,)
-        Relative; NaN where even twice what a first guess says would not do.
+        Relative; NaN where even three times what a first guess says would not do.
     """
     n, p = one.value.shape
     one = _typical(one)

@@ -11,7 +11,7 @@ headings, which share V_0 and k. m is what the linear hull lacks and a current a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from itertools import pairwise
 
 import numpy as np
@@ -31,6 +31,7 @@ V, V0, LOST, SUM = (FIRST_LONGITUDINAL + i for i in (SPEED, SETTLED, LOSS, PATH)
 N_STATE = FIRST_LONGITUDINAL + 4
 #: columns of the measurements
 Y_V, Y_R, Y_PSI, Y_U = range(4)
+_LONGEST_PAUSE_S = 0.4
 
 
 @dataclass(frozen=True)
@@ -111,6 +112,26 @@ class Run:
     def base_heading_rad(self) -> float:
         """Mean heading, rad."""
         return float(np.nanmean(self.record.heading_rad))
+
+
+def coarsened(record: Record) -> Record:
+    """Return the record without most of the instants at which nothing but the compass was read.
+
+    Beside a rate gyro they tell the speed nothing, and cost most. One is kept where nothing else was measured for a
+    while, for the course of the rudder.
+    """
+    if not record.used[Y_R]:
+        return record
+    needed = np.any(np.isfinite(record.measured[:, [Y_V, Y_R]]), axis=1)
+    needed[[0, -1]] = True
+    keep, last = needed.copy(), -np.inf
+    for k, instant in enumerate(record.time_s):
+        keep[k] = needed[k] or instant - last > _LONGEST_PAUSE_S
+        last = instant if keep[k] else last
+    n = record.time_s.size
+    columns = {field.name: getattr(record, field.name) for field in fields(record)}
+    rows = {k: v[keep] for k, v in columns.items() if isinstance(v, np.ndarray) and v.shape[0] == n}
+    return replace(record, **rows)
 
 
 def run_of(record: Record) -> Run:
@@ -194,7 +215,8 @@ def _lateral_half(run: Run, fit: LateralFit, current: str) -> tuple[Float, ...]:
     chain = lateral_steps(fit.hull, fit.forces, step_s, speed, rudder)
     Phi[1:, :N_CHAIN, :N_CHAIN], g[1:, :N_CHAIN], Q[1:, :N_CHAIN, :N_CHAIN] = chain
     decay = np.exp(-fit.current_rate_per_s * step_s)
-    for i in range(CURRENT.start, CURRENT.stop):
+    # V_T takes in what the swinging heading does to the current; the stream along the course does not vary like that
+    for i in range(CURRENT.start, CURRENT.stop if current == "earth" else CURRENT.start + 1):
         Phi[1:, i, i], Q[1:, i, i] = decay, fit.current_m_s**2 * (1.0 - decay**2)
     Y = np.column_stack([record.measured, run.along_m_s])
     H, R = np.zeros((n, 4, N_STATE)), np.ones((n, 4))

@@ -24,7 +24,7 @@ import numpy as np
 from pipeline.identify import maximum_likelihood
 from pipeline.identify.doubts import doubts
 from pipeline.identify.estimate import Estimate, hull_values
-from pipeline.identify.joint_motion import LateralFit, Priors, Run, run_of
+from pipeline.identify.joint_motion import LateralFit, Priors, Run, coarsened, run_of
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.record import Record
 from pipeline.identify.speed_without_log import Motion, Speed, speed_without_log
@@ -113,30 +113,33 @@ def identify_without_log(
     _check(no_log)
     order = sorted((record, *companions), key=lambda r: r.start_utc_ns)
     own = next(i for i, r in enumerate(order) if r is record)
-    runs = tuple(run_of(r) for r in order)
+    runs = tuple(run_of(coarsened(r)) for r in order)
     speeds = tuple(r.speed_m_s for r in order)
     parameters: Float | None = None
     rounds: list[dict[str, Any]] = []
     converged = False
     for _ in range(no_log.max_rounds):
-        given = tuple(_with_speed(run, speed) for run, speed in zip(runs, speeds, strict=True))
-        estimates = tuple(maximum_likelihood.identify(run.record, spec, arm_per_m, settings) for run in given)
+        given = [replace(r, speed_m_s=speed) for r, speed in zip(order, speeds, strict=True)]
+        estimates = tuple(maximum_likelihood.identify(r, spec, arm_per_m, settings) for r in given)
         fits = tuple(_lateral_fit(e, spec, arm_per_m) for e in estimates)
-        priors = _priors(order, spec, no_log)
-        found = speed_without_log(Motion(given, fits, priors, spec.current), parameters)
+        moving = tuple(_with_speed(run, r) for run, r in zip(runs, given, strict=True))
+        found = speed_without_log(Motion(moving, fits, _priors(order, spec, no_log), spec.current), parameters)
         speed, motion, parameters = found
         mean, std = motion.mean_speed(parameters, own)
-        moved = [float(np.mean(new - old)) for new, old in zip(speed.speed_m_s, speeds, strict=True)]
+        moved = [float(np.mean(v - run.record.speed_m_s)) for v, run in zip(speed.speed_m_s, moving, strict=True)]
         rounds.append({"mean_speed_m_s": mean, "std_given_the_hull_m_s": std, "moved_m_s": moved[own]})
         if max(map(abs, moved)) < no_log.tolerance * mean:
             converged = True
             break
-        speeds = speed.speed_m_s
+        speeds = tuple(
+            np.interp(r.time_s, run.record.time_s, v) for r, run, v in zip(order, runs, speed.speed_m_s, strict=True)
+        )
     return _combined(estimates, found, own, rounds, converged=converged, no_log=no_log)
 
 
-def _with_speed(run: Run, speed_m_s: Float) -> Run:
-    return replace(run, record=replace(run.record, speed_m_s=speed_m_s))
+def _with_speed(run: Run, record: Record) -> Run:
+    speed = np.interp(run.record.time_s, record.time_s, record.speed_m_s)
+    return replace(run, record=replace(run.record, speed_m_s=speed))
 
 
 def _check(no_log: NoLogSettings) -> None:
@@ -218,6 +221,9 @@ def _combined(
     fit = estimates[own]
     mean, given_std = motion.mean_speed(parameters, own)
     variance = given_std**2 + motion.surge_variance(parameters, own)
+    if _contradicts(speed):
+        # the truth may lie with either half of the model: half their difference, as a standard deviation
+        variance += (0.5 * speed.misfit_m_s[0]) ** 2
     gradient = np.zeros(6)
     for number, estimate in enumerate(estimates):
         one = _hull_gradient(motion, parameters, own, number, np.sqrt(np.diag(estimate.covariance)))
@@ -244,6 +250,11 @@ def _combined(
         report=report,
         warnings=(*kept, *own_doubts, *_warnings(speed, mean, std, motion.current, converged=converged)),
     )
+
+
+def _contradicts(speed: Speed) -> bool:
+    misfit, std = speed.misfit_m_s
+    return abs(misfit) > _MISFIT_SEEN * std
 
 
 def _speed_report(
@@ -277,11 +288,10 @@ def _warnings(speed: Speed, mean: float, std: float, current: str, *, converged:
             f"the speed through the water is known to {100 * std / mean:.0f} % only, and every parameter with it: "
             "sail a run on the opposite heading, or state the trial speed and how well it is known"
         )
-    misfit, misfit_std = speed.misfit_m_s
-    if abs(misfit) > _MISFIT_SEEN * misfit_std:
+    if _contradicts(speed):
         said.append(
-            f"her lateral motion shows {misfit:.2f} m/s of current along the course that the GNSS along the bow does "
-            "not: the hull does something that eq. (16) lacks"
+            f"her lateral motion shows {speed.misfit_m_s[0]:.2f} m/s of current along the course that the GNSS along "
+            "the bow does not: the hull does something that eq. (16) lacks, and the speed is less certain for it"
         )
     if not converged:
         said.append("not converged: the speed through the water still moved when the rounds allowed ran out")

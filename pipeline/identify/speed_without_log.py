@@ -32,8 +32,8 @@ from pipeline.model.smoother import LinearSystem, last_state, smooth
 from pipeline.normalise.series import Float
 
 #: bounds of T in s, of the wander of V over its mean in 1/s^0.5, of the noise of y_u in m/s; the wander is never taken
-#: for nothing, because no ship keeps to the longitudinal equation: 0.2 % of V in a minute
-_T_S, _WANDER, _NOISE_M_S = (2.0, 3000.0), (3e-4, 0.03), (1e-4, 2.0)
+#: for nothing, because no ship keeps to the longitudinal equation: 0.8 % of V in a minute
+_T_S, _WANDER, _NOISE_M_S = (2.0, 3000.0), (1e-3, 0.03), (1e-4, 2.0)
 _GATE = 5.0
 #: of the logarithms of T and the noise levels, for finite differences
 _STEP = 0.05
@@ -97,7 +97,7 @@ class Motion:
         mean = float(np.mean([np.nanmean(run.along_m_s) for run in runs]))
         bounds = np.array([_T_S, (_WANDER[0] * mean, _WANDER[1] * mean), _NOISE_M_S])
         self.low, self.high = np.log(bounds).T
-        self.start = np.log([60.0, 1e-3 * mean, 0.1])
+        self.start = np.log([60.0, 2e-3 * mean, 0.1])
 
     def system(self, parameters: Float, averaged: int = 0) -> LinearSystem:
         """Return the linear system for (log T, log wander, log noise of y_u); good until the next call."""
@@ -109,15 +109,19 @@ class Motion:
         """Return the same with other y_u or turning."""
         return Motion(runs, self.fits, self.priors, self.current)
 
-    def fitted(self, start: Float) -> tuple[Float, float]:
-        """Return the most likely (log T, log wander, log noise of y_u), shape (3,), and its log-likelihood."""
+    def fitted(self, start: Float | None) -> tuple[Float, float]:
+        """Return the most likely (log T, log wander, log noise of y_u), shape (3,), and its log-likelihood.
+
+        ``start`` is one found before; without it several are tried.
+        """
 
         def cost(parameters: Float) -> float:
             return -last_state(self.system(parameters)).log_likelihood
 
         bounds = list(zip(self.low, self.high, strict=True))
         # a slow ship that obeys and a quick one that wanders can look alike: both are tried
-        starts = [start, *(np.array([log_T, self.low[1] + 0.1, start[2]]) for log_T in _START_LOG_T)]
+        fresh = [self.start, *(np.array([log_T, self.low[1] + 0.1, self.start[2]]) for log_T in _START_LOG_T)]
+        starts = fresh if start is None else [start]
         searches = [
             minimize(cost, np.clip(x, self.low, self.high), method="L-BFGS-B", bounds=bounds, options=_SEARCH)
             for x in starts
@@ -177,7 +181,6 @@ def speed_without_log(motion: Motion, start: Float | None = None) -> tuple[Speed
     parameters : ndarray, shape (3,)
         log T, log wander, log noise of y_u.
     """
-    parameters = motion.start if start is None else start
     # a loose first pass: how the ship turned, and which y_u are no measurements
     loose = smooth(motion.system(motion.start))
     rows = spans(motion.runs)
@@ -185,7 +188,7 @@ def speed_without_log(motion: Motion, start: Float | None = None) -> tuple[Speed
         replace(run, squared_rate=loose.mean[span, YAW] ** 2) for run, span in zip(motion.runs, rows, strict=True)
     )
     motion = motion.with_runs(_gated(runs, loose.innovation[:, -1] / np.sqrt(loose.variance[:, -1]), rows))
-    parameters, value = motion.fitted(parameters)
+    parameters, value = motion.fitted(start)
     system = motion.system(parameters)
     found = smooth(system)
     at = [np.isclose(parameters, motion.low, atol=1e-6), np.isclose(parameters, motion.high, atol=1e-6)]

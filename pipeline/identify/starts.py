@@ -49,12 +49,13 @@ def thinned(record: Record, instants: int) -> Record:
 
     Whole instants are dropped, so measurements stay where they were made; each kind of measurement keeps its share.
     """
-    n = record.time_s.size
-    every = max(1, round(n / instants))
-    keep = np.zeros(n, dtype=np.bool_)
+    measured = [np.flatnonzero(np.isfinite(column)) for column in record.measured.T]
+    # counted by what was measured: many readings of the rudder in between must not thin the measurements out
+    every = max(1, round(len(np.unique(np.concatenate(measured))) / instants))
+    keep = np.zeros(record.time_s.size, dtype=np.bool_)
     keep[[0, -1]] = True
-    for column in record.measured.T:
-        keep[np.flatnonzero(np.isfinite(column))[::every]] = True
+    for rows in measured:
+        keep[rows[::every]] = True
     return replace(
         record,
         time_s=record.time_s[keep],

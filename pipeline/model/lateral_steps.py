@@ -19,6 +19,7 @@ SWAY, YAW, FORCE, MOMENT, HEADING = 0, 1, 2, 3, 4
 N_CHAIN = 5
 #: Taylor terms; 1 / 19! is below the last bit of a double for |A| h up to 1
 _ORDER = 18
+_SETTLED = 1e-18
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 
@@ -117,4 +118,6 @@ def _exponential_times(A: Float, X: Float) -> Float:
     for k in range(1, _ORDER + 1):
         term = (A @ term) / k
         total += term
+        if float(np.max(np.abs(term), initial=0.0)) < _SETTLED:
+            break
     return total

@@ -83,6 +83,22 @@ def test_two_steps_are_both_found() -> None:
         assert abs(change.change[5] - size * TRUTH[5]) <= change.width * change.std[5]
 
 
+def test_fouling_and_a_docking_are_told_apart() -> None:
+    n, docked = 30, 18
+    years = np.arange(n) * 30 / 365.25
+    fouled = np.outer(np.where(np.arange(n) < docked, years, 0.0), [0.08, 0, 0, 0.08, 0, 0])
+    h = history(n, shift=fouled)
+    found = found_in(h)
+    assert found.verdict == "step and drift"
+    drift, cleaned = found.changes
+    assert (drift.kind, cleaned.kind) == ("drift", "step")
+    assert cleaned.between_utc_ns[1] == h.time_utc_ns[docked]
+    truth = -fouled[docked - 1] * TRUTH
+    # from the end of the line, not from its middle
+    assert np.all(np.abs(cleaned.change - truth) <= cleaned.width * cleaned.std)
+    assert cleaned.moved[NAMES.index("a22")]
+
+
 def test_no_change_says_what_would_have_been_seen_and_keeps_its_word() -> None:
     seen = []
     for seed in range(8):

@@ -155,10 +155,11 @@ def _tell(one: dict[str, Any]) -> None:
     click.echo(click.style(title, bold=True) + (f"; left out: {left}" if left else ""))
     pooled = one["pooled"]
     if pooled is not None and pooled["poolable"] is not None:
+        p_value = number(pooled["p_value"], 2) if pooled["p_value"] > 1e-16 else "0 to 16 digits"
         may = "may be pooled" if pooled["poolable"] else "are not one within their standard errors"
         click.echo(
             f"  the sets {may}: Q = {number(pooled['q'])} on {pooled['degrees_of_freedom']} degrees of freedom, "
-            f"p = {number(pooled['p_value'], 2)}; with standard errors {number(pooled['scale'], 3)} times as large "
+            f"p = {p_value}; with standard errors {number(pooled['scale'], 3)} times as large "
             "they would agree"
         )
     click.echo(f"  {click.style(one['verdict'], bold=True)}: {one['why']}")
@@ -168,12 +169,16 @@ def _tell(one: dict[str, Any]) -> None:
         return
     smallest, scatter = one["smallest_step_seen"], one["scatter_between_trials"]
     rows = [
-        [name, number(s["value"], 3), number(s["percent"], 2), number(scatter[name]["percent"], 2), s["unit"]]
+        [name, number(s["value"], 3), _percent(s["percent"]), _percent(scatter[name]["percent"]), s["unit"]]
         for name, s in smallest.items()
         if name != "power"
     ]
     click.echo(f"  seen with {100 * smallest['power']:g} % probability: a step midway, of one parameter alone, of")
     print_table(["", "step", "%", "scatter between trials %", "unit"], rows)
+
+
+def _percent(share: float) -> str:
+    return number(share, 2) if not abs(share) >= 100 else f"{share:.0f}"
 
 
 def _tell_change(change: dict[str, Any]) -> None:

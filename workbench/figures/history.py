@@ -93,7 +93,7 @@ def _level(found: Changes, time: Nanoseconds, j: int) -> Float:
             after = time >= (first + last) // 2
             level[after] = change.before[j] + change.change[j]
         else:
-            inside = (time >= first) & (time <= last)
-            years = (time[inside] - first) / (1e9 * YEAR_S)
+            inside = time >= first
+            years = (np.minimum(time[inside], last) - first) / (1e9 * YEAR_S)
             level[inside] = change.before[j] + change.change[j] * years
     return level

@@ -1,0 +1,197 @@
+"""Monte Carlo at the information limit: the errors of maximum likelihood beside the Cramer-Rao bound.
+
+Each run sails a zigzag of twenty minutes (a boat of 3 m: of her own time) in the paper's wind and stream, reads it by
+instruments with one common clock, and fits it. Two bounds are held against the errors: the bound at the truth, from the
+expected information at the simulator's own parameters and noise levels, and the bound that the estimator reports.
+Where the two differ the simulator's disturbances are not those of eq. (16). From bytes on: `benchmarks.monte_carlo`.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass, replace
+from math import radians
+from multiprocessing import get_context
+
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import numpy as np
+
+from benchmarks.information_page import write_page
+from benchmarks.information_result import Case, Run
+from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings, identify
+from pipeline.identify.record import Record, make_record
+from pipeline.normalise.instruments import Instruments
+from pipeline.normalise.series import SECOND_NS, Float, Series
+from pipeline.simulate.disturbances import CALM, Disturbance, Environment
+from pipeline.simulate.hulls import HULLS
+from pipeline.simulate.instruments import Instrument
+from pipeline.simulate.trial import PAPER_ENVIRONMENT, Trial, TrialSettings, simulate_trial, zigzag_settings
+from schemas.channels import CHANNELS
+from schemas.errors import KempfError
+from schemas.model_spec import ModelSpec
+
+SCALES = (0.3, 1.0, 3.0)
+VELOCITY, YAW_RATE, HEADING, RUDDER, LOG = 0.05, radians(0.03), radians(0.05), radians(0.1), 0.05
+#: the boat lives so many times faster than a Mariner, by V / L: her instruments are read faster, her trial is shorter
+HASTE = {"usv": 12.0}
+SPEC = ModelSpec()
+#: force and stream drawn from eq. (16) itself, of the paper's sizes: there the model is exactly true
+DRAWN = Environment(
+    wind_force=Disturbance(0.0, 5e-3, SPEC.wind_correlation_rate_per_s),
+    current_north=Disturbance(0.0, 0.2, SPEC.current_correlation_rate_per_s),
+    current_east=Disturbance(0.0, 0.2, SPEC.current_correlation_rate_per_s),
+)
+ENVIRONMENTS: dict[str, Environment] = {
+    "paper": PAPER_ENVIRONMENT,
+    "drawn": DRAWN,
+    "constant": replace(PAPER_ENVIRONMENT, wind_force=replace(PAPER_ENVIRONMENT.wind_force, std=0.0)),
+    "calm": CALM,
+}
+#: a level that is nothing in the truth stands at the lower bound of the search
+_LOW = MaximumLikelihoodSettings().sigma_low
+_CHANNEL_OF = {channel.column: channel for channel in CHANNELS.values()}
+
+
+def instruments(case: Case) -> tuple[Instrument, ...]:
+    """Return what she carries: all ticks on the whole second, or the boat's twelfth of one; the rudder twice as fast."""
+    rate = HASTE.get(case.hull, 1.0)
+    # a boat of 3 m whose noise is as small beside her motion as a ship's is: velocities by V, rates by V / L
+    slow, fast = (0.25, HASTE["usv"]) if case.control == "noise of her size" else (1.0, 1.0)
+    exact = 0.0 if case.control == "exact rudder and log" else 1.0
+    return tuple(
+        Instrument(name, rate * per, 0.0, 0.0, noise={quantity: std})
+        for name, per, quantity, std in (
+            ("gnss", 1.0, "velocity", slow * VELOCITY),
+            ("heading", 1.0, "heading", HEADING),
+            ("yaw_rate", 1.0, "yaw_rate", fast * YAW_RATE),
+            ("rudder", 2.0, "rudder_angle", exact * RUDDER),
+            ("log", 1.0, "speed_through_water", exact * slow * LOG),
+        )
+    )
+
+
+def settings_of(case: Case, number: int) -> TrialSettings:
+    """Return the settings of one run; base headings all round, first sides in turn."""
+    haste = HASTE.get(case.hull, 1.0)
+    settings = zigzag_settings(
+        case.hull,
+        seed=number,
+        first_side="starboard" if number % 2 == 0 else "port",
+        duration_s=1200.0 / haste,
+        steady_s=120.0 / haste,
+        environment=ENVIRONMENTS[case.environment],
+        noise_scale=case.scale,
+    )
+    # the golden angle spreads the base headings over the stream's direction
+    return replace(settings, heading_deg=(137.508 * number) % 360.0, instruments=instruments(case))
+
+
+def record_of(trial: Trial, case: Case) -> Record:
+    """Return the zigzag as the estimator gets it, from 20 s (of a ship) before the first execute."""
+    series = {}
+    for record in trial.instruments:
+        for column, value in record.values.items():
+            channel = _CHANNEL_OF[column]
+            held = np.unwrap(value) if channel.wrap == "circle" else value
+            series[channel.name] = Series(record.measured_utc_ns, held)
+    log = Instruments(series, dict.fromkeys(series, "simulated"), ())
+    zigzag, start = trial.truth.zigzags[0], trial.settings.start_utc_ns
+    lead = 20.0 / HASTE.get(case.hull, 1.0)
+    cut = (start + round((zigzag.start_s - lead) * SECOND_NS), start + round(zigzag.end_s * SECOND_NS))
+    made = make_record(log, *cut)
+    measured = made.measured.copy()
+    if case.control == "y_v from the exact heading":
+        psi = trial.truth.trajectory.at((log.series["heading"].time_utc_ns - start) / SECOND_NS).state[:, 2]
+        exact = replace(log, series={**series, "heading": Series(series["heading"].time_utc_ns, psi)})
+        other = make_record(exact, *cut)
+        measured[:, 0] = other.measured[:, 0]
+        made = replace(made, heading_rad=other.heading_rad)
+    if not case.with_heading:
+        measured[:, 2] = np.nan
+    return replace(made, measured=measured)
+
+
+def true_theta(case: Case) -> Float:
+    """Return hull parameters and logarithms of the noise levels as the simulator has them, shape (12,)."""
+    hull, environment = HULLS[case.hull], ENVIRONMENTS[case.environment]
+    p, noise = hull.parameters, {k: v for i in instruments(case) for k, v in i.noise.items()}
+    # eq. (18) turns the heading's noise into speed
+    across = np.hypot(noise["velocity"], hull.trial_speed_m_s * noise["heading"])
+    measurement = case.scale * np.array([across, noise["yaw_rate"], noise["heading"]])
+    sigma = np.array([environment.wind_force.std, 0.0, environment.current_north.std, *measurement])
+    return np.concatenate(
+        [[p.a11, p.a12, p.a21, p.a22, p.b1, p.b2], np.log(np.maximum(sigma, np.array(_LOW)))],
+    )
+
+
+def run(case: Case, number: int) -> Run:
+    """Sail, read, fit, and take the information at the truth."""
+    trial = simulate_trial(settings_of(case, number))
+    arm, settings, theta = trial.truth.wind_arm_per_m, MaximumLikelihoodSettings(), true_theta(case)
+    try:
+        record = record_of(trial, case)
+        found = identify(record, SPEC.with_arm(arm), arm, settings)
+    except KempfError as error:
+        return Run(case, number, failure=error.code)
+    objective = settings.bind(record, SPEC.with_arm(arm), arm)
+    free = objective.active & (theta > objective.low + 1e-9)
+    return Run(
+        case,
+        number,
+        value=found.hull.array(),
+        std=np.array([p.std for p in found.parameters]),
+        truth=theta[:6],
+        information=objective.full(theta)[2],
+        free=free,
+        levels={n.name: n.value for n in found.noise},
+        converged=found.converged,
+        widened=found.report["standard_errors"] != "information",
+        gross=sum(found.report["gross_errors"].values()),
+    )
+
+
+def cases() -> list[Case]:
+    """Return all cells: the grid, the paper's two measurements, disturbances of eq. (16), one source off at a time."""
+    grid = [Case(hull, scale) for hull in HULLS for scale in SCALES]
+    two = [Case(hull, 1.0, with_heading=False) for hull in HULLS]
+    drawn = [Case(hull, 1.0, environment="drawn") for hull in HULLS]
+    controls = [
+        Case("mariner", 1.0, environment="constant"),
+        Case("mariner", 1.0, environment="calm"),
+        Case("mariner", 1.0, control="exact rudder and log"),
+        Case("mariner", 1.0, control="y_v from the exact heading"),
+        Case("usv", 1.0, control="exact rudder and log"),
+        Case("usv", 1.0, control="noise of her size"),
+    ]
+    return [*grid, *two, *drawn, *controls]
+
+
+def sail_all(wanted: Sequence[tuple[Case, int]], processes: int) -> list[Run]:
+    """Do all runs, in any order; return them sorted."""
+    order = {case: k for k, case in enumerate(dict.fromkeys(case for case, _ in wanted))}
+    done: list[Run] = []
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
+        for one in as_completed([pool.submit(run, *task) for task in wanted]):
+            done.append(one.result())
+            if len(done) % 50 == 0:
+                print(f"{len(done)}/{len(wanted)}", file=sys.stderr, flush=True)
+    return sorted(done, key=lambda r: (order[r.case], r.number))
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=200)
+    parser.add_argument("--processes", type=int, default=2)
+    options = parser.parse_args()
+    # one run of every cell after the other, so that an early stop would leave all cells equally far
+    runs = sail_all([(case, number) for number in range(options.runs) for case in cases()], options.processes)
+    print(write_page(runs, f"--runs {options.runs}").read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    main()

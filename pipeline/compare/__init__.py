@@ -1,0 +1,1 @@
+"""Measured over predicted: what a model says beside what was measured."""

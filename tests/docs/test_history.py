@@ -1,0 +1,43 @@
+"""docs/history.md is true: its example runs to its output, its settings are the defaults, its verdicts exist."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import fields
+from pathlib import Path
+
+from pipeline.history.settings import ChangeSettings
+from tests.docs.console import File, Names, Shell, blocks, difference, steps
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "history.md").read_text(encoding="utf-8")
+
+
+def test_the_example_runs_to_its_output(tmp_path: Path) -> None:
+    shell = Shell(tmp_path)
+    try:
+        for step in steps(TEXT):
+            if isinstance(step, File):
+                (tmp_path / step.name).write_text(step.content, encoding="utf-8")
+                continue
+            found, code = shell.run(f"PYTHONPATH='{ROOT}' {step.line}")
+            assert code == 0, found
+            assert difference(step.shown, found, Names()) is None
+    finally:
+        shell.close()
+    assert [kind for kind, _, _ in blocks(TEXT)] == ["python", "console"]
+
+
+def test_every_setting_is_told_with_its_value() -> None:
+    told = dict(re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", TEXT, flags=re.MULTILINE))
+    assert {name: float(value) for name, value in told.items()} == {
+        field.name: float(getattr(ChangeSettings(), field.name)) for field in fields(ChangeSettings)
+    }
+
+
+def test_the_verdicts_are_those_of_the_code() -> None:
+    source = (ROOT / "pipeline" / "history" / "changes.py").read_text(encoding="utf-8")
+    told = re.findall(r"``([a-z ]+)``", source.partition("verdict : str")[2].partition("why : str")[0])
+    table = TEXT.partition("| verdict |")[2].partition("\n\n")[0]
+    assert set(told) == set(re.findall(r"`([a-z ]+)`", table))
+    assert len(told) == 7

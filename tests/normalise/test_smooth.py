@@ -1,0 +1,52 @@
+"""The speed without its noise and its spikes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.lateral_speed import noise_std
+from pipeline.normalise.series import SECOND_NS, Series
+from pipeline.normalise.smooth import smoothed, without_spikes
+
+
+def slow(period_s: float = 1.0, noise: float = 0.05, seed: int = 0) -> tuple[Series, np.ndarray]:
+    time = np.arange(0.0, 900.0, period_s)
+    truth = 8.0 - 0.8 * np.sin(np.pi * time / 150.0) ** 2
+    read = truth + noise * np.random.default_rng(seed).standard_normal(time.size)
+    return Series((time * SECOND_NS).astype(np.int64), read), truth
+
+
+def test_most_of_the_noise_goes_and_the_speed_stays() -> None:
+    for period_s in (0.2, 1.0, 2.0):
+        read, truth = slow(period_s)
+        found = smoothed(read, noise_std(read))
+        np.testing.assert_array_equal(found.time_utc_ns, read.time_utc_ns)
+        assert np.std(found.value - truth) < 0.4 * 0.05
+        assert abs(np.mean(found.value - truth)) < 0.2 * 0.05
+
+
+def test_a_speed_without_noise_is_left_alone() -> None:
+    read, _ = slow(noise=0.0)
+    assert smoothed(read, 0.0) is read
+    few = Series(read.time_utc_ns[:8], read.value[:8])
+    assert smoothed(few, 0.05) is few
+
+
+def test_a_change_faster_than_the_noise_allows_is_not_smoothed_away() -> None:
+    time = np.arange(0.0, 600.0)
+    truth = 8.0 + np.sin(2 * np.pi * time / 20.0)
+    read = Series((time * SECOND_NS).astype(np.int64), truth + 0.02 * np.random.default_rng(1).standard_normal(600))
+    assert np.std(smoothed(read, noise_std(read)).value - truth) < 0.02
+
+
+def test_spikes_go_and_are_counted_steps_stay() -> None:
+    read, _ = slow()
+    value = read.value.copy()
+    value[[50, 200, 201, 640]] += [4.0, -3.0, -3.0, 6.0]
+    found, count = without_spikes(Series(read.time_utc_ns, value))
+    assert count == 4 and len(found) == len(read) - 4
+    assert without_spikes(read) == (read, 0) or without_spikes(read)[1] == 0
+    step = Series(
+        read.time_utc_ns, np.where(np.arange(len(read)) < 400, 8.0, 5.0) + 0.01 * np.sin(np.arange(len(read)))
+    )
+    assert without_spikes(step)[1] == 0

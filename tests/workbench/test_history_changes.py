@@ -1,0 +1,153 @@
+"""``kempf history --changes``: from parameter sets in a warehouse to what is told, and what is left out of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from schemas.profile import VesselProfile
+from tests.history.made import NAMES, UNITS, history, step
+from tests.warehouse.samples import inputs, parameter_set
+from tests.workbench.driving import Ran, kempf, refused
+from warehouse import parameter_sets, vessels
+from warehouse.parameter_set import Estimate, ParameterSet
+from warehouse.store import Warehouse
+
+VESSEL = "aurora"
+
+
+def made_sets(n: int, shift: np.ndarray | None = None, **changes: object) -> list[ParameterSet]:
+    h = history(n, shift=shift)
+    made = []
+    for i in range(n):
+        std = np.sqrt(np.diag(h.covariance[i]))
+        estimates = tuple(
+            Estimate(name, float(v), float(s), u) for name, v, s, u in zip(NAMES, h.value[i], std, UNITS, strict=True)
+        )
+        values: dict[str, object] = {
+            "parameters": estimates,
+            "covariance_names": NAMES,
+            "covariance": tuple(tuple(float(x) for x in row) for row in h.covariance[i]),
+            "segment_ids": (f"seg-{i}",),
+        }
+        made_of = inputs(start_utc_ns=int(h.time_utc_ns[i]), settings={"of": str(sorted(changes))})
+        made.append(parameter_set(VESSEL, made_of, **{**values, "settings": {}, **changes}))
+    return made
+
+
+@pytest.fixture
+def place(tmp_path: Path) -> Path:
+    vessels.register(Warehouse(str(tmp_path / "w")), VESSEL, VesselProfile())
+    return tmp_path / "w"
+
+
+def put(place: Path, *sets: ParameterSet) -> None:
+    parameter_sets.insert(Warehouse(str(place)), sets)
+
+
+def asked(place: Path, *more: object) -> Ran:
+    return kempf("history", "--vessel", VESSEL, "--changes", *more, "--warehouse", place)
+
+
+def test_a_new_rudder_is_told_to_a_person_and_to_a_program(place: Path, tmp_path: Path) -> None:
+    put(place, *made_sets(16, step(16, 9, b1=0.1, b2=0.1)))
+    document = asked(place, "--figure", tmp_path / "f.png", "--json").json
+    assert set(document) == {"vessel", "history", "changes"}
+    assert len(document["history"]) == 16 * 6
+    (one,) = document["changes"]
+    assert set(one) == {
+        *("model", "model_sha256", "estimator", "parameter_set_ids", "left_out", "sets", "occasions", "pooled"),
+        *("verdict", "why", "p_value", "level", "changes", "scatter_between_trials", "smallest_step_seen", "figure"),
+    }
+    assert (one["verdict"], one["sets"], len(one["occasions"])) == ("step", 16, 16)
+    assert one["pooled"]["poolable"] is False
+    (change,) = one["changes"]
+    assert set(change) == {
+        *("kind", "between", "interval", "confidence", "p_value", "bic_ahead_of_other_form", "parameters", "alone"),
+    }
+    assert change["between"] == [one["occasions"][8], one["occasions"][9]]
+    b2 = change["parameters"]["b2"]
+    assert set(b2) == {*("before", "change", "std", "low", "high", "percent", "percent_std", "unit", "moved")}
+    assert b2["moved"] and b2["unit"] == "1/m^2" and b2["low"] < 0.1 * 6.28e-05 < b2["high"]
+    assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
+    told = asked(place)
+    assert told.code == 0
+    assert "step between " in told.out and "are not one within their standard errors" in told.out
+    assert "seen with 90 % probability" in told.out
+
+
+def test_no_change_tells_what_would_have_been_seen(place: Path) -> None:
+    put(place, *made_sets(12))
+    (one,) = asked(place, "--json").json["changes"]
+    assert (one["verdict"], one["changes"]) == ("no change seen", [])
+    assert all(one["smallest_step_seen"][name]["percent"] > 0 for name in NAMES)
+    assert "no change seen" in asked(place).out
+
+
+def test_what_cannot_be_compared_is_left_out_and_counted(place: Path) -> None:
+    sets = made_sets(8)
+    nan = tuple((math.nan,) * 6 for _ in NAMES)
+    blind = tuple(replace(e, std=None) for e in sets[0].parameters)
+    put(place, *sets[:4])
+    put(place, replace(sets[4], convergence={"converged": False}))
+    put(place, replace(sets[5], segment_ids=("seg-0", "seg-1")))
+    put(place, replace(sets[6], segment_ids=("seg-0",)))
+    put(place, replace(sets[7], covariance=nan, parameters=blind))
+    (one,) = asked(place, "--json").json["changes"]
+    assert one["parameter_set_ids"] == [s.parameter_set_id for s in sets[:4]]
+    assert one["left_out"] == {
+        "made of several segments": 1,
+        "not converged": 1,
+        "of a segment that is there already": 1,
+        "without standard errors": 1,
+    }
+    assert "left out: 1 made of several segments" in asked(place).out
+
+
+def test_only_one_model_and_estimator_are_compared(place: Path) -> None:
+    put(place, *made_sets(4), *made_sets(4, estimator="paper"), *made_sets(3, model_name="tank", model_sha256="d" * 64))
+    told = asked(place, "--json").json["changes"]
+    assert [(one["model"], one["estimator"], one["sets"]) for one in told] == [
+        ("linear", "ml", 4),
+        ("tank", "ml", 3),
+        ("linear", "paper", 4),
+    ]
+    assert told[1]["verdict"] == "not testable with these data"
+    assert told[1]["p_value"] is None
+
+
+def test_trials_of_one_day_are_one_occasion_unless_said_otherwise(place: Path) -> None:
+    put(place, *(replace(s, start_utc_ns=10**18 + i * 3_600_000_000_000) for i, s in enumerate(made_sets(6))))
+    (one,) = asked(place, "--json").json["changes"]
+    assert (one["verdict"], len(one["occasions"])) == ("not testable with these data", 1)
+    assert "12 h" in one["why"]
+    (other,) = asked(place, "--occasion", "0", "--json").json["changes"]
+    assert len(other["occasions"]) == 6
+    assert other["verdict"] != one["verdict"]
+
+
+def test_without_sets_nothing_is_told(place: Path) -> None:
+    assert asked(place, "--json").json == {"vessel": VESSEL, "history": [], "changes": []}
+    assert "No parameter set" in asked(place).out
+    long_ago = asked(place, "--as-of", "2001-01-01", "--json").json
+    assert long_ago["changes"] == []
+
+
+def test_the_plain_history_is_as_it_was_and_loads_no_engine(place: Path) -> None:
+    put(place, *made_sets(4))
+    told = kempf("history", "--vessel", VESSEL, "--warehouse", place, "--json").json
+    assert isinstance(told, list) and len(told) == 24
+    assert asked(place, "--json").json["history"] == told
+
+
+def test_wrong_requests(place: Path, tmp_path: Path) -> None:
+    put(place, *made_sets(4))
+    plain = kempf("history", "--vessel", VESSEL, "--figure", tmp_path / "f.png", "--warehouse", place, "--json")
+    refused(plain, 2, "figure_without_changes")
+    refused(asked(place, "--figure", tmp_path / "f.txt", "--json"), 2, "figure_format")
+    refused(asked(place, "--figure", tmp_path / "no" / "f.png", "--json"), 2, "cannot_write")
+    refused(asked(place, "--occasion", "-1", "--json"), 2, "usage")
