@@ -43,6 +43,8 @@ def draw(levels: Sequence[float], error: Mapping[str, Mapping[str, Sequence[floa
     """
     figure, panels = plt.subplots(1, len(error), figsize=(6.2 * len(error), 6.2), sharey=True, layout="constrained")
     where = list(range(len(levels)))
+    # one scale for all panels; NaN, where a method gave nothing, compares as false and drops out
+    lowest = min(v for methods in error.values() for values in methods.values() for v in values if v > 0.0)
     for panel, (ship, methods) in zip(panels, error.items(), strict=True):
         for method, values in methods.items():
             colour, line, mark = STYLES[method]
@@ -53,7 +55,7 @@ def draw(levels: Sequence[float], error: Mapping[str, Mapping[str, Sequence[floa
             panel.plot(*zip(*inside, strict=True), mark, color=colour, ms=6, zorder=3) if inside else None
             panel.plot(above, [_TOP] * len(above), marker="$\\uparrow$", ls="", color=colour, ms=9, zorder=3)
         panel.set_yscale("log")
-        panel.set_ylim(top=1.3 * _TOP)
+        panel.set_ylim(0.7 * lowest, 1.3 * _TOP)
         panel.set_xticks(where, [f"{level:g}" for level in levels])
         panel.set_xlabel("disturbance, times the paper's (5e-3 m/s$^2$, 0.3 m/s)")
         panel.set_title(ship)

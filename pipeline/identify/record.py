@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.identify.agreement import Channels, check_agreement
+from pipeline.identify.checks import check_manoeuvre, check_sway, check_way
 from pipeline.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.instruments import Instruments
@@ -15,6 +17,8 @@ from schemas.errors import DataRejected
 
 #: columns of `Record.measured`
 MEASUREMENTS = ("lateral_speed", "yaw_rate", "heading")
+#: channels that are held against those that identification needs
+_COMPARED = ("speed_through_water", "latitude", "longitude")
 #: a log slower than this changes little in between; longer gaps are refused
 _MAX_SPEED_GAP_S = 60.0
 _MIN_INSTANTS = 40
@@ -115,6 +119,9 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     yaw = _cut(instruments, "yaw_rate", start_utc_ns, end_utc_ns)
     if yaw is None:
         warnings.append("no yaw rate channel: the yaw rate is estimated through the heading")
+    others = [_cut(instruments, name, start_utc_ns, end_utc_ns) for name in _COMPARED]
+    yaw, said = check_agreement(Channels(heading, course, ground_speed, yaw, *others), lateral)
+    warnings += said
     timed = [lateral.time_utc_ns, heading.time_utc_ns, rudder.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
@@ -123,6 +130,8 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     instants, speed = _trimmed(instants, speed, warnings)
     delta = rudder.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
+    warnings += [*check_manoeuvre(rudder, heading), *check_way(speed)]
+    warnings += check_sway(lateral, heading, rudder, yaw) if yaw is not None else ()
     measured = np.full((instants.size, 3), np.nan)
     _place(measured, 0, instants, lateral.time_utc_ns, lateral.value_m_s)
     if np.count_nonzero(np.isfinite(measured[:, 0])) < _MIN_INSTANTS // 2:

@@ -42,18 +42,20 @@ class Slope:
         return self.left_over < _TOGETHER
 
 
-def windows(*series: Series) -> Nanoseconds:
+def windows(*series: Series, most: int = _WINDOWS) -> Nanoseconds:
     """Return the edges of equal windows over what the series have in common, shape (n,); empty where that is little.
 
     Parameters
     ----------
     *series : Series
         Not empty.
+    most : int, optional
+        Windows at most.
     """
     start = max(int(one.time_utc_ns[0]) for one in series)
     end = min(int(one.time_utc_ns[-1]) for one in series)
     shortest = max(_SHORTEST_PERIODS * one.period_s for one in series)
-    count = int(min(_WINDOWS, (end - start) * 1e-9 / shortest)) if end > start else 0
+    count = int(min(most, (end - start) * 1e-9 / shortest)) if end > start else 0
     if count < _FEWEST:
         return np.empty(0, dtype=np.int64)
     edges: Nanoseconds = np.linspace(0, end - start, count + 1).astype(np.int64) + start

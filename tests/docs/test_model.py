@@ -19,7 +19,7 @@ def test_examples_are_valid_and_named(tmp_path: Path) -> None:
         path = tmp_path / "model.yaml"
         path.write_text("\n".join(lines), encoding="utf-8")
         found.append(read_model(path))
-    assert [(m.name, m.wind, m.current) for m in found] == [("tank", "none", "none"), ("paper", "force", "lateral")]
+    assert [(m.name, m.wind, m.current) for m in found] == [("tank", "force", "none"), ("paper", "force", "lateral")]
 
 
 def test_tank_example_is_the_file() -> None:
