@@ -33,7 +33,7 @@ PUBLISHED = {"Z_10_10_S": ((9.7, 20.5), (9.1, 19.7)), "Z_10_10_P": ((9.7, 17.8),
 METHODS = ("default", "tank", "regression")
 _TITLES = {
     "default": "Maximum likelihood, the default model (wind, current)",
-    "tank": "Maximum likelihood, `docs/models/tank.yaml` (neither)",
+    "tank": "Maximum likelihood, `docs/models/tank.yaml` (force and moment that change within seconds)",
     "regression": "Least squares, the first approximation (14)",
 }
 _TANK = Path(__file__).parents[1] / "docs" / "models" / "tank.yaml"
@@ -192,27 +192,27 @@ def meaning(found: list[Found]) -> list[str]:
     n = len(found)
     swift = sum(one.size_per_s > 0.95 * FASTEST_PER_S for one in found)
     loose = sum(not made.convergence["converged"] for made in _sets(found, "default"))
-    bound = sum("sigma_r" in made.convergence["active_bounds"] for made in _sets(found, "default"))
+    bound = sum("sigma_r" in made.convergence["active_bounds"] for made in _sets(found, "tank"))
+    wider = [made.convergence["widened"] for made in _sets(found, "tank")]
     return [
         "## How to read this",
         "",
         "- The tank measures almost without noise: third differences give 3e-8 rad/s for the yaw rate. What a linear",
         "  model leaves over is not noise but ship: cross-flow drag, speed loss, stall. At 20 Hz it comes in thousands",
-        "  of values, taken for independent, which are not: see the lag-1 autocorrelations. The standard errors of",
-        "  such sets are far too small.",
-        "- The default model is one for the sea. Here wind and current are free to explain what is ship, and without a",
-        "  wind arm in the profile the force does not turn her, so the yaw equation has no disturbance of its own. The",
-        f"  noise of the yaw rate falls to its lower bound in {bound} of {n} runs, and the likelihood bends the",
-        "  lateral speed, which the current may shift, until the yaw equation holds.",
-        f"- The search runs until she answers as fast as the likelihood allows ({FASTEST_PER_S:g} 1/s; the model's",
-        f"  own V/L is 0.17 1/s): {swift} of {n} sets lie at that limit, {loose} of {n} are stored as not converged.",
-        "- The model for a tank, with neither wind nor current, converges, and the 10/10 runs give a tanker. Most",
-        "  others do not: without a disturbance that takes up what (16) lacks, her answers at all speeds and drift",
-        "  angles go into six numbers. Every such set says that its prediction errors are not white.",
+        "  of values that are not independent. The standard errors are those of the sandwich (decision 0016), up to",
+        f"  {max(wider):.1f} times those of the information; they tell how far another stretch of the same run would",
+        "  move the parameters, not how far another rudder angle would.",
+        f"- The default model is one for the sea: {loose} of {n} runs end on no maximum, {swift}",
+        f"  at the limit of {FASTEST_PER_S:g} 1/s that the search sets (the model's own V/L is 0.17 1/s). With large",
+        "  rudder angles it is plausible, but a21' and a22' grow with the angle: the hull takes on what drifts.",
+        "- The model for a tank converges. Its force and moment take up within seconds what the linear ship lacks.",
+        "  Runs of 1 deg of heading, and the short 10/10 ones, hold too little besides that to tell the six apart;",
+        f"  the noise of the yaw rate is at its bound in {bound} of {n}.",
         "- Least squares is plausible in most runs, because there is hardly noise and no disturbance, which is what it",
         "  is good for; with 1 deg of heading and 5 deg of rudder it fails too.",
         "- Over the runs, parameters move with the rudder angle by many standard errors (see b2' by least squares).",
-        "  That is the mark of missing physics, not of scatter.",
+        "  That is the mark of missing physics, not of scatter. What one linear model makes of runs it has not seen is",
+        "  on [its own page](hsva_held_out.md).",
     ]
 
 

@@ -136,10 +136,7 @@ def _from_all_starts(
     """Let the starting points race on the thinned record and carry the best to the end on the whole one."""
     coarse = settings.bind(thinned(objective.record, settings.coarse_instants), objective.spec, objective.arm_per_m)
     entries = sorted(starting_points(objective.record), key=lambda start: -coarse.value(start[1]))[: settings.entries]
-    race: list[tuple[str, Search]] = []
-    for name, theta in entries:
-        ends = tuple(search for _, search in race)
-        race.append((name, climb(coarse, theta, settings.coarse_iterations, _RACE_DECREMENT, ends)))
+    race = [(name, climb(coarse, theta, settings.coarse_iterations, _RACE_DECREMENT)) for name, theta in entries]
     race.sort(key=lambda entry: -entry[1].log_likelihood)
 
     def to_the_end(theta: Float) -> Search:

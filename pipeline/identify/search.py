@@ -5,7 +5,7 @@ Where the model lacks something the expected information is not the curvature, a
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -17,9 +17,6 @@ from pipeline.normalise.series import Float
 _NEAR = 5.0
 #: damping after a step that did not rise: less changes only the weakest directions, and steps fail along others too
 _DAMPED = 0.1
-#: a maximum found before is met again where the log-likelihood is this close to its top, and as its curvature says
-_MET = 2.0
-_AS_EXPECTED = 0.5
 _HULL = 6
 
 
@@ -63,9 +60,7 @@ def free(objective: Objective, theta: Float, score: Float) -> Mask:
     return objective.active & ~pressed
 
 
-def climb(
-    objective: Objective, start: Float, max_iterations: int, decrement: float, known: tuple[Search, ...] = ()
-) -> Search:
+def climb(objective: Objective, start: Float, max_iterations: int, decrement: float) -> Search:
     """Climb from one start.
 
     Parameters
@@ -75,8 +70,6 @@ def climb(
     max_iterations : int
     decrement : float
         Converged when half the squared Newton decrement, the log-likelihood still to be gained, falls below this.
-    known : tuple of Search, optional
-        Where other searches of the same objective have ended: one that comes upon their hill ends there too.
 
     Returns
     -------
@@ -97,10 +90,6 @@ def climb(
         if gain < decrement:
             converged, reason = True, "the log-likelihood still to be gained is below the limit"
             break
-        met = next((one for one in known if _on_its_hill(one, theta, value)), None)
-        if met is not None:
-            reason = "came upon a maximum that another start had reached"
-            return replace(met, reason=reason, passes=tuple(passes))
         found = None
         while damping < 1e9:
             step = _bounded(damped_step(score, curvature, movable, damping), theta, scale)
@@ -120,13 +109,6 @@ def climb(
         curvature = information if gain > _NEAR else bfgs(curvature, step, before - score, movable)
         passes.append(Pass(theta, value, gain, damping))
     return Search(theta, value, score, information, converged, reason, tuple(passes))
-
-
-def _on_its_hill(top: Search, theta: Float, value: float) -> bool:
-    """Whether a point lies as high as the curvature at a maximum promises so near to it."""
-    away = theta - top.theta
-    below = 0.5 * float(away @ top.information @ away)
-    return top.converged and below < _MET and abs(top.log_likelihood - value - below) < _AS_EXPECTED
 
 
 def _bounded(step: Float, theta: Float, scale: Float) -> Float:

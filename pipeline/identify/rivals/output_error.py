@@ -16,6 +16,7 @@ from pipeline.identify.estimate import Estimate
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.record import Record
 from pipeline.identify.rivals.even import without_means
+from pipeline.identify.rivals.told import disturbed
 from schemas.model_spec import ModelSpec
 
 
@@ -53,7 +54,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Output
     still = spec.model_copy(update={"wind": "none", "moment": "none", "current": "none"})
     used = _without_means(record) if settings.remove_means else record
     found = maximum_likelihood.identify(used, still, arm_per_m, settings)
-    if still == spec:
+    if not disturbed(spec):
         return replace(found, estimator="output-error")
     unknown = "output-error knows nothing of wind and current: what they do is taken for the ship's own, or for noise"
     return replace(found, estimator="output-error", warnings=(unknown, *found.warnings))

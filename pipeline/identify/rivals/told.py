@@ -56,7 +56,7 @@ def told(
     whole = bool(np.all(np.isfinite(values)))
     step, speed = step_of(record), record.mean_speed_m_s
     said = [*record.warnings]
-    if spec.wind != "none" or spec.moment != "none" or spec.current != "none":
+    if disturbed(spec):
         said.append(f"{name} knows nothing of {blind_to}: what they do is taken for the ship's own, or for noise")
     if not converged:
         said.append(f"not converged: {reason}")
@@ -83,6 +83,11 @@ def told(
         fit=fit or {},
         warnings=tuple(said),
     )
+
+
+def disturbed(spec: ModelSpec) -> bool:
+    """Whether a model was asked for in which something acts besides the ship; a moment left open counts for none."""
+    return spec.wind != "none" or spec.moment == "gauss-markov" or spec.current != "none"
 
 
 def named(hull: Float) -> dict[str, float]:
