@@ -55,7 +55,7 @@ def draw_changes(
     panel.invert_yaxis()
     panel.set_xlabel("reported though nothing changed, %; dashed: the level promised")
     panel.grid(axis="x", lw=0.3)
-    panel.legend(fontsize=7, loc="lower right")
+    left.legend(fontsize=7, loc="outside upper center", ncols=4, frameon=False)
     panels = right.subplots(2, 2, sharex=True, sharey=True)
     names = list(dict.fromkeys(name for name, _ in curves))
     for one, name in zip(panels.flat, names, strict=True):

@@ -25,7 +25,7 @@ _STOPPED_SHARE = 0.1
 _STOPPED_M_S = 0.05
 _STOPPED_TIME = 0.02
 #: what yaw rate and rudder leave over of the lateral speed, in its noise, below which it says nothing of its own
-_NOTHING_OF_ITS_OWN = 1.1
+_NOTHING_OF_ITS_OWN = 1.03
 _NEIGHBOURS = 5
 
 

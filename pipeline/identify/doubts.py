@@ -48,7 +48,10 @@ def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
     """
     a11, _, a21, a22, b1, b2 = (float(p) for p in hull)
     vague = [name for name, value, error in zip(HULL_PARAMETERS, hull, std, strict=True) if error >= abs(value)]
-    found = [f"not determined, error as large as the value: {', '.join(vague)}"] if vague else []
+    found = []
+    if vague:
+        cure = "a zigzag of other angles or more legs, or several pooled, would tell"
+        found.append(f"not determined, error as large as the value ({cure}): {', '.join(vague)}")
     if a11 > 0:
         found.append("a11 is positive: sway would feed itself, no hull does; something acts that the model lacks")
     if a22 > 0:
