@@ -25,7 +25,7 @@ class ChangeSettings:
         Degrees of freedom of Student's t in the simulated histories: some trials go worse than their covariances say.
     caution : float
         Factor on the level inside: how far the scatter between trials is from known shows in no simulated history.
-        Without it up to 8 % instead of 5 % of histories of 4 or 5 sets are reported (`benchmarks/changes.py`).
+        At 1 the false alarms of histories of 4 or 5 scattering sets lay above the level.
     occasion_s : float
         Sets begun within this time are one occasion, s.
     power : float

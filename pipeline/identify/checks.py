@@ -98,7 +98,7 @@ def check_manoeuvre(rudder: Series, heading: Series) -> tuple[str, ...]:
         raise DataRejected(
             "rudder_unit",
             f"The rudder moves within {np.rad2deg(range_rad):.2f} deg only, yet the heading swings over "
-            f"{np.rad2deg(turned):.0f} deg: radians were taken for degrees, or something else steers.",
+            f"{np.rad2deg(turned):.0f} deg: radians were taken for degrees, or something else turns her.",
             "Write `unit: rad` for rudder_angle in the vessel profile if the log counts radians; else sail a zigzag of "
             "at least 5 degrees of rudder.",
             {"rudder_range_rad": range_rad, "heading_range_rad": turned},

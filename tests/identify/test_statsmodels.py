@@ -19,7 +19,7 @@ LEVELS = np.log([2e-3, np.exp(-400.0), 0.03, 0.05, 5e-4, np.exp(-400.0)])
 
 
 def kept(record: Record) -> Record:
-    """Instants at which lateral speed or yaw rate was measured, some of the values taken out, no heading measurement."""
+    """Instants at which lateral speed or yaw rate was measured, some values taken out, no heading measurement."""
     rows = np.isfinite(record.measured[:, :2]).any(axis=1)
     measured = record.measured[rows].copy()
     measured[:, 2] = np.nan

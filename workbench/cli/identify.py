@@ -45,6 +45,11 @@ def command(vessel: str, model: Path | None, estimator: str, uri: str, as_json: 
             _tell(outcome)
         if pooled is not None:
             tell_set(pooled, f"{len(pooled.segment_ids)} zigzags pooled: {pooled.parameter_set_id}")
+            out = len(outcomes) - len(pooled.segment_ids)
+            if out:
+                click.echo(
+                    f"  {out} zigzags are not in it: broken off, not converged, or the same manoeuvre in another log"
+                )
         click.echo(f"next: kempf history --vessel {vessel}, kempf params show ID, kempf rerun ID")
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if failed and len(failed) == len(outcomes):

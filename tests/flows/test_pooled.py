@@ -1,0 +1,71 @@
+"""The job that pools: one set of a vessel from several days, stored, built again bit for bit, not computed twice."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from flows.files import read_profiles
+from flows.identify_vessel import Request, identify_vessel
+from flows.ingest_logs import ingest
+from flows.pool_vessel import ALIAS, POOLED, pool_vessel
+from flows.reprocess_vessel import reprocess_vessel
+from flows.rerun_set import rerun
+from pipeline.simulate.csv_log import to_csv
+from pipeline.simulate.nmea_log import to_nmea
+from pipeline.simulate.trial import simulate_trial, zigzag_settings
+from tests.conftest import Ship
+from tests.flows.content import fresh
+from tests.workbench.driving import kempf
+from warehouse import aliases, parameter_sets
+from warehouse.store import Warehouse
+
+DAY_NS = 86_400_000_000_000
+
+
+@pytest.fixture(scope="module")
+def days(mariner: Ship, tmp_path_factory: pytest.TempPathFactory) -> Warehouse:
+    """Two days of the ship; the second one was logged twice."""
+    folder = mariner.write(tmp_path_factory.mktemp("days"))
+    settings = zigzag_settings("mariner", duration_s=400.0, seed=2)
+    second = simulate_trial(replace(settings, start_utc_ns=settings.start_utc_ns + DAY_NS, heading_deg=100.0))
+    (folder / "second.csv.gz").write_bytes(to_csv(second))
+    (folder / "second.nmea.gz").write_bytes(to_nmea(second))
+    warehouse = fresh(folder / "w")
+    paths = [folder / name for name in ("mariner.csv.gz", "second.csv.gz", "second.nmea.gz")]
+    done = ingest(warehouse, paths, given=read_profiles([folder / "profile.yaml"]))
+    assert [len(o.segments) for o in done] == [1, 1, 1]
+    return warehouse
+
+
+def test_two_days_make_one_set_which_is_built_again_and_not_twice(days: Warehouse) -> None:
+    outcomes = identify_vessel(days, "mariner", Request())
+    found = pool_vessel(days, "mariner", Request(), outcomes)
+    assert found is not None
+    pooled, new = found
+    assert new and pooled.estimator == POOLED
+    # the day that two loggers wrote counts once
+    assert len(outcomes) == 3 and len(pooled.segment_ids) == 2
+    starts = {o.segment.segment_id: o.segment.start_utc_ns for o in outcomes}
+    assert abs(starts[pooled.segment_ids[0]] - starts[pooled.segment_ids[1]]) > DAY_NS / 2
+    assert pooled.convergence["pooling"]["may_be_pooled"]
+    single = [o.parameter_set for o in outcomes if o.parameter_set]
+    assert all(pooled.parameters[5].std < 0.95 * one.parameters[5].std for one in single)
+    assert aliases.of_vessel(days, "mariner")[ALIAS] == pooled.parameter_set_id
+    assert rerun(days, pooled.parameter_set_id).verdict == "bit-identical"
+    again = pool_vessel(days, "mariner", Request(), outcomes)
+    assert again is not None and not again[1] and again[0].parameter_set_id == pooled.parameter_set_id
+    assert pool_vessel(days, "mariner", Request(estimator="least-squares"), outcomes) is None
+    assert pool_vessel(days, "mariner", Request(), outcomes[:1]) is None
+
+
+def test_reprocessing_keeps_the_pool_and_the_command_lists_it_last(days: Warehouse) -> None:
+    report = reprocess_vessel(days, "mariner")
+    assert report.status == "unchanged" and report.kept_sets == 4
+    listed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri), "--json").json
+    assert [one["estimator"] for one in listed] == ["ml", "ml", "ml", POOLED]
+    told = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri))
+    assert "2 zigzags pooled" in told.out and "1 zigzags are not in it" in told.out
+    assert len(parameter_sets.summaries(days, "mariner")) == 4
