@@ -79,12 +79,16 @@ def _by_cell(
         column = np.array([v[i] for v in values])
         shown = np.clip(column, low, high)
         panel.plot(x + 0.11 * (i - 2.5), shown, "o", ms=4, color=f"C{i}", label=name, clip_on=False)
-    panel.set_xticks(x, [f"{c.case.hull}\nx {c.case.scale:g}" for c in grid], fontsize=6.5)
+    panel.set_xticks(x, [f"x {c.case.scale:g}" for c in grid], fontsize=7)
+    for hull in dict.fromkeys(c.case.hull for c in grid):
+        middle = float(np.mean([k for k, c in enumerate(grid) if c.case.hull == hull]))
+        panel.text(middle, -0.09, hull, transform=panel.get_xaxis_transform(), ha="center", va="top", fontsize=8)
     for edge in np.arange(2.5, len(grid) - 1, 3.0):
         panel.axvline(edge, color="0.8", lw=0.6)
     panel.set_title(title, fontsize=10)
     panel.grid(axis="y", lw=0.3)
-    panel.legend(ncols=6, fontsize=7, frameon=False, loc="upper left")
+    covered = wanted[0] > 50.0
+    panel.legend(ncols=6, fontsize=7, frameon=False, loc="lower left" if covered else "upper left")
 
 
 def _scenario(panel: Axes, chosen: Sequence[Cell], paper_percent: Float) -> None:
@@ -97,7 +101,8 @@ def _scenario(panel: Axes, chosen: Sequence[Cell], paper_percent: Float) -> None
         panel.plot(at, 100 * c.rms, "o", ms=4.5, color=f"C{k}", label=c.case.hull)
         panel.plot(at, 100 * c.bound, "_", ms=9, color="k", label="bound at the truth" if k == 0 else None)
     panel.set_yscale("log")
-    panel.set_ylim(0.05, 60.0)
+    panel.set_ylim(0.05, 300.0)
     panel.set_xticks(x, _PARAMETERS)
     panel.set_ylabel("rms error, %")
+    panel.grid(axis="y", lw=0.3)
     panel.legend(ncols=4, fontsize=7, frameon=False, loc="upper left")

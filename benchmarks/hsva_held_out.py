@@ -132,8 +132,8 @@ def page(ways: list[Trained], chosen: tuple[float, float], grid: list[list[str]]
         for name, run in best.runs.items()
     ]
     return [
-        "KVLCC2 at model scale, HSVA, SIMMAN 2008 data, 20 Hz. Trained on Z_20_10_P and Z_20_10_S; free runs over whole",
-        "records from the measured initial state, the logged rudder and speed; mean over the runs of each run's rms.",
+        "KVLCC2 at model scale, HSVA, SIMMAN 2008 data, 20 Hz. Trained on Z_20_10_P and Z_20_10_S; free runs over",
+        "whole records from the measured initial state, the logged rudder and speed; mean over the runs of each run's rms.",
         "",
         f"**Held out, 11 runs: {yaw:.3f} deg/s and {sway:.4f} m/s** (wanted: {WANTED[0]} and {WANTED[1]}).",
         "",
@@ -146,8 +146,9 @@ def page(ways: list[Trained], chosen: tuple[float, float], grid: list[list[str]]
         "",
         "## What was chosen, and on what",
         "",
-        "How fast force and moment forget, and the power of V that the rudder's force goes with, are stated in a model,",
-        "not estimated. They were chosen by the product of both free-run errors over the two training runs, 1e-3 deg m/s2:",
+        "How fast force and moment forget, and the power of V that the rudder's force goes with, are stated in a",
+        "model, not estimated. They were chosen by the product of both free-run errors over the two training runs,",
+        "in 1e-3 deg m/s2:",
         "",
         *result_page.table(["rate, 1/s", *(f"V^{e:g}" for e in EXPONENTS)], grid),
         "",

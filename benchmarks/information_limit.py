@@ -37,6 +37,8 @@ from schemas.model_spec import ModelSpec
 
 SCALES = (0.3, 1.0, 3.0)
 VELOCITY, YAW_RATE, HEADING, RUDDER, LOG = 0.05, radians(0.03), radians(0.05), radians(0.1), 0.05
+#: fast enough that how the rudder moved between its readings does not matter
+RUDDER_HZ = 4.0
 #: the boat lives so many times faster than a Mariner, by V / L: her instruments are read faster, her trial is shorter
 HASTE = {"usv": 12.0}
 SPEC = ModelSpec()
@@ -58,18 +60,19 @@ _CHANNEL_OF = {channel.column: channel for channel in CHANNELS.values()}
 
 
 def instruments(case: Case) -> tuple[Instrument, ...]:
-    """Return what she carries: all ticks on the whole second, or the boat's twelfth of one; the rudder twice as fast."""
+    """Return what she carries, all on one clock: every second, the boat every twelfth of one; the rudder faster."""
     rate = HASTE.get(case.hull, 1.0)
     # a boat of 3 m whose noise is as small beside her motion as a ship's is: velocities by V, rates by V / L
     slow, fast = (0.25, HASTE["usv"]) if case.control == "noise of her size" else (1.0, 1.0)
     exact = 0.0 if case.control == "exact rudder and log" else 1.0
+    readings = 2.0 if case.control == "rudder at 2 Hz" else RUDDER_HZ
     return tuple(
         Instrument(name, rate * per, 0.0, 0.0, noise={quantity: std})
         for name, per, quantity, std in (
             ("gnss", 1.0, "velocity", slow * VELOCITY),
             ("heading", 1.0, "heading", HEADING),
             ("yaw_rate", 1.0, "yaw_rate", fast * YAW_RATE),
-            ("rudder", 2.0, "rudder_angle", exact * RUDDER),
+            ("rudder", readings, "rudder_angle", exact * RUDDER),
             ("log", 1.0, "speed_through_water", exact * slow * LOG),
         )
     )
@@ -170,21 +173,30 @@ def cases() -> list[Case]:
         Case("mariner", 1.0, environment="calm"),
         Case("mariner", 1.0, control="exact rudder and log"),
         Case("mariner", 1.0, control="y_v from the exact heading"),
+        Case("ferry", 0.3, control="rudder at 2 Hz"),
         Case("usv", 1.0, control="exact rudder and log"),
-        Case("usv", 1.0, control="noise of her size"),
+        *[Case("usv", scale, control="noise of her size") for scale in SCALES],
     ]
     return [*grid, *two, *drawn, *controls]
 
 
-def sail_all(wanted: Sequence[tuple[Case, int]], processes: int) -> list[Run]:
+def wanted(runs: int) -> list[tuple[Case, int]]:
+    """Return all runs, ``runs`` of a cell of the grid and a share of them of the other cells.
+
+    Cells take turns, so that an early stop would leave all of them equally far.
+    """
+    return [(case, number) for number in range(runs) for case in cases() if number < max(1, runs // case.share)]
+
+
+def sail_all(tasks: Sequence[tuple[Case, int]], processes: int) -> list[Run]:
     """Do all runs, in any order; return them sorted."""
-    order = {case: k for k, case in enumerate(dict.fromkeys(case for case, _ in wanted))}
+    order = {case: k for k, case in enumerate(dict.fromkeys(case for case, _ in tasks))}
     done: list[Run] = []
     with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
-        for one in as_completed([pool.submit(run, *task) for task in wanted]):
+        for one in as_completed([pool.submit(run, *task) for task in tasks]):
             done.append(one.result())
             if len(done) % 50 == 0:
-                print(f"{len(done)}/{len(wanted)}", file=sys.stderr, flush=True)
+                print(f"{len(done)}/{len(tasks)}", file=sys.stderr, flush=True)
     return sorted(done, key=lambda r: (order[r.case], r.number))
 
 
@@ -193,8 +205,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=200)
     parser.add_argument("--processes", type=int, default=2)
     options = parser.parse_args()
-    # one run of every cell after the other, so that an early stop would leave all cells equally far
-    runs = sail_all([(case, number) for number in range(options.runs) for case in cases()], options.processes)
+    runs = sail_all(wanted(options.runs), options.processes)
     print(write_page(runs, f"--runs {options.runs}").read_text(encoding="utf-8"))
 
 

@@ -25,6 +25,18 @@ class Case:
     with_heading: bool = True
     control: str = ""
 
+    @property
+    def on_grid(self) -> bool:
+        """Whether it is one of the hulls and noise levels in the paper's wind and stream, nothing else changed."""
+        return self.environment == "paper" and self.with_heading and not self.control
+
+    @property
+    def share(self) -> int:
+        """How many times fewer runs it gets than a cell of the grid."""
+        if self.on_grid:
+            return 1
+        return 4 if self.with_heading else 2
+
 
 @dataclass(frozen=True, eq=False)
 class Run:

@@ -8,9 +8,14 @@ to a11, a12, a21, a22 run along in the innermost axis, where the processor takes
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
+#: how what runs at every instant is compiled: put into its caller, and without counting references to arrays, which
+#: takes longer than the arithmetic; such a function may fill arrays but not make them
+STEP: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": True, "_nrt": False}
 #: rows and columns of the chain
 V, R, F, M, PSI = 0, 1, 2, 3, 4
 N_CHAIN = 5
@@ -27,7 +32,7 @@ _POWERS = _NODES ** np.arange(_ORDER + 1)[:, None]
 LONGEST = 0.5
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**STEP)
 def rates(theta, speed, arm, mu_F, mu_M, A, b):  # type: ignore[no-untyped-def]
     """Fill A, shape (2, 2), and b, shape (2,), at a speed; return the size of the chain's matrix in 1/s."""
     A[0, 0], A[0, 1], A[1, 0], A[1, 1] = theta[0] * speed, theta[1] * speed, theta[2] * speed, theta[3] * speed
@@ -36,9 +41,32 @@ def rates(theta, speed, arm, mu_F, mu_M, A, b):  # type: ignore[no-untyped-def]
     return abs(A[0, 0]) + abs(A[1, 1]) + np.sqrt(abs(A[0, 1] * A[1, 0])) + max(mu_F, mu_M)
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+@njit(**STEP, fastmath={"contract"})
 def discretise(  # type: ignore[no-untyped-def]
-    A, b, arm, mu_F, mu_M, h, u0, u1, speed, q_F, q_M, derivatives, Phi, g, held, Q, dPhi, dg, dheld, dQ, room
+    A,
+    b,
+    arm,
+    mu_F,
+    mu_M,
+    h,
+    u0,
+    u1,
+    speed,
+    q_F,
+    q_M,
+    derivatives,
+    Phi,
+    g,
+    held,
+    Q,
+    dPhi,
+    dg,
+    dheld,
+    dQ,
+    T,
+    dT,
+    answer,
+    danswer,
 ):
     """One exact step of h seconds, the rudder moving from u0 to u1.
 
@@ -50,7 +78,6 @@ def discretise(  # type: ignore[no-untyped-def]
     The answers to a unit of F and of M are summed at the nodes of a Gauss-Legendre rule by the way, because Q is the
     integral of their squares.
     """
-    T, dT, answer, danswer = room
     columns = 4 if q_M > 0.0 else 3
     for i in range(N_CHAIN):
         for c in range(N_CHAIN):

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
-from pipeline.identify.chain import LONGEST, N_CHAIN, PSI, M, R, V, discretise, rates, room_for_a_step
+from pipeline.identify.chain import LONGEST, N_CHAIN, PSI, STEP, M, R, V, discretise, rates, room_for_a_step
 from pipeline.normalise.series import Float
 
 #: theta = (a11, a12, a21, a22, b1, b2, log sigma_F, sigma_M, sigma_V, sigma_v, sigma_r, sigma_psi); the second half
@@ -29,14 +29,15 @@ FASTEST_PER_S = 10.0
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def _advance(x, P, dx, dP, F, g, Q, dF, dg, dQ, derivatives, chain, room):  # type: ignore[no-untyped-def]
+@njit(**STEP, fastmath={"contract"})
+def _advance(  # type: ignore[no-untyped-def]
+    x, P, dx, dP, F, g, Q, dF, dg, dQ, derivatives, chain, W, dW, dWt, moved, dmoved
+):
     """Let x <- F x + g, P <- F P F' + Q, and their derivatives.
 
     Derivatives of a matrix lie in rows (i, (c, j)), so that F acts on them row by row, on all columns and parameters
     at once. ``chain`` is how many states belong to the chain; only its rows of F depend on the parameters.
     """
-    W, dW, dWt, moved, dmoved = room
     n, width = x.size, x.size * N_THETA
     for i in range(n):
         moved[i] = g[i]
@@ -100,21 +101,27 @@ def _advance(x, P, dx, dP, F, g, Q, dF, dg, dQ, derivatives, chain, room):  # ty
             P[c, i] = total
 
 
-@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
-def _update(y, h, noise, level, x, P, dx, dP, derivatives, score, information, room):  # type: ignore[no-untyped-def]
-    """Take in one scalar y = h x + noise; return innovation and variance, set its score, add to the information."""
-    gain, dPh, de, dS, gains, tile = room
+@njit(**STEP, fastmath={"contract"})
+def _update(  # type: ignore[no-untyped-def]
+    y, h, row, noise, level, x, P, dx, dP, withheld, derivatives, score, information, gain, dPh, de, dS, gains, tile
+):
+    """Take in one scalar y = h x + noise; return innovation and variance, set its score, add to the information.
+
+    A withheld one is only predicted.
+    """
     n, width = x.size, x.size * N_THETA
     e, S = y, noise
     for i in range(n):
         total = 0.0
         for c in range(n):
-            total += P[i, c] * h[c]
+            total += P[i, c] * h[row, c]
         gain[i] = total
-        e -= h[i] * x[i]
-        S += h[i] * total
+        e -= h[row, i] * x[i]
+        S += h[row, i] * total
     if not (S > 0.0) or not np.isfinite(e):
         return e, -1.0
+    if withheld:
+        return e, S
     for i in range(n):
         gain[i] /= S
     if derivatives:
@@ -123,7 +130,7 @@ def _update(y, h, noise, level, x, P, dx, dP, derivatives, score, information, r
         for j in range(N_THETA):
             de[j], dS[j] = 0.0, 0.0
         for c in range(n):
-            f = h[c]
+            f = h[row, c]
             if f != 0.0:
                 # dP h, by symmetry a sum of rows
                 for q in range(width):
@@ -132,7 +139,7 @@ def _update(y, h, noise, level, x, P, dx, dP, derivatives, score, information, r
                     de[j] -= f * dx[c, j]
         dS[level] = 2.0 * noise
         for c in range(n):
-            f = h[c]
+            f = h[row, c]
             if f != 0.0:
                 for j in range(N_THETA):
                     dS[j] += f * dPh[c * N_THETA + j]
@@ -168,7 +175,7 @@ def _update(y, h, noise, level, x, P, dx, dP, derivatives, score, information, r
     return e, S
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**STEP)
 def _gather(  # type: ignore[no-untyped-def]
     states, chain, q_delta, Phi, g, held, Q, dPhi, dg, dheld, dQ, F, gs, Qs, dF, dgs, dQs, derivatives
 ):
@@ -204,7 +211,22 @@ def _gather(  # type: ignore[no-untyped-def]
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def likelihood(  # type: ignore[no-untyped-def]
-    theta, derivatives, time_s, speed, rudder, rudder_noise, measured, current_row, arm, mu_F, mu_M, mu_V, x0, P0, trace
+    theta,
+    derivatives,
+    time_s,
+    speed,
+    rudder,
+    rudder_noise,
+    measured,
+    withheld,
+    current_row,
+    arm,
+    mu_F,
+    mu_M,
+    mu_V,
+    x0,
+    P0,
+    trace,
 ):
     """Log-likelihood of one segment, its score and its expected Fisher information.
 
@@ -222,6 +244,8 @@ def likelihood(  # type: ignore[no-untyped-def]
         Intensity of the rudder's error before each instant, rad s^0.5; over a step the error is taken for constant.
     measured : ndarray, shape (n, 3)
         y_v, y_r, y_psi at the instants, NaN where not measured then.
+    withheld : ndarray of bool, shape (n,)
+        Instants whose measurements are predicted, innovation and variance told, and not taken in.
     current_row : ndarray, shape (n, 2)
         h_1 and h_2 at the instants; used where y_v is measured.
     arm, mu_F, mu_M, mu_V : float
@@ -253,12 +277,10 @@ def likelihood(  # type: ignore[no-untyped-def]
     Q, dQ = np.zeros((N_CHAIN, N_CHAIN, 2)), np.zeros((N_CHAIN, N_CHAIN, 4))
     F, gs, Qs = np.zeros((n, n)), np.zeros(n), np.zeros((n, n))
     dF, dgs, dQs = np.zeros((chain, chain, 4)), np.zeros((n, N_THETA)), np.zeros((n, n * N_THETA))
-    step_room = room_for_a_step()
-    room = (np.zeros((n, n)), np.zeros_like(dP), np.zeros_like(dP), np.zeros(n), np.zeros_like(dx))
-    update_room = (
-        *(np.zeros(n), np.zeros(n * N_THETA), np.zeros(N_THETA), np.zeros(N_THETA)),
-        *(np.zeros(n * N_THETA), np.zeros(n * N_THETA)),
-    )
+    T, dT, answer, danswer = room_for_a_step()
+    W, dW, dWt, moved, dmoved = np.zeros((n, n)), np.zeros_like(dP), np.zeros_like(dP), np.zeros(n), np.zeros_like(dx)
+    gain, de, dS = np.zeros(n), np.zeros(N_THETA), np.zeros(N_THETA)
+    dPh, gains, tile = np.zeros(n * N_THETA), np.zeros(n * N_THETA), np.zeros(n * N_THETA)
     h, first_current = np.zeros((3, n)), n
     for i in range(n):
         state = states[i]
@@ -274,6 +296,7 @@ def likelihood(  # type: ignore[no-untyped-def]
     if P0[M, M] <= 0.0:
         q_M = 0.0
     square_V = np.exp(2.0 * theta[LOG_V])
+    noises = np.exp(2.0 * theta[LOG_MEASUREMENT:])
     for k in range(time_s.size):
         if k > 0 and time_s[k] > time_s[k - 1]:
             span, U = time_s[k] - time_s[k - 1], 0.5 * (speed[k] + speed[k - 1])
@@ -292,32 +315,36 @@ def likelihood(  # type: ignore[no-untyped-def]
                 u0 = rudder[k - 1] + slope * sub
                 discretise(
                     *(A, b, arm, mu_F, mu_M, s, u0, u0 + slope, U, q_F, q_M, derivatives),
-                    *(Phi, g, held, Q, dPhi, dg, dheld, dQ, step_room),
+                    *(Phi, g, held, Q, dPhi, dg, dheld, dQ, T, dT, answer, danswer),
                 )
                 _gather(
                     *(states, chain, rudder_noise[k] * rudder_noise[k] / s, Phi, g, held, Q, dPhi, dg, dheld, dQ),
                     *(F, gs, Qs, dF, dgs, dQs, derivatives),
                 )
-                _advance(x, P, dx, dP, F, gs, Qs, dF, dgs, dQs, derivatives, chain, room)
+                _advance(x, P, dx, dP, F, gs, Qs, dF, dgs, dQs, derivatives, chain, W, dW, dWt, moved, dmoved)
         for i in range(currents):
             h[0, first_current + i] = current_row[k, i]
         for channel in range(3):
             if np.isnan(measured[k, channel]):
                 continue
             level = LOG_MEASUREMENT + channel
-            noise = np.exp(2.0 * theta[level])
+            noise = noises[channel]
             e, S = _update(
                 measured[k, channel],
-                *(h[channel], noise, level, x, P, dx, dP, derivatives, one, information, update_room),
+                *(h, channel, noise, level, x, P, dx, dP, withheld[k], derivatives, one, information),
+                *(gain, dPh, de, dS, gains, tile),
             )
             if S < 0.0:
                 return -np.inf, score, information
-            log_likelihood -= 0.5 * (_LOG_2PI + np.log(S) + e * e / S)
-            score += one
+            if not withheld[k]:
+                log_likelihood -= 0.5 * (_LOG_2PI + np.log(S) + e * e / S)
+                if derivatives:
+                    for j in range(N_THETA):
+                        score[j] += one[j]
             if innovation.shape[0] > 0:
                 innovation[k, channel] = e
                 variance[k, channel] = S
-            if scores.shape[0] > 0:
+            if scores.shape[0] > 0 and not withheld[k]:
                 scores[k, channel] = one
         if filtered.shape[0] > 0:
             filtered[k], spread[k] = 0.0, 0.0

@@ -85,9 +85,9 @@ class Likelihood:
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
             spec.current_correlation_rate_per_s,
         )
-        inputs = (record.time_s, record.speed_m_s, record.rudder_rad)
-        measurements = (record.rudder_noise_rad_sqrt_s, record.measured, row)
-        self._fixed = (*inputs, *measurements, arm_per_m, *rates, np.zeros(N_STATE), P0)
+        taken = np.zeros(record.time_s.size, dtype=np.bool_)
+        inputs = (record.time_s, record.speed_m_s, record.rudder_rad, record.rudder_noise_rad_sqrt_s)
+        self._fixed = (*inputs, record.measured, taken, row, arm_per_m, *rates, np.zeros(N_STATE), P0)
         self.low = np.concatenate([np.full(6, -np.inf), np.log(sigma_low)])
         self.high = np.concatenate([np.full(6, np.inf), np.log(sigma_high)])
         # a disturbance that the specification leaves out has no intensity at all
@@ -112,6 +112,24 @@ class Likelihood:
             np.zeros((n if scores else 0, 3, N_THETA)),
         )
         likelihood(theta, scores, *self._fixed, kept)
+        return Trace(*kept)
+
+    def predict(self, theta: Float, withheld: Mask) -> Trace:
+        """Run the filter with some instants' measurements withheld; they are predicted, not taken in.
+
+        Parameters
+        ----------
+        theta : ndarray, shape (12,)
+        withheld : ndarray of bool, shape (n,)
+        """
+        n = self.record.time_s.size
+        kept = (
+            *(np.full((n, 3), np.nan), np.full((n, 3), np.nan)),
+            *(np.full((n, N_STATE), np.nan), np.full((n, N_STATE), np.nan)),
+            np.zeros((0, 3, N_THETA)),
+        )
+        before, after = self._fixed[:5], self._fixed[6:]
+        likelihood(theta, False, *before, withheld, *after, kept)  # noqa: FBT003 - the same
         return Trace(*kept)
 
     def answers_per_s(self, theta: Float) -> float:

@@ -192,6 +192,9 @@ def _priors(records: list[Record], spec: ModelSpec, no_log: NoLogSettings) -> Pr
 def _hull_gradient(motion: Motion, parameters: Float, own: int, number: int, std: Float) -> Float:
     """Return d (mean speed of the run ``own``) / d (hull parameters of the run ``number``), shape (6,)."""
     gradient = np.empty(6)
+    if not np.all(np.isfinite(std)):
+        # a hull without standard errors leaves the speed without one
+        return np.full(6, np.nan)
     fit = motion.fits[number]
     for i in range(6):
         step = 0.1 * std[i]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from pipeline.identify.agreement import Channels, check_agreement
 from pipeline.identify.checks import check_manoeuvre, check_sway, check_way
+from pipeline.identify.jumps import find_jumps
 from pipeline.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.instruments import Instruments
@@ -122,6 +123,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     others = [_cut(instruments, name, start_utc_ns, end_utc_ns) for name in _COMPARED]
     yaw, said = check_agreement(Channels(heading, course, ground_speed, yaw, *others), lateral)
     warnings += said
+    lateral = _without_jumps(lateral, warnings)
     timed = [lateral.time_utc_ns, heading.time_utc_ns, rudder.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
@@ -221,6 +223,24 @@ def _speed(
         )
     # smoothing takes away what is fast and leaves the intensity of what is slow
     return speed, noise * float(np.sqrt(log.period_s))
+
+
+def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:
+    found = find_jumps(lateral)
+    count = int(np.count_nonzero(found.inside))
+    if found.unresolved:
+        warnings.append(
+            f"the GNSS velocity leaps {found.unresolved} times as no ship can, and nothing tells which side is right: "
+            "all of it is kept; look at the receiver"
+        )
+    if not count:
+        return lateral
+    warnings.append(f"{count} gross errors of lateral_speed left out before the fit: jumps of the GNSS velocity")
+    sound = {
+        name: np.where(found.inside, np.nan, getattr(lateral, name))
+        for name in ("value_m_s", "std_m_s", "forward_m_s", "drift_rad")
+    }
+    return replace(lateral, **sound)
 
 
 def _rudder_noise(rudder: Series, delta: Float, speed: Float, speed_noise: float) -> Float:

@@ -37,8 +37,19 @@ class Case:
 
     def arguments(self) -> tuple[Any, ...]:
         """In the order of the kernel, after theta and derivatives."""
-        inputs = (self.time_s, self.speed, self.rudder, self.rudder_noise, self.measured, self.current_row)
-        return (*inputs, self.arm, self.wind_rate, self.moment_rate, self.current_rate, self.x0, self.P0)
+        inputs = (self.time_s, self.speed, self.rudder, self.rudder_noise, self.measured)
+        taken = np.zeros(self.time_s.size, dtype=np.bool_)
+        return (
+            *inputs,
+            taken,
+            self.current_row,
+            self.arm,
+            self.wind_rate,
+            self.moment_rate,
+            self.current_rate,
+            self.x0,
+            self.P0,
+        )
 
 
 def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -239,6 +240,20 @@ def test_a_drift_that_no_linear_hull_has_is_not_taken_for_a_current() -> None:
     assert any("eq. (16) lacks" in warning for warning in wary.warnings)
     trusting = identify_without_log(bent, SPEC, arm, SETTINGS, NoLogSettings(hull_misfit=0.0)).report["speed"]
     assert abs(trusting["mean_m_s"] - truth) > 5.0 * trusting["std_m_s"]
+
+
+def test_a_hull_without_standard_errors_leaves_the_speed_without_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    trial, (record, _) = sailed(0.6)
+    identify = maximum_likelihood.identify
+
+    def blind(*given: Any) -> Estimate:
+        return replace(identify(*given), covariance=np.full((6, 6), np.nan))
+
+    monkeypatch.setattr(maximum_likelihood, "identify", blind)
+    estimate = identify_without_log(record, SPEC, trial.truth.wind_arm_per_m, SETTINGS, NoLogSettings(max_rounds=1))
+    assert np.isnan(estimate.report["speed"]["std_m_s"])
+    assert all(np.isnan(p.std) and np.isfinite(p.value) for p in estimate.parameters)
+    assert not estimate.converged and any("still moved" in warning for warning in estimate.warnings)
 
 
 def test_two_calls_give_the_same_bits() -> None:
