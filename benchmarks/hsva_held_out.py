@@ -133,7 +133,7 @@ def page(ways: list[Trained], chosen: tuple[float, float], grid: list[list[str]]
     ]
     return [
         "KVLCC2 at model scale, HSVA, SIMMAN 2008 data, 20 Hz. Trained on Z_20_10_P and Z_20_10_S; free runs over",
-        "whole records from the measured initial state, the logged rudder and speed; mean over the runs of each run's rms.",
+        "whole records from the measured initial state, logged rudder and speed; mean over the runs of each one's rms.",
         "",
         f"**Held out, 11 runs: {yaw:.3f} deg/s and {sway:.4f} m/s** (wanted: {WANTED[0]} and {WANTED[1]}).",
         "",

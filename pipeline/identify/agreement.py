@@ -187,7 +187,7 @@ def _refuse_rate(rate: Slope, course: Slope | None) -> None:
         )
     wrong = "heading" if backwards else "yaw_rate"
     raise DataRejected(
-        f"{wrong}_sign",
+        "heading_sign" if backwards else "yaw_rate_sign",
         f"{found}: the sign of {wrong} is wrong.",
         f"Write `positive: port` for {wrong} {_PROFILE}.",
         details,

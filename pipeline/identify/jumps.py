@@ -17,12 +17,14 @@ from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds, Series
 
 #: a change beyond so many robust standard deviations of the changes over such a time is a leap
 _LEAP = 6.0
+#: and if it is so many times the changes beside it, so many readings on either side
+_SUDDEN, _BESIDE = 4.0, 3
 #: a stretch is at most so long, and all of them at most this share of the readings; else it is no gross error
 _LONGEST_S = 90.0
 _LARGEST_SHARE = 0.2
 _FEWEST = 20
-#: a velocity that leaps more often than this leaps for another reason
-_MOST_PIECES = 250
+#: a velocity that is broken more often than this is broken for another reason
+_MOST_BREAKS = 250
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,7 +35,8 @@ class Jumps:
     ----------
     inside : ndarray of bool, shape (n,)
     unresolved : int
-        Leaps where so much would have to go that nothing tells which side of them is right; none is taken out then.
+        Leaps where so much would have to go, or so little, that nothing tells which side of them is right; none is
+        taken out then.
     """
 
     inside: NDArray[np.bool_]
@@ -67,19 +70,26 @@ def find_jumps(lateral: LateralSpeed) -> Jumps:
     motion = _Motion(
         lateral.time_utc_ns[known], np.column_stack([lateral.forward_m_s[known], lateral.value_m_s[known]])
     )
-    leaps = motion.leaps()
+    breaks, leaps = motion.breaks()
     if leaps.size == 0:
         return Jumps(inside, 0)
-    edges = np.concatenate([[0], leaps + 1, [known.size]])
-    if leaps.size > _MOST_PIECES:
-        return Jumps(inside, int(leaps.size))
+    edges = np.concatenate([[0], breaks + 1, [known.size]])
     wild = np.ones(known.size, dtype=np.bool_)
-    for piece in _longest_chain(motion, edges):
+    for piece in _longest_chain(motion, edges) if breaks.size <= _MOST_BREAKS else ():
         wild[edges[piece] : edges[piece + 1]] = False
-    if np.count_nonzero(wild) > _LARGEST_SHARE * known.size:
+    _spare_smooth(wild, leaps)
+    if np.count_nonzero(wild) > _LARGEST_SHARE * known.size or not wild.any():
         return Jumps(inside, int(leaps.size))
     inside[known[wild]] = True
     return Jumps(inside, 0)
+
+
+def _spare_smooth(wild: NDArray[np.bool_], leaps: NDArray[np.intp]) -> None:
+    """Keep the stretches that the velocity neither leaps into nor out of."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], wild, [False]]).astype(np.int8)))
+    for first, end in edges.reshape(-1, 2):
+        if not np.any((leaps >= first - 1) & (leaps < end)):
+            wild[first:end] = False
 
 
 class _Motion:
@@ -98,10 +108,20 @@ class _Motion:
         self._noise = np.array([noise_std(Series(time_ns, column)) for column in velocity.T])
         self._limits: dict[int, Float] = {}
 
-    def leaps(self) -> NDArray[np.intp]:
-        """Return the readings that the next one does not go on from."""
-        far = np.any(np.abs(np.diff(self.velocity, axis=0)) > self._limit(1), axis=1)
-        return np.array([k for k in np.flatnonzero(far) if not self.goes_on(int(k), int(k) + 1)], dtype=np.intp)
+    def breaks(self) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+        """Return the readings that the next one does not go on from, and those of them where it leaps away.
+
+        Without noise a ship's quickest changes are far from the usual too, but then she goes on changing.
+        """
+        change = np.abs(np.diff(self.velocity, axis=0))
+        far = np.flatnonzero(np.any(change > self._limit(1), axis=1))
+        breaks = np.array([k for k in far if not self.goes_on(k, k + 1)], dtype=np.intp)
+        padded = np.pad(change, ((_BESIDE, _BESIDE), (0, 0)), mode="reflect")
+        beside = [np.median(np.delete(padded[k : k + 2 * _BESIDE + 1], _BESIDE, axis=0), axis=0) for k in breaks]
+        sudden = [
+            np.any(change[k] > np.maximum(self._limit(1), _SUDDEN * b)) for k, b in zip(breaks, beside, strict=True)
+        ]
+        return breaks, breaks[np.array(sudden, dtype=np.bool_)]
 
     def goes_on(self, first: int, second: int) -> bool:
         """Whether one reading can follow another, however much later within the longest stretch."""

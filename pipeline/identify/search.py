@@ -15,6 +15,8 @@ from pipeline.normalise.series import Float
 
 #: with less log-likelihood than this to gain, steps tell more of the curvature than the expected information
 _NEAR = 5.0
+#: share of its promise that a step must keep for the expected information to be trusted with the next one
+_KEPT = 0.1
 #: damping after a step that did not rise: less changes only the weakest directions, and steps fail along others too
 _DAMPED = 0.1
 _HULL = 6
@@ -105,8 +107,12 @@ def climb(objective: Objective, start: Float, max_iterations: int, decrement: fl
             break
         damping = damping / 10.0 if damping > 1e-9 else 0.0
         step, before = found - theta, score
+        rise, far = there[0] - value, gain > _NEAR
         theta, (value, score, information) = found, there
-        curvature = information if gain > _NEAR else bfgs(curvature, step, before - score, movable)
+        if far and rise > _KEPT * gain:
+            curvature = information
+        else:
+            curvature = bfgs(information if far else curvature, step, before - score, movable)
         passes.append(Pass(theta, value, gain, damping))
     return Search(theta, value, score, information, converged, reason, tuple(passes))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +13,8 @@ from pipeline.normalise.series import Float
 
 #: lengths whose Mariner-like ship is tried, m: from a harbour drone to a supertanker, a factor 1.6 apart
 _LENGTHS_M = tuple(float(f"{1.5 * 1.6**k:.4g}") for k in range(12))
+#: changes of the rudder's side that the race of the starting points needs at most; a zigzag of 20 minutes has about ten
+_TURNS = 30
 
 
 def starting_points(record: Record) -> list[tuple[str, Float]]:
@@ -47,8 +50,10 @@ def _noise_start(record: Record) -> Float:
 def thinned(record: Record, instants: int) -> Record:
     """Return the record with about this many of its instants, for the race of the starting points.
 
-    Whole instants are dropped, so measurements stay where they were made; each kind of measurement keeps its share.
+    Whole instants are dropped, so measurements stay where they were made; each kind of measurement keeps its share. Of
+    a long record only the beginning takes part: thinned over all of it, nothing of the single turns would be left.
     """
+    record = _beginning(record)
     measured = [np.flatnonzero(np.isfinite(column)) for column in record.measured.T]
     # counted by what was measured: many readings of the rudder in between must not thin the measurements out
     every = max(1, round(len(np.unique(np.concatenate(measured))) / instants))
@@ -56,12 +61,24 @@ def thinned(record: Record, instants: int) -> Record:
     keep[[0, -1]] = True
     for rows in measured:
         keep[rows[::every]] = True
+    return _kept(record, keep)
+
+
+def _beginning(record: Record) -> Record:
+    """Cut a record after `_TURNS` changes of the rudder's side; whole if there are fewer."""
+    over = np.abs(record.rudder_rad) > 0.5 * float(np.std(record.rudder_rad))
+    side = np.sign(record.rudder_rad[over])
+    turns = np.flatnonzero(over)[1:][side[1:] != side[:-1]]
+    return _kept(record, slice(0, int(turns[_TURNS]))) if turns.size > _TURNS else record
+
+
+def _kept(record: Record, rows: Any) -> Record:
     return replace(
         record,
-        time_s=record.time_s[keep],
-        speed_m_s=record.speed_m_s[keep],
-        rudder_rad=record.rudder_rad[keep],
-        rudder_noise_rad_sqrt_s=record.rudder_noise_rad_sqrt_s[keep],
-        measured=record.measured[keep],
-        heading_rad=record.heading_rad[keep],
+        time_s=record.time_s[rows],
+        speed_m_s=record.speed_m_s[rows],
+        rudder_rad=record.rudder_rad[rows],
+        rudder_noise_rad_sqrt_s=record.rudder_noise_rad_sqrt_s[rows],
+        measured=record.measured[rows],
+        heading_rad=record.heading_rad[rows],
     )
