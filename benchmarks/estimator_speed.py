@@ -159,7 +159,7 @@ def against_statsmodels(own: list[Sailed]) -> list[str]:
     head = ["record", "Kempf, ms", "statsmodels, s", "gradients", "log-likelihood beside ours", "times Kempf"]
     return [
         f"statsmodels {version('statsmodels')}: the same states, measurements and exact steps "
-        "(benchmarks/statsmodels_likelihood.py; tests/identify/test_statsmodels.py holds the two log-likelihoods together). "
+        "(benchmarks/statsmodels_likelihood.py; that the log-likelihoods agree: tests/identify/test_statsmodels.py). "
         "Its own `.fit()` with L-BFGS and differences, from the start that our race takes for the likeliest, its "
         "parameters scaled by that start, no covariance; ours is the whole fit with race, gross errors and report.",
         "",

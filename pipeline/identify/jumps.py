@@ -115,7 +115,7 @@ class _Motion:
         """
         change = np.abs(np.diff(self.velocity, axis=0))
         far = np.flatnonzero(np.any(change > self._limit(1), axis=1))
-        breaks = np.array([k for k in far if not self.goes_on(k, k + 1)], dtype=np.intp)
+        breaks = np.array([k for k in far if not self.goes_on(int(k), int(k) + 1)], dtype=np.intp)
         padded = np.pad(change, ((_BESIDE, _BESIDE), (0, 0)), mode="reflect")
         beside = [np.median(np.delete(padded[k : k + 2 * _BESIDE + 1], _BESIDE, axis=0), axis=0) for k in breaks]
         sudden = [

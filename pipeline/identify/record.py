@@ -102,7 +102,8 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     Raises
     ------
     DataRejected
-        A channel is missing, not finite, has a gap that cannot be bridged, or the rudder did not move.
+        A channel is missing, not finite, has a gap that cannot be bridged, stands still or contradicts another; the
+        rudder or the ship did not move; `docs/bad_input.md` has every code.
     """
     warnings: list[str] = []
     heading = _need(instruments, "heading", start_utc_ns, end_utc_ns)
@@ -134,6 +135,26 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     _check(instants, delta, rudder)
     warnings += [*check_manoeuvre(rudder, heading), *check_way(speed)]
     warnings += check_sway(lateral, heading, rudder, yaw) if yaw is not None else ()
+    measured = _measured(instants, lateral, yaw, heading)
+    noise = np.array([float(np.nanmedian(lateral.std_m_s)), noise_std(yaw) if yaw else np.nan, noise_std(heading)])
+    return Record(
+        start_utc_ns=int(instants[0]),
+        time_s=(instants - instants[0]).astype(np.float64) / SECOND_NS,
+        speed_m_s=speed,
+        rudder_rad=delta,
+        measured=measured,
+        heading_rad=heading.at(instants, gap_limit_s(heading)),
+        heading_origin_rad=float(heading.value[0]),
+        rudder_period_s=rudder.period_s,
+        rudder_noise_rad_sqrt_s=_rudder_noise(rudder, delta, speed, speed_noise),
+        lateral=lateral,
+        noise_start=noise,
+        warnings=tuple(warnings),
+    )
+
+
+def _measured(instants: Nanoseconds, lateral: LateralSpeed, yaw: Series | None, heading: Series) -> Float:
+    """Lay the measurements out at their instants, shape (n, 3), the heading counted from its first value."""
     measured = np.full((instants.size, 3), np.nan)
     _place(measured, 0, instants, lateral.time_utc_ns, lateral.value_m_s)
     if np.count_nonzero(np.isfinite(measured[:, 0])) < _MIN_INSTANTS // 2:
@@ -146,23 +167,8 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     if yaw is not None:
         _place(measured, 1, instants, yaw.time_utc_ns, yaw.value)
     _place(measured, 2, instants, heading.time_utc_ns, heading.value)
-    origin = float(heading.value[0])
-    measured[:, 2] -= origin
-    noise = np.array([float(np.nanmedian(lateral.std_m_s)), noise_std(yaw) if yaw else np.nan, noise_std(heading)])
-    return Record(
-        start_utc_ns=int(instants[0]),
-        time_s=(instants - instants[0]).astype(np.float64) / SECOND_NS,
-        speed_m_s=speed,
-        rudder_rad=delta,
-        measured=measured,
-        heading_rad=heading.at(instants, gap_limit_s(heading)),
-        heading_origin_rad=origin,
-        rudder_period_s=rudder.period_s,
-        rudder_noise_rad_sqrt_s=_rudder_noise(rudder, delta, speed, speed_noise),
-        lateral=lateral,
-        noise_start=noise,
-        warnings=tuple(warnings),
-    )
+    measured[:, 2] -= float(heading.value[0])
+    return measured
 
 
 def _cut(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> Series | None:
