@@ -214,7 +214,8 @@ def test_without_an_earth_current_only_a_trial_speed_tells() -> None:
     assert vague.report["speed"]["std_m_s"] > 1.0
     known = NoLogSettings(trial_speed_m_s=trial.settings.hull.trial_speed_m_s, trial_speed_std_m_s=0.1)
     speed = found(known, current="lateral").report["speed"]
-    assert speed["std_m_s"] < 0.4
+    # a stream fixed in the earth taken for lateral is a wrong model: its errors are not white and all is widened
+    assert speed["std_m_s"] < 0.7 * vague.report["speed"]["std_m_s"]
     assert abs(speed["mean_m_s"] - true_speed(trial, record)) < 3.0 * speed["std_m_s"]
 
 
