@@ -224,7 +224,7 @@ def one_fit() -> list[str]:
             free = str(int(np.count_nonzero(bound.active)))
             rows.append([f"{hull} {seed}", str(sailed.record.time_s.size), free, steps, *times, str(found.converged)])
     under = sum(m < TARGET_MS for m in medians)
-    head = ["record", "samples", "free parameters", "steps at the end", "median, ms", "fastest, ms", "converged"]
+    head = ["record", "samples", "free parameters", "last steps", "median, ms", "fastest, ms", "converged"]
     return [
         *result_page.table(head, rows),
         "",
@@ -293,7 +293,8 @@ def threads(sailed: list[Sailed]) -> list[str]:
         f"{len(sailed)} separate fits by the clock, fastest of 8: one thread {single:.2f} s, two threads "
         f"{double:.2f} s, {single / double:.2f} times as fast. Of {os.cpu_count()} processors the process got "
         f"{of_one:.2f} with one thread and {of_two:.2f} with two; what it lacks to 1 and 2 went to others on the "
-        f"machine or to waiting. {100.0 * compiled / whole:.0f} % of a fit runs in the kernel, outside the interpreter's lock.",
+        f"machine or to waiting. "
+        f"{100.0 * compiled / whole:.0f} % of a fit runs in the kernel, outside the interpreter's lock.",
     ]
 
 
@@ -307,10 +308,9 @@ class _Watched(MaximumLikelihoodSettings):
         def watched(function: Callable[..., Any]) -> Callable[..., Any]:
             def call(*arguments: Any, **named: Any) -> Any:
                 begin = time.thread_time()
-                try:
-                    return function(*arguments, **named)
-                finally:
-                    noted.append(time.thread_time() - begin)
+                result = function(*arguments, **named)
+                noted.append(time.thread_time() - begin)
+                return result
 
             return call
 

@@ -131,7 +131,7 @@ def _boat(as_is: Cell, exact: Cell, sized: Cell) -> str:
         f"{100 * exact.bound[5]:.1g} %. With an exact rudder and log the bias is {_biases(exact)} in the "
         f"{len(exact.z)} of {exact.runs} runs that converge; as it is {_biases(as_is)}, and sigma_r comes out at "
         f"{np.rad2deg(as_is.levels['sigma_r']):.3f} deg/s where it is 0.030. The likely reason: the estimator takes "
-        "the speed's error for a shake of the rudder of twice its relative size, though in a turn a V v + a V r gives half "
-        "of that back. Too much process noise makes the filter follow the measured yaw rate, a regression on noisy "
-        f"values. With noise as small beside her motion as a ship's is the bias is {_biases(sized)}."
+        "the speed's error for a shake of the rudder of twice its relative size, though in a turn a V v + a V r gives "
+        "half of that back. Too much process noise makes the filter follow the measured yaw rate, a regression on "
+        f"noisy values. With noise as small beside her motion as a ship's is the bias is {_biases(sized)}."
     )

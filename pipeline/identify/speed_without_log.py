@@ -31,9 +31,11 @@ from pipeline.model.longitudinal import Surge
 from pipeline.model.smoother import LinearSystem, last_state, smooth
 from pipeline.normalise.series import Float
 
-#: bounds of T in s, of the wander of V over its mean in 1/s^0.5, of the noise of y_u in m/s; the wander is never taken
-#: for nothing, because no ship keeps to the longitudinal equation: 0.8 % of V in a minute
-_T_S, _WANDER, _NOISE_M_S = (2.0, 3000.0), (1e-3, 0.03), (1e-4, 2.0)
+#: bounds of T in s, of the wander of V over its mean in 1/s^0.5, of the noise of y_u in m/s
+_T_S, _WANDER, _NOISE_M_S = (2.0, 3000.0), (1e-5, 0.03), (1e-4, 2.0)
+#: no ship keeps to the longitudinal equation: once T is found, V is let wander by 0.8 % in a minute at least. Not
+#: before: a T too short would explain why she wanders less
+_LEAST_WANDER = 1e-3
 _GATE = 5.0
 #: of the logarithms of T and the noise levels, for finite differences
 _STEP = 0.05
@@ -97,6 +99,7 @@ class Motion:
         mean = float(np.mean([np.nanmean(run.along_m_s) for run in runs]))
         bounds = np.array([_T_S, (_WANDER[0] * mean, _WANDER[1] * mean), _NOISE_M_S])
         self.low, self.high = np.log(bounds).T
+        self.least_wander = float(np.log(_LEAST_WANDER * mean))
         self.start = np.log([60.0, 2e-3 * mean, 0.1])
 
     def system(self, parameters: Float, averaged: int = 0) -> LinearSystem:
@@ -120,7 +123,7 @@ class Motion:
 
         bounds = list(zip(self.low, self.high, strict=True))
         # a slow ship that obeys and a quick one that wanders can look alike: both are tried
-        fresh = [self.start, *(np.array([log_T, self.low[1] + 0.1, self.start[2]]) for log_T in _START_LOG_T)]
+        fresh = [self.start, *(np.array([log_T, self.start[1] - 2.0, self.start[2]]) for log_T in _START_LOG_T)]
         starts = fresh if start is None else [start]
         searches = [
             minimize(cost, np.clip(x, self.low, self.high), method="L-BFGS-B", bounds=bounds, options=_SEARCH)
@@ -129,9 +132,13 @@ class Motion:
         best = min(searches, key=lambda search: float(search.fun))
         return np.asarray(best.x, dtype=np.float64), -float(best.fun)
 
+    def believed(self, parameters: Float) -> Float:
+        """Return the parameters with no less wander than a ship has, shape (3,)."""
+        return np.array([parameters[0], max(parameters[1], self.least_wander), parameters[2]])
+
     def mean_speed(self, parameters: Float, averaged: int) -> tuple[float, float]:
         """Return the mean of V over one run and its standard error, both m/s, the lateral parameters being given."""
-        end = last_state(self.system(parameters, averaged))
+        end = last_state(self.system(self.believed(parameters), averaged))
         duration = float(self.runs[averaged].record.time_s[-1])
         return float(end.mean[SUM]) / duration, float(np.sqrt(end.covariance[SUM, SUM])) / duration
 
@@ -179,7 +186,7 @@ def speed_without_log(motion: Motion, start: Float | None = None) -> tuple[Speed
     motion : Motion
         With the turning filled in and gross errors of y_u left out.
     parameters : ndarray, shape (3,)
-        log T, log wander, log noise of y_u.
+        log T, log wander, log noise of y_u, the most likely ones; see `Motion.believed`.
     """
     # a loose first pass: how the ship turned, and which y_u are no measurements
     loose = smooth(motion.system(motion.start))
@@ -188,10 +195,11 @@ def speed_without_log(motion: Motion, start: Float | None = None) -> tuple[Speed
         replace(run, squared_rate=loose.mean[span, YAW] ** 2) for run, span in zip(motion.runs, rows, strict=True)
     )
     motion = motion.with_runs(_gated(runs, loose.innovation[:, -1] / np.sqrt(loose.variance[:, -1]), rows))
-    parameters, value = motion.fitted(start)
+    fitted, value = motion.fitted(start)
+    at = [np.isclose(fitted, motion.low, atol=1e-6), np.isclose(fitted, motion.high, atol=1e-6)]
+    parameters = motion.believed(fitted)
     system = motion.system(parameters)
     found = smooth(system)
-    at = [np.isclose(parameters, motion.low, atol=1e-6), np.isclose(parameters, motion.high, atol=1e-6)]
     names = ("T", "wander of V", "noise of y_u")
     T, wander, noise = (float(p) for p in np.exp(parameters))
     std = np.sqrt(np.einsum("kii->ki", found.covariance))
@@ -214,7 +222,7 @@ def speed_without_log(motion: Motion, start: Float | None = None) -> tuple[Speed
         at_bound=tuple(name for i, name in enumerate(names) if at[0][i] or at[1][i]),
         log_likelihood=value,
     )
-    return speed, motion, parameters
+    return speed, motion, fitted
 
 
 def _gated(runs: tuple[Run, ...], white: Float, rows: tuple[slice, ...]) -> tuple[Run, ...]:
