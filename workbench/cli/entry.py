@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import _thread
+import contextlib
 import json
 import os
 import sys
+import threading
 import traceback
 from collections.abc import Sequence
 from io import TextIOWrapper
@@ -85,9 +87,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 
 def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
-    """Deliver an interruption again that came where Python can only drop it, as in the callback of a weak reference."""
+    """Deliver an interruption again that came where Python can only drop it, as in the callback of a weak reference.
+
+    From a thread and a moment later: sent from here, it would come inside this very function, and be dropped again.
+    """
     if isinstance(unraisable.exc_value, KeyboardInterrupt):
-        _thread.interrupt_main()
+        again = threading.Timer(0.02, _thread.interrupt_main)
+        again.daemon = True
+        with contextlib.suppress(RuntimeError):  # at the interpreter's end no thread starts: it is leaving anyway
+            again.start()
     else:
         sys.__unraisablehook__(unraisable)
 
