@@ -1,0 +1,242 @@
+"""The screen: what every candidate would add to the fitted model, without refitting it.
+
+Score (Lagrange multiplier) statistic of each candidate with all fitted parameters as nuisance: with the candidate's
+columns S of the whitened innovations and S' = (I - P_0) S what the fitted ones cannot imitate, LM = e'S'(S'S')^-1 S'e,
+chi-squared with as many degrees of freedom as the candidate has parameters, and the expected parameter change
+(S'S')^-1 S'e. Reference: Breusch & Pagan (1980), "The Lagrange multiplier test and its applications to model
+specification in econometrics", Review of Economic Studies 47; Saris, Satorra & Sorbom (1987), "The detection and
+correction of specification errors in structural equation models", Sociological Methodology 17.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.stats import chi2
+
+from pipeline.diagnose import sensitivity
+from pipeline.diagnose.filtered import Filtered
+from pipeline.diagnose.pooled_fit import Fit, Linearised
+from pipeline.diagnose.sensitivity import N_HULL, Point
+from pipeline.model.augmented import Augmented
+from pipeline.model.terms.effect import Effect
+from pipeline.normalise.series import Float
+
+#: share of an effect that the fitted parameters imitate, above which nothing can be told of it
+NOT_TESTABLE = 0.999
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """One effect against the fitted model.
+
+    Attributes
+    ----------
+    effect : Effect
+    score : float
+        LM; NaN where the effect cannot be tested.
+    p_value, p_adjusted : float
+        Of the score; the second by Benjamini & Yekutieli (2001) over the catalogue.
+    change, std : ndarray, shape (p,)
+        Expected parameter change and its standard error, in the parameters' units.
+    absorption : float
+        Share of the effect's whitened trace that the fitted parameters imitate.
+    missing : tuple of str
+        Channels it needs that the runs lack.
+    direction : ndarray, shape (N,)
+        S' times the change: what the effect would explain of the whitened innovations.
+    steps : tuple of float
+        Where on its grid it was tried.
+    """
+
+    effect: Effect
+    score: float
+    p_value: float
+    p_adjusted: float
+    change: Float
+    std: Float
+    absorption: float
+    missing: tuple[str, ...]
+    direction: Float
+    steps: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Nuisance:
+    """The innovations of all runs in one column, and an orthonormal basis of what the fitted parameters span.
+
+    Attributes
+    ----------
+    u : ndarray, shape (N,)
+    basis : ndarray, shape (N, q)
+    """
+
+    u: Float
+    basis: Float
+
+    def clean(self, columns: Float) -> Float:
+        """Return columns without what the fitted parameters can imitate, shape (N, c)."""
+        result: Float = columns - self.basis @ (self.basis.T @ columns)
+        return result
+
+
+def nuisance(lines: Sequence[Linearised], shared: int) -> Nuisance:
+    """Return the basis of hull, effects and noise levels of all runs.
+
+    Parameters
+    ----------
+    lines : sequence of Linearised
+    shared : int
+        How many parameters the runs share; the others are each run's own.
+    """
+    own = [line.J[:, [k for k, i in enumerate(line.index) if i >= shared]] for line in lines]
+    common = [line.J[:, [k for k, i in enumerate(line.index) if i < shared]] for line in lines]
+    # the levels of one run touch no other: their bases stand below each other, and only what is shared meets them all
+    q_own = [_orthonormal(columns) for columns in own]
+    rest = np.concatenate([c - q @ (q.T @ c) for c, q in zip(common, q_own, strict=True)])
+    u = np.concatenate([line.u for line in lines])
+    blocks = np.zeros((u.size, sum(q.shape[1] for q in q_own)))
+    row = column = 0
+    for q in q_own:
+        blocks[row : row + q.shape[0], column : column + q.shape[1]] = q
+        row, column = row + q.shape[0], column + q.shape[1]
+    return Nuisance(u, np.column_stack([blocks, _orthonormal(rest)]))
+
+
+def _orthonormal(columns: Float) -> Float:
+    norm = np.linalg.norm(columns, axis=0)
+    kept = columns[:, norm > 0.0] / norm[norm > 0.0]
+    if not kept.shape[1]:
+        return np.zeros((columns.shape[0], 0))
+    left, singular, _ = np.linalg.svd(kept, full_matrices=False)
+    basis: Float = left[:, singular > 1e-9 * singular[0]]
+    return basis
+
+
+def screen(base: Fit, effects: Mapping[str, Effect], workers: Executor) -> list[Candidate]:
+    """Score every effect that the model does not have yet, the highest first.
+
+    Parameters
+    ----------
+    base : Fit
+        The fitted model.
+    effects : mapping
+        Catalogue.
+    workers : Executor
+        Effects share it; nothing depends on it.
+
+    Returns
+    -------
+    list of Candidate
+    """
+    present = {effect.name for effect in base.model.effects}
+    chosen = [effect for effect in effects.values() if effect.name not in present]
+    known = nuisance(base.linearised, N_HULL + len(base.model.names))
+    found = list(workers.map(lambda effect: _score(base, known, effect), chosen))
+    adjusted = _adjusted([one.p_value for one in found])
+    found = [replace(one, p_adjusted=p) for one, p in zip(found, adjusted, strict=True)]
+    return sorted(found, key=lambda one: (-np.nan_to_num(one.score, nan=-1.0), one.effect.name))
+
+
+def missing_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
+    """Return the channels that an effect needs and some of the runs lack."""
+    return tuple(c for c in effect.needs if any(c not in one.run.channels for one in base.runs))
+
+
+def _score(base: Fit, known: Nuisance, effect: Effect) -> Candidate:
+    missing = missing_channels(base, effect)
+    size = len(effect.parameters)
+    nothing = Candidate(
+        *(effect, np.nan, 1.0, 1.0, np.full(size, np.nan), np.full(size, np.nan), np.nan, missing),
+        *(np.zeros(0), ()),
+    )
+    if missing:
+        return nothing
+    best, tries = nothing, 0
+    for steps in _grid(effect):
+        columns = candidate_columns(base, effect, steps)
+        if columns is None:
+            continue
+        tries += 1
+        one = _tested(known, columns, effect, steps)
+        if np.isnan(best.score) or one.score > best.score:
+            best = one if not np.isnan(one.score) or np.isnan(best.absorption) else best
+    # the largest of several tries is larger than any one of them: Bonferroni
+    return replace(best, p_value=min(1.0, max(tries, 1) * best.p_value))
+
+
+def _grid(effect: Effect) -> list[tuple[float, ...]]:
+    """Return the points at which an effect is tried: its first parameter over its steps, the others at their first."""
+    first, *rest = effect.parameters
+    return [(step, *(p.steps[0] for p in rest)) for step in first.steps]
+
+
+def candidate_columns(base: Fit, effect: Effect, steps: Sequence[float]) -> Float | None:
+    """Return the columns of J of an effect at a step, shape (N, p), None where the filter runs away."""
+    model = base.model.with_effect(effect)
+    at = base.values.size
+    columns = []
+    for k, step in enumerate(steps):
+        parts = []
+        for number, (filtered, line) in enumerate(zip(base.runs, base.linearised, strict=True)):
+            values = np.concatenate([base.values, np.zeros(len(steps))])
+            values[at + k] = step
+            point = Point(base.hull, values, base.levels[number])
+            other = sensitivity.passed(Filtered(filtered.run, model, filtered.spec), point)
+            if not np.isfinite(other.log_likelihood):
+                return None
+            parts.append(sensitivity.difference(line.passed, other, step))
+        columns.append(np.concatenate(parts))
+    result: Float = np.column_stack(columns)
+    return result if np.all(np.isfinite(result)) else None
+
+
+def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float, ...]) -> Candidate:
+    clean = known.clean(columns)
+    before, after = float(np.sum(columns**2)), float(np.sum(clean**2))
+    absorption = 1.0 - after / before if before > 0.0 else 1.0
+    size = columns.shape[1]
+    unknown = np.full(size, np.nan)
+    if absorption > NOT_TESTABLE or before == 0.0:
+        return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, absorption, (), np.zeros(0), steps)
+    information = clean.T @ clean
+    scale = np.sqrt(np.diag(information))
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-9, hermitian=True) / np.outer(scale, scale)
+    gradient = clean.T @ known.u
+    change = inverse @ gradient
+    score = float(gradient @ change)
+    return Candidate(
+        effect=effect,
+        score=score,
+        p_value=float(chi2.sf(score, size)),
+        p_adjusted=1.0,
+        change=change,
+        std=np.sqrt(np.diag(inverse)),
+        absorption=absorption,
+        missing=(),
+        direction=clean @ change,
+        steps=steps,
+    )
+
+
+def _adjusted(p_values: Sequence[float]) -> list[float]:
+    """Adjust p-values for their number under any dependence (Benjamini & Yekutieli 2001, Annals of Statistics 29)."""
+    p = np.asarray(p_values)
+    if not p.size:
+        return []
+    order = np.argsort(p, kind="stable")
+    m = p.size
+    harmonic = float(np.sum(1.0 / np.arange(1, m + 1)))
+    raised = p[order] * m * harmonic / np.arange(1, m + 1)
+    smallest = np.minimum(1.0, np.minimum.accumulate(raised[::-1])[::-1])
+    result = np.empty(m)
+    result[order] = smallest
+    return [float(x) for x in result]
+
+
+def model_of(names: Sequence[str], effects: Mapping[str, Effect]) -> Augmented:
+    """Return the model with these effects of a catalogue, in order."""
+    return Augmented(tuple(effects[name] for name in names))

@@ -1,0 +1,1 @@
+"""What an effect is made of: terms written as expressions, parsed, never evaluated as Python, and compiled to programs."""

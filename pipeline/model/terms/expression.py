@@ -1,0 +1,189 @@
+"""Reading an expression such as ``r*abs(r)``: the grammar of Python, a short list of what may stand in it, no evaluation."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Mapping
+from difflib import get_close_matches
+
+import numpy as np
+
+from pipeline.model.terms import program
+from pipeline.model.terms.program import DEPTH, Program
+from schemas.errors import UsageError
+
+_LONGEST = 4000
+_DEEPEST = 60
+_LARGEST_POWER = 9.0
+_BINARY = {
+    ast.Add: program.ADD,
+    ast.Sub: program.SUBTRACT,
+    ast.Mult: program.MULTIPLY,
+    ast.Div: program.DIVIDE,
+    ast.Pow: program.POWER,
+}
+_FUNCTIONS = {
+    "abs": (program.ABS, 1),
+    "sign": (program.SIGN, 1),
+    "sin": (program.SIN, 1),
+    "cos": (program.COS, 1),
+    "sqrt": (program.SQRT, 1),
+    "exp": (program.EXP, 1),
+    "log": (program.LOG, 1),
+    "tanh": (program.TANH, 1),
+    "min": (program.MIN, 2),
+    "max": (program.MAX, 2),
+}
+
+
+def names_in(text: str) -> list[str]:
+    """Return the variables of an expression in the order in which they appear first; functions are none of them.
+
+    Raises
+    ------
+    UsageError
+        ``expression_invalid``.
+    """
+    tree = _parsed(text)
+    called = {node.func for node in ast.walk(tree) if isinstance(node, ast.Call)}
+    found = [node for node in ast.walk(tree) if isinstance(node, ast.Name) and node not in called]
+    return list(dict.fromkeys(n.id for n in sorted(found, key=lambda n: (n.lineno, n.col_offset))))
+
+
+def compiled(text: str, variables: Mapping[str, int]) -> Program:
+    """Compile an expression.
+
+    Parameters
+    ----------
+    text : str
+        Numbers, variables, ``+ - * / **``, parentheses and the functions abs, sign, sin, cos, sqrt, exp, log, tanh,
+        min, max.
+    variables : mapping
+        Index of every variable that may stand in it.
+
+    Returns
+    -------
+    Program
+
+    Raises
+    ------
+    UsageError
+        ``expression_invalid``: it holds something else; the message says what and where.
+    """
+    code: list[tuple[int, int]] = []
+    constants: list[float] = []
+    deepest = _emit(_parsed(text).body, text, variables, code, constants, 0)
+    if deepest > DEPTH:
+        raise _wrong(text, None, f"it is nested {deepest} deep, {DEPTH} is the most")
+    return Program(np.array(code, dtype=np.int64).reshape(-1, 2), np.array(constants, dtype=np.float64))
+
+
+def _parsed(text: str) -> ast.Expression:
+    if len(text) > _LONGEST:
+        raise _wrong(text[:40] + "...", None, f"it is {len(text)} characters long, {_LONGEST} is the most")
+    depth = deepest = 0
+    for letter in text:
+        depth += (letter == "(") - (letter == ")")
+        deepest = max(deepest, depth)
+    if deepest > _DEEPEST:
+        raise _wrong(text[:40] + "...", None, f"its parentheses are nested {deepest} deep, {_DEEPEST} is the most")
+    try:
+        tree = ast.parse(text.strip(), mode="eval")
+    except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
+        place = getattr(error, "offset", None)
+        raise _wrong(text, place, "it is no formula") from error
+    return tree
+
+
+def _emit(  # noqa: PLR0913 - the walk carries what it fills
+    node: ast.expr,
+    text: str,
+    variables: Mapping[str, int],
+    code: list[tuple[int, int]],
+    constants: list[float],
+    height: int,
+) -> int:
+    """Append the instructions of a node; return the highest the stack stands on the way."""
+    if height > DEPTH:
+        return height
+    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+        code.append((program.CONSTANT, len(constants)))
+        constants.append(_number(node, text))
+        return height + 1
+    if isinstance(node, ast.Name):
+        if node.id not in variables:
+            raise _unknown(node.id, node.col_offset, text, [*variables, *_FUNCTIONS])
+        code.append((program.VARIABLE, variables[node.id]))
+        return height + 1
+    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+        high = _emit(node.operand, text, variables, code, constants, height)
+        if isinstance(node.op, ast.USub):
+            code.append((program.NEGATE, 0))
+        return high
+    if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+        if isinstance(node.op, ast.Pow):
+            _check_power(node, text)
+        high = _emit(node.left, text, variables, code, constants, height)
+        high = max(high, _emit(node.right, text, variables, code, constants, height + 1))
+        code.append((_BINARY[type(node.op)], 0))
+        return high
+    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+        return _emit_call(node, node.func.id, text, variables, code, constants, height)
+    raise _wrong(text, node.col_offset + 1, f"{type(node).__name__} may not stand in a formula")
+
+
+def _emit_call(  # noqa: PLR0913 - as above
+    node: ast.Call,
+    name: str,
+    text: str,
+    variables: Mapping[str, int],
+    code: list[tuple[int, int]],
+    constants: list[float],
+    height: int,
+) -> int:
+    if name not in _FUNCTIONS:
+        raise _unknown(name, node.col_offset, text, list(_FUNCTIONS))
+    instruction, count = _FUNCTIONS[name]
+    if len(node.args) != count or node.keywords:
+        raise _wrong(text, node.col_offset + 1, f"{name} takes {count} argument{'s' * (count > 1)}")
+    high = height
+    for k, argument in enumerate(node.args):
+        high = max(high, _emit(argument, text, variables, code, constants, height + k))
+    code.append((instruction, 0))
+    return high
+
+
+def _number(node: ast.Constant, text: str) -> float:
+    try:
+        value = float(node.value)  # type: ignore[arg-type]
+    except OverflowError:
+        value = np.inf
+    if not np.isfinite(value):
+        raise _wrong(text, node.col_offset + 1, "a number in it is beyond what a computer holds")
+    return value
+
+
+def _check_power(node: ast.BinOp, text: str) -> None:
+    exponent = node.right
+    if isinstance(exponent, ast.UnaryOp):
+        exponent = exponent.operand
+    if not (isinstance(exponent, ast.Constant) and type(exponent.value) in (int, float)):
+        raise _wrong(text, node.right.col_offset + 1, "the exponent of ** must be a number")
+    if abs(_number(exponent, text)) > _LARGEST_POWER:
+        raise _wrong(text, node.right.col_offset + 1, f"the exponent of ** may be {_LARGEST_POWER:g} at most")
+
+
+def _unknown(name: str, column: int, text: str, known: list[str]) -> UsageError:
+    close = get_close_matches(name, known, n=1)
+    hint = f"; did you mean {close[0]!r}?" if close else ""
+    return _wrong(text, column + 1, f"{name!r} is not known{hint} Known are {', '.join(sorted(known))}")
+
+
+def _wrong(text: str, place: int | None, why: str) -> UsageError:
+    where = f" at character {place}" if place else ""
+    return UsageError(
+        "expression_invalid",
+        f"The expression {text!r} cannot be used{where}: {why}.",
+        "Write a formula such as 'yaw: r*abs(r)'; `kempf effects show --symbols` lists what may stand in it.",
+        {"expression": text, "place": place},
+    )
