@@ -14,6 +14,7 @@ from pipeline.diagnose.run import Run
 from pipeline.diagnose.sensitivity import N_HULL, N_LEVELS, Point
 from pipeline.identify.scoring import damped_step
 from pipeline.model.augmented import Augmented
+from pipeline.model.ship import mariner_like
 from pipeline.normalise.series import Float
 from schemas.model_spec import ModelSpec
 
@@ -178,6 +179,8 @@ class _Layout:
         self.model = filtered[0].model
         self.shared = N_HULL + len(self.model.names)
         runs = len(filtered)
+        # a number that happens to lie near 0 may grow to the size that it has in other ships
+        self.typical = 0.5 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
         self.low = np.concatenate([np.full(N_HULL, -np.inf), self.model.low, np.tile(LOWEST, runs)])
         self.high = np.concatenate([np.full(N_HULL, np.inf), self.model.high, np.tile(HIGHEST, runs)])
         self.used = np.concatenate([np.ones(self.shared, dtype=bool), *(f.levels_used() for f in filtered)])
@@ -210,8 +213,8 @@ class _Layout:
 
     def bounded(self, step: Float, theta: Float) -> Float:
         """Shorten a step that would double the hull, or move a level by more than e."""
-        L = np.max(np.abs(step[:N_HULL]) / np.maximum(np.abs(theta[:N_HULL]), 1e-12))
-        result = step * min(1.0, 1.0 / max(float(L), 1e-300))
+        reach = np.maximum(np.abs(theta[:N_HULL]), self.typical)
+        result = step * min(1.0, 1.0 / max(float(np.max(np.abs(step[:N_HULL]) / reach)), 1e-300))
         result[self.shared :] = np.clip(step[self.shared :], -1.0, 1.0)
         return result
 

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from itertools import product
 
 import numpy as np
 from scipy.stats import chi2
@@ -22,7 +23,7 @@ from pipeline.diagnose.filtered import Filtered
 from pipeline.diagnose.pooled_fit import Fit, Linearised
 from pipeline.diagnose.sensitivity import N_HULL, Point
 from pipeline.model.augmented import Augmented
-from pipeline.model.terms.effect import Effect
+from pipeline.model.terms.effect import Effect, Parameter
 from pipeline.normalise.series import Float
 
 #: share of an effect that the fitted parameters imitate, above which nothing can be told of it
@@ -162,27 +163,41 @@ def _score(base: Fit, known: Nuisance, effect: Effect) -> Candidate:
             continue
         tries += 1
         one = _tested(known, columns, effect, steps)
-        if np.isnan(best.score) or one.score > best.score:
-            best = one if not np.isnan(one.score) or np.isnan(best.absorption) else best
+        if best is nothing or one.p_value < best.p_value or np.isnan(best.score):
+            best = one
     # the largest of several tries is larger than any one of them: Bonferroni
     return replace(best, p_value=min(1.0, max(tries, 1) * best.p_value))
 
 
 def _grid(effect: Effect) -> list[tuple[float, ...]]:
-    """Return the points at which an effect is tried: its first parameter over its steps, the others at their first."""
-    first, *rest = effect.parameters
-    return [(step, *(p.steps[0] for p in rest)) for step in first.steps]
+    """Return the points at which an effect is tried: its first parameter and those of shape over all their steps."""
+    choices = [p.steps if k == 0 or _is_shape(p) else p.steps[:1] for k, p in enumerate(effect.parameters)]
+    return list(product(*choices))
+
+
+def _is_shape(parameter: Parameter) -> bool:
+    """Tell a parameter that is never 0, such as a frequency: it shapes the effect and does not make it."""
+    return not parameter.low <= 0.0 <= parameter.high
 
 
 def candidate_columns(base: Fit, effect: Effect, steps: Sequence[float]) -> Float | None:
-    """Return the columns of J of an effect at a step, shape (N, p), None where the filter runs away."""
+    """Return the columns of J of an effect at a step, one for every parameter that is not one of shape.
+
+    Returns
+    -------
+    ndarray, shape (N, c), or None
+        None where the filter runs away.
+    """
     model = base.model.with_effect(effect)
     at = base.values.size
+    shape = np.array([step if _is_shape(p) else 0.0 for p, step in zip(effect.parameters, steps, strict=True)])
     columns = []
-    for k, step in enumerate(steps):
+    for k, (parameter, step) in enumerate(zip(effect.parameters, steps, strict=True)):
+        if _is_shape(parameter):
+            continue
         parts = []
         for number, (filtered, line) in enumerate(zip(base.runs, base.linearised, strict=True)):
-            values = np.concatenate([base.values, np.zeros(len(steps))])
+            values = np.concatenate([base.values, shape])
             values[at + k] = step
             point = Point(base.hull, values, base.levels[number])
             other = sensitivity.passed(Filtered(filtered.run, model, filtered.spec), point)
@@ -198,28 +213,36 @@ def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float,
     clean = known.clean(columns)
     before, after = float(np.sum(columns**2)), float(np.sum(clean**2))
     absorption = 1.0 - after / before if before > 0.0 else 1.0
-    size = columns.shape[1]
-    unknown = np.full(size, np.nan)
-    if absorption > NOT_TESTABLE or before == 0.0:
+    unknown = np.full(len(effect.parameters), np.nan)
+    if absorption > NOT_TESTABLE or before == 0.0 or np.any(np.sum(clean**2, axis=0) == 0.0):
         return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, absorption, (), np.zeros(0), steps)
     information = clean.T @ clean
     scale = np.sqrt(np.diag(information))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-9, hermitian=True) / np.outer(scale, scale)
     gradient = clean.T @ known.u
-    change = inverse @ gradient
-    score = float(gradient @ change)
+    found = inverse @ gradient
+    score = float(gradient @ found)
+    made = np.array([not _is_shape(p) for p in effect.parameters])
+    change, std = np.array(steps, dtype=np.float64), unknown.copy()
+    change[made], std[made] = found, np.sqrt(np.diag(inverse))
     return Candidate(
         effect=effect,
         score=score,
-        p_value=float(chi2.sf(score, size)),
+        p_value=float(chi2.sf(score, found.size)) if _plausible(effect, change) else 1.0,
         p_adjusted=1.0,
         change=change,
-        std=np.sqrt(np.diag(inverse)),
+        std=std,
         absorption=absorption,
         missing=(),
-        direction=clean @ change,
+        direction=clean @ found,
         steps=steps,
     )
+
+
+def _plausible(effect: Effect, change: Float) -> bool:
+    """Tell whether the change goes where the effect can be at all: a rudder cannot answer before it moves."""
+    inside = [np.clip(x, p.low, p.high) for x, p in zip(change, effect.parameters, strict=True)]
+    return any(x != 0.0 for x, p in zip(inside, effect.parameters, strict=True) if not _is_shape(p))
 
 
 def _adjusted(p_values: Sequence[float]) -> list[float]:

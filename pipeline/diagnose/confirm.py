@@ -1,0 +1,118 @@
+"""The confirmation: a candidate refitted with everything else, and what that is worth in runs that did not fit it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.diagnose import pooled_fit, sensitivity
+from pipeline.diagnose.held_out import predictive
+from pipeline.diagnose.pooled_fit import Fit
+from pipeline.diagnose.run import Run
+from pipeline.diagnose.sensitivity import N_HULL, Point
+from pipeline.model.augmented import Augmented
+from pipeline.normalise.series import Float
+
+#: what a candidate must save in the Bayesian information criterion (Kass & Raftery 1995, JASA 90: strong evidence)
+BIC_SAVING = 6.0
+
+
+@dataclass(frozen=True, eq=False)
+class Confirmation:
+    """A model with one effect more, refitted.
+
+    Attributes
+    ----------
+    fit : Fit
+    likelihood_ratio : float
+        Twice the log-likelihood gained.
+    bic_change : float
+        Negative where the effect earns its parameters.
+    fold_gains : ndarray, shape (runs,)
+        Log-likelihood gained in each fitted run by parameters that did not see it, to first order.
+    held_out_gains : ndarray, shape (held,)
+        The same in the held-out runs.
+    at_bound : bool
+        Whether a parameter of the effect ended at a bound.
+    """
+
+    fit: Fit
+    likelihood_ratio: float
+    bic_change: float
+    fold_gains: Float
+    held_out_gains: Float
+    at_bound: bool
+
+    @property
+    def holds(self) -> bool:
+        """Whether it stands every test: information criterion, most folds, held-out runs, a plausible value."""
+        gains = np.concatenate([self.fold_gains, self.held_out_gains])
+        return bool(
+            self.bic_change < -BIC_SAVING
+            and np.mean(gains > 0.0) > 0.5
+            and np.sum(gains) > 0.0
+            and not self.at_bound
+            and np.isfinite(self.fit.log_likelihood)
+        )
+
+
+def confirm(base: Fit, model: Augmented, start: Float, held: Sequence[Run], workers: Executor) -> Confirmation:
+    """Refit a model that has effects beyond those of a fitted one.
+
+    Parameters
+    ----------
+    base : Fit
+    model : Augmented
+        Its last effects are new.
+    start : ndarray, shape (p,)
+        Of all effects.
+    held : sequence of Run
+        Held out.
+    workers : Executor
+    """
+    fit = pooled_fit.with_model(base, model, start, workers)
+    new = model.names[len(base.model.names) :]
+    ratio = 2.0 * (fit.log_likelihood - base.log_likelihood)
+    added = slice(base.values.size, None)
+    reach = 1e-9 * np.maximum(np.abs(model.high[added]), np.abs(model.low[added]))
+    low, high, at = model.low[added], model.high[added], fit.values[added]
+    # at a lower bound of 0 the effect is absent, which the criterion tells; any other bound is implausible
+    bound = (at >= high - reach) | ((at <= low + reach) & (low != 0.0))
+    return Confirmation(
+        fit=fit,
+        likelihood_ratio=ratio,
+        bic_change=len(new) * float(np.log(fit.count)) - ratio,
+        fold_gains=_left_out(fit, workers) - _left_out(base, workers),
+        held_out_gains=np.array([predictive(fit, run) - predictive(base, run) for run in held]),
+        at_bound=bool(np.any(bound)),
+    )
+
+
+def _left_out(fit: Fit, workers: Executor) -> Float:
+    """Log-likelihood of each run under what the other runs say of the shared parameters, one step from the fit."""
+    shared = N_HULL + len(fit.model.names)
+    informations, scores = [], []
+    for line in fit.linearised:
+        common = line.J[:, [k for k, i in enumerate(line.index) if i < shared]]
+        own = line.J[:, [k for k, i in enumerate(line.index) if i >= shared]]
+        q, _ = np.linalg.qr(own)
+        common = common - q @ (q.T @ common)
+        informations.append(common.T @ common)
+        scores.append(common.T @ line.u)
+    whole = np.sum(informations, axis=0)
+
+    def one(number: int) -> float:
+        rest = whole - informations[number]
+        scale = np.sqrt(np.maximum(np.diag(rest), 1e-300))
+        step = np.linalg.lstsq(rest / np.outer(scale, scale), scores[number] / scale, rcond=1e-8)[0] / scale
+        moved = np.concatenate([fit.hull, fit.values]) - step
+        values = np.clip(moved[N_HULL:], fit.model.low, fit.model.high)
+        point = Point(moved[:N_HULL], values, fit.levels[number])
+        return sensitivity.passed(fit.runs[number], point).log_likelihood
+
+    if len(fit.linearised) < 2:
+        return np.zeros(len(fit.linearised))
+    return np.array(list(workers.map(one, range(len(fit.runs)))))

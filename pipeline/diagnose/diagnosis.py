@@ -1,0 +1,213 @@
+"""Diagnosis: screen, confirm, sets, step, and the reference that says whether anything is left.
+
+Effects are added one at a time, the simplest of the best set first, until no candidate stands the tests. Held-out
+manoeuvres are chosen before the first screen and never fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.diagnose import pooled_fit
+from pipeline.diagnose.confirm import Confirmation, confirm
+from pipeline.diagnose.flexible import Flexible, flexible
+from pipeline.diagnose.gate import without_gross_errors
+from pipeline.diagnose.held_out import FreeRun, free_run
+from pipeline.diagnose.pooled_fit import Fit
+from pipeline.diagnose.run import Run
+from pipeline.diagnose.screen import Candidate, screen
+from pipeline.diagnose.sets import shortlist, undecided
+from pipeline.diagnose.split import split
+from pipeline.diagnose.start import Start
+from pipeline.model.augmented import Augmented
+from pipeline.model.terms.effect import Effect
+from pipeline.normalise.series import Float
+from schemas.model_spec import ModelSpec
+
+Told = Callable[[str], None]
+
+
+@dataclass(frozen=True)
+class DiagnosisSettings:
+    """Settings of a diagnosis; all of them are part of its identity.
+
+    Attributes
+    ----------
+    level : float
+        Adjusted p-value below which a candidate is refitted.
+    refits : int
+        At most, of one step.
+    most_steps : int
+        Effects added at most.
+    """
+
+    level: float = 0.01
+    refits: int = 6
+    most_steps: int = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Step:
+    """One rung of the ladder.
+
+    Attributes
+    ----------
+    fit : Fit
+    added : Effect or None
+        None on the first.
+    chosen_from : tuple of (Candidate, Confirmation)
+        The set it was taken from, itself first.
+    refused : tuple of (Candidate, Confirmation)
+        What was refitted and did not stand the tests, or was clearly worse.
+    screened : tuple of Candidate
+        What the screen of this step's model says of everything else.
+    fitted, held : tuple of FreeRun
+        Free runs of the fitted and of the held-out manoeuvres.
+    """
+
+    fit: Fit
+    added: Effect | None
+    chosen_from: tuple[tuple[Candidate, Confirmation], ...]
+    refused: tuple[tuple[Candidate, Confirmation], ...]
+    screened: tuple[Candidate, ...]
+    fitted: tuple[FreeRun, ...]
+    held: tuple[FreeRun, ...]
+
+    @property
+    def in_sample_error(self) -> float:
+        """Mean relative error of the free runs of fitted manoeuvres."""
+        return float(np.mean([run.score for run in self.fitted]))
+
+    @property
+    def held_out_error(self) -> float | None:
+        """Mean relative error of the free runs of held-out manoeuvres."""
+        return float(np.mean([run.score for run in self.held])) if self.held else None
+
+    @property
+    def intensities(self) -> Float:
+        """Geometric means over the runs of the levels of the disturbances' drives, shape (3,)."""
+        result: Float = np.exp(np.mean(self.fit.levels[:, :3], axis=0))
+        return result
+
+
+@dataclass(frozen=True, eq=False)
+class Diagnosis:
+    """What a diagnosis found; `pipeline.diagnose.verdict` puts it in words.
+
+    Attributes
+    ----------
+    steps : tuple of Step
+        The plain model first.
+    before, after : Flexible or None
+        The flexible reference beside the plain model and beside the last; None with a single run.
+    fitted, held : tuple of Run
+    gross_errors : int
+    settings : DiagnosisSettings
+    """
+
+    steps: tuple[Step, ...]
+    before: Flexible | None
+    after: Flexible | None
+    fitted: tuple[Run, ...]
+    held: tuple[Run, ...]
+    gross_errors: int
+    settings: DiagnosisSettings
+
+
+def _silent(_: str) -> None:
+    return
+
+
+def diagnose(
+    runs: Sequence[Run],
+    spec: ModelSpec,
+    start: Start,
+    effects: Mapping[str, Effect],
+    workers: Executor,
+    settings: DiagnosisSettings = DiagnosisSettings(),
+    given: Augmented = Augmented(),
+    told: Told = _silent,
+) -> Diagnosis:
+    """Find what a vessel's model lacks.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+        All usable manoeuvres in order of time.
+    spec : ModelSpec
+        Disturbances.
+    start : Start
+        One row of levels a run.
+    effects : mapping
+        Catalogue.
+    workers : Executor
+    settings : DiagnosisSettings, optional
+    given : Augmented, optional
+        Effects that the model has already.
+    told : callable, optional
+        Is told what is done, for a progress line.
+    """
+    chosen, left = split(runs)
+    begin = start.of(chosen)
+    values = np.array([0.0 if p.low <= 0.0 <= p.high else p.low for _, p in given.parameters])
+    if given.effects:
+        values = np.array([p.steps[0] for _, p in given.parameters])
+    told(f"fitting the model to {len(chosen)} manoeuvres, {len(left)} held out")
+    base = pooled_fit.fit(given, [runs[i] for i in chosen], spec, begin.hull, begin.levels, values, workers)
+    cleaned, gross = without_gross_errors(base)
+    if gross:
+        base = pooled_fit.fit(given, cleaned, spec, base.hull, base.levels, base.values, workers)
+    held = [runs[i] for i in left]
+    told(f"screening {len(effects)} effects")
+    steps = [_step(base, None, (), (), held, screen(base, effects, workers))]
+    before = flexible(base, workers) if len(chosen) > 1 else None
+    while len(steps) <= settings.most_steps:
+        last = steps[-1]
+        tried: list[tuple[Candidate, Confirmation]] = []
+        for candidate in shortlist(last.screened, settings.level, settings.refits):
+            told(f"step {len(steps)}: refitting with {candidate.effect.title}")
+            tried.append((candidate, _confirmed(last.fit, candidate, held, workers)))
+        best = undecided([pair for pair in tried if pair[1].holds])
+        if not best:
+            steps[-1] = _refused(last, tried)
+            break
+        names = {candidate.effect.name for candidate, _ in best}
+        worse = tuple(pair for pair in tried if pair[0].effect.name not in names)
+        found = best[0][1].fit
+        told(f"step {len(steps)}: screening beside {best[0][0].effect.title}")
+        steps.append(_step(found, best[0][0].effect, tuple(best), worse, held, screen(found, effects, workers)))
+    told("measuring what is left")
+    after = flexible(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
+    return Diagnosis(
+        tuple(steps), before, after, tuple(one.run for one in base.runs), tuple(held), gross, settings
+    )
+
+
+def _confirmed(base: Fit, candidate: Candidate, held: Sequence[Run], workers: Executor) -> Confirmation:
+    model = base.model.with_effect(candidate.effect)
+    size = candidate.change.size
+    inside = np.clip(candidate.change, model.low[-size:], model.high[-size:])
+    # a threshold is climbed from where it was tried: at 0 it has no slope of its own
+    if len(candidate.effect.parameters[0].steps) > 1 and candidate.steps:
+        inside[0] = candidate.steps[0] if inside[0] <= 0.0 else inside[0]
+    return confirm(base, model, np.concatenate([base.values, inside]), held, workers)
+
+
+def _refused(step: Step, tried: list[tuple[Candidate, Confirmation]]) -> Step:
+    return Step(step.fit, step.added, step.chosen_from, (*step.refused, *tried), step.screened, step.fitted, step.held)
+
+
+def _step(
+    fit: Fit,
+    added: Effect | None,
+    chosen_from: tuple[tuple[Candidate, Confirmation], ...],
+    refused: tuple[tuple[Candidate, Confirmation], ...],
+    held: Sequence[Run],
+    screened: Sequence[Candidate],
+) -> Step:
+    fitted = tuple(free_run(fit, one.run) for one in fit.runs)
+    return Step(fit, added, chosen_from, refused, tuple(screened), fitted, tuple(free_run(fit, run) for run in held))

@@ -1,0 +1,93 @@
+"""Where the fits of diagnosis begin: a plain ship from the runs one by one, and noise levels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.diagnose import pooled_fit
+from pipeline.diagnose.pooled_fit import Fit
+from pipeline.diagnose.run import Run
+from pipeline.identify import maximum_likelihood
+from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
+from pipeline.identify.record import Record
+from pipeline.model.augmented import Augmented
+from pipeline.model.ship import mariner_like
+from pipeline.normalise.series import Float
+from schemas.errors import DataRejected, KempfError
+from schemas.model_spec import ModelSpec
+
+#: intensities to start from, SI: of what drives the wind force, the moment and the current
+_INTENSITIES = (1e-4, 1e-6, 1e-3)
+_SHORT_CLIMB, _ENTRIES = 5, 4
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Hull, shape (6,), and logarithms of the noise levels, shape (runs, 6)."""
+
+    hull: Float
+    levels: Float
+
+    def of(self, numbers: Sequence[int]) -> Start:
+        """Return the start of some of the runs."""
+        return Start(self.hull, self.levels[list(numbers)])
+
+
+def start_of(records: Sequence[Record], runs: Sequence[Run], spec: ModelSpec, workers: Executor) -> Start:
+    """Race the ships that the runs give one by one over all of them; the most likely after a few steps wins.
+
+    Parameters
+    ----------
+    records : sequence of Record
+        One a run.
+    runs : sequence of Run
+    spec : ModelSpec
+    workers : Executor
+
+    Raises
+    ------
+    DataRejected
+        ``no_ship_explains_it``.
+    """
+    levels = np.array([_levels(record, run) for record, run in zip(records, runs, strict=True)])
+    arm = runs[0].ship.arm_per_m
+    alone = [one for one in workers.map(lambda record: _alone(record, spec, arm), records) if one is not None]
+    hulls = [*alone, np.median(alone, axis=0)] if alone else []
+    hulls.append(mariner_like(runs[0].ship.length_m).array())
+    raced: list[Fit] = []
+    for hull in hulls[-_ENTRIES:]:
+        found = pooled_fit.fit(
+            *(Augmented(), runs, spec, hull, levels, np.zeros(0), workers), max_iterations=_SHORT_CLIMB
+        )
+        if np.isfinite(found.log_likelihood):
+            raced.append(found)
+    if not raced:
+        raise DataRejected(
+            "no_ship_explains_it",
+            f"No plain ship gives the {len(runs)} zigzags a finite likelihood.",
+            "Look at the channels (heading, yaw rate, speed, rudder) of these segments.",
+        )
+    best = max(raced, key=lambda one: one.log_likelihood)
+    return Start(best.hull, best.levels)
+
+
+def _alone(record: Record, spec: ModelSpec, arm_per_m: float) -> Float | None:
+    """Identify one segment by itself; None where that fails."""
+    try:
+        found = maximum_likelihood.identify(record, spec, arm_per_m, MaximumLikelihoodSettings())
+    except KempfError:
+        return None
+    return found.hull.array() if np.all(np.isfinite(found.hull.array())) else None
+
+
+def _levels(record: Record, run: Run) -> Float:
+    """Noise levels to start from: those of the readings, smaller where several were averaged, and a little more."""
+    spread = np.nan_to_num(np.nanstd(run.measured, axis=0), nan=1.0)
+    noise = np.nan_to_num(record.noise_start, nan=1e-3)
+    readings = np.isfinite(record.measured).sum(axis=0) / np.maximum(np.isfinite(run.measured).sum(axis=0), 1)
+    level = np.maximum(noise / np.sqrt(np.maximum(readings, 1.0)), 0.02 * spread)
+    return np.log(np.concatenate([_INTENSITIES, np.maximum(level, 1e-5)]))
