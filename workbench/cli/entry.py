@@ -30,6 +30,7 @@ COMMANDS = {
     "history": "Show a vessel's parameters over time, as known now or at an earlier time.",
     "export": "Write a parameter set as a file for other programs.",
     "steer": "Make a course-keeping law from a parameter set and try it on the simulated ship.",
+    "effects": "List and show the physical effects that a model can be given.",
     "rerun": "Build a parameter set again from the raw bytes and compare every bit.",
     "reprocess": "Bring the whole fleet up to date with its profiles and the code.",
     "vessels": "List vessels, show and set their profiles.",

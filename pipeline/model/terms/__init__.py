@@ -1,1 +1,1 @@
-"""What an effect is made of: terms written as expressions, parsed, never evaluated as Python, and compiled to programs."""
+"""What an effect is made of: terms written as formulas, parsed, never evaluated as Python, compiled to programs."""

@@ -1,8 +1,9 @@
-"""Reading an expression such as ``r*abs(r)``: the grammar of Python, a short list of what may stand in it, no evaluation."""
+"""Reading an expression such as ``r*abs(r)``: Python's grammar, a short list of what may stand in it, no evaluation."""
 
 from __future__ import annotations
 
 import ast
+import re
 from collections.abc import Mapping
 from difflib import get_close_matches
 
@@ -14,6 +15,11 @@ from schemas.errors import UsageError
 
 _LONGEST = 4000
 _DEEPEST = 60
+#: levels of the parsed tree: a sum of n terms has n of them, and Python's own stack must hold them all
+_MOST_LEVELS = 200
+_SHOWN = 80
+#: all that a formula is written with; whatever else there is to Python is refused before its parser sees it
+_TOKEN = re.compile(r"\s+|(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?(?![\w.])|[A-Za-z_]\w*|\*\*|[-+*/(),]", re.ASCII)
 _LARGEST_POWER = 9.0
 _BINARY = {
     ast.Add: program.ADD,
@@ -22,7 +28,23 @@ _BINARY = {
     ast.Div: program.DIVIDE,
     ast.Pow: program.POWER,
 }
-_FUNCTIONS = {
+#: what a person may have written that is no formula
+_WORDS: dict[type[ast.expr], str] = {
+    ast.Lambda: "a function of your own",
+    ast.IfExp: "if",
+    ast.BoolOp: "and, or",
+    ast.Compare: "a comparison",
+    ast.Tuple: "a comma outside a function",
+    ast.Starred: "a star before an argument",
+    ast.BinOp: "this operation",
+    ast.UnaryOp: "this operation",
+    ast.Constant: "True, False or None",
+    ast.Call: "a call of a result",
+    ast.Yield: "yield",
+    ast.Await: "await",
+}
+#: functions by name: instruction and number of arguments
+FUNCTIONS = {
     "abs": (program.ABS, 1),
     "sign": (program.SIGN, 1),
     "sin": (program.SIN, 1),
@@ -79,23 +101,53 @@ def compiled(text: str, variables: Mapping[str, int]) -> Program:
 
 
 def _parsed(text: str) -> ast.Expression:
+    if not isinstance(text, str):
+        raise _wrong(repr(text), None, "it is no text")
     if len(text) > _LONGEST:
-        raise _wrong(text[:40] + "...", None, f"it is {len(text)} characters long, {_LONGEST} is the most")
+        raise _wrong(text, None, f"it is {len(text)} characters long, {_LONGEST} is the most")
+    text = re.sub(r"\s", " ", text, flags=re.ASCII).rstrip()
+    if not text:
+        raise _wrong(text, None, "it is empty")
+    _check_tokens(text)
     depth = deepest = 0
     for letter in text:
         depth += (letter == "(") - (letter == ")")
         deepest = max(deepest, depth)
     if deepest > _DEEPEST:
-        raise _wrong(text[:40] + "...", None, f"its parentheses are nested {deepest} deep, {_DEEPEST} is the most")
+        raise _wrong(text, None, f"its parentheses are nested {deepest} deep, {_DEEPEST} is the most")
+    blank = len(text) - len(text.lstrip())
     try:
-        tree = ast.parse(text.strip(), mode="eval")
+        tree = ast.parse(text.lstrip(), mode="eval")
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
         place = getattr(error, "offset", None)
-        raise _wrong(text, place, "it is no formula") from error
+        raise _wrong(text, place and place + blank, "it is no formula") from error
+    if _levels(tree) > _MOST_LEVELS:
+        raise _wrong(text, None, f"its operations are nested more than {_MOST_LEVELS} deep")
+    for node in ast.walk(tree):
+        if isinstance(node, ast.expr):
+            node.col_offset += blank
     return tree
 
 
-def _emit(  # noqa: PLR0913 - the walk carries what it fills
+def _check_tokens(text: str) -> None:
+    place = 0
+    while place < len(text):
+        token = _TOKEN.match(text, place)
+        if token is None:
+            raise _wrong(text, place + 1, f"{text[place]!r} may not stand in a formula there")
+        place = token.end()
+
+
+def _levels(tree: ast.AST) -> int:
+    """Count the levels of a tree without recursion."""
+    levels, row = 0, [tree]
+    while row and levels <= _MOST_LEVELS:
+        row = [below for node in row for below in ast.iter_child_nodes(node)]
+        levels += 1
+    return levels
+
+
+def _emit(
     node: ast.expr,
     text: str,
     variables: Mapping[str, int],
@@ -112,7 +164,7 @@ def _emit(  # noqa: PLR0913 - the walk carries what it fills
         return height + 1
     if isinstance(node, ast.Name):
         if node.id not in variables:
-            raise _unknown(node.id, node.col_offset, text, [*variables, *_FUNCTIONS])
+            raise _unknown(node.id, node.col_offset, text, [*variables, *FUNCTIONS])
         code.append((program.VARIABLE, variables[node.id]))
         return height + 1
     if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
@@ -129,10 +181,10 @@ def _emit(  # noqa: PLR0913 - the walk carries what it fills
         return high
     if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
         return _emit_call(node, node.func.id, text, variables, code, constants, height)
-    raise _wrong(text, node.col_offset + 1, f"{type(node).__name__} may not stand in a formula")
+    raise _wrong(text, node.col_offset + 1, f"{_WORDS.get(type(node), 'this')} may not stand in a formula")
 
 
-def _emit_call(  # noqa: PLR0913 - as above
+def _emit_call(
     node: ast.Call,
     name: str,
     text: str,
@@ -141,9 +193,9 @@ def _emit_call(  # noqa: PLR0913 - as above
     constants: list[float],
     height: int,
 ) -> int:
-    if name not in _FUNCTIONS:
-        raise _unknown(name, node.col_offset, text, list(_FUNCTIONS))
-    instruction, count = _FUNCTIONS[name]
+    if name not in FUNCTIONS:
+        raise _unknown(name, node.col_offset, text, list(FUNCTIONS))
+    instruction, count = FUNCTIONS[name]
     if len(node.args) != count or node.keywords:
         raise _wrong(text, node.col_offset + 1, f"{name} takes {count} argument{'s' * (count > 1)}")
     high = height
@@ -174,16 +226,21 @@ def _check_power(node: ast.BinOp, text: str) -> None:
 
 
 def _unknown(name: str, column: int, text: str, known: list[str]) -> UsageError:
-    close = get_close_matches(name, known, n=1)
-    hint = f"; did you mean {close[0]!r}?" if close else ""
-    return _wrong(text, column + 1, f"{name!r} is not known{hint} Known are {', '.join(sorted(known))}")
+    shown = _short(name)
+    close = get_close_matches(shown, known, n=1)
+    hint = f"; did you mean {close[0]!r}? " if close else ". "
+    return _wrong(text, column + 1, f"{shown!r} is not known{hint}Known are {', '.join(sorted(known))}")
+
+
+def _short(text: str) -> str:
+    return text if len(text) <= _SHOWN else text[:_SHOWN] + "..."
 
 
 def _wrong(text: str, place: int | None, why: str) -> UsageError:
     where = f" at character {place}" if place else ""
     return UsageError(
         "expression_invalid",
-        f"The expression {text!r} cannot be used{where}: {why}.",
+        f"The expression {_short(text)!r} cannot be used{where}: {why}.",
         "Write a formula such as 'yaw: r*abs(r)'; `kempf effects show --symbols` lists what may stand in it.",
-        {"expression": text, "place": place},
+        {"expression": _short(text), "place": place},
     )

@@ -90,7 +90,7 @@ def _two(what, left, right, width):  # type: ignore[no-untyped-def]
         by_a, by_b = 1.0 / b, -value / b
     elif what == POWER:
         value = a**b
-        by_a = b * a ** (b - 1.0)
+        by_a = b * a ** (b - 1.0) if b != 0.0 else 0.0
         # an exponent that is no function of the state needs no logarithm of a negative base
         by_b = value * np.log(a) if a > 0.0 else 0.0
     elif what == MIN:

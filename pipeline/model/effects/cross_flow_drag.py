@@ -1,0 +1,64 @@
+"""Cross-flow drag: every strip of the hull resists its own sideways speed with the square of it.
+
+The integral over the length is taken by Gauss and Legendre's rule with six nodes. One drag coefficient serves sway
+and yaw: their inertias, added mass included, stand as those of a hull whose radius of gyration is a quarter of her
+length.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from pipeline.model.terms.effect import Effect, Parameter
+
+#: inertia in sway times the length squared over that in yaw
+_INERTIA = 16.0
+
+
+def _strip(weighted: bool) -> str:
+    nodes, weights = np.polynomial.legendre.leggauss(6)
+    terms = []
+    for x, weight in zip((0.5 * nodes).tolist(), (0.5 * weights).tolist(), strict=True):
+        speed = f"(v{x:+.12g}*L*r)"
+        terms.append(f"{weight * (x if weighted else 1.0):+.12g}*abs{speed}*{speed}")
+    return "".join(terms)
+
+
+_SWAY = f"-c/L*({_strip(weighted=False)})"
+_YAW = f"-{_INERTIA:g}*c/L**2*({_strip(weighted=True)})"
+
+EFFECT = Effect(
+    name="cross_flow_drag",
+    title="cross-flow drag of the hull",
+    group="hull",
+    plain=(
+        "Every strip along the hull resists its own sideways flow with the square of its speed, so a hull that "
+        "drifts and turns is slowed more than in proportion."
+    ),
+    equation=(
+        "dv/dt += -c/L mean(|v + x r| (v + x r)), dr/dt += -16 c/L^2 mean(x/L |v + x r| (v + x r)), means over "
+        "-L/2 < x < L/2"
+    ),
+    reference=(
+        "Fossen 2021, Handbook of marine craft hydrodynamics and motion control, 2nd ed.; Norrbin 1971, Theory "
+        "and observations on the use of a mathematical model for ship manoeuvring, SSPA publ. 68"
+    ),
+    parameters=(
+        Parameter(
+            "c",
+            "1",
+            -1.0,
+            12.0,
+            (1.0,),
+            "drag coefficient times draught, length squared and half the density, over the mass with added mass",
+        ),
+    ),
+    terms={"sway": _SWAY, "yaw": _YAW},
+    confounded_with=(
+        "sway_quadratic, yaw_quadratic, yaw_absv_r, sway_absr_v and the cubic hull terms: it is close to a sum of them"
+    ),
+    separated_by=(
+        "Turns at several rudder angles with a spiral or pull-out: drift and turn in other ratios weigh the parts "
+        "of the drag differently."
+    ),
+)

@@ -1,0 +1,66 @@
+"""First-order lag between the rudder reading and the rudder that the hull feels.
+
+Between two instants the reading is a straight line, to which the response of a first-order lag is known exactly:
+there is no error of integration that could pass for a lag of its own.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from pipeline.model.terms.effect import Effect, Parameter
+from pipeline.normalise.series import Float
+
+
+def rudder_course(time_s: Float, rudder_rad: Float, values: Float) -> Float:
+    """Return the response of a first-order lag to the rudder, which stood still before the first instant.
+
+    Parameters
+    ----------
+    time_s, rudder_rad : ndarray, shape (n,)
+        Evenly spaced; the rudder is linear between them.
+    values : ndarray, shape (1,)
+        Time constant, s.
+
+    Returns
+    -------
+    ndarray, shape (n,)
+        What the hull feels, rad.
+    """
+    tau, step = float(values[0]), float(time_s[1] - time_s[0]) if time_s.size > 1 else 0.0
+    if not tau > 0.0 or step == 0.0:
+        return rudder_rad
+    followed: Float = _followed(np.ascontiguousarray(rudder_rad), step / tau)
+    return followed
+
+
+@njit(cache=True, nogil=True)
+def _followed(rudder, ratio):  # type: ignore[no-untyped-def]
+    out = np.empty_like(rudder)
+    out[0] = rudder[0]
+    left = np.exp(-ratio)
+    for k in range(1, rudder.size):
+        behind = (rudder[k] - rudder[k - 1]) / ratio
+        out[k] = rudder[k] - behind + (out[k - 1] - rudder[k - 1] + behind) * left
+    return out
+
+
+EFFECT = Effect(
+    name="rudder_lag",
+    title="first-order rudder lag",
+    group="rudder",
+    plain="The rudder follows its reading late and gradually, as a steering engine or a filtered sensor does.",
+    equation="tau d(delta)/dt + delta = delta logged",
+    reference=(
+        "van Amerongen 1982, Adaptive steering of ships, thesis, TU Delft; Fossen 2021, Handbook of marine craft "
+        "hydrodynamics and motion control, 2nd ed."
+    ),
+    parameters=(Parameter("tau", "s", 0.0, 30.0, (0.5,), "time constant of the lag"),),
+    rudder_course=rudder_course,
+    confounded_with="dead_time, rate_limit, heading_latency, gyro_latency",
+    separated_by=(
+        "A rudder feedback logged at 1 Hz or faster beside the rudder order: its course after an execute shows "
+        "whether it creeps, waits or runs at a fixed rate."
+    ),
+)

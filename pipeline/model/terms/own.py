@@ -1,0 +1,178 @@
+"""An effect of a person's own, written as a formula: ``yaw: r*abs(r)``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from difflib import get_close_matches
+
+import numpy as np
+
+from pipeline.model.terms.effect import Effect, Parameter
+from pipeline.model.terms.expression import compiled, names_in
+from pipeline.model.terms.ordinary import answer, require_ordinary
+from pipeline.model.terms.places import KINDS, Place, allowed, require_in_place
+from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS
+from schemas.errors import UsageError
+
+#: names that stand for an unknown number: few, so that a slip of the pen does not become one
+_UNKNOWN = re.compile(r"(?:c|k|tau)[1-9]?")
+_NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
+#: what counts as much on each target, in its unit: a parameter is tried where it does a tenth of that
+_MUCH = {
+    **{"sway": 0.05, "yaw": 1e-3, "rudder": 0.1, "speed": 0.5},
+    **{"lateral_speed": 0.3, "yaw_rate": 3e-3, "heading": 0.03},
+}
+#: bounds, in steps
+_REACH = 1000.0
+_MOST_TERMS = 7
+
+
+def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
+    """Make an effect from formulas.
+
+    Parameters
+    ----------
+    texts : sequence of str
+        Each ``target: formula``, several in one text divided by semicolons; formulas for one target are added. Names
+        such as c, c1, k2, tau are unknown numbers to be estimated; without any, one factor c multiplies all.
+    name : str, optional
+        What the effect is called: small letters, digits and underscores.
+
+    Returns
+    -------
+    Effect
+        Of the group ``own``; it needs the channels that its formulas speak of.
+
+    Raises
+    ------
+    UsageError
+        ``expression_invalid``, ``effect_target``, ``symbol_out_of_place``, ``effect_not_finite``,
+        ``effect_not_absent``, ``effect_name``, ``effect_no_effect``: it is zero at every ordinary state.
+
+    Examples
+    --------
+    >>> effect = from_expression(["yaw: r*abs(r)"])
+    >>> dict(effect.terms), [p.name for p in effect.parameters]
+    ({'yaw': 'c*(r*abs(r))'}, ['c'])
+    """
+    require_name(name)
+    terms = _terms([texts] if isinstance(texts, str) else texts)
+    found = dict.fromkeys(n for text in terms.values() for n in names_in(text))
+    unknown = [n for n in found if _UNKNOWN.fullmatch(n)]
+    if not unknown:
+        unknown, terms = ["c"], {target: f"c*({text})" for target, text in terms.items()}
+    needs = tuple(channel for symbol, channel in CHANNEL_SYMBOLS.items() if symbol in found)
+    written = "; ".join(f"{target}: {text}" for target, text in terms.items())
+
+    def made(parameters: tuple[Parameter, ...]) -> Effect:
+        return Effect(
+            name=name,
+            title=f"your own effect {name}",
+            group="own",
+            plain=f"A term of your own on {_joined([TARGETS[target][1] for target in terms])}.",
+            equation=written,
+            reference="written by the user",
+            parameters=parameters,
+            terms=terms,
+            needs=needs,
+        )
+
+    parameters = tuple(_parameter(n, unknown, terms) for n in unknown)
+    effect = made(parameters)
+    require_ordinary(effect)
+    return effect
+
+
+def require_name(name: str) -> None:
+    """Refuse what is no name of an effect.
+
+    Parameters
+    ----------
+    name : str
+
+    Raises
+    ------
+    UsageError
+        ``effect_name``.
+    """
+    if not (isinstance(name, str) and _NAME.fullmatch(name)):
+        raise UsageError(
+            "effect_name",
+            f"An effect cannot be called {str(name)[:60]!r}.",
+            "Take small letters, digits and underscores, a letter first, 40 at most: my_drag.",
+        )
+
+
+def _joined(words: Sequence[str]) -> str:
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def _terms(texts: Sequence[str]) -> dict[str, str]:
+    parts: dict[str, list[str]] = {}
+    pieces = [piece for text in texts for piece in _text(text).split(";") if piece.strip()]
+    if not pieces:
+        raise _no_formula("nothing is written there")
+    if len(pieces) > _MOST_TERMS:
+        raise _no_formula(f"it holds {len(pieces)} formulas, {_MOST_TERMS} is the most")
+    for piece in pieces:
+        target, colon, text = piece.partition(":")
+        target = target.strip()
+        if not colon:
+            raise _no_formula(f"{piece.strip()[:60]!r} does not say what the formula acts on")
+        if target not in TARGETS:
+            close = get_close_matches(target[:60], TARGETS, n=1)
+            hint = f"; did you mean {close[0]!r}?" if close else "."
+            raise UsageError(
+                "effect_target",
+                f"A formula acts on {target[:60]!r}, which is not known{hint}",
+                f"Name one of {', '.join(TARGETS)} before the colon.",
+                {"target": target[:60]},
+            )
+        _require_known(target, text.strip())
+        parts.setdefault(target, []).append(text.strip())
+    return {t: found[0] if len(found) == 1 else " + ".join(f"({f})" for f in found) for t, found in parts.items()}
+
+
+def _require_known(target: str, text: str) -> None:
+    """Compile a formula as it was written, before it is joined to others: the message points into it."""
+    place = Place(target, KINDS[target], text)
+    require_in_place(place)
+    names = dict.fromkeys([*allowed(place.kind), *(n for n in names_in(text) if _UNKNOWN.fullmatch(n))])
+    compiled(text, {name: i for i, name in enumerate(names)})
+
+
+def _text(text: str) -> str:
+    if not isinstance(text, str):
+        raise _no_formula(f"it is {type(text).__name__}, no text")
+    return text
+
+
+def _no_formula(why: str) -> UsageError:
+    return UsageError(
+        "expression_invalid",
+        f"The formula of an effect cannot be used: {why}.",
+        "Write what it acts on, a colon and a formula, as in 'yaw: r*abs(r)'; `kempf effects show --symbols` lists "
+        "what may stand in it.",
+    )
+
+
+def _parameter(name: str, unknown: Sequence[str], terms: dict[str, str]) -> Parameter:
+    one, ones = {n: 0.0 if n == name else 1.0 for n in unknown}, dict.fromkeys(unknown, 1.0)
+    steps, moved = [], False
+    for target, text in terms.items():
+        with np.errstate(all="ignore"):
+            effect = answer(text, ones).value - answer(text, one).value
+            size = float(np.sqrt(np.mean(np.square(effect))))
+        moved = moved or size != 0.0
+        if np.isfinite(size) and size > 0.0:
+            steps.append(0.1 * _MUCH[target] / size)
+    if not moved:
+        raise UsageError(
+            "effect_no_effect",
+            f"The number {name!r} changes nothing at any ordinary state: {'; '.join(terms.values())[:80]}.",
+            "Write a formula that is not 0 where the ship turns.",
+            {"parameter": name},
+        )
+    step = float(f"{min(steps, default=1.0):.1g}")
+    return Parameter(name, "", -_REACH * step, _REACH * step, (step,), "a number of your own formula, in SI units")

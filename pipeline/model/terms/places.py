@@ -1,0 +1,103 @@
+"""Which symbols stand where: a term may ask for nothing that the filter has not computed by then."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+from pipeline.model.terms.effect import Effect
+from pipeline.model.terms.expression import names_in
+from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, COMPUTED_SYMBOLS, RUN_SYMBOLS, SHIP_SYMBOLS, STATE_SYMBOLS
+from schemas.errors import UsageError
+
+Kind = Literal["speed", "rudder", "force", "measured", "noise"]
+
+_OWN_STATES = ("m1", "m2", "m3", "m4")
+#: what a term of each kind may not ask for beyond the states of other effects
+_LATER: Mapping[Kind, frozenset[str]] = {
+    "speed": frozenset({"delta", "vdot", "rdot"}),
+    "rudder": frozenset({"vdot", "rdot"}),
+    "force": frozenset({"vdot", "rdot"}),
+    "measured": frozenset(),
+    # asked for once, before the run begins
+    "noise": frozenset({*STATE_SYMBOLS, "delta", "vdot", "rdot", *CHANNEL_SYMBOLS, *RUN_SYMBOLS}),
+}
+#: kind of term by target
+KINDS: Mapping[str, Kind] = {
+    "speed": "speed",
+    "rudder": "rudder",
+    "sway": "force",
+    "yaw": "force",
+    "lateral_speed": "measured",
+    "yaw_rate": "measured",
+    "heading": "measured",
+}
+
+
+@dataclass(frozen=True)
+class Place:
+    """One expression of an effect and where it stands.
+
+    Attributes
+    ----------
+    name : str
+        As a person would say it: ``yaw``, ``m1.derivative``.
+    kind : str
+    text : str
+    """
+
+    name: str
+    kind: Kind
+    text: str
+
+
+def places(effect: Effect) -> list[Place]:
+    """Return every expression of an effect: terms in the order given, then its states."""
+    found = [Place(target, KINDS[target], text) for target, text in effect.terms.items()]
+    for state in effect.states:
+        found.append(Place(f"{state.name}.derivative", "force", state.derivative))
+        found.append(Place(f"{state.name}.noise", "noise", state.noise))
+        found.append(Place(f"{state.name}.initial_std", "noise", state.initial_std))
+    return found
+
+
+def allowed(kind: Kind, own_states: tuple[str, ...] = ()) -> tuple[str, ...]:
+    """Return the symbols that a term of a kind may ask for.
+
+    Parameters
+    ----------
+    kind : str
+    own_states : tuple of str, optional
+        States that its effect brings along.
+    """
+    every = (*STATE_SYMBOLS, *COMPUTED_SYMBOLS, *SHIP_SYMBOLS, *CHANNEL_SYMBOLS, *RUN_SYMBOLS)
+    strange = set(_OWN_STATES) - set(own_states)
+    return tuple(name for name in every if name not in _LATER[kind] and name not in strange)
+
+
+def require_in_place(place: Place, own_states: tuple[str, ...] = ()) -> None:
+    """Refuse an expression that asks for a symbol which is not there yet where it stands.
+
+    Parameters
+    ----------
+    place : Place
+    own_states : tuple of str, optional
+        States that its effect brings along.
+
+    Raises
+    ------
+    UsageError
+        ``symbol_out_of_place``.
+    """
+    known = allowed(place.kind, own_states)
+    everywhere = {*STATE_SYMBOLS, *COMPUTED_SYMBOLS, *SHIP_SYMBOLS, *CHANNEL_SYMBOLS, *RUN_SYMBOLS}
+    for name in names_in(place.text):
+        if name in everywhere and name not in known:
+            why = "belongs to no state of this effect" if name in _OWN_STATES else "is not known yet where it stands"
+            raise UsageError(
+                "symbol_out_of_place",
+                f"The expression for {place.name} asks for {name!r}, which {why}.",
+                f"Use {', '.join(known)}.",
+                {"place": place.name, "symbol": name},
+            )

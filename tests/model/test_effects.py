@@ -1,0 +1,552 @@
+"""The catalogue: every effect can be computed, vanishes without its parameters and says what a person must know."""
+
+from __future__ import annotations
+
+import json
+import re
+import sys
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from pipeline.model import effects
+from pipeline.model.augmented import Augmented
+from pipeline.model.effects import as_json, catalogue, digest, from_expression, from_file, get
+from pipeline.model.terms.effect import Effect, ExtraState, Parameter
+from pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
+from pipeline.model.terms.ordinary import answer, require_ordinary, run
+from pipeline.model.terms.places import places
+from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, SYMBOLS
+from schemas.errors import KempfError, NotFound, UsageError
+from workbench.effects_table import effects_table
+
+ALL = catalogue()
+DOCUMENT = Path(__file__).parents[2] / "docs" / "effects.md"
+#: effects that DIAGNOSIS names, by the files that hold them
+NAMED = {
+    *("cross_flow_drag", "sway_quadratic", "yaw_quadratic", "yaw_absv_r", "sway_absr_v", "sway_cubic", "yaw_v2r"),
+    *("sway_vr2", "yaw_cubic", "rudder_stall", "flow_straightening", "rudder_lag", "dead_time", "backlash"),
+    *("rate_limit", "neutral_angle", "rudder_asymmetry", "propeller_wash", "propeller_walk", "speed_loss"),
+    *("wind_force", "earth_current", "waves", "shallow_water", "antenna_lever", "heading_misalignment", "gyro_bias"),
+    *("gyro_scale", "gnss_latency", "log_scale", "roll_coupling", "load_condition", "memory"),
+}
+UNITS = {"1", "s", "rad", "rad/s", "s/rad", "1/rad^2", "m", "m/s"}
+each = pytest.mark.parametrize("effect", ALL.values(), ids=list(ALL))
+courses = pytest.mark.parametrize("effect", [e for e in ALL.values() if e.rudder_course], ids=lambda e: e.name)
+
+
+def typical(effect: Effect) -> dict[str, float]:
+    return {p.name: p.steps[0] for p in effect.parameters}
+
+
+def at(text: str, parameters: dict[str, float], **symbols: float) -> float:
+    """Value of a term for given symbols, all others 0."""
+    index = {name: i for i, name in enumerate([*SYMBOLS, *parameters])}
+    values = np.zeros(len(index))
+    for name, number in {**symbols, **parameters}.items():
+        values[index[name]] = number
+    return float(run(compiled(text, index), values)[0])
+
+
+def test_the_catalogue_holds_what_was_asked_for() -> None:
+    assert set(ALL) >= NAMED
+    assert len(ALL) >= 33
+    assert list(ALL) == sorted(ALL)
+
+
+@each
+def test_it_can_be_computed_at_ordinary_states_and_is_absent_without_parameters(effect: Effect) -> None:
+    require_ordinary(effect)
+    programs, code, _ = Augmented((effect,)).table
+    assert len(programs) == len(effect.terms) + 3 * len(effect.states)
+    assert code.shape[1] == 2
+
+
+@each
+def test_it_does_something_at_its_typical_values(effect: Effect) -> None:
+    own = tuple(state.name for state in effect.states)
+    for text in effect.terms.values():
+        assert np.any(answer(text, typical(effect), own, 0.1).value != 0.0)
+    for state in effect.states:
+        assert np.any(answer(state.derivative, typical(effect), own, 0.1).value != 0.0)
+    if effect.rudder_course is not None:
+        time = np.arange(0.0, 60.0, 0.1)
+        rudder = 0.3 * np.sin(0.3 * time)
+        assert np.max(np.abs(effect.rudder_course(time, rudder, one(effect, 2)) - rudder)) > 1e-3
+
+
+@each
+def test_every_parameter_can_be_absent_and_is_tried_within_its_bounds(effect: Effect) -> None:
+    assert effect.parameters
+    for parameter in effect.parameters:
+        assert parameter.low <= 0.0 < parameter.high
+        assert parameter.unit in UNITS
+        assert parameter.meaning
+        assert parameter.name not in SYMBOLS and parameter.name not in FUNCTIONS
+        assert list(parameter.steps) == sorted(set(parameter.steps))
+        assert all(step != 0.0 and parameter.low < step < parameter.high for step in parameter.steps)
+    first = effect.parameters[0]
+    assert len(first.steps) == (3 if effect.name in ("backlash", "dead_time", "rate_limit") else 1)
+
+
+@each
+def test_it_uses_its_parameters_and_asks_for_the_channels_it_speaks_of(effect: Effect) -> None:
+    spoken = {name for place in places(effect) for name in names_in(place.text)}
+    if effect.rudder_course is None:
+        assert {p.name for p in effect.parameters} <= spoken
+    assert set(effect.needs) == {channel for symbol, channel in CHANNEL_SYMBOLS.items() if symbol in spoken}
+
+
+@each
+def test_its_words_are_for_a_naval_architect(effect: Effect) -> None:
+    assert re.fullmatch(r"[A-Z][A-Za-z ,;'-]{20,}\.", effect.plain), effect.plain
+    assert "_" not in effect.title
+    assert len(effect.separated_by) > 20 and effect.separated_by.endswith(".")
+    assert re.search(r"\b(19|20)\d\d\b|ITTC", effect.reference)
+    assert effect.confounded_with
+    assert effect.equation
+    for name in re.findall(r"\b[a-z]+_[a-z0-9_]+\b", effect.confounded_with):
+        assert name in ALL, name
+
+
+def test_the_document_has_the_table_that_the_command_prints() -> None:
+    text = DOCUMENT.read_text(encoding="utf-8")
+    shown = text.partition("<!-- catalogue: kempf effects list --markdown -->\n")[2]
+    assert shown.partition("<!-- end of the catalogue -->")[0].strip() == effects_table(ALL.values()).strip()
+
+
+@each
+def test_its_content_is_json_and_its_digest_pins_it(effect: Effect) -> None:
+    told = json.loads(json.dumps(as_json(effect), allow_nan=False))
+    assert told["sha256"] == digest(effect) == digest(get(effect.name))
+    assert digest(replace(effect, plain="Other words.")) == digest(effect)
+    first = effect.parameters[0]
+    wider = replace(effect, parameters=(replace(first, high=2.0 * first.high), *effect.parameters[1:]))
+    assert digest(wider) != digest(effect)
+
+
+def test_digests_differ() -> None:
+    assert len({digest(effect) for effect in ALL.values()}) == len(ALL)
+
+
+# ---------------------------------------------------------------- what they compute, against closed forms
+
+
+def test_cross_flow_drag_is_the_integral_over_the_strips() -> None:
+    effect, L = ALL["cross_flow_drag"], 120.0
+    x = (np.arange(200_000) + 0.5) / 200_000 - 0.5
+    for v, r in ((1.0, 0.0), (-0.7, 0.01), (0.3, 0.02), (0.0, -0.02)):
+        speed = v + x * L * r
+        sway = -2.5 / L * np.mean(np.abs(speed) * speed)
+        yaw = -16.0 * 2.5 / L**2 * np.mean(x * np.abs(speed) * speed)
+        drag = abs(v) + L * abs(r) / 2
+        assert at(effect.terms["sway"], {"c": 2.5}, v=v, r=r, L=L) == pytest.approx(sway, abs=0.01 * 2.5 / L * drag**2)
+        assert at(effect.terms["yaw"], {"c": 2.5}, v=v, r=r, L=L) == pytest.approx(yaw, abs=0.01 * 2.5 / L**2 * drag**2)
+
+
+@pytest.mark.parametrize("name", [n for n, e in ALL.items() if e.group == "hull" and e.parameters[0].low > -4.0])
+def test_hull_damping_opposes_the_motion(name: str) -> None:
+    effect = ALL[name]
+    for target, symbol in (("sway", "v"), ("yaw", "r")):
+        for sign in (-1.0, 1.0):
+            if target in effect.terms:
+                motion = {"v": 0.5, "r": 0.01, "V": 6.0, "L": 100.0} | {symbol: sign * {"v": 0.5, "r": 0.01}[symbol]}
+                assert sign * at(effect.terms[target], typical(effect), **motion) < 0.0
+
+
+@each
+def test_hull_and_rudder_are_alike_to_both_sides_but_for_what_is_not(effect: Effect) -> None:
+    if effect.group not in ("hull", "rudder", "propulsion") or effect.name in ("rudder_asymmetry", "neutral_angle"):
+        return
+    if effect.name == "propeller_walk" or effect.rudder_course is not None:
+        return
+    ship = {"V": 6.0, "L": 100.0, "V0": 7.0, "n0": 2.0, "n": 1.5, "b1": -1e-3, "b2": 6e-5}
+    for target, text in effect.terms.items():
+        if target == "speed":
+            continue
+        there = at(text, typical(effect), v=0.4, r=0.01, delta=0.2, **ship)
+        back = at(text, typical(effect), v=-0.4, r=-0.01, delta=-0.2, **ship)
+        assert there == pytest.approx(-back) and there != 0.0
+
+
+def test_sensor_effects_follow_from_eq_18() -> None:
+    # a ship that turns with V = 6, v = -0.5, r = 0.02 in a current; velocity over ground tau ago, heading tau ago
+    V, r, tau, step = 6.0, 0.02, 0.05, 1e-5
+    v = lambda t: -0.5 + 0.03 * t  # noqa: E731
+    K = lambda t: 0.7 + r * t  # noqa: E731
+
+    def over_ground(t: float) -> np.ndarray:
+        return np.array([V * np.cos(K(t)) - v(t) * np.sin(K(t)) + 0.3, V * np.sin(K(t)) + v(t) * np.cos(K(t)) - 0.2])
+
+    def lateral(velocity: np.ndarray, heading: float) -> float:
+        return float(-velocity[0] * np.sin(heading) + velocity[1] * np.cos(heading))
+
+    now = lateral(over_ground(0.0), K(0.0))
+    late_gnss = lateral(over_ground(-step), K(0.0)) - now
+    term = ALL["gnss_latency"].terms["lateral_speed"]
+    assert at(term, {"tau": step}, vdot=0.03, V=V, r=r) == pytest.approx(late_gnss, rel=1e-3)
+    late_heading = lateral(over_ground(0.0), K(-step)) - now
+    term = ALL["heading_latency"].terms["lateral_speed"]
+    current_ahead = 0.3 * np.cos(0.7) - 0.2 * np.sin(0.7)
+    assert at(term, {"tau": step}, V=V + current_ahead, r=r) == pytest.approx(late_heading, rel=1e-3)
+    askew = lateral(over_ground(0.0), K(0.0) + step) - now
+    term = ALL["heading_misalignment"].terms["lateral_speed"]
+    assert at(term, {"c": step}, V=V + current_ahead) == pytest.approx(askew, rel=1e-3)
+    assert at(ALL["heading_latency"].terms["heading"], {"tau": tau}, r=r) == pytest.approx(K(-tau) - K(0.0))
+    assert at(ALL["antenna_lever"].terms["lateral_speed"], {"x": 12.0}, r=r) == pytest.approx(0.24)
+
+
+def test_waves_have_the_spread_and_the_frequency_that_are_asked_for() -> None:
+    effect, L = ALL["waves"], 80.0
+    told = {"c": 0.02, "k": 1.3}
+    w = 1.3 * np.sqrt(9.81 / L)
+    first, second = effect.states
+    A = np.array([[0.0, 1.0], [at(second.derivative, told, L=L, m1=1.0), at(second.derivative, told, L=L, m2=1.0)]])
+    q = at(second.noise, told, L=L)
+    stationary = np.diag([at(first.initial_std, told, L=L) ** 2, at(second.initial_std, told, L=L) ** 2])
+    assert A @ stationary + stationary @ A.T + np.diag([0.0, q**2]) == pytest.approx(np.zeros((2, 2)), abs=1e-15)
+    assert stationary[0, 0] == pytest.approx(0.02**2)
+    assert np.abs(np.linalg.eigvals(A)) == pytest.approx([w, w])
+    assert at(first.derivative, told, m2=0.3) == 0.3
+
+
+def test_what_stands_for_eq_16_scales_it() -> None:
+    ship = {"a11": -5e-3, "a21": -1e-4, "a22": -0.01, "b1": -1e-3, "b2": 6e-5, "V": 6.0, "V0": 7.0, "v": 0.4, "r": 0.01}
+    sway, yaw = -5e-3 * 6.0 * 0.4, 6.0 * (-1e-4 * 0.4 - 0.01 * 0.01)
+    load = ALL["load_condition"].terms
+    assert at(load["sway"], {"c": 0.1}, day=2.0, **ship) == pytest.approx(0.2 * sway)
+    assert at(load["yaw"], {"c": 0.1}, day=2.0, delta=0.2, **ship) == pytest.approx(0.2 * (yaw + 6e-5 * 36.0 * 0.2))
+    shallow = ALL["shallow_water"].terms
+    assert at(shallow["yaw"], {"c": 1.0}, T=5.0, h=10.0, **ship) == pytest.approx(0.25 * yaw)
+    assert at(shallow["sway"], {"c": 1.0}, T=5.0, h=2.0, **ship) == pytest.approx(sway)  # a depth less than the draught
+    power = ALL["speed_exponent"].terms["yaw"]
+    assert at(power, {"c": 1.0}, delta=0.2, **ship) == pytest.approx(6e-5 * 0.2 * (36.0 * 7.0 / 6.0 - 36.0))
+    wash = ALL["propeller_wash"].terms["yaw"]
+    told = {"n": 1.8, "n0": 2.0, "delta": 0.2}
+    assert at(wash, {"c": 1.0}, **told, **ship) == pytest.approx(6e-5 * 0.2 * ((7.0 * 0.9) ** 2 - 36.0))
+
+
+def test_wind_from_starboard_pushes_to_port_and_turns_the_bow_away() -> None:
+    effect = ALL["wind_force"]
+    wind = {"U": 10.0, "L": 100.0}
+    assert at(effect.terms["sway"], typical(effect), gamma=np.pi / 2, **wind) < 0.0
+    assert at(effect.terms["yaw"], typical(effect), gamma=np.pi / 4, **wind) < 0.0
+    assert at(effect.terms["yaw"], typical(effect), gamma=0.0, **wind) == 0.0
+
+
+def test_a_turn_takes_speed_away() -> None:
+    effect = ALL["speed_loss"]
+    told = {"V": 7.0, "L": 100.0, "delta": 0.3, "v": -0.6, "r": 0.02}
+    assert at(effect.states[0].derivative, typical(effect), **told) > 0.0
+    assert at(effect.terms["speed"], typical(effect), m1=1.0) == -1.0
+
+
+# ---------------------------------------------------------------- what becomes of the rudder
+
+
+def zigzag(step: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    """A rudder put over and back at 3 deg/s, on an even axis."""
+    time = np.arange(0.0, 80.0 + step / 2, step)
+    corners = [0.0, 5.0, 11.7, 30.0, 43.3, 60.0, 73.3, 80.0]
+    return time, np.interp(time, corners, [0.0, 0.0, 0.35, 0.35, -0.35, -0.35, 0.35, 0.35])
+
+
+def one(effect: Effect, k: int) -> np.ndarray:
+    return np.array([p.steps[min(k, len(p.steps) - 1)] for p in effect.parameters])
+
+
+@courses
+def test_without_its_parameter_the_course_is_unchanged(effect: Effect) -> None:
+    time, rudder = zigzag()
+    assert effect.rudder_course is not None
+    assert np.array_equal(effect.rudder_course(time, rudder, np.zeros(1)), rudder)
+    assert np.allclose(effect.rudder_course(time, rudder, np.full(1, 1e-9)), rudder, atol=1e-8)
+
+
+@courses
+def test_a_course_is_deterministic_causal_and_leaves_its_input_alone(effect: Effect) -> None:
+    time, rudder = zigzag()
+    kept = rudder.copy()
+    assert effect.rudder_course is not None
+    for k in range(3):
+        first = effect.rudder_course(time, rudder, one(effect, k))
+        assert first.shape == rudder.shape and np.all(np.isfinite(first))
+        assert np.array_equal(first, effect.rudder_course(time, rudder, one(effect, k)))
+        later = rudder.copy()
+        later[400:] = 0.1
+        assert np.array_equal(effect.rudder_course(time, later, one(effect, k))[:400], first[:400])
+        assert np.max(np.abs(first)) <= np.max(np.abs(rudder)) + 1e-12
+        assert np.allclose(effect.rudder_course(time, -rudder, one(effect, k)), -first, atol=1e-15)
+    assert np.array_equal(rudder, kept)
+    still = np.full(time.size, 0.2)
+    assert np.allclose(effect.rudder_course(time, still, one(effect, 0)), still, atol=1e-15)
+    assert effect.rudder_course(time[:1], rudder[:1], one(effect, 0)).shape == (1,)
+
+
+def test_lag_is_the_exact_response_to_a_ramp() -> None:
+    course = ALL["rudder_lag"].rudder_course
+    assert course is not None
+    time = np.arange(0.0, 20.0, 0.25)
+    for tau in (0.05, 0.7, 4.0):
+        exact = 0.03 * (time - tau * (1.0 - np.exp(-time / tau)))
+        assert np.allclose(course(time, 0.03 * time, np.array([tau])), exact, atol=1e-13)
+
+
+def test_lag_does_not_depend_on_the_step() -> None:
+    course = ALL["rudder_lag"].rudder_course
+    assert course is not None
+    fine, coarse = zigzag(0.025), zigzag(0.1)
+    told = np.array([1.5])
+    assert np.allclose(course(*fine, told)[::4], course(coarse[0], fine[1][::4], told), atol=1e-12)
+
+
+def test_dead_time_shifts() -> None:
+    course = ALL["dead_time"].rudder_course
+    assert course is not None
+    time, rudder = zigzag()
+    late = course(time, rudder, np.array([1.2]))
+    assert np.allclose(late[12:], rudder[:-12], atol=1e-12)
+    assert np.all(late[:12] == rudder[0])
+
+
+def test_backlash_is_a_play() -> None:
+    course = ALL["backlash"].rudder_course
+    assert course is not None
+    time, rudder = zigzag()
+    taken = course(time, rudder, np.array([0.05]))
+    assert np.max(np.abs(taken - rudder)) == pytest.approx(0.025)
+    assert taken[250] == pytest.approx(0.325) and taken[500] == pytest.approx(-0.325)
+    small = 0.02 * np.sin(time)
+    assert np.all(course(time, small, np.array([0.05])) == 0.0)
+
+
+def test_rate_limit_is_exact_between_the_instants() -> None:
+    course = ALL["rate_limit"].rudder_course
+    assert course is not None
+    rng = np.random.default_rng(7)
+    knots = np.cumsum(rng.normal(0.0, 0.05, 40))
+    coarse = np.arange(0.0, 40.0)
+    fine = np.arange(0.0, 39.0 + 5e-4, 1e-3)
+    slowness = np.array([20.0])
+    reference = course(fine, np.interp(fine, coarse, knots), slowness)
+    assert np.allclose(course(coarse, knots, slowness), reference[::1000], atol=1e-12)
+    assert np.max(np.abs(np.diff(reference))) <= 1e-3 / 20.0 + 1e-15
+    stepped = np.where(coarse < 5.0, 0.0, 0.3)
+    assert course(coarse, stepped, slowness)[4:12] == pytest.approx([0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.3])
+
+
+# ---------------------------------------------------------------- adding one
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """A second folder that the catalogue reads."""
+    monkeypatch.setattr(effects, "__path__", [*effects.__path__, str(tmp_path)])
+    before = set(sys.modules)
+    yield tmp_path
+    for name in set(sys.modules) - before:
+        if name.startswith("pipeline.model.effects."):
+            del sys.modules[name]
+
+
+GOOD = """
+from pipeline.model.terms.effect import Effect, Parameter
+EFFECT = Effect(
+    name="{name}", title="t", group="hull", plain="p", equation="e", reference="r",
+    parameters=(Parameter("c", "1", -1.0, 1.0, (0.1,), "m"),), terms={{"{target}": "c*r"}},
+)
+"""
+
+
+def test_adding_one_is_adding_one_file(folder: Path) -> None:
+    (folder / "quite_new.py").write_text(GOOD.format(name="quite_new", target="yaw"), encoding="utf-8")
+    assert set(catalogue()) == {*ALL, "quite_new"}
+
+
+def test_the_worked_example_of_the_document_works(folder: Path) -> None:
+    text = DOCUMENT.read_text(encoding="utf-8")
+    name, source = re.findall(r"```python\n# pipeline/model/effects/(\w+)\.py\n(.*?)```", text, flags=re.DOTALL)[0]
+    (folder / f"{name}.py").write_text(source, encoding="utf-8")
+    assert name not in ALL
+    added = catalogue()[name]
+    require_ordinary(added)
+    assert added.plain and added.separated_by
+
+
+def test_the_effect_file_of_the_document_works() -> None:
+    shown = re.findall(r"```yaml\n(.*?)```", DOCUMENT.read_text(encoding="utf-8"), flags=re.DOTALL)
+    assert len(shown) == 1
+    effect = from_file(shown[0], "own.yaml")
+    assert effect.group == "own"
+    assert effect.needs == ("wind_speed", "wind_angle")
+
+
+@pytest.mark.parametrize(
+    ("content", "told"),
+    [
+        ("raise RuntimeError('no')", "raised RuntimeError: no"),
+        ("import there_is_no_such_module", "ModuleNotFoundError"),
+        ("x = (", "SyntaxError"),
+        ("x = 1", "defines no EFFECT"),
+        (GOOD.format(name="other", target="yaw"), "bears the name of its effect"),
+        (GOOD.format(name="yaw_cubic", target="yaw"), "is called 'yaw_cubic'"),
+        (GOOD.format(name="zz_wrong", target="roll"), "'roll'"),
+    ],
+)
+def test_a_wrong_file_in_the_folder_is_one_clear_error(folder: Path, content: str, told: str) -> None:
+    (folder / "zz_wrong.py").write_text(content, encoding="utf-8")
+    with pytest.raises(KempfError, match=re.escape(told)) as caught:
+        catalogue()
+    assert caught.value.code == "catalogue_invalid"
+    assert "zz_wrong.py" in caught.value.message
+
+
+def test_an_unknown_effect_is_not_found() -> None:
+    with pytest.raises(NotFound, match="did you mean 'yaw_quadratic'"):
+        get("yaw_quadratics")
+
+
+# ---------------------------------------------------------------- what is refused
+
+
+def test_effects_that_cannot_be_computed_are_refused() -> None:
+    good = ALL["yaw_quadratic"]
+    for change, code in (
+        ({"terms": {"yaw": "c*v/r"}}, "effect_not_finite"),
+        ({"terms": {"yaw": "c*sqrt(abs(v))"}}, "effect_not_finite"),
+        ({"terms": {"yaw": "r*abs(r)"}}, "effect_not_absent"),
+        ({"terms": {"yaw": "c*m1"}}, "symbol_out_of_place"),
+        ({"terms": {"yaw": "c*rdot"}}, "symbol_out_of_place"),
+        ({"terms": {"speed": "c*delta"}}, "symbol_out_of_place"),
+        ({"terms": {"yaw": "c*m1"}, "states": (ExtraState("m1", "v", "c*r"),)}, "symbol_out_of_place"),
+        ({"terms": {"yaw": "m1"}, "states": (ExtraState("m1", "v - m1"),)}, "effect_not_absent"),
+        ({"parameters": (Parameter("k", "1", -1.0, 1.0, (0.1,), "m"),)}, "expression_invalid"),
+    ):
+        with pytest.raises(UsageError) as caught:
+            require_ordinary(replace(good, **change))
+        assert caught.value.code == code
+    with pytest.raises(UsageError, match="at v = 0, r = 0"):
+        require_ordinary(replace(good, terms={"yaw": "c*v/r"}))
+
+
+def test_own_expressions() -> None:
+    plain = from_expression(["yaw: r*abs(r)"], "mine")
+    assert (plain.name, dict(plain.terms), [p.name for p in plain.parameters]) == (
+        "mine",
+        {"yaw": "c*(r*abs(r))"},
+        ["c"],
+    )
+    two = from_expression(["sway: c*v; yaw: k*r"])
+    assert (dict(two.terms), [p.name for p in two.parameters]) == ({"sway": "c*v", "yaw": "k*r"}, ["c", "k"])
+    assert dict(from_expression(["yaw: c*r", "yaw: k*v"]).terms) == {"yaw": "(c*r) + (k*v)"}
+    assert from_expression(["yaw: U**2*sin(2*gamma)"]).needs == ("wind_speed", "wind_angle")
+    assert from_expression(["lateral_speed: tau*vdot"]).parameters[0].name == "tau"
+    for effect in (plain, two):
+        require_ordinary(effect)
+        for p in effect.parameters:
+            assert p.low < 0.0 < p.steps[0] < p.high
+        assert "yaw acceleration" in effect.plain
+
+
+@pytest.mark.parametrize(
+    ("text", "code", "told"),
+    [
+        ("yaw: rr", "expression_invalid", "did you mean 'r'"),
+        ("yaw: c*vv", "expression_invalid", "'vv' is not known"),
+        ("yaw: sine(v)", "expression_invalid", "did you mean 'sin'"),
+        ("yaw: c10*v", "expression_invalid", "'c10' is not known"),
+        ("yw: r", "effect_target", "did you mean 'yaw'"),
+        ("r*abs(r)", "expression_invalid", "does not say what the formula acts on"),
+        ("", "expression_invalid", "nothing is written"),
+        (" ; ", "expression_invalid", "nothing is written"),
+        ("yaw:", "expression_invalid", "it is empty"),
+        ("yaw: r); (v", "expression_invalid", "no formula"),
+        ("yaw: v/r", "effect_not_finite", "at v = 0, r = 0"),
+        ("yaw: 1/0", "effect_not_finite", "no finite value"),
+        ("yaw: log(v)", "effect_not_finite", "ordinary state"),
+        ("yaw: ((9.0**9)**9)**9 * v", "effect_not_finite", "no finite value"),
+        ("yaw: exp(k*v)", "effect_not_absent", "still 1"),
+        ("yaw: r - r", "effect_no_effect", "changes nothing"),
+        ("yaw: c*v + k*0", "effect_no_effect", "'k' changes nothing"),
+        ("yaw: vdot", "symbol_out_of_place", "'vdot'"),
+        ("speed: delta", "symbol_out_of_place", "'delta'"),
+        ("yaw: m1", "symbol_out_of_place", "no state of this effect"),
+        (";".join(["yaw: r"] * 9), "expression_invalid", "9 formulas"),
+    ],
+)
+def test_own_expressions_that_are_refused(text: str, code: str, told: str) -> None:
+    with pytest.raises(UsageError) as caught:
+        from_expression([text])
+    assert (caught.value.code, told in caught.value.message) == (code, True), caught.value.message
+    assert caught.value.next_step
+
+
+@pytest.mark.parametrize("name", ["", "Own", "a b", "../x", "a" * 41, "1a", "é"])
+def test_a_name_that_is_none_is_refused(name: str) -> None:
+    with pytest.raises(UsageError, match="cannot be called"):
+        from_expression(["yaw: r"], name)
+
+
+FILE = """
+name: mine
+plain: My own drag.
+reference: my own measurements
+terms: {yaw: "-c*r*abs(r)"}
+parameters:
+  c: {unit: "1", low: -1, high: 5, steps: [0.5]}
+"""
+
+
+def test_an_effect_file() -> None:
+    effect = from_file(FILE, "mine.yaml")
+    assert (effect.name, effect.group, effect.title) == ("mine", "own", "mine")
+    assert effect.parameters == (Parameter("c", "1", -1.0, 5.0, (0.5,), ""),)
+    assert digest(effect) == digest(from_file(FILE, "elsewhere.yaml"))
+    with_state = FILE.replace('"-c*r*abs(r)"}', '"c*(r - m1)"}\nstates: {m1: {derivative: "(r - m1)*V/L"}}')
+    assert from_file(with_state, "x").states == (ExtraState("m1", "(r - m1)*V/L"),)
+
+
+@pytest.mark.parametrize(
+    ("change", "told"),
+    [
+        (("name: mine", "name: My effect"), "cannot be called"),
+        (("plain: My own drag.", ""), "plain: Field required"),
+        (("terms:", "term:"), "terms: Field required"),
+        (("r*abs(r)", "rr"), "terms.yaw"),
+        (("-c*r*abs(r)", "-c*v/r"), "no finite value"),
+        (("-c*r*abs(r)", "r*abs(r)"), "parameters.c: no formula speaks of it"),
+        (("-c*r*abs(r)", "r + 0*c"), "is still"),
+        (("{yaw:", "{roll:"), "'roll'"),
+        (("low: -1", "low: 1"), "parameters.c: Value error, 0 must lie between"),
+        (("low: -1", "low: .nan"), "parameters.c.low"),
+        (("steps: [0.5]", "steps: [9]"), "must lie between low and high"),
+        (("steps: [0.5]", "steps: []"), "parameters.c.steps"),
+        (("  c:", "  r:"), "already stands for something else"),
+        (("  c:", "  c c:"), "is no name of a parameter"),
+        (("terms:", "states: {m2: {derivative: '0'}}\nterms:"), "states are numbered through"),
+        (("terms:", "states: {m1: {derivative: 'q'}}\nterms:"), "states.m1.derivative"),
+        (("terms:", "needs: [barometer]\nterms:"), "barometer"),
+        (("terms:", "code: print(1)\nterms:"), "code: Extra inputs"),
+        (("terms:", "more: !!python/object/apply:os.system [ls]\nterms:"), "not valid YAML"),
+        (("plain: My own drag.", "plain: &a My own drag.\ntitle: *a"), "alias"),
+        (("terms: {", "terms: {{"), "not valid YAML"),
+    ],
+)
+def test_a_wrong_effect_file_is_one_clear_error_with_file_and_key(change: tuple[str, str], told: str) -> None:
+    assert change[0] in FILE
+    with pytest.raises(UsageError) as caught:
+        from_file(FILE.replace(*change), "mine.yaml")
+    assert caught.value.code == "effect_file_invalid"
+    assert caught.value.message.startswith("mine.yaml is not a valid effect file: ")
+    assert told in caught.value.message
+
+
+@pytest.mark.parametrize(
+    "text", ["", "- a", "7", "[" * 2000, "- " * 2000, "? " * 2000, "a: {" * 2000, "\x00", "a: " + "x" * 60_000]
+)
+def test_what_is_no_effect_file(text: str) -> None:
+    with pytest.raises(UsageError, match="is not a valid effect file"):
+        from_file(text, "mine.yaml")

@@ -1,0 +1,55 @@
+"""kempf effects: the catalogue on the terminal and as JSON."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from pipeline.model.effects import catalogue
+from pipeline.model.terms.symbols import SYMBOLS, TARGETS
+from tests.workbench.driving import kempf, refused
+
+DOCUMENT = Path(__file__).parents[2] / "docs" / "effects.md"
+
+
+def test_list() -> None:
+    told = kempf("effects", "list")
+    assert told.code == 0
+    assert [line.split()[0] for line in told.out.splitlines()[1:]] == list(catalogue())
+    hull = kempf("effects", "list", "--group", "hull")
+    assert len(hull.out.splitlines()) == 1 + sum(e.group == "hull" for e in catalogue().values())
+
+
+def test_list_as_json_says_everything() -> None:
+    told = kempf("effects", "list", "--json").json
+    assert [one["name"] for one in told] == list(catalogue())
+    assert {"title", "group", "plain", "equation", "reference", "parameters", "terms", "needs", "sha256"} <= set(
+        told[0]
+    )
+
+
+def test_the_table_of_the_document() -> None:
+    assert kempf("effects", "list", "--markdown").out in DOCUMENT.read_text(encoding="utf-8")
+
+
+def test_show() -> None:
+    told = kempf("effects", "show", "rudder_lag")
+    assert told.code == 0
+    for words in ("first-order rudder lag", "told apart by:", "dead_time", "tau", "time constant of the lag"):
+        assert words in told.out
+    assert kempf("effects", "show", "rudder_lag", "--json").json["parameters"][0]["unit"] == "s"
+
+
+def test_show_symbols() -> None:
+    told = kempf("effects", "show", "--symbols")
+    assert told.code == 0
+    listed = {line.split()[0] for line in told.out.splitlines() if line.strip()}
+    assert {*SYMBOLS, *TARGETS} <= listed
+    as_json = kempf("effects", "show", "--symbols", "--json").json
+    assert set(as_json["symbols"]) == set(SYMBOLS)
+    assert as_json["functions"]["max"] == 2
+
+
+def test_what_is_not_there_is_told() -> None:
+    refused(kempf("effects", "show", "yaw_quadratics", "--json"), 4, "effect_unknown")
+    refused(kempf("effects", "show", "--json"), 2, "usage")
+    refused(kempf("effects", "list", "--group", "colour", "--json"), 2, "usage")

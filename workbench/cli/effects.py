@@ -1,0 +1,103 @@
+"""``kempf effects list|show``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from workbench.cli.options import json_option
+from workbench.terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from pipeline.model.terms.effect import Effect
+
+
+@click.group("effects")
+def command() -> None:
+    """List and show the physical effects that a model can be given."""
+
+
+@command.command("list")
+@click.option("--group", type=click.Choice(["hull", "rudder", "propulsion", "environment", "sensor", "other"]))
+@click.option("--markdown", is_flag=True, help="Print the table of docs/effects.md.")
+@json_option
+def list_effects(group: str | None, markdown: bool, as_json: bool) -> None:
+    """List the catalogue: what each effect is and which channels it needs."""
+    from pipeline.model.effects import as_json as told
+    from pipeline.model.effects import catalogue
+    from workbench.effects_table import effects_table
+
+    found = [effect for effect in catalogue().values() if group in (None, effect.group)]
+    if as_json:
+        print_json([told(effect) for effect in found])
+    elif markdown:
+        click.echo(effects_table(found), nl=False)
+    else:
+        rows = [[e.name, e.group, ", ".join(e.needs) or "-", e.title] for e in found]
+        print_table(["effect", "group", "needs", "what it is"], rows)
+
+
+@command.command("show")
+@click.argument("name", required=False)
+@click.option("--symbols", is_flag=True, help="List what may stand in a formula of your own.")
+@json_option
+def show(name: str | None, symbols: bool, as_json: bool) -> None:
+    """Show an effect whole, or what may stand in a formula."""
+    from pipeline.model.effects import as_json as told
+    from pipeline.model.effects import get
+
+    if name is None and not symbols:
+        raise click.UsageError("Name an effect, or give --symbols.")
+    effect = None if name is None else get(name)
+    if as_json:
+        shown = {} if effect is None else told(effect)
+        print_json({**shown, **(_symbols() if symbols else {})})
+        return
+    if effect is not None:
+        _tell(effect)
+    if symbols:
+        _tell_symbols()
+
+
+def _tell(effect: Effect) -> None:
+    click.echo(click.style(f"{effect.name}: {effect.title}", bold=True))
+    click.echo(f"  {effect.plain}")
+    click.echo(f"  equation: {effect.equation}")
+    click.echo(f"  needs: {', '.join(effect.needs) or 'no channel beyond those of every trial'}")
+    click.echo(f"  looks like: {effect.confounded_with}")
+    click.echo(f"  told apart by: {effect.separated_by}")
+    click.echo(f"  reference: {effect.reference}")
+    rows = [
+        [p.name, p.unit, f"{p.low:g}", f"{p.high:g}", ", ".join(f"{step:g}" for step in p.steps), p.meaning]
+        for p in effect.parameters
+    ]
+    print_table(["", "unit", "low", "high", "tried at", "meaning"], rows)
+
+
+def _symbols() -> dict[str, Any]:
+    from pipeline.model.terms.expression import FUNCTIONS
+    from pipeline.model.terms.symbols import (
+        CHANNEL_SYMBOLS,
+        COMPUTED_SYMBOLS,
+        RUN_SYMBOLS,
+        SHIP_SYMBOLS,
+        STATE_SYMBOLS,
+        TARGETS,
+    )
+    from schemas.channels import CHANNELS
+
+    channels = {s: f"{CHANNELS[c].words}, {CHANNELS[c].unit}; channel {c}" for s, c in CHANNEL_SYMBOLS.items()}
+    return {
+        "targets": {name: f"{words}, {unit}" for name, (unit, words) in TARGETS.items()},
+        "symbols": {**STATE_SYMBOLS, **COMPUTED_SYMBOLS, **SHIP_SYMBOLS, **channels, **RUN_SYMBOLS},
+        "functions": {name: count for name, (_, count) in FUNCTIONS.items()},
+    }
+
+
+def _tell_symbols() -> None:
+    known = _symbols()
+    print_table(["acts on", "what it is"], list(known["targets"].items()), "Before the colon")
+    print_table(["symbol", "what it is"], list(known["symbols"].items()), "After the colon")
+    click.echo(f"  functions: {', '.join(known['functions'])}; operations: + - * / **")
+    click.echo("  numbers to be estimated: c, c1 to c9, k, k1 to k9, tau, tau1 to tau9")
