@@ -17,7 +17,7 @@ class _Frozen(BaseModel):
 
 
 class ParameterEntry(_Frozen):
-    """One number of the effect; with 0 the effect is absent."""
+    """One number of the effect: 0 is where it is absent, or lies outside the bounds of what only shapes it."""
 
     unit: str = Field(default="", max_length=40)
     #: bounds that are physical
@@ -29,8 +29,8 @@ class ParameterEntry(_Frozen):
 
     @model_validator(mode="after")
     def _ordered(self) -> ParameterEntry:
-        if not self.low <= 0.0 <= self.high or self.low == self.high:
-            raise ValueError(f"0 must lie between low and high; they are {self.low:g} and {self.high:g}")
+        if not self.low < self.high:
+            raise ValueError(f"low must be less than high; they are {self.low:g} and {self.high:g}")
         outside = [step for step in self.steps if step == 0.0 or not self.low <= step <= self.high]
         if outside:
             raise ValueError(f"the step {outside[0]:g} must not be 0 and must lie between low and high")
@@ -69,6 +69,11 @@ class EffectFile(_Frozen):
         for name in self.parameters:
             if not _NAME.fullmatch(name):
                 raise ValueError(f"{name[:40]!r} is no name of a parameter: take letters, digits and underscores")
+        first, entry = next(iter(self.parameters.items()))
+        if not entry.low <= 0.0 <= entry.high:
+            raise ValueError(
+                f"0 must lie between low and high of {first[:40]}, the first parameter: it makes the effect"
+            )
         strange = [name for name in self.states if name not in ("m1", "m2", "m3", "m4")]
         if strange:
             raise ValueError(f"states are called m1, m2, m3, m4; found {strange[0][:40]!r}")

@@ -27,7 +27,7 @@ ALL = catalogue()
 DOCUMENT = Path(__file__).parents[2] / "docs" / "effects.md"
 #: effects that DIAGNOSIS names, by the files that hold them
 NAMED = {
-    *("cross_flow_drag", "sway_quadratic", "yaw_quadratic", "yaw_absv_r", "sway_absr_v", "sway_cubic", "yaw_v2r"),
+    *("cross_flow_drag", "sway_quadratic", "yaw_quadratic", "yaw_abs_v_r", "sway_abs_r_v", "sway_cubic", "yaw_v2r"),
     *("sway_vr2", "yaw_cubic", "rudder_stall", "flow_straightening", "rudder_lag", "dead_time", "backlash"),
     *("rate_limit", "neutral_angle", "rudder_asymmetry", "propeller_wash", "propeller_walk", "speed_loss"),
     *("wind_force", "earth_current", "waves", "shallow_water", "antenna_lever", "heading_misalignment", "gyro_bias"),
@@ -82,13 +82,15 @@ def test_it_does_something_at_its_typical_values(effect: Effect) -> None:
 def test_every_parameter_can_be_absent_and_is_tried_within_its_bounds(effect: Effect) -> None:
     assert effect.parameters
     for parameter in effect.parameters:
-        assert parameter.low <= 0.0 < parameter.high
+        assert parameter.low < parameter.high
         assert parameter.unit in UNITS
         assert parameter.meaning
         assert parameter.name not in SYMBOLS and parameter.name not in FUNCTIONS
         assert list(parameter.steps) == sorted(set(parameter.steps))
         assert all(step != 0.0 and parameter.low < step < parameter.high for step in parameter.steps)
     first = effect.parameters[0]
+    assert first.low <= 0.0 < first.high
+    assert [p.name for p in effect.parameters if p.shapes] == (["k"] if effect.name == "waves" else [])
     assert len(first.steps) == (3 if effect.name in ("backlash", "dead_time", "rate_limit") else 1)
 
 
@@ -447,13 +449,36 @@ def test_own_expressions() -> None:
     for effect in (plain, two):
         require_ordinary(effect)
         for p in effect.parameters:
-            assert p.low < 0.0 < p.steps[0] < p.high
+            assert p.low < 0.0 < p.steps[0] < p.high and not p.shapes
         assert "yaw acceleration" in effect.plain
+
+
+@pytest.mark.parametrize(
+    ("text", "makers", "shapes"),
+    [
+        ("yaw: c*tanh(k*v)", ["c"], ["k"]),
+        ("yaw: c*v*exp(k*r)", ["c"], ["k"]),
+        ("yaw: exp(k*v) - 1", ["k"], []),
+        ("sway: c*v + k*tanh(tau*r)", ["c", "k"], ["tau"]),
+        ("yaw: k*sin(tau*t)", ["k"], ["tau"]),
+        ("sway: c1*v**3 + c2*v*r**2; yaw: c3*r", ["c1", "c2", "c3"], []),
+    ],
+)
+def test_numbers_that_make_are_told_from_numbers_that_shape(text: str, makers: list[str], shapes: list[str]) -> None:
+    effect = from_expression([text])
+    assert [p.name for p in effect.parameters] == [*makers, *shapes]
+    assert [p.name for p in effect.parameters if p.shapes] == shapes
+    for p in effect.parameters:
+        assert len(p.steps) == (3 if p.shapes else 1)
+        assert all(p.low < step < p.high for step in p.steps)
+    require_ordinary(effect)
 
 
 @pytest.mark.parametrize(
     ("text", "code", "told"),
     [
+        ("yaw: c1*r + c2*v + c3*V + c4*delta + c5*r**3 + c6*v**3 + c7*r*r", "effect_numbers", "7 unknown numbers"),
+        ("yaw: c*k*r", "effect_no_effect", "but what another number"),
         ("yaw: rr", "expression_invalid", "did you mean 'r'"),
         ("yaw: c*vv", "expression_invalid", "'vv' is not known"),
         ("yaw: sine(v)", "expression_invalid", "did you mean 'sin'"),
@@ -520,7 +545,8 @@ def test_an_effect_file() -> None:
         (("-c*r*abs(r)", "r*abs(r)"), "parameters.c: no formula speaks of it"),
         (("-c*r*abs(r)", "r + 0*c"), "is still"),
         (("{yaw:", "{roll:"), "'roll'"),
-        (("low: -1", "low: 1"), "parameters.c: Value error, 0 must lie between"),
+        (("low: -1", "low: 0.1"), "0 must lie between low and high of c"),
+        (("low: -1", "low: 5"), "parameters.c: low must be less"),
         (("low: -1", "low: .nan"), "parameters.c.low"),
         (("steps: [0.5]", "steps: [9]"), "must lie between low and high"),
         (("steps: [0.5]", "steps: []"), "parameters.c.steps"),

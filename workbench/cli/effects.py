@@ -1,4 +1,4 @@
-"""``kempf effects list|show``."""
+"""``kempf effects list|show``; try, add and undo, which need a vessel, are beside."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from workbench.cli import effects_of_vessel
 from workbench.cli.options import json_option
 from workbench.terminal import print_json, print_table
 
@@ -15,8 +16,12 @@ if TYPE_CHECKING:
 
 @click.group("effects")
 def command() -> None:
-    """List and show the physical effects that a model can be given."""
+    """Physical effects: list and show them, try one of your own, add one to a vessel's model."""
 
+
+command.add_command(effects_of_vessel.try_formula)
+command.add_command(effects_of_vessel.add)
+command.add_command(effects_of_vessel.undo)
 
 @command.command("list")
 @click.option("--group", type=click.Choice(["hull", "rudder", "propulsion", "environment", "sensor", "other"]))

@@ -55,7 +55,8 @@ EFFECT = Effect(
     ),
     terms={"sway": _SWAY, "yaw": _YAW},
     confounded_with=(
-        "sway_quadratic, yaw_quadratic, yaw_absv_r, sway_absr_v and the cubic hull terms: it is close to a sum of them"
+        "sway_quadratic, yaw_quadratic, yaw_abs_v_r, sway_abs_r_v and the cubic hull terms: it is close to a sum "
+        "of them"
     ),
     separated_by=(
         "Turns at several rudder angles with a spiral or pull-out: drift and turn in other ratios weigh the parts "

@@ -17,7 +17,7 @@ EFFECT = Effect(
     ),
     parameters=(Parameter("c", "1", -1.0, 15.0, (1.0,), "coefficient without dimension, positive where it opposes"),),
     terms={"sway": "-c*v*abs(v)/L"},
-    confounded_with="cross_flow_drag, sway_cubic, sway_absr_v",
+    confounded_with="cross_flow_drag, sway_cubic, sway_abs_r_v",
     separated_by=(
         "A pull-out and a spiral hold sway and turn at other ratios than a zigzag does; 10/10 beside 20/20 shows "
         "the order of the growth."

@@ -17,7 +17,7 @@ EFFECT = Effect(
     ),
     parameters=(Parameter("c", "1", -3.0, 10.0, (0.5,), "coefficient without dimension, positive where it opposes"),),
     terms={"sway": "-c*v*r**2*L/max(V, 0.1)"},
-    confounded_with="sway_cubic, sway_v2r, sway_absr_v, cross_flow_drag",
+    confounded_with="sway_cubic, sway_v2r, sway_abs_r_v, cross_flow_drag",
     separated_by=(
         "A pull-out and a spiral hold sway and turn at other ratios than a zigzag does; 10/10 beside 20/20 shows "
         "the order of the growth."

@@ -15,7 +15,7 @@ EFFECT = Effect(
     ),
     parameters=(Parameter("c", "1", -2.0, 15.0, (0.5,), "coefficient without dimension, positive where it opposes"),),
     terms={"yaw": "-c*r*abs(r)"},
-    confounded_with="yaw_cubic, yaw_absv_r, cross_flow_drag, rudder_stall",
+    confounded_with="yaw_cubic, yaw_abs_v_r, cross_flow_drag, rudder_stall",
     separated_by=(
         "A pull-out and a spiral hold sway and turn at other ratios than a zigzag does; 10/10 beside 20/20 shows "
         "the order of the growth."

@@ -19,7 +19,7 @@ EFFECT = Effect(
         Parameter("c", "1", -20.0, 150.0, (10.0,), "coefficient without dimension, positive where it opposes"),
     ),
     terms={"yaw": "-c*v**2*r/(max(V, 0.1)*L)"},
-    confounded_with="yaw_absv_r, yaw_v3, yaw_vr2, yaw_cubic, cross_flow_drag",
+    confounded_with="yaw_abs_v_r, yaw_v3, yaw_vr2, yaw_cubic, cross_flow_drag",
     separated_by=(
         "A pull-out and a spiral hold sway and turn at other ratios than a zigzag does; 10/10 beside 20/20 shows "
         "the order of the growth."

@@ -17,7 +17,10 @@ RudderCourse = Callable[[Float, Float, Float], Float]
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of an effect; with 0 the effect is absent.
+    """One number of an effect.
+
+    Either it makes the effect, which is absent with 0, or it shapes what others make, such as a frequency: then 0 lies
+    outside its bounds.
 
     Attributes
     ----------
@@ -35,6 +38,16 @@ class Parameter:
     high: float
     steps: tuple[float, ...]
     meaning: str
+
+    @property
+    def shapes(self) -> bool:
+        """Whether it shapes the effect and does not make it."""
+        return not self.low <= 0.0 <= self.high
+
+    @property
+    def absent(self) -> float:
+        """Its value where the effect is absent: 0, or any where it only shapes."""
+        return self.steps[0] if self.shapes else 0.0
 
 
 @dataclass(frozen=True)

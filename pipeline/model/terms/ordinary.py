@@ -127,7 +127,7 @@ def require_ordinary(effect: Effect) -> None:
         ``effect_not_absent``.
     """
     own = tuple(state.name for state in effect.states)
-    absent = {p.name: 0.0 for p in effect.parameters}
+    absent = {p.name: p.absent for p in effect.parameters}
     trials = [absent, *({**absent, **_typical(effect, k)} for k in range(_most_steps(effect)))]
     for place in places(effect):
         require_in_place(place, own)
@@ -141,7 +141,7 @@ def require_ordinary(effect: Effect) -> None:
         if np.any(rest != 0.0):
             raise UsageError(
                 "effect_not_absent",
-                f"With every parameter at 0 the term of {effect.name!r} for {target} is still "
+                f"With its parameters at 0 the term of {effect.name!r} for {target} is still "
                 f"{rest[np.flatnonzero(rest)[0]]:.3g}; it must be 0 then, as without the effect.",
                 "Write it so that a parameter multiplies the whole, as in 'c*(...)'.",
                 {"effect": effect.name, "target": target},

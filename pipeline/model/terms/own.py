@@ -6,11 +6,10 @@ import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-import numpy as np
-
 from pipeline.model.terms.effect import Effect, Parameter
 from pipeline.model.terms.expression import compiled, names_in
-from pipeline.model.terms.ordinary import answer, require_ordinary
+from pipeline.model.terms.ordinary import require_ordinary
+from pipeline.model.terms.own_parameters import parameters_of
 from pipeline.model.terms.places import KINDS, Place, allowed, require_in_place
 from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS
 from schemas.errors import UsageError
@@ -18,14 +17,8 @@ from schemas.errors import UsageError
 #: names that stand for an unknown number: few, so that a slip of the pen does not become one
 _UNKNOWN = re.compile(r"(?:c|k|tau)[1-9]?")
 _NAME = re.compile(r"[a-z][a-z0-9_]{0,39}")
-#: what counts as much on each target, in its unit: a parameter is tried where it does a tenth of that
-_MUCH = {
-    **{"sway": 0.05, "yaw": 1e-3, "rudder": 0.1, "speed": 0.5},
-    **{"lateral_speed": 0.3, "yaw_rate": 3e-3, "heading": 0.03},
-}
-#: bounds, in steps
-_REACH = 1000.0
 _MOST_TERMS = 7
+_MOST_UNKNOWN = 6
 
 
 def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
@@ -35,7 +28,8 @@ def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
     ----------
     texts : sequence of str
         Each ``target: formula``, several in one text divided by semicolons; formulas for one target are added. Names
-        such as c, c1, k2, tau are unknown numbers to be estimated; without any, one factor c multiplies all.
+        such as c, c1, k2, tau are unknown numbers to be estimated; without any, one factor c multiplies all. One that
+        only shapes what another makes, as k in c*tanh(k*v), is positive.
     name : str, optional
         What the effect is called: small letters, digits and underscores.
 
@@ -48,7 +42,8 @@ def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
     ------
     UsageError
         ``expression_invalid``, ``effect_target``, ``symbol_out_of_place``, ``effect_not_finite``,
-        ``effect_not_absent``, ``effect_name``, ``effect_no_effect``: it is zero at every ordinary state.
+        ``effect_not_absent``, ``effect_name``, ``effect_no_effect``: a number in it changes nothing;
+        ``effect_numbers``: it has too many.
 
     Examples
     --------
@@ -62,6 +57,12 @@ def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
     unknown = [n for n in found if _UNKNOWN.fullmatch(n)]
     if not unknown:
         unknown, terms = ["c"], {target: f"c*({text})" for target, text in terms.items()}
+    if len(unknown) > _MOST_UNKNOWN:
+        raise UsageError(
+            "effect_numbers",
+            f"The formula has {len(unknown)} unknown numbers, {_MOST_UNKNOWN} is the most.",
+            "Try it in parts: a trial tells few numbers apart.",
+        )
     needs = tuple(channel for symbol, channel in CHANNEL_SYMBOLS.items() if symbol in found)
     written = "; ".join(f"{target}: {text}" for target, text in terms.items())
 
@@ -78,8 +79,7 @@ def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
             needs=needs,
         )
 
-    parameters = tuple(_parameter(n, unknown, terms) for n in unknown)
-    effect = made(parameters)
+    effect = made(parameters_of(terms, unknown))
     require_ordinary(effect)
     return effect
 
@@ -155,24 +155,3 @@ def _no_formula(why: str) -> UsageError:
         "Write what it acts on, a colon and a formula, as in 'yaw: r*abs(r)'; `kempf effects show --symbols` lists "
         "what may stand in it.",
     )
-
-
-def _parameter(name: str, unknown: Sequence[str], terms: dict[str, str]) -> Parameter:
-    one, ones = {n: 0.0 if n == name else 1.0 for n in unknown}, dict.fromkeys(unknown, 1.0)
-    steps, moved = [], False
-    for target, text in terms.items():
-        with np.errstate(all="ignore"):
-            effect = answer(text, ones).value - answer(text, one).value
-            size = float(np.sqrt(np.mean(np.square(effect))))
-        moved = moved or size != 0.0
-        if np.isfinite(size) and size > 0.0:
-            steps.append(0.1 * _MUCH[target] / size)
-    if not moved:
-        raise UsageError(
-            "effect_no_effect",
-            f"The number {name!r} changes nothing at any ordinary state: {'; '.join(terms.values())[:80]}.",
-            "Write a formula that is not 0 where the ship turns.",
-            {"parameter": name},
-        )
-    step = float(f"{min(steps, default=1.0):.1g}")
-    return Parameter(name, "", -_REACH * step, _REACH * step, (step,), "a number of your own formula, in SI units")

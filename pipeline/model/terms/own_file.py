@@ -89,7 +89,7 @@ def _content(text: str, where: str) -> Any:
 
 def _fault(error: Any) -> str:
     place = ".".join(str(part) for part in error["loc"])
-    return f"{place[:80] or 'file'}: {error['msg']}"
+    return f"{place[:80] or 'file'}: {error['msg'].removeprefix('Value error, ')}"
 
 
 def _check_names(told: EffectFile) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
-    name="sway_absr_v",
+    name="sway_abs_r_v",
     title="sway damping that grows with the turn",
     group="hull",
     plain="The hull resists sideways flow the more, the faster it turns, whichever way.",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
-    name="yaw_absv_r",
+    name="yaw_abs_v_r",
     title="yaw damping that grows with drift",
     group="hull",
     plain="The hull resists turning the more, the faster it is swept sideways, whichever way.",
