@@ -316,8 +316,7 @@ def draw(results: list[Result]) -> None:
         axes[row, 1].set(ylabel="rms error, %", title=f"{kind}, stream {CURRENTS[-1]:g} m/s", yscale="log")
         for panel in axes[row]:
             panel.grid(lw=0.3)
-    axes[0, 0].legend(fontsize=8)
-    axes[0, 1].legend(fontsize=8, ncols=2)
+    figure.legend(*axes[0, 1].get_legend_handles_labels(), fontsize=8, ncols=3, loc="outside lower center")
     figure.savefig(result_page.RESULTS / "no_log.png", dpi=90, metadata={"Software": None})
     plt.close(figure)
 
@@ -383,14 +382,7 @@ def main() -> None:
     with ProcessPoolExecutor(options.processes, mp_context=get_context("spawn")) as pool:
         jobs = [pool.submit(run, *one) for one in wanted]
         every = no_log_fleet.zigzags(options.data)
-        voyages = [
-            pool.submit(
-                no_log_fleet.compare,
-                one,
-                tuple(z.blind for z in every if (z.ship, z.day) == (one.ship, one.day) and z is not one),
-            )
-            for one in every
-        ]
+        voyages = [pool.submit(no_log_fleet.compare, one, no_log_fleet.companions(one, every)) for one in every]
         for number, job in enumerate(jobs):
             results += job.result()
             case = wanted[number][0]

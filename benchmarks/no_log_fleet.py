@@ -12,6 +12,7 @@ import numpy as np
 
 from benchmarks import measured_ships, result_page
 from flows.files import read_profiles
+from pipeline.identify.companions import Passage, companions_of, shaft_speed
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings, identify
 from pipeline.identify.no_log import NoLogSettings, identify_without_log
 from pipeline.identify.record import Record, make_record
@@ -20,13 +21,11 @@ from pipeline.normalise.instruments import from_readings
 from pipeline.segment.find import find_manoeuvres
 from schemas.model_spec import ModelSpec
 
-#: how well the trial speed of the particulars is taken to be known, relative: it is not the speed of this day
-TRIAL_SPEED_STD = 0.05
 WAYS = {
     "sure": "no log, the hull taken at its word (`hull_misfit` 0)",
     "none": "no log",
-    "trial": f"no log, trial speed of the particulars known to {100 * TRIAL_SPEED_STD:.0f} %",
-    "others": "no log, the day's other zigzag as companion",
+    "trial": "no log, trial speed of the particulars",
+    "others": "as `kempf identify` does it: trial speed and companions",
 }
 
 
@@ -37,7 +36,8 @@ class Zigzag:
     ship: str
     day: str
     arm_per_m: float
-    trial_speed_m_s: float
+    trial_speed_m_s: float | None
+    passage: Passage
     logged: Record
     blind: Record
 
@@ -66,22 +66,30 @@ def zigzags(data: Path) -> list[Zigzag]:
             blind = replace(instruments, series={n: s for n, s in series.items() if n != "speed_through_water"})
             for z in find_manoeuvres(series["heading"], series["rudder_angle"], series["speed_through_water"]):
                 records = (make_record(i, z.start_utc_ns, z.end_utc_ns) for i in (instruments, blind))
-                arm, speed = profile.wind_arm_per_m or 0.0, profile.trial_speed_m_s or float("nan")
-                found.append(Zigzag(ship.name, path.name, arm, speed, *records))
+                arm, speed = profile.wind_arm_per_m or 0.0, profile.trial_speed_m_s
+                bounds = z.start_utc_ns, z.end_utc_ns
+                engine = shaft_speed(instruments, *bounds)
+                passage = Passage(*bounds, z.base_heading_deg, engine)
+                found.append(Zigzag(ship.name, path.name, arm, speed, passage, *records))
     return found
+
+
+def companions(zigzag: Zigzag, every: list[Zigzag]) -> tuple[Record, ...]:
+    """Return the runs that `kempf identify` would take beside one."""
+    hers = [z for z in every if z.ship == zigzag.ship]
+    return tuple(hers[i].blind for i in companions_of(zigzag.passage, [z.passage for z in hers]))
 
 
 def compare(zigzag: Zigzag, others: tuple[Record, ...]) -> list[Found]:
     """Identify one zigzag in every way."""
     spec, settings = ModelSpec(), MaximumLikelihoodSettings()
     with_log = identify(zigzag.logged, spec, zigzag.arm_per_m, settings).hull.b2
-    speed = zigzag.trial_speed_m_s
-    known = NoLogSettings(trial_speed_m_s=speed, trial_speed_std_m_s=TRIAL_SPEED_STD * speed)
+    known = NoLogSettings(trial_speed_m_s=zigzag.trial_speed_m_s)
     chosen: dict[str, tuple[NoLogSettings, tuple[Record, ...]]] = {
         "sure": (NoLogSettings(hull_misfit=0.0), ()),
         "none": (NoLogSettings(), ()),
         "trial": (known, ()),
-        "others": (NoLogSettings(), others),
+        "others": (known, others),
     }
     found = []
     for way, (no_log, companions) in chosen.items():

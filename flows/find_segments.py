@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
+from pipeline.identify.companions import has_log, shaft_speed
 from pipeline.normalise.instruments import Instruments, from_readings
 from pipeline.segment.find import find_manoeuvres
 from pipeline.segment.imo import judge
@@ -82,6 +83,9 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
             "phases": [asdict(phase) for phase in zigzag.phases],
             "speed": asdict(zigzag.speed) if zigzag.speed else None,
             "lateral_speed": lateral_summary(instruments, zigzag),
+            # which other zigzags may help one without a log is decided before any is read again
+            "has_log": has_log(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
+            "shaft_speed_per_s": shaft_speed(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
         },
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from os import cpu_count
@@ -12,6 +12,7 @@ from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
 from flows.refresh_logs import Refreshed, refresh_logs
 from flows.unforeseen import as_told
+from flows.without_log import CAN, KEY, companions_of, estimate_of, no_log_settings, without_log
 from pipeline.identify.estimators import default_settings, estimate
 from pipeline.identify.record import make_record
 from pipeline.normalise.instruments import Instruments, from_readings
@@ -26,11 +27,15 @@ from warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class Request:
-    """What a person asks for: which model, which estimator, which of its settings differ from the defaults."""
+    """What a person asks for: which model, which estimator, which of its settings differ from the defaults.
+
+    ``no_log`` are those of `pipeline.identify.no_log.NoLogSettings`, for segments without a speed through the water.
+    """
 
     spec: ModelSpec = field(default_factory=ModelSpec)
     estimator: str = "ml"
     settings: tuple[tuple[str, Any], ...] = ()
+    no_log: tuple[tuple[str, Any], ...] = ()
 
     def all_settings(self) -> dict[str, Any]:
         """Return every setting of the estimator, defaults included; they are part of a set's identity."""
@@ -94,6 +99,7 @@ def identify_vessel(
         raise _no_segments(warehouse, vessel)
     table_versions = delta.versions(warehouse)
     outcomes: list[IdentifyOutcome] = []
+    readable = [segment for segment in found if segment.ingest_id not in refreshed.failed]
     ingests = list(dict.fromkeys(segment.ingest_id for segment in found))
     with ThreadPoolExecutor(max_workers=cpu_count()) as pool:
         for done, ingest in enumerate(ingests):
@@ -102,40 +108,56 @@ def identify_vessel(
             if ingest in refreshed.failed:
                 outcomes += [IdentifyOutcome(segment, None, error=refreshed.failed[ingest]) for segment in hers]
             else:
-                outcomes += _identify_log(warehouse, by_ingest[ingest], hers, request, pool, flow_run, table_versions)
+                beside = {s.segment_id: companions_of(s, readable, by_ingest) for s in hers if without_log(s)}
+                job = _Job(warehouse, request, pool, flow_run, table_versions, by_ingest)
+                outcomes += _identify_log(job, by_ingest[ingest], hers, beside)
     progress(len(ingests), len(ingests), "done")
     outcomes.sort(key=lambda o: (o.segment.start_utc_ns, o.segment.segment_id))
     _point_to_current(warehouse, vessel, outcomes, request.spec, adopt=adopt)
     return outcomes
 
 
-def _identify_log(
-    warehouse: Warehouse,
-    row: logs.LogRow,
-    found: Sequence[Segment],
-    request: Request,
-    pool: ThreadPoolExecutor,
-    flow_run: str | None,
-    table_versions: dict[str, int],
-) -> list[IdentifyOutcome]:
-    """Identify the segments of one log, one a thread, and store the new sets in one commit."""
-    profile = vessels.get(warehouse, row.profile_sha256)
-    wanted = [inputs_of(segment, row.profile_sha256, request) for segment in found]
-    missing = _missing(warehouse, wanted)
-    instruments = from_readings(readings.read(warehouse, row.ingest_id)) if missing else None
+@dataclass(frozen=True)
+class _Job:
+    """What is the same for every log of one call."""
 
-    def one(segment: Segment, inputs: Inputs) -> IdentifyOutcome:
+    warehouse: Warehouse
+    request: Request
+    pool: ThreadPoolExecutor
+    flow_run: str | None
+    table_versions: dict[str, int]
+    by_ingest: Mapping[str, logs.LogRow]
+
+
+def _identify_log(
+    job: _Job, row: logs.LogRow, found: Sequence[Segment], beside: Mapping[str, tuple[Segment, ...]]
+) -> list[IdentifyOutcome]:
+    """Identify the segments of one log, one a thread, and store the new sets in one commit.
+
+    ``beside`` are the companions by segment, of those without a log.
+    """
+    warehouse, pool = job.warehouse, job.pool
+    profile = vessels.get(warehouse, row.profile_sha256)
+    companions = [beside.get(s.segment_id, ()) if job.request.estimator in CAN else () for s in found]
+    wanted = [inputs_of(s, row.profile_sha256, job.request, c) for s, c in zip(found, companions, strict=True)]
+    missing = _missing(warehouse, wanted)
+    asked = [c for c, inputs in zip(companions, wanted, strict=True) if parameter_set_id(inputs) in missing]
+    ingests = {row.ingest_id, *(s.ingest_id for c in asked for s in c)} if missing else set()
+    held = {job.by_ingest[i].log_id: from_readings(readings.read(warehouse, i)) for i in sorted(ingests)}
+
+    def one(segment: Segment, inputs: Inputs, others: tuple[Segment, ...]) -> IdentifyOutcome:
         name = parameter_set_id(inputs)
-        if name not in missing or instruments is None:
+        if name not in missing:
             return IdentifyOutcome(segment, parameter_sets.get(warehouse, name))
-        told = provenance.collect(warehouse, inputs, [segment.ingest_id], flow_run, table_versions)
+        used = [s.ingest_id for s in (segment, *others)]
+        told = provenance.collect(warehouse, inputs, used, job.flow_run, job.table_versions)
         try:
-            made = build(instruments, profile, inputs, row.vessel, (segment.segment_id,), told)
+            made = build(held[row.log_id], profile, inputs, row.vessel, (segment.segment_id,), told, held)
         except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
             return IdentifyOutcome(segment, None, error=as_told(error))
         return IdentifyOutcome(segment, made, new=True)
 
-    outcomes = list(pool.map(one, found, wanted))
+    outcomes = list(pool.map(one, found, wanted, companions))
     parameter_sets.insert(warehouse, [o.parameter_set for o in outcomes if o.new and o.parameter_set])
     return outcomes
 
@@ -179,16 +201,29 @@ def _point_to_current(
         aliases.point(warehouse, vessel, whole[-1].parameter_set_id)
 
 
-def inputs_of(segment: Segment, profile_sha256: str, request: Request) -> Inputs:
-    """Return all that the parameter set of one segment is a function of."""
+def inputs_of(segment: Segment, profile_sha256: str, request: Request, companions: Sequence[Segment] = ()) -> Inputs:
+    """Return all that the parameter set of one segment is a function of.
+
+    Parameters
+    ----------
+    segment : Segment
+    profile_sha256 : str
+    request : Request
+    companions : sequence of Segment
+        Of a segment without a log.
+    """
+    settings = request.all_settings()
+    if request.estimator in CAN and without_log(segment):
+        settings = {**settings, KEY: no_log_settings(dict(request.no_log))}
     return Inputs(
-        log_ids=(segment.log_id,),
+        log_ids=(segment.log_id, *(s.log_id for s in companions)),
         profile_sha256=profile_sha256,
         bounds=(Bounds(segment.log_id, segment.start_utc_ns, segment.end_utc_ns),),
         model_spec=request.spec.model_dump(mode="json"),
         estimator=request.estimator,
-        settings=request.all_settings(),
+        settings=settings,
         code_version=code_version.fingerprint(),
+        companions=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in companions),
     )
 
 
@@ -199,6 +234,7 @@ def build(
     vessel: str,
     segment_ids: tuple[str, ...],
     told: dict[str, Any],
+    others: Mapping[str, Instruments] | None = None,
 ) -> ParameterSet:
     """Compute the parameter set that some inputs describe; nothing is stored.
 
@@ -213,6 +249,8 @@ def build(
     segment_ids : tuple of str
     told : dict
         Provenance.
+    others : mapping of str to Instruments, optional
+        Series by log, where the inputs name companions.
 
     Raises
     ------
@@ -228,5 +266,8 @@ def build(
     bounds, spec = inputs.bounds[0], ModelSpec.model_validate(dict(inputs.model_spec))
     arm = arm_of(spec, profile)
     record = make_record(instruments, bounds.start_utc_ns, bounds.end_utc_ns)
-    result = estimate(inputs.estimator, record, spec.with_arm(arm), arm or 0.0, dict(inputs.settings))
+    if KEY in inputs.settings:
+        result = estimate_of(record, spec.with_arm(arm), arm or 0.0, profile, inputs, others or {})
+    else:
+        result = estimate(inputs.estimator, record, spec.with_arm(arm), arm or 0.0, dict(inputs.settings))
     return as_parameter_set(result, inputs, vessel, segment_ids, told, without_arm(spec, arm))

@@ -10,6 +10,7 @@ from typing import Any
 from flows.identify_vessel import IdentifyOutcome, Request
 from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
+from flows.without_log import without_log
 from pipeline.identify import pooling
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.pooling import Member
@@ -54,8 +55,8 @@ def pool_vessel(
     Returns
     -------
     (ParameterSet, bool) or None
-        The pooled set, and whether it is new; None where the estimator is another or fewer than two segments
-        converged. A manoeuvre that two logs hold counts once.
+        The pooled set, and whether it is new; None where the estimator is another or fewer than two segments with a
+        log converged. A manoeuvre that two logs hold counts once.
 
     Raises
     ------
@@ -70,6 +71,8 @@ def pool_vessel(
         and o.parameter_set.convergence.get("converged")
         and o.segment.kind == "zigzag"
         and o.segment.ingest_id in rows
+        # pooled with the speed over ground they would be wrong together, and sure of it
+        and not without_log(o.segment)
     ]
     if request.estimator != SEPARATE or not chosen:
         return None

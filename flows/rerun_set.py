@@ -7,6 +7,7 @@ from typing import Any
 
 from flows.identify_vessel import build
 from flows.pool_vessel import POOLED, build_pooled
+from flows.vessel_model import ESTIMATOR, build_model
 from pipeline.ingest.read import read_log
 from pipeline.normalise.instruments import from_readings
 from warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
@@ -75,9 +76,11 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
     told = dict(stored.provenance)
     if inputs.estimator == POOLED:
         rebuilt = build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, told)
+    elif inputs.estimator == ESTIMATOR:
+        rebuilt = build_model(instruments, profile, inputs, stored.vessel, told, stored.parent)
     else:
-        one = instruments[inputs.log_ids[0]]
-        rebuilt = build(one, profile, inputs, stored.vessel, stored.segment_ids, told)
+        one = instruments[inputs.bounds[0].log_id]
+        rebuilt = build(one, profile, inputs, stored.vessel, stored.segment_ids, told, instruments)
     verdict, differences = agreement.verdict(stored, rebuilt, tolerance)
     now, then = code_version.packages(), dict(stored.provenance.get("packages") or {})
     changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}
@@ -96,4 +99,5 @@ def _inputs(stored: ParameterSet) -> Inputs:
         estimator=told["estimator"],
         settings=told["settings"],
         code_version=told["code_version"],
+        companions=tuple(Bounds(**bounds) for bounds in told.get("companions", ())),
     )

@@ -109,6 +109,8 @@ class VesselProfile(_Frozen):
     draught_m: float | None = Field(default=None, gt=0)
     block_coefficient: float | None = Field(default=None, gt=0, le=1)
     trial_speed_m_s: float | None = Field(default=None, gt=0)
+    #: how well the trial speed is known as the speed of her zigzags before the first execute; see docs/no_log.md
+    trial_speed_std_m_s: float | None = Field(default=None, gt=0)
     #: l of eq. (16): yaw acceleration per unit of lateral acceleration that the wind causes, 1/m
     wind_arm_per_m: float | None = None
     antenna: Antenna = Antenna()

@@ -44,6 +44,8 @@ class Inputs:
         Hash of the vessel profile.
     bounds : tuple of Bounds
         The segments; kept sorted by log, then start.
+    companions : tuple of Bounds
+        Segments that tell something of these without being identified themselves; kept sorted likewise.
     model_spec : mapping
         The model specification as JSON content.
     estimator : str
@@ -61,19 +63,23 @@ class Inputs:
     estimator: str
     settings: Mapping[str, Any]
     code_version: str
+    companions: tuple[Bounds, ...] = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "log_ids", tuple(sorted(set(self.log_ids))))
-        ordered = sorted(self.bounds, key=lambda b: (b.log_id, b.start_utc_ns, b.end_utc_ns))
-        object.__setattr__(self, "bounds", tuple(ordered))
+        for name in ("bounds", "companions"):
+            ordered = sorted(getattr(self, name), key=lambda b: (b.log_id, b.start_utc_ns, b.end_utc_ns))
+            object.__setattr__(self, name, tuple(ordered))
 
     def as_json(self) -> dict[str, Any]:
         """Return the inputs as JSON content; what is not finite is named, as a bound may be infinite."""
+        companions = {"companions": [vars(bounds) for bounds in self.companions]} if self.companions else {}
         content: dict[str, Any] = plain(
             {
                 "log_ids": self.log_ids,
                 "profile_sha256": self.profile_sha256,
                 "segments": [vars(bounds) for bounds in self.bounds],
+                **companions,
                 "model": self.model_spec,
                 "estimator": self.estimator,
                 "settings": self.settings,

@@ -8,6 +8,7 @@ from typing import Any
 
 from pipeline.identify import least_squares, maximum_likelihood, paper
 from pipeline.identify.estimate import Estimate
+from pipeline.identify.no_log import NoLogSettings, identify_without_log
 from pipeline.identify.record import Record
 from pipeline.identify.rivals import (
     multiple_models,
@@ -51,6 +52,36 @@ def default_settings(name: str) -> dict[str, Any]:
     return asdict(_ESTIMATORS[name].settings())
 
 
+def estimate_without_log(
+    record: Record,
+    spec: ModelSpec,
+    arm_per_m: float,
+    settings: dict[str, Any],
+    no_log: dict[str, Any],
+    companions: tuple[Record, ...] = (),
+) -> Estimate:
+    """Run ``ml`` on one record without a log, see `pipeline.identify.no_log.identify_without_log`.
+
+    Parameters
+    ----------
+    record : Record
+    spec : ModelSpec
+    arm_per_m : float
+        l of eq. (16), 1/m.
+    settings : dict
+        Of ``ml``, as `default_settings` gives them.
+    no_log : dict
+        Fields of `pipeline.identify.no_log.NoLogSettings`.
+    companions : tuple of Record
+    """
+    lateral = maximum_likelihood.MaximumLikelihoodSettings(**_with_tuples(settings))
+    return identify_without_log(record, spec, arm_per_m, lateral, NoLogSettings(**no_log), companions)
+
+
+def _with_tuples(settings: dict[str, Any]) -> dict[str, Any]:
+    return {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
+
+
 def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, settings: dict[str, Any]) -> Estimate:
     """Run one estimator on one record.
 
@@ -69,6 +100,6 @@ def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, setti
     -------
     Estimate
     """
-    given: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
     chosen = _ESTIMATORS[name]
-    return chosen.identify(with_rudder_inflow(record, spec), spec, arm_per_m, chosen.settings(**given))
+    given = chosen.settings(**_with_tuples(settings))
+    return chosen.identify(with_rudder_inflow(record, spec), spec, arm_per_m, given)

@@ -6,7 +6,8 @@ that the whole is linear; the speed it estimates is fed back by the caller. The 
     y_v = v - c_N sin K + c_E cos K - m sin(K - K_0)        y_u = V + c_N cos K + c_E sin K
 
 A current along the course is told from the speed by the first of these while the heading swings, and by runs on other
-headings, which share V_0 and k. m is what the linear hull lacks and a current along the course would look like.
+headings, which share V_0 and k. m is what the linear hull lacks and a current along the course would look like, to
+each run its own.
 """
 
 from __future__ import annotations
@@ -257,10 +258,13 @@ def _first_speed(run: Run) -> float:
 
 
 def _bridge(part: tuple[Float, ...], run: Run, gap_s: float, priors: Priors, current: str) -> None:
-    """Write the step from the run before to this one: motion and forces begin anew, current, V_0, k and bias stay."""
+    """Write the step from the run before to this one: motion and forces begin anew, current, V_0, k and bias stay.
+
+    m begins anew too: what a linear hull lacks depends on how far and how fast she is swung.
+    """
     Phi, g, Q = part[:3]
     x0, P0 = _initial(run, priors, current)
-    anew = [*range(N_CHAIN), V]
+    anew = [*range(N_CHAIN), MISFIT, V]
     Phi[0, anew, anew] = 0.0
     g[0, anew] = x0[anew]
     Q[0, anew, anew] = np.diag(P0)[anew]

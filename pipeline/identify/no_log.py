@@ -11,11 +11,12 @@ delta depends on the lateral parameters too, and on what is not known of them; t
 
 If eq. (16) were all of the ship, one zigzag would give the current along the course to a few cm/s: it makes y_v swing
 with the heading, a quarter period behind the drift. Real hulls have parts in their drift that do the same. So this part
-of y_v is given away but for ``hull_misfit``, one unknown that the runs share.
+of y_v is given away but for ``hull_misfit``, one unknown a run.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
@@ -24,18 +25,21 @@ import numpy as np
 from pipeline.identify import maximum_likelihood
 from pipeline.identify.doubts import doubts
 from pipeline.identify.estimate import Estimate, hull_values
-from pipeline.identify.joint_motion import LateralFit, Priors, Run, coarsened, run_of
+from pipeline.identify.joint_motion import LateralFit, Priors, coarsened, run_of
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.record import Record
+from pipeline.identify.rudder_inflow import with_rudder_inflow
 from pipeline.identify.speed_without_log import Motion, Speed, speed_without_log
 from pipeline.model.lateral_steps import SlowForces
 from pipeline.model.ship import Hull
 from pipeline.normalise.series import Float
-from schemas.errors import UsageError
+from schemas.errors import KempfError, UsageError
 from schemas.model_spec import ModelSpec
 
 #: powers of V by which the parameters are multiplied in eq. (16)
 SPEED_POWER = np.array([1.0, 1.0, 1.0, 1.0, 2.0, 2.0])
+#: how well a trial speed is known, relative, where nobody says so; how far from it a run may be for it to count then
+_TRIAL_SPEED_STD, _SAME_ENGINE = 0.1, 0.25
 #: share of the speed above which its standard error is named as the trouble
 _POORLY_KNOWN = 0.05
 #: standard errors beyond which the two halves of the model contradict each other
@@ -50,7 +54,9 @@ class NoLogSettings:
     ----------
     trial_speed_m_s, trial_speed_std_m_s : float or None
         Speed through the water on a straight course at the shaft speed of the run, and how well it is known, m/s; None
-        where it is not. The rudder's own drag is not told apart from it: leave room for that.
+        where it is not. The rudder's own drag is not told apart from it: leave room for that. A speed without a
+        standard deviation is taken to be known to 10 %, and counts only for a run within 25 % of it over ground: at
+        another engine setting it says nothing.
     current_std_m_s : float
         Of each component of the current.
     hull_misfit : float
@@ -61,7 +67,8 @@ class NoLogSettings:
     max_rounds : int
         Fits at most.
     tolerance : float
-        The speed stays when its mean moves by less than this share of it; what is left is scaled away to first order.
+        The speed stays when it moves by less than this share of its mean, root mean square over the run; what is left
+        of the mean is scaled away to first order.
     """
 
     trial_speed_m_s: float | None = None
@@ -86,7 +93,8 @@ def identify_without_log(
     Parameters
     ----------
     record : Record
-        Its ``speed_m_s`` is the GNSS speed along the bow, to start from.
+        Its ``speed_m_s`` is the GNSS speed along the bow, to start from; its rudder as it was read, see
+        `pipeline.identify.rudder_inflow`.
     spec : ModelSpec
         Disturbance model. Only the ``earth`` current tells a current along the course from the speed.
     arm_per_m : float
@@ -96,7 +104,8 @@ def identify_without_log(
     no_log : NoLogSettings, optional
     companions : tuple of Record
         Other runs of the ship, not long before or after, with the same engine setting, best on other headings: they
-        share V_0 and k, and the current but for its drift. Their parameters are not returned.
+        share V_0 and k, and the current but for its drift. Their parameters are not returned. One that cannot be
+        fitted is left out, and a warning says so.
 
     Returns
     -------
@@ -107,52 +116,96 @@ def identify_without_log(
     Raises
     ------
     UsageError
-        A trial speed without its standard deviation, or one that is not positive.
+        ``trial_speed``: it or its standard deviation is not positive, or the latter stands alone.
     """
-    no_log = no_log or NoLogSettings()
-    _check(no_log)
-    order = sorted((record, *companions), key=lambda r: r.start_utc_ns)
+    known, said = _known(no_log or NoLogSettings(), record)
+
+    def fit(one: Record) -> Estimate:
+        return maximum_likelihood.identify(one, spec, arm_per_m, settings)
+
+    order, estimates, left_out = _first_fits(record, companions, spec, fit)
     own = next(i for i, r in enumerate(order) if r is record)
-    runs = tuple(run_of(coarsened(r)) for r in order)
-    speeds = tuple(r.speed_m_s for r in order)
+    given = [with_rudder_inflow(r, spec) for r in order]
     parameters: Float | None = None
     rounds: list[dict[str, Any]] = []
     converged = False
-    for _ in range(no_log.max_rounds):
-        given = [replace(r, speed_m_s=speed) for r, speed in zip(order, speeds, strict=True)]
-        estimates = tuple(maximum_likelihood.identify(r, spec, arm_per_m, settings) for r in given)
+    for number in range(known.max_rounds):
+        if number:
+            estimates = tuple(fit(r) for r in given)
         fits = tuple(_lateral_fit(e, spec, arm_per_m) for e in estimates)
-        moving = tuple(_with_speed(run, r) for run, r in zip(runs, given, strict=True))
-        found = speed_without_log(Motion(moving, fits, _priors(order, spec, no_log), spec.current), parameters)
+        moving = tuple(run_of(coarsened(r)) for r in given)
+        found = speed_without_log(Motion(moving, fits, _priors(order, spec, known), spec.current), parameters)
         speed, motion, parameters = found
         mean, std = motion.mean_speed(parameters, own)
-        moved = [float(np.mean(v - run.record.speed_m_s)) for v, run in zip(speed.speed_m_s, moving, strict=True)]
-        rounds.append({"mean_speed_m_s": mean, "std_given_the_hull_m_s": std, "moved_m_s": moved[own]})
-        if max(map(abs, moved)) < no_log.tolerance * mean:
+        change = [v - run.record.speed_m_s for v, run in zip(speed.speed_m_s, moving, strict=True)]
+        # the mean may stay while the shape changes: a current across the course makes the GNSS speed swing
+        far = max(float(np.sqrt(np.mean(c**2))) for c in change)
+        moved = {"moved_m_s": float(np.mean(change[own])), "moved_rms_m_s": far}
+        rounds.append({"mean_speed_m_s": mean, "std_given_the_hull_m_s": std, **moved})
+        if far < known.tolerance * mean:
             converged = True
             break
-        speeds = tuple(
-            np.interp(r.time_s, run.record.time_s, v) for r, run, v in zip(order, runs, speed.speed_m_s, strict=True)
-        )
-    return _combined(estimates, found, own, rounds, converged=converged, no_log=no_log)
+        given = [
+            with_rudder_inflow(replace(r, speed_m_s=np.interp(r.time_s, run.record.time_s, v)), spec)
+            for r, run, v in zip(order, moving, speed.speed_m_s, strict=True)
+        ]
+    result = _combined(estimates, found, own, rounds, converged=converged, no_log=known)
+    return replace(result, warnings=(*result.warnings, *said, *left_out))
 
 
-def _with_speed(run: Run, record: Record) -> Run:
-    speed = np.interp(run.record.time_s, record.time_s, record.speed_m_s)
-    return replace(run, record=replace(run.record, speed_m_s=speed))
+def _first_fits(
+    record: Record, companions: tuple[Record, ...], spec: ModelSpec, fit: Callable[[Record], Estimate]
+) -> tuple[list[Record], tuple[Estimate, ...], tuple[str, ...]]:
+    """Fit every run with its GNSS speed; a companion that has no hull to give is left out, and is no reason to stop.
+
+    Returns
+    -------
+    list of Record
+        The runs that stay, in the order of time.
+    tuple of Estimate
+    tuple of str
+        What became of the others.
+    """
+    kept = [(record, fit(with_rudder_inflow(record, spec)))]
+    reasons = []
+    for companion in companions:
+        try:
+            estimate = fit(with_rudder_inflow(companion, spec))
+        except KempfError as error:
+            reasons.append(error.code)
+            continue
+        if estimate.converged and np.all(np.isfinite(estimate.covariance)):
+            kept.append((companion, estimate))
+        else:
+            reasons.append("not_converged")
+    kept.sort(key=lambda pair: pair[0].start_utc_ns)
+    said = (f"{len(reasons)} of {len(companions)} companion runs left out: {', '.join(reasons)}",) if reasons else ()
+    return [r for r, _ in kept], tuple(e for _, e in kept), said
 
 
-def _check(no_log: NoLogSettings) -> None:
-    given = (no_log.trial_speed_m_s, no_log.trial_speed_std_m_s)
-    if given == (None, None):
-        return
-    if None in given or not all(value is not None and value > 0.0 for value in given):
+def _known(no_log: NoLogSettings, record: Record) -> tuple[NoLogSettings, tuple[str, ...]]:
+    """Return the settings with the trial speed as it counts for this run, and what is to be said of it."""
+    speed, std = no_log.trial_speed_m_s, no_log.trial_speed_std_m_s
+    if speed is None and std is None:
+        return no_log, ()
+    if speed is None or speed <= 0.0 or (std is not None and std <= 0.0):
         raise UsageError(
             "trial_speed",
-            f"The trial speed is {given[0]} m/s with a standard deviation of {given[1]} m/s; expected two positive "
-            "numbers or neither.",
-            "Say how well the speed at this shaft speed is known, such as 0.2 m/s.",
+            f"The trial speed is {speed} m/s with a standard deviation of {std} m/s; expected positive numbers, and no "
+            "standard deviation without a speed.",
+            "Say at which speed she goes on a straight course at this shaft speed, and how well it is known.",
         )
+    if std is not None:
+        return no_log, ()
+    over_ground = record.mean_speed_m_s
+    if abs(over_ground / speed - 1.0) > _SAME_ENGINE:
+        said = (
+            f"the trial speed of {speed:.2f} m/s is not used: she made {over_ground:.2f} m/s over ground, perhaps at "
+            "another engine setting; state its standard deviation if it holds for this run"
+        )
+        return replace(no_log, trial_speed_m_s=None), (said,)
+    said = f"the trial speed of {speed:.2f} m/s is taken to be known to {100 * _TRIAL_SPEED_STD:.0f} %"
+    return replace(no_log, trial_speed_std_m_s=_TRIAL_SPEED_STD * speed), (said,)
 
 
 def _lateral_fit(estimate: Estimate, spec: ModelSpec, arm_per_m: float) -> LateralFit:
@@ -172,7 +225,10 @@ def _lateral_fit(estimate: Estimate, spec: ModelSpec, arm_per_m: float) -> Later
 def _priors(records: list[Record], spec: ModelSpec, no_log: NoLogSettings) -> Priors:
     mean = float(np.mean([r.mean_speed_m_s for r in records]))
     both = all(r.used[1] and r.used[2] for r in records)
-    known = no_log.trial_speed_m_s, no_log.trial_speed_std_m_s
+    known, unknown = (
+        (no_log.trial_speed_m_s, no_log.trial_speed_std_m_s),
+        float(np.hypot(0.3 * mean, no_log.current_std_m_s)),
+    )
     return Priors(
         sway_m_s=2.0,
         yaw_rad_s=0.2,
@@ -182,7 +238,8 @@ def _priors(records: list[Record], spec: ModelSpec, no_log: NoLogSettings) -> Pr
         bias_rad_s=0.02 * (spec.rate_bias and both),
         current_m_s=no_log.current_std_m_s,
         speed_m_s=max(mean, 2.0),
-        settled_m_s=(known[0], known[1]) if known[0] is not None and known[1] is not None else (mean, 10.0 + mean),
+        # in a zigzag a ship loses up to a third of her settled speed; the stream comes on top
+        settled_m_s=(known[0], known[1]) if known[0] is not None and known[1] is not None else (mean, unknown),
         loss_m=1e3,
         misfit_m_s=no_log.hull_misfit * mean,
         drift_m_s_per_root_s=no_log.current_drift_m_s_per_root_hour / 60.0,
@@ -224,9 +281,9 @@ def _combined(
     fit = estimates[own]
     mean, given_std = motion.mean_speed(parameters, own)
     variance = given_std**2 + motion.surge_variance(parameters, own)
-    if _contradicts(speed):
+    if _contradicts(speed, own):
         # the truth may lie with either half of the model: half their difference, as a standard deviation
-        variance += (0.5 * speed.misfit_m_s[0]) ** 2
+        variance += (0.5 * speed.misfit_m_s[own][0]) ** 2
     gradient = np.zeros(6)
     for number, estimate in enumerate(estimates):
         one = _hull_gradient(motion, parameters, own, number, np.sqrt(np.diag(estimate.covariance)))
@@ -251,12 +308,12 @@ def _combined(
         covariance=covariance,
         converged=bool(fit.converged and converged),
         report=report,
-        warnings=(*kept, *own_doubts, *_warnings(speed, mean, std, motion.current, converged=converged)),
+        warnings=(*kept, *own_doubts, *_warnings(speed, own, mean, std, motion.current, converged=converged)),
     )
 
 
-def _contradicts(speed: Speed) -> bool:
-    misfit, std = speed.misfit_m_s
+def _contradicts(speed: Speed, own: int) -> bool:
+    misfit, std = speed.misfit_m_s[own]
     return abs(misfit) > _MISFIT_SEEN * std
 
 
@@ -275,14 +332,14 @@ def _speed_report(
         "wander_m_s_per_root_s": speed.surge.wander_m_s_per_root_s,
         "along_noise_m_s": speed.along_noise_m_s,
         "at_bound": list(speed.at_bound),
-        "hull_misfit_m_s": list(speed.misfit_m_s),
+        "hull_misfit_m_s": list(speed.misfit_m_s[own]),
         "runs": len(speed.runs),
         "rounds": rounds,
         "settings": asdict(no_log),
     }
 
 
-def _warnings(speed: Speed, mean: float, std: float, current: str, *, converged: bool) -> list[str]:
+def _warnings(speed: Speed, own: int, mean: float, std: float, current: str, *, converged: bool) -> list[str]:
     said = [f"no water log: speed {mean:.2f} m/s, standard error {std:.2g} m/s, estimated from GNSS and the turning"]
     if current == "none":
         said.append("the model has no current: the GNSS speed along the bow is the speed through the water")
@@ -291,10 +348,10 @@ def _warnings(speed: Speed, mean: float, std: float, current: str, *, converged:
             f"the speed through the water is known to {100 * std / mean:.0f} % only, and every parameter with it: "
             "sail a run on the opposite heading, or state the trial speed and how well it is known"
         )
-    if _contradicts(speed):
+    if _contradicts(speed, own):
         said.append(
-            f"her lateral motion shows {speed.misfit_m_s[0]:.2f} m/s of current along the course that the GNSS along "
-            "the bow does not: the hull does something that eq. (16) lacks, and the speed is less certain for it"
+            f"her lateral motion shows {speed.misfit_m_s[own][0]:.2f} m/s of current along the course that the GNSS "
+            "along the bow does not: the hull does something that eq. (16) lacks, and the speed is less certain for it"
         )
     if not converged:
         said.append("not converged: the speed through the water still moved when the rounds allowed ran out")

@@ -56,8 +56,10 @@ class Speed:
     surge : Surge
     along_noise_m_s : float
         Standard deviation of y_u.
-    settled_m_s, loss_m, misfit_m_s : tuple of (float, float)
-        V_0, k and what the hull shows of a current that is none, with their standard errors.
+    settled_m_s, loss_m : tuple of (float, float)
+        V_0 and k with their standard errors.
+    misfit_m_s : tuple of (float, float)
+        One a run: what the hull shows of a current that is none, with its standard error.
     current_along_m_s, current_along_std_m_s, correlation : tuple of ndarray, shape (n,)
         Current along the bow with its standard error, and the correlation of its error with that of V.
     at_bound : tuple of str
@@ -72,7 +74,7 @@ class Speed:
     along_noise_m_s: float
     settled_m_s: tuple[float, float]
     loss_m: tuple[float, float]
-    misfit_m_s: tuple[float, float]
+    misfit_m_s: tuple[tuple[float, float], ...]
     current_along_m_s: tuple[Float, ...]
     current_along_std_m_s: tuple[Float, ...]
     correlation: tuple[Float, ...]
@@ -215,7 +217,7 @@ def speed_without_log(motion: Motion, start: Float | None = None) -> tuple[Speed
         along_noise_m_s=noise,
         settled_m_s=(float(found.mean[-1, V0]), float(std[-1, V0])),
         loss_m=(float(found.mean[-1, LOST]), float(std[-1, LOST])),
-        misfit_m_s=(float(found.mean[-1, MISFIT]), float(std[-1, MISFIT])),
+        misfit_m_s=tuple((float(found.mean[span, MISFIT][-1]), float(std[span, MISFIT][-1])) for span in rows),
         current_along_m_s=tuple(along[span] for span in rows),
         current_along_std_m_s=tuple(along_std[span] for span in rows),
         correlation=tuple(shared[span] / (along_std[span] * std[span, V] + 1e-300) for span in rows),

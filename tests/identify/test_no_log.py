@@ -13,21 +13,23 @@ from scipy.integrate import quad_vec
 from scipy.linalg import expm
 
 from pipeline.identify import maximum_likelihood
+from pipeline.identify.companions import Passage, companions_of, has_log
 from pipeline.identify.estimate import Estimate
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.no_log import SPEED_POWER, NoLogSettings, identify_without_log
 from pipeline.identify.record import Record, make_record
+from pipeline.identify.rudder_inflow import with_rudder_inflow
 from pipeline.identify.starts import thinned
 from pipeline.model.lateral_steps import SlowForces, lateral_steps
 from pipeline.model.longitudinal import PATH, SPEED, Surge, discretise_surge
 from pipeline.model.ship import mariner_like
 from pipeline.model.smoother import LinearSystem, last_state, smooth
-from pipeline.normalise.series import SECOND_NS
+from pipeline.normalise.series import SECOND_NS, Series
 from pipeline.simulate.disturbances import Disturbance, Environment
 from pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
 from pipeline.simulate.plant import STATE
 from pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
-from schemas.errors import UsageError
+from schemas.errors import DataRejected, UsageError
 from schemas.model_spec import ModelSpec
 from tests.identify.simulated import instruments_of, truth_of, without
 
@@ -264,9 +266,98 @@ def test_two_calls_give_the_same_bits() -> None:
     np.testing.assert_array_equal(again.covariance, found().covariance)
 
 
-@pytest.mark.parametrize(("speed", "std"), [(5.0, None), (None, 0.1), (5.0, 0.0), (-5.0, 0.1)])
+@pytest.mark.parametrize(("speed", "std"), [(None, 0.1), (5.0, 0.0), (-5.0, 0.1), (0.0, None)])
 def test_half_a_trial_speed_is_refused(speed: float | None, std: float | None) -> None:
     trial, (record, _) = sailed(0.6)
     with pytest.raises(UsageError) as refused:
         identify_without_log(record, SPEC, trial.truth.wind_arm_per_m, SETTINGS, NoLogSettings(speed, std))
     assert refused.value.code == "trial_speed"
+
+
+def test_a_trial_speed_of_unknown_worth_counts_little_and_only_near_it() -> None:
+    trial, _ = sailed(0.6)
+    told = trial.settings.hull.trial_speed_m_s
+    near = found(NoLogSettings(told), current="lateral")
+    assert near.report["speed"]["settings"]["trial_speed_std_m_s"] == pytest.approx(0.1 * told)
+    vague, sure = found(current="lateral"), found(NoLogSettings(told, 0.1), current="lateral")
+    assert sure.report["speed"]["std_m_s"] < near.report["speed"]["std_m_s"] < vague.report["speed"]["std_m_s"]
+    assert any("known to 10 %" in warning for warning in near.warnings)
+    far = found(NoLogSettings(2.0 * told), current="lateral")
+    assert far.report["speed"]["settings"]["trial_speed_m_s"] is None
+    assert far.report["speed"]["mean_m_s"] == vague.report["speed"]["mean_m_s"]
+    assert any("is not used" in warning for warning in far.warnings)
+
+
+def test_a_companion_that_fails_stops_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    trial, (record, other) = sailed(0.6)
+    identify = maximum_likelihood.identify
+
+    def failing(one: Record, *given: Any) -> Estimate:
+        if one.start_utc_ns == other.start_utc_ns:
+            raise DataRejected("no_ship_explains_it", "It does not.", "Look.")
+        return identify(one, *given)
+
+    monkeypatch.setattr(maximum_likelihood, "identify", failing)
+    estimate = identify_without_log(record, SPEC, trial.truth.wind_arm_per_m, SETTINGS, None, (other,))
+    assert estimate.hull == found().hull
+    assert "1 of 1 companion runs left out: no_ship_explains_it" in estimate.warnings
+
+
+def test_the_rudder_in_the_race_follows_the_speed_that_is_found() -> None:
+    trial, (record, _) = sailed(0.6)
+    spec, arm = SPEC.model_copy(update={"rudder_speed_exponent": 1.2}), trial.truth.wind_arm_per_m
+    seen: list[Record] = []
+    with pytest.MonkeyPatch.context() as patch:
+        identify = maximum_likelihood.identify
+
+        def watched(one: Record, *given: Any) -> Estimate:
+            seen.append(one)
+            return identify(one, *given)
+
+        patch.setattr(maximum_likelihood, "identify", watched)
+        identify_without_log(record, spec, arm, SETTINGS, NoLogSettings(max_rounds=2))
+    assert len(seen) == 2 and np.any(seen[0].rudder_rad != seen[1].rudder_rad)
+    for one in seen:
+        expected = with_rudder_inflow(replace(record, speed_m_s=one.speed_m_s), spec)
+        np.testing.assert_array_equal(one.rudder_rad, expected.rudder_rad)
+
+
+HOUR = 3600 * SECOND_NS
+
+
+def passage(hours: float, heading_deg: float, **changes: Any) -> Passage:
+    start = round(hours * HOUR)
+    return replace(Passage(start, start + 600 * SECOND_NS, heading_deg, 1.5), **changes)
+
+
+def test_companions_are_soon_and_on_other_headings() -> None:
+    run = passage(0.0, 350.0)
+    others = [
+        run,
+        passage(0.1, 10.0),  # the same heading
+        passage(0.05, 170.0),  # overlaps
+        passage(1.0, 80.0),
+        passage(1.0, 170.0),  # at the same time as the one before, and makes more of the stream
+        passage(9.0, 170.0),
+        passage(14.0, 170.0),  # another day
+        passage(0.5, 170.0, shaft_speed_per_s=1.4),
+        passage(1.05, 175.0, shaft_speed_per_s=None),  # overlaps with a better one
+    ]
+    assert companions_of(run, others) == (4, 5)
+    assert companions_of(run, others[:4]) == (3,)
+    assert companions_of(run, others[:2]) == ()
+    assert companions_of(run, [passage(-0.5, 170.0), passage(0.5, 170.0)]) == (0, 1)
+
+
+@pytest.mark.parametrize("readings", [0, 19, 20, 200])
+def test_the_log_counts_where_the_record_takes_it(readings: int) -> None:
+    trial, _ = sailed(0.6)
+    instruments = instruments_of(trial)
+    start = trial.settings.start_utc_ns + round((trial.truth.zigzags[0].start_s - 20) * SECOND_NS)
+    end = trial.settings.start_utc_ns + round(trial.truth.zigzags[0].end_s * SECOND_NS)
+    log = instruments.series["speed_through_water"].between(start - 5 * SECOND_NS, end + 5 * SECOND_NS)
+    rows = np.linspace(0, len(log) - 1, readings).astype(int)
+    series = {**instruments.series, "speed_through_water": Series(log.time_utc_ns[rows], log.value[rows])}
+    instruments = replace(instruments, series=series)
+    taken = not any(w.startswith("no water log") for w in make_record(instruments, start, end).warnings)
+    assert has_log(instruments, start, end) is taken is (readings >= 20)
