@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from os import cpu_count
@@ -13,13 +13,15 @@ from flows.parameter_set_of import arm_of
 from flows.progress import Progress, silent
 from flows.refresh_logs import refresh_logs
 from pipeline.diagnose.run import Run, Ship, make_run, step_of
+from pipeline.diagnose.split import split
 from pipeline.diagnose.start import Start, start_of
-from pipeline.identify.record import Record, make_record
+from pipeline.identify.record import make_record
 from pipeline.normalise.instruments import Instruments, from_readings
 from schemas.errors import KempfError, NotFound
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 from warehouse import logs, readings, segments, vessels
+from warehouse.parameter_set import Bounds
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
 
@@ -35,29 +37,86 @@ class VesselRuns:
 
     Attributes
     ----------
-    vessel : str
-    profile : VesselProfile
     spec : ModelSpec
         With the arm and the moment decided.
     runs : tuple of Run
-        In order of time.
-    found : tuple of Segment
-        One a run.
+        In order of time; named by their segments.
     start : Start
-        Hull and noise levels to start a fit from.
+        Hull and noise levels to start a fit from; the held-out runs have no part in the hull.
     skipped : dict of str to str
         Why a segment is no run, by its id.
+    """
+
+    spec: ModelSpec
+    runs: tuple[Run, ...]
+    start: Start
+    skipped: dict[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """Which segments of a vessel count, and how her logs are read.
+
+    Attributes
+    ----------
+    vessel : str
     profile_sha256 : str
+    segments : tuple of Segment
+        Sorted by log and time, as the inputs of a parameter set are.
+    ingests : dict of str to str
+        Ingest by log, of these segments.
+    file_names : dict of str to str
+        By log.
+    skipped : dict of str to str
     """
 
     vessel: str
-    profile: VesselProfile
-    spec: ModelSpec
-    runs: tuple[Run, ...]
-    found: tuple[Segment, ...]
-    start: Start
-    skipped: dict[str, str]
     profile_sha256: str
+    segments: tuple[Segment, ...]
+    ingests: dict[str, str]
+    file_names: dict[str, str]
+    skipped: dict[str, str]
+
+
+def choose(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Chosen:
+    """Choose the zigzags of a vessel: each manoeuvre once, all read with the newest profile.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    progress : Progress, optional
+        Logs that were read by other code are read anew first.
+
+    Raises
+    ------
+    NotFound
+        ``no_segments``.
+    """
+    refreshed = refresh_logs(warehouse, vessel, progress)
+    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel) if row.ingest_id not in refreshed.failed}
+    found = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
+    if not found:
+        raise NotFound(
+            "no_segments",
+            f"No zigzag was found in the {len(rows)} logs of {vessel!r}.",
+            "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
+            {"vessel": vessel},
+        )
+    profile_sha256 = rows[max(found, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
+    kept, skipped = once([s for s in found if rows[s.ingest_id].profile_sha256 == profile_sha256])
+    for segment in found:
+        if rows[segment.ingest_id].profile_sha256 != profile_sha256:
+            skipped[segment.segment_id] = "its log is read with an older profile"
+    kept.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
+    return Chosen(
+        vessel,
+        profile_sha256,
+        tuple(kept),
+        {s.log_id: s.ingest_id for s in kept},
+        {s.log_id: rows[s.ingest_id].file_name for s in kept},
+        skipped,
+    )
 
 
 def vessel_runs(warehouse: Warehouse, vessel: str, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:
@@ -74,31 +133,57 @@ def vessel_runs(warehouse: Warehouse, vessel: str, spec: ModelSpec, progress: Pr
     Raises
     ------
     NotFound
-        ``no_runs``: none can be used; the details say why.
+        ``no_segments``, ``no_runs``: none can be used; the details say why.
     """
-    refreshed = refresh_logs(warehouse, vessel, progress)
-    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel) if row.ingest_id not in refreshed.failed}
-    found = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
-    if not found:
-        raise NotFound(
-            "no_segments",
-            f"No zigzag was found in the {len(rows)} logs of {vessel!r}.",
-            "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
-            {"vessel": vessel},
-        )
-    profile_sha256 = rows[max(found, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
-    profile = vessels.get(warehouse, profile_sha256)
-    kept, skipped = once([s for s in found if rows[s.ingest_id].profile_sha256 == profile_sha256])
-    skipped |= {
-        s.segment_id: "its log is read with an older profile"
-        for s in found
-        if rows[s.ingest_id].profile_sha256 != profile_sha256
-    }
-    records, instruments = _records(warehouse, kept, rows, skipped, progress)
+    chosen = choose(warehouse, vessel, progress)
+    return assembled(warehouse, chosen, spec, progress)
+
+
+def assembled(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:
+    """Read the chosen segments from the warehouse and make runs of them."""
+    instruments = {}
+    for done, (log_id, ingest_id) in enumerate(chosen.ingests.items()):
+        progress(done, len(chosen.ingests), f"reading {chosen.file_names[log_id]}")
+        instruments[log_id] = from_readings(readings.read(warehouse, ingest_id))
+    progress(len(chosen.ingests), len(chosen.ingests), "finding a ship to start from")
+    profile = vessels.get(warehouse, chosen.profile_sha256)
+    bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
+    made = assemble(instruments, profile, bounds, spec)
+    return VesselRuns(made.spec, made.runs, made.start, chosen.skipped | made.skipped)
+
+
+def assemble(
+    instruments: Mapping[str, Instruments],
+    profile: VesselProfile,
+    bounds: Sequence[tuple[str, Bounds]],
+    spec: ModelSpec,
+) -> VesselRuns:
+    """Make runs of segments; a function of its arguments alone, so that a rerun makes the same.
+
+    Parameters
+    ----------
+    instruments : mapping of str to Instruments
+        Series by log.
+    profile : VesselProfile
+    bounds : sequence of (str, Bounds)
+        Segments with their names.
+    spec : ModelSpec
+
+    Raises
+    ------
+    NotFound
+        ``no_runs``.
+    """
+    records, skipped = [], {}
+    for name, one in sorted(bounds, key=lambda entry: (entry[1].start_utc_ns, entry[0])):
+        try:
+            records.append((name, one, make_record(instruments[one.log_id], one.start_utc_ns, one.end_utc_ns)))
+        except KempfError as error:
+            skipped[name] = str(error)
     if not records:
         raise NotFound(
             "no_runs",
-            f"None of the {len(found)} zigzags of {vessel!r} can be used: "
+            f"None of the {len(bounds)} zigzags can be used: "
             + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:5]),
             "See docs/bad_input.md for every reason and what mends it.",
             {"skipped": skipped},
@@ -106,40 +191,15 @@ def vessel_runs(warehouse: Warehouse, vessel: str, spec: ModelSpec, progress: Pr
     arm = arm_of(spec, profile)
     ready = spec.with_arm(arm)
     ship = Ship(profile.length_m or _LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
-    step = step_of([record for _, record in records], ship.length_m)
-    days = {log_id: k for k, log_id in enumerate(dict.fromkeys(segment.log_id for segment, _ in records))}
+    step = step_of([record for _, _, record in records], ship.length_m)
+    days = {log_id: k for k, log_id in enumerate(dict.fromkeys(one.log_id for _, one, _ in records))}
     runs = tuple(
-        make_run(s.segment_id, record, instruments[s.ingest_id], ready, ship, step, days[s.log_id])
-        for s, record in records
+        make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id])
+        for name, one, record in records
     )
-    progress(len(records), len(records), "finding a ship to start from")
     with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
-        start = start_of([record for _, record in records], runs, ready, workers)
-    return VesselRuns(
-        vessel, profile, ready, runs, tuple(s for s, _ in records), start, skipped, profile_sha256
-    )
-
-
-def _records(
-    warehouse: Warehouse,
-    kept: Sequence[Segment],
-    rows: dict[str, logs.LogRow],
-    skipped: dict[str, str],
-    progress: Progress,
-) -> tuple[list[tuple[Segment, Record]], dict[str, Instruments]]:
-    instruments: dict[str, Instruments] = {}
-    records = []
-    for done, segment in enumerate(sorted(kept, key=lambda s: (s.start_utc_ns, s.segment_id))):
-        if segment.ingest_id not in instruments:
-            progress(done, len(kept), f"reading {rows[segment.ingest_id].file_name}")
-            instruments[segment.ingest_id] = from_readings(readings.read(warehouse, segment.ingest_id))
-        try:
-            record = make_record(instruments[segment.ingest_id], segment.start_utc_ns, segment.end_utc_ns)
-        except KempfError as error:
-            skipped[segment.segment_id] = str(error)
-        else:
-            records.append((segment, record))
-    return records, instruments
+        start = start_of([record for _, _, record in records], runs, ready, split(runs)[0], workers)
+    return VesselRuns(ready, runs, start, skipped)
 
 
 def once(found: Sequence[Segment]) -> tuple[list[Segment], dict[str, str]]:

@@ -168,6 +168,22 @@ _ALL = (
         partition_by=("vessel_key",),
     ),
     Table(
+        "diagnoses",
+        "what a vessel's model lacks, as found once; never changed once written",
+        (
+            *_VESSEL,
+            Column("diagnosis_id", "text", "hash of what produced the diagnosis"),
+            _SET,
+            _START,
+            Column("verdict", "text", "adequate, explained, ambiguous, unexplained, insufficient_data"),
+            Column("effects", "texts", "effects found, those of the sets"),
+            Column("content_json", "text", "the diagnosis under the command line's keys"),
+            Column("inputs_json", "text", "all that it is a function of"),
+            _CODE,
+        ),
+        partition_by=("vessel_key",),
+    ),
+    Table(
         "aliases",
         "a name, such as current, that points to a parameter set of a vessel",
         (*_VESSEL, Column("alias", "text", "the name"), _SET),

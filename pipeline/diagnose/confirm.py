@@ -8,12 +8,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.diagnose import pooled_fit, sensitivity
+from pipeline.diagnose import sensitivity
 from pipeline.diagnose.held_out import predictive
 from pipeline.diagnose.pooled_fit import Fit
 from pipeline.diagnose.run import Run
+from pipeline.diagnose.screen import Candidate
 from pipeline.diagnose.sensitivity import N_HULL, Point
-from pipeline.model.augmented import Augmented
+from pipeline.diagnose.staged import added
 from pipeline.normalise.series import Float
 
 #: what a candidate must save in the Bayesian information criterion (Kass & Raftery 1995, JASA 90: strong evidence)
@@ -59,26 +60,25 @@ class Confirmation:
         )
 
 
-def confirm(base: Fit, model: Augmented, start: Float, held: Sequence[Run], workers: Executor) -> Confirmation:
-    """Refit a model that has effects beyond those of a fitted one.
+def confirm(base: Fit, candidate: Candidate, held: Sequence[Run], workers: Executor) -> Confirmation:
+    """Refit a model with one effect more.
 
     Parameters
     ----------
     base : Fit
-    model : Augmented
-        Its last effects are new.
-    start : ndarray, shape (p,)
-        Of all effects.
+    candidate : Candidate
+        Of the screen beside ``base``.
     held : sequence of Run
         Held out.
     workers : Executor
     """
-    fit = pooled_fit.with_model(base, model, start, workers)
+    fit = added(base, candidate, workers)
+    model = fit.model
     new = model.names[len(base.model.names) :]
     ratio = 2.0 * (fit.log_likelihood - base.log_likelihood)
-    added = slice(base.values.size, None)
-    reach = 1e-9 * np.maximum(np.abs(model.high[added]), np.abs(model.low[added]))
-    low, high, at = model.low[added], model.high[added], fit.values[added]
+    last = slice(base.values.size, None)
+    reach = 1e-9 * np.maximum(np.abs(model.high[last]), np.abs(model.low[last]))
+    low, high, at = model.low[last], model.high[last], fit.values[last]
     # at a lower bound of 0 the effect is absent, which the criterion tells; any other bound is implausible
     bound = (at >= high - reach) | ((at <= low + reach) & (low != 0.0))
     return Confirmation(

@@ -12,23 +12,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.diagnose import pooled_fit
 from pipeline.diagnose.confirm import Confirmation, confirm
 from pipeline.diagnose.flexible import Flexible, flexible
-from pipeline.diagnose.gate import without_gross_errors
 from pipeline.diagnose.held_out import FreeRun, free_run
 from pipeline.diagnose.pooled_fit import Fit
 from pipeline.diagnose.run import Run
 from pipeline.diagnose.screen import Candidate, screen
-from pipeline.diagnose.sets import shortlist, undecided
+from pipeline.diagnose.sets import WINDOW, shortlist, undecided
 from pipeline.diagnose.split import split
+from pipeline.diagnose.staged import staged
 from pipeline.diagnose.start import Start
-from pipeline.model.augmented import Augmented
 from pipeline.model.terms.effect import Effect
 from pipeline.normalise.series import Float
 from schemas.model_spec import ModelSpec
 
 Told = Callable[[str], None]
+#: how many times its score a refit gains at most, as far as has been seen
+_FORETOLD = 3.0
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ def diagnose(
     effects: Mapping[str, Effect],
     workers: Executor,
     settings: DiagnosisSettings = DiagnosisSettings(),
-    given: Augmented = Augmented(),
+    given: Sequence[Effect] = (),
     told: Told = _silent,
 ) -> Diagnosis:
     """Find what a vessel's model lacks.
@@ -146,21 +146,15 @@ def diagnose(
         Catalogue.
     workers : Executor
     settings : DiagnosisSettings, optional
-    given : Augmented, optional
+    given : sequence of Effect, optional
         Effects that the model has already.
     told : callable, optional
         Is told what is done, for a progress line.
     """
     chosen, left = split(runs)
-    begin = start.of(chosen)
-    values = np.array([0.0 if p.low <= 0.0 <= p.high else p.low for _, p in given.parameters])
-    if given.effects:
-        values = np.array([p.steps[0] for _, p in given.parameters])
     told(f"fitting the model to {len(chosen)} manoeuvres, {len(left)} held out")
-    base = pooled_fit.fit(given, [runs[i] for i in chosen], spec, begin.hull, begin.levels, values, workers)
-    cleaned, gross = without_gross_errors(base)
-    if gross:
-        base = pooled_fit.fit(given, cleaned, spec, base.hull, base.levels, base.values, workers)
+    fits, gross = staged([runs[i] for i in chosen], spec, start.of(chosen), given, workers)
+    base = fits[-1]
     held = [runs[i] for i in left]
     told(f"screening {len(effects)} effects")
     steps = [_step(base, None, (), (), held, screen(base, effects, workers))]
@@ -169,8 +163,11 @@ def diagnose(
         last = steps[-1]
         tried: list[tuple[Candidate, Confirmation]] = []
         for candidate in shortlist(last.screened, settings.level, settings.refits):
+            # the score foretells the likelihood ratio; what is far behind the best refit cannot come near it
+            if any(candidate.score * _FORETOLD < k.likelihood_ratio - WINDOW for _, k in tried if k.holds):
+                continue
             told(f"step {len(steps)}: refitting with {candidate.effect.title}")
-            tried.append((candidate, _confirmed(last.fit, candidate, held, workers)))
+            tried.append((candidate, confirm(last.fit, candidate, held, workers)))
         best = undecided([pair for pair in tried if pair[1].holds])
         if not best:
             steps[-1] = _refused(last, tried)
@@ -182,23 +179,16 @@ def diagnose(
         steps.append(_step(found, best[0][0].effect, tuple(best), worse, held, screen(found, effects, workers)))
     told("measuring what is left")
     after = flexible(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
-    return Diagnosis(
-        tuple(steps), before, after, tuple(one.run for one in base.runs), tuple(held), gross, settings
-    )
-
-
-def _confirmed(base: Fit, candidate: Candidate, held: Sequence[Run], workers: Executor) -> Confirmation:
-    model = base.model.with_effect(candidate.effect)
-    size = candidate.change.size
-    inside = np.clip(candidate.change, model.low[-size:], model.high[-size:])
-    # a threshold is climbed from where it was tried: at 0 it has no slope of its own
-    if len(candidate.effect.parameters[0].steps) > 1 and candidate.steps:
-        inside[0] = candidate.steps[0] if inside[0] <= 0.0 else inside[0]
-    return confirm(base, model, np.concatenate([base.values, inside]), held, workers)
+    return Diagnosis(tuple(steps), before, after, tuple(one.run for one in base.runs), tuple(held), gross, settings)
 
 
 def _refused(step: Step, tried: list[tuple[Candidate, Confirmation]]) -> Step:
     return Step(step.fit, step.added, step.chosen_from, (*step.refused, *tried), step.screened, step.fitted, step.held)
+
+
+def step_of(fit: Fit, held: Sequence[Run]) -> Step:
+    """Return a fitted model as a rung by itself, with its free runs and nothing screened."""
+    return _step(fit, fit.model.effects[-1] if fit.model.effects else None, (), (), held, ())
 
 
 def _step(

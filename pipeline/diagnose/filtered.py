@@ -141,7 +141,6 @@ class Filtered:
         kept = (
             *(np.full((n, 3), np.nan), np.full((n, 3), np.nan)),
             *(np.empty((n if states else 0, size)), np.empty((n if states else 0, size))),
-            *(np.empty((0, size, size)), np.empty((0, size, size)), np.empty((0, size, size))),
         )
         value = extended(
             *(hull, used, values, run.step_s, inputs, run.rudder_noise, run.measured, run.offset_s),

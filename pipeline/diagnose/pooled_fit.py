@@ -12,7 +12,8 @@ from pipeline.diagnose import sensitivity
 from pipeline.diagnose.filtered import Filtered, Passed
 from pipeline.diagnose.run import Run
 from pipeline.diagnose.sensitivity import N_HULL, N_LEVELS, Point
-from pipeline.identify.scoring import damped_step
+from pipeline.identify import search
+from pipeline.identify.scoring import Mask
 from pipeline.model.augmented import Augmented
 from pipeline.model.ship import mariner_like
 from pipeline.normalise.series import Float
@@ -21,6 +22,8 @@ from schemas.model_spec import ModelSpec
 #: converged when the log-likelihood still to be gained falls below this
 _DECREMENT = 1e-2
 _MAX_ITERATIONS = 40
+#: largest change of an effect in one step of the search, in its own steps
+_REACH = 5.0
 #: bounds of the noise levels, SI: three intensities per root second and three standard deviations
 LOWEST = np.log(np.array([1e-7, 1e-9, 1e-5, 1e-5, 1e-7, 1e-6]))
 HIGHEST = np.log(np.array([0.3, 0.03, 1.0, 10.0, 0.5, 1.0]))
@@ -127,105 +130,77 @@ def climb(
 ) -> Fit:
     """Climb to the maximum by damped Fisher scoring."""
     model = filtered[0].model
-    layout = _Layout(filtered)
-    theta = np.concatenate([hull, np.clip(values, model.low, model.high), levels.ravel()])
-    damping, converged, count = 1e-4, False, 0
-    lines = _linearise(filtered, layout, theta, workers)
-    value, score, information = layout.gather(lines)
-    for count in range(1, max_iterations + 1):  # noqa: B007 - told at the end
-        free = layout.free(theta, score)
-        step = damped_step(score, information, free, 0.0)
-        if 0.5 * float(score @ step) < _DECREMENT:
-            converged = True
-            break
-        rose = False
-        while damping < 1e8 and not rose:
-            step = damped_step(score, information, free, damping)
-            candidate = layout.clipped(theta + layout.bounded(step, theta))
-            found = _linearise(filtered, layout, candidate, workers)
-            there = layout.gather(found)
-            rose = there[0] > value
-            damping = damping / 10.0 if rose else max(damping * 10.0, 1e-3)
-        if not rose:
-            break
-        theta, lines, (value, score, information) = candidate, found, there
+    layout = _Layout(filtered, workers)
+    # a number that happens to lie near 0 may grow to the size that it has in other ships
+    least = 0.05 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
+    begin = np.where(np.abs(hull) < least, np.copysign(least, hull), hull)
+    theta = np.concatenate([begin, np.clip(values, model.low, model.high) / layout.unit, levels.ravel()])
+    found = search.climb(layout, theta, max_iterations, _DECREMENT)
+    theta, score, information = found.theta, found.score, found.information
+    lines = layout.linearised(theta)
     shared = layout.shared
-    free = layout.free(theta, score)
+    free = search.free(layout, theta, score)
     covariance = np.full((shared, shared), np.nan)
     index = np.flatnonzero(free)
     block = information[np.ix_(index, index)]
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
     inverse = np.linalg.pinv(block / np.outer(scale, scale), rcond=1e-12, hermitian=True) / np.outer(scale, scale)
     first = np.flatnonzero(index < shared)
-    covariance[np.ix_(index[first], index[first])] = inverse[np.ix_(first, first)]
+    back = layout.scale[index[first]]
+    covariance[np.ix_(index[first], index[first])] = inverse[np.ix_(first, first)] * np.outer(back, back)
     return Fit(
         model=model,
         runs=filtered,
         hull=theta[:N_HULL],
-        values=theta[N_HULL:shared],
+        values=theta[N_HULL:shared] * layout.unit,
         levels=theta[shared:].reshape(-1, N_LEVELS),
-        log_likelihood=value,
+        log_likelihood=found.log_likelihood,
         covariance=covariance,
         linearised=lines,
-        converged=converged,
-        iterations=count,
+        converged=found.converged,
+        iterations=len(found.passes) - 1,
     )
 
 
 class _Layout:
-    """Where everything stands in the common vector: hull, effects, then six levels a run."""
+    """Where everything stands in the common vector: hull, effects, then six levels a run; and its log-likelihood."""
 
-    def __init__(self, filtered: Sequence[Filtered]) -> None:
-        self.model = filtered[0].model
+    def __init__(self, filtered: Sequence[Filtered], workers: Executor) -> None:
+        self.filtered, self.workers, self.model = filtered, workers, filtered[0].model
         self.shared = N_HULL + len(self.model.names)
         runs = len(filtered)
-        # a number that happens to lie near 0 may grow to the size that it has in other ships
-        self.typical = 0.5 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
-        self.low = np.concatenate([np.full(N_HULL, -np.inf), self.model.low, np.tile(LOWEST, runs)])
-        self.high = np.concatenate([np.full(N_HULL, np.inf), self.model.high, np.tile(HIGHEST, runs)])
-        self.used = np.concatenate([np.ones(self.shared, dtype=bool), *(f.levels_used() for f in filtered)])
+        # effects are counted in steps of a size that the search may take at once
+        self.unit = np.array([_REACH * abs(p.steps[0]) for _, p in self.model.parameters])
+        self.low = np.concatenate([np.full(N_HULL, -np.inf), self.model.low / self.unit, np.tile(LOWEST, runs)])
+        self.high = np.concatenate([np.full(N_HULL, np.inf), self.model.high / self.unit, np.tile(HIGHEST, runs)])
+        self.scale = np.concatenate([np.ones(N_HULL), self.unit, [1.0]])
+        used: Mask = np.concatenate([np.ones(self.shared, dtype=np.bool_), *(f.levels_used() for f in filtered)])
+        self.active = used.astype(np.bool_)
 
     def point(self, theta: Float, run: int) -> Point:
+        """Return what of the vector one run has."""
         first = self.shared + N_LEVELS * run
-        return Point(theta[:N_HULL], theta[N_HULL : self.shared], theta[first : first + N_LEVELS])
+        values = theta[N_HULL : self.shared] * self.unit
+        return Point(theta[:N_HULL], values, theta[first : first + N_LEVELS])
 
-    def places(self, index: list[int], run: int) -> list[int]:
-        return [i if i < self.shared else i + N_LEVELS * run for i in index]
+    def linearised(self, theta: Float) -> tuple[Linearised, ...]:
+        """Return u and J of every run."""
+        numbers = range(len(self.filtered))
+        return tuple(self.workers.map(lambda i: linearise(self.filtered[i], self.point(theta, i)), numbers))
 
-    def gather(self, lines: Sequence[Linearised]) -> tuple[float, Float, Float]:
-        n = self.used.size
+    def full(self, theta: Float) -> tuple[float, Float, Float]:
+        """Log-likelihood, score and expected information, summed in the order of the runs."""
+        n = theta.size
         value, score, information = 0.0, np.zeros(n), np.zeros((n, n))
-        for run, line in enumerate(lines):
+        for run, line in enumerate(self.linearised(theta)):
             value += line.passed.log_likelihood
             if not np.isfinite(value):
-                return -np.inf, score, information
-            at = self.places(line.index, run)
-            score[at] += line.J.T @ line.u
-            information[np.ix_(at, at)] += line.J.T @ line.J
+                return -np.inf, np.zeros(n), np.zeros((n, n))
+            at = [i if i < self.shared else i + N_LEVELS * run for i in line.index]
+            J = line.J * self.scale[[min(i, self.shared) for i in line.index]]
+            score[at] += J.T @ line.u
+            information[np.ix_(at, at)] += J.T @ J
         return value, score, information
-
-    def free(self, theta: Float, score: Float) -> np.ndarray:
-        held = ((theta <= self.low) & (score < 0.0)) | ((theta >= self.high) & (score > 0.0))
-        return self.used & ~held
-
-    def clipped(self, theta: Float) -> Float:
-        return np.clip(theta, self.low, self.high)
-
-    def bounded(self, step: Float, theta: Float) -> Float:
-        """Shorten a step that would double the hull, or move a level by more than e."""
-        reach = np.maximum(np.abs(theta[:N_HULL]), self.typical)
-        result = step * min(1.0, 1.0 / max(float(np.max(np.abs(step[:N_HULL]) / reach)), 1e-300))
-        result[self.shared :] = np.clip(step[self.shared :], -1.0, 1.0)
-        return result
-
-
-def _linearise(
-    filtered: Sequence[Filtered], layout: _Layout, theta: Float, workers: Executor
-) -> tuple[Linearised, ...]:
-    def one(run: int) -> Linearised:
-        return linearise(filtered[run], layout.point(theta, run))
-
-    return tuple(workers.map(one, range(len(filtered))))
 
 
 def linearise(filtered: Filtered, point: Point) -> Linearised:

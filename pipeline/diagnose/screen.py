@@ -136,7 +136,7 @@ def screen(base: Fit, effects: Mapping[str, Effect], workers: Executor) -> list[
     present = {effect.name for effect in base.model.effects}
     chosen = [effect for effect in effects.values() if effect.name not in present]
     known = nuisance(base.linearised, N_HULL + len(base.model.names))
-    found = list(workers.map(lambda effect: _score(base, known, effect), chosen))
+    found = list(workers.map(lambda effect: _scored(base, known, effect), chosen))
     adjusted = _adjusted([one.p_value for one in found])
     found = [replace(one, p_adjusted=p) for one, p in zip(found, adjusted, strict=True)]
     return sorted(found, key=lambda one: (-np.nan_to_num(one.score, nan=-1.0), one.effect.name))
@@ -147,7 +147,13 @@ def missing_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
     return tuple(c for c in effect.needs if any(c not in one.run.channels for one in base.runs))
 
 
-def _score(base: Fit, known: Nuisance, effect: Effect) -> Candidate:
+def score(base: Fit, effect: Effect) -> Candidate:
+    """Score one effect beside a fitted model; its p-value is adjusted for its own grid alone."""
+    one = _scored(base, nuisance(base.linearised, N_HULL + len(base.model.names)), effect)
+    return replace(one, p_adjusted=one.p_value)
+
+
+def _scored(base: Fit, known: Nuisance, effect: Effect) -> Candidate:
     missing = missing_channels(base, effect)
     size = len(effect.parameters)
     nothing = Candidate(

@@ -37,8 +37,10 @@ class Start:
         return Start(self.hull, self.levels[list(numbers)])
 
 
-def start_of(records: Sequence[Record], runs: Sequence[Run], spec: ModelSpec, workers: Executor) -> Start:
-    """Race the ships that the runs give one by one over all of them; the most likely after a few steps wins.
+def start_of(
+    records: Sequence[Record], runs: Sequence[Run], spec: ModelSpec, chosen: Sequence[int], workers: Executor
+) -> Start:
+    """Race the ships that single runs give over several; the most likely one after a few steps wins.
 
     Parameters
     ----------
@@ -46,6 +48,8 @@ def start_of(records: Sequence[Record], runs: Sequence[Run], spec: ModelSpec, wo
         One a run.
     runs : sequence of Run
     spec : ModelSpec
+    chosen : sequence of int
+        The runs that race; the others get noise levels of their own and no part in the hull.
     workers : Executor
 
     Raises
@@ -55,24 +59,27 @@ def start_of(records: Sequence[Record], runs: Sequence[Run], spec: ModelSpec, wo
     """
     levels = np.array([_levels(record, run) for record, run in zip(records, runs, strict=True)])
     arm = runs[0].ship.arm_per_m
-    alone = [one for one in workers.map(lambda record: _alone(record, spec, arm), records) if one is not None]
-    hulls = [*alone, np.median(alone, axis=0)] if alone else []
-    hulls.append(mariner_like(runs[0].ship.length_m).array())
+    found = list(workers.map(lambda i: _alone(records[i], spec, arm), chosen))
+    alone = [one for one in found if one is not None]
+    hulls = [np.median(alone, axis=0), *alone] if alone else []
+    hulls = [*hulls[: _ENTRIES - 1], mariner_like(runs[0].ship.length_m).array()]
     raced: list[Fit] = []
-    for hull in hulls[-_ENTRIES:]:
-        found = pooled_fit.fit(
-            *(Augmented(), runs, spec, hull, levels, np.zeros(0), workers), max_iterations=_SHORT_CLIMB
+    for hull in hulls:
+        one = pooled_fit.fit(
+            *(Augmented(), [runs[i] for i in chosen], spec, hull, levels[list(chosen)], np.zeros(0), workers),
+            max_iterations=_SHORT_CLIMB,
         )
-        if np.isfinite(found.log_likelihood):
-            raced.append(found)
+        if np.isfinite(one.log_likelihood):
+            raced.append(one)
     if not raced:
         raise DataRejected(
             "no_ship_explains_it",
-            f"No plain ship gives the {len(runs)} zigzags a finite likelihood.",
+            f"No plain ship gives the {len(chosen)} zigzags a finite likelihood.",
             "Look at the channels (heading, yaw rate, speed, rudder) of these segments.",
         )
     best = max(raced, key=lambda one: one.log_likelihood)
-    return Start(best.hull, best.levels)
+    levels[list(chosen)] = best.levels
+    return Start(best.hull, levels)
 
 
 def _alone(record: Record, spec: ModelSpec, arm_per_m: float) -> Float | None:

@@ -1,6 +1,6 @@
 """The extended Kalman filter of eq. (16) with effects: one pass over one run, compiled.
 
-State x = (v, r, psi, F, M, m_1 .. m_k, c_1, c_2, b): the chain, the states that effects bring along, the current towards
+State x = (v, r, psi, F, M, m_1 .. m_k, c_1, c_2, b): the chain, the states that effects bring along, the current to the
 north and east (or the paper's V_T), the bias of the rate gyro. Between measurements the mean moves by the classical
 fourth-order Runge-Kutta rule with the terms of every effect in it, the covariance by the linearisation at the middle of
 the step (Jazwinski 1970, "Stochastic Processes and Filtering Theory", ch. 8; the exact exponential's series to the
@@ -47,7 +47,7 @@ def _add(kind, place, programs, code, constants, values, slopes, stack, width, t
 def _dynamics(  # type: ignore[no-untyped-def]
     x, row, ship, width, programs, code, constants, values, slopes, stack, total, f, J
 ):
-    """Fill f = dx/dt of the chain and the effects' states, shape (width,), and its derivatives J, shape (width, width)."""
+    """Fill f = dx/dt of chain and effects' states, shape (width,), and its derivatives J, shape (width, width)."""
     a11, a12, a21, a22, b1, b2, arm, mu_F, mu_M, exponent, V0 = ship
     for i in range(width):
         values[i] = x[i]
@@ -98,9 +98,61 @@ def _dynamics(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _series(A, w, h, nodes, width, a, b):  # type: ignore[no-untyped-def]
-    """Fill ``nodes``, shape (3, width), with exp(A s) w at s = 0, h/2 and h."""
-    for i in range(width):
+def _exponential(A, h, live, Phi, term, work):  # type: ignore[no-untyped-def]
+    """Fill Phi with exp(A h) to the fourth order, over the live states; the others stay what they are."""
+    for i in live:
+        for j in live:
+            term[i, j] = 1.0 if i == j else 0.0
+            Phi[i, j] = term[i, j]
+    for order in range(1, 5):
+        s = h / order
+        for i in live:
+            for j in live:
+                value = 0.0
+                for m in live:
+                    value += A[i, m] * term[m, j]
+                work[i, j] = s * value
+        for i in live:
+            for j in live:
+                term[i, j] = work[i, j]
+                Phi[i, j] += term[i, j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _covariance(P, Phi, decay, live, after, W):  # type: ignore[no-untyped-def]
+    """Let P <- F P F' where F is Phi on the live states and ``decay`` on those after them."""
+    for i in live:
+        for j in live:
+            value = 0.0
+            for m in live:
+                value += Phi[i, m] * P[m, j]
+            W[i, j] = value
+        for j in after:
+            value = 0.0
+            for m in live:
+                value += Phi[i, m] * P[m, j]
+            W[i, j] = value * decay[j]
+    for i in live:
+        for j in live:
+            if j > i:
+                break
+            value = 0.0
+            for m in live:
+                value += W[i, m] * Phi[j, m]
+            P[i, j] = value
+            P[j, i] = value
+        for j in after:
+            P[i, j] = W[i, j]
+            P[j, i] = W[i, j]
+    for i in after:
+        for j in after:
+            P[i, j] *= decay[i] * decay[j]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _noise(P, A, w, q, h, live, nodes, a, b):  # type: ignore[no-untyped-def]
+    """Add to P what white noise of intensity q along w does over h seconds: Simpson's rule on exp(A s) w."""
+    for i in live:
         a[i] = w[i]
         for node in range(3):
             nodes[node, i] = w[i]
@@ -108,15 +160,106 @@ def _series(A, w, h, nodes, width, a, b):  # type: ignore[no-untyped-def]
     for order in range(1, 5):
         half *= 0.5 * h / order
         whole *= h / order
-        for i in range(width):
+        for i in live:
             total = 0.0
-            for j in range(width):
+            for j in live:
                 total += A[i, j] * a[j]
             b[i] = total
-        for i in range(width):
+        for i in live:
             a[i] = b[i]
             nodes[1, i] += half * a[i]
             nodes[2, i] += whole * a[i]
+    for i in live:
+        for j in live:
+            P[i, j] += (
+                q * h / 6.0 * (nodes[0, i] * nodes[0, j] + 4.0 * nodes[1, i] * nodes[1, j] + nodes[2, i] * nodes[2, j])
+            )
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _take_in(x, P, h, e, S, gain):  # type: ignore[no-untyped-def]
+    """Take in one scalar measurement of innovation e and variance S; ``gain`` holds P h."""
+    n = x.size
+    for i in range(n):
+        g = gain[i] / S
+        if g != 0.0:
+            x[i] += g * e
+            for j in range(i + 1):
+                value = P[i, j] - g * gain[j]
+                P[i, j] = value
+                P[j, i] = value
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _begin(P, programs, code, constants, values, slopes, stack, total, extra):  # type: ignore[no-untyped-def]
+    """Add the initial variance of the effects' own states to P, and fill the intensities of what drives them."""
+    width = P.shape[0] - N_AFTER
+    for i in range(width - N_BEFORE):
+        total[:] = 0.0
+        _add(ON_INITIAL, i, programs, code, constants, values, slopes, stack, width, total)
+        P[N_BEFORE + i, N_BEFORE + i] += total[0] ** 2
+        total[:] = 0.0
+        _add(ON_NOISE, i, programs, code, constants, values, slopes, stack, width, total)
+        extra[i] = total[0] ** 2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _live_states(P0, width):  # type: ignore[no-untyped-def]
+    """Return the states of the chain and of effects that there are, and those after them."""
+    before, after = np.empty(width, dtype=np.int64), np.empty(N_AFTER, dtype=np.int64)
+    m = k = 0
+    for i in range(P0.shape[0]):
+        if i < width and (i <= PSI or i >= N_BEFORE or P0[i, i] > 0.0):
+            before[m] = i
+            m += 1
+        elif i >= width and P0[i, i] > 0.0:
+            after[k] = i
+            k += 1
+    return before[:m], after[:k]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _substep(  # type: ignore[no-untyped-def]
+    x, P, start, middle, end, h, drive, decay, ship, live, after, table, values, slopes, stack, total, room
+):
+    """Move mean and covariance over one substep.
+
+    ``drive`` holds the intensities squared of F, of M, of the rudder's error, of the current, then of effects' states.
+    """
+    programs, code, constants = table
+    k1, k2, k3, k4, xs, A, J, Phi, term, work, nodes, w, va, vb, W = room
+    width = k1.size
+    _dynamics(x, start, ship, width, programs, code, constants, values, slopes, stack, total, k1, J)
+    for i in range(width):
+        xs[i] = x[i] + 0.5 * h * k1[i]
+    _dynamics(xs, middle, ship, width, programs, code, constants, values, slopes, stack, total, k2, J)
+    for i in range(width):
+        xs[i] = x[i] + 0.5 * h * k2[i]
+    _dynamics(xs, middle, ship, width, programs, code, constants, values, slopes, stack, total, k3, A)
+    U = values[SPEED]
+    for i in range(width):
+        xs[i] = x[i] + h * k3[i]
+    _dynamics(xs, end, ship, width, programs, code, constants, values, slopes, stack, total, k4, J)
+    for i in range(width):
+        x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
+    for i in after:
+        x[i] *= decay[i]
+    _exponential(A, h, live, Phi, term, work)
+    _covariance(P, Phi, decay, live, after, W)
+    for i in after:
+        if i < x.size - 1:
+            P[i, i] += drive[3] * h
+    for source in range(3 + width - N_BEFORE):
+        q = drive[source] if source < 3 else drive[source + 1]
+        if q <= 0.0:
+            continue
+        for i in range(width):
+            w[i] = 0.0
+        if source == 2:
+            w[V], w[R] = ship[4] * U * U, ship[5] * U * U
+        else:
+            w[(F, M)[source] if source < 2 else N_BEFORE + source - 3] = 1.0
+        _noise(P, A, w, q, h, live, nodes, va, vb)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -171,8 +314,8 @@ def extended(  # type: ignore[no-untyped-def]
     table : tuple
         ``programs`` int64 (q, 4): kind, place, first and last instruction; ``code`` and ``constants`` of all of them.
     kept : tuple of ndarray
-        ``predicted`` and ``variance``, shape (n, 3), to be filled; ``states`` and ``spread``, shape (n, 8 + k), filtered,
-        and ``after``, ``before``, ``moved`` for a smoother, shape (n, 8 + k, 8 + k), or 0 rows.
+        ``predicted`` and ``variance``, shape (n, 3), to be filled; ``states`` and ``spread``, shape (n, 8 + k), the
+        filtered states and their variances, or 0 rows.
 
     Returns
     -------
@@ -180,184 +323,69 @@ def extended(  # type: ignore[no-untyped-def]
         Log-likelihood; -inf where the filter runs away.
     """
     programs, code, constants = table
-    predicted, variance, states, spread, after, before, moved = kept
-    n, steps = x0.size, measured.shape[0]
-    width = n - N_AFTER
+    predicted, variance, states, spread = kept
+    n, width = x0.size, x0.size - N_AFTER
     x, P = x0.copy(), P0.copy()
     arm, length, draught, V0, n0, exponent = constants_of_ship
     ship = (hull[0], hull[1], hull[2], hull[3], hull[4], hull[5], arm, rates[0], rates[1], exponent, V0)
     values, slopes = np.zeros(PARAMETER + parameters.size), np.zeros((PARAMETER + parameters.size, width))
     values[SHIP : SHIP + 6] = hull
     values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
-    values[PARAMETER:] = parameters
-    stack, total = np.zeros((DEPTH, width + 1)), np.zeros(width + 1)
-    extra = np.zeros(MOST_EXTRA)
-    if programs.shape[0] > 0:
-        values[SPEED] = inputs[0, 0]
-        for i in range(width - N_BEFORE):
-            total[:] = 0.0
-            _add(ON_INITIAL, i, programs, code, constants, values, slopes, stack, width, total)
-            P[N_BEFORE + i, N_BEFORE + i] += total[0] ** 2
-            total[:] = 0.0
-            _add(ON_NOISE, i, programs, code, constants, values, slopes, stack, width, total)
-            extra[i] = total[0] ** 2
-    k1, k2, k3, k4, xs = np.zeros(width), np.zeros(width), np.zeros(width), np.zeros(width), np.zeros(width)
-    A, J, Phi, term, work = (
-        *(np.zeros((width, width)), np.zeros((width, width)), np.zeros((width, width)), np.zeros((width, width))),
-        np.zeros((width, width)),
+    values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
+    stack, total, extra = np.zeros((DEPTH, width + 1)), np.zeros(width + 1), np.zeros(width - N_BEFORE)
+    live, after = _live_states(P0, width)
+    _begin(P, programs, code, constants, values, slopes, stack, total, extra)
+    k1, J = np.zeros(width), np.zeros((width, width))
+    room = (
+        *(k1, np.zeros(width), np.zeros(width), np.zeros(width), np.zeros(width), np.zeros((width, width)), J),
+        *(np.zeros((width, width)), np.zeros((width, width)), np.zeros((width, width)), np.zeros((3, width))),
+        *(np.zeros(width), np.zeros(width), np.zeros(width), np.zeros((n, n))),
     )
-    nodes, w, va, vb = np.zeros((3, width)), np.zeros(width), np.zeros(width), np.zeros(width)
-    W, gain, h, stood = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n)
-    simpson = (1.0 / 6.0, 4.0 / 6.0, 1.0 / 6.0)
-    q_F, q_M, q_c = levels[0] ** 2, levels[1] ** 2, levels[2] ** 2
-    has_M = P0[M, M] > 0.0
+    gain, h, stood, decay, drive = np.zeros(n), np.zeros(n), np.zeros(n), np.ones(n), np.zeros(4 + width - N_BEFORE)
+    decay[n - 3 : n - 1] = np.exp(-rates[2] * step_s / SUBSTEPS)
+    drive[0], drive[3], drive[4:] = levels[0] ** 2, levels[2] ** 2, extra
+    drive[1] = levels[1] ** 2 if P0[M, M] > 0.0 else 0.0
     log_likelihood = 0.0
-    H = step_s / SUBSTEPS
-    current_decay = np.exp(-rates[2] * H)
-    keep = before.shape[0] > 0
-    for k in range(steps):
-        if keep:
-            moved[k] = 0.0
-            for i in range(n):
-                moved[k, i, i] = 1.0
+    for k in range(measured.shape[0]):
         if k > 0:
+            drive[2] = rudder_noise[k] ** 2
             for sub in range(SUBSTEPS):
-                i0 = ROWS * (k - 1) + 2 * sub
-                start, middle, end = inputs[i0], inputs[i0 + 1], inputs[i0 + 2]
-                _dynamics(x, start, ship, width, programs, code, constants, values, slopes, stack, total, k1, J)
-                for i in range(width):
-                    xs[i] = x[i] + 0.5 * H * k1[i]
-                _dynamics(xs, middle, ship, width, programs, code, constants, values, slopes, stack, total, k2, J)
-                for i in range(width):
-                    xs[i] = x[i] + 0.5 * H * k2[i]
-                _dynamics(xs, middle, ship, width, programs, code, constants, values, slopes, stack, total, k3, A)
-                U = values[SPEED]
-                for i in range(width):
-                    xs[i] = x[i] + H * k3[i]
-                _dynamics(xs, end, ship, width, programs, code, constants, values, slopes, stack, total, k4, J)
-                for i in range(width):
-                    x[i] += H / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
-                # exp(A H) to the fourth order
-                for i in range(width):
-                    for j in range(width):
-                        term[i, j] = 1.0 if i == j else 0.0
-                        Phi[i, j] = term[i, j]
-                for order in range(1, 5):
-                    s = H / order
-                    for i in range(width):
-                        for j in range(width):
-                            value = 0.0
-                            for m in range(width):
-                                value += A[i, m] * term[m, j]
-                            work[i, j] = s * value
-                    for i in range(width):
-                        for j in range(width):
-                            term[i, j] = work[i, j]
-                            Phi[i, j] += term[i, j]
-                for i in range(n):
-                    for j in range(n):
-                        if i < width:
-                            value = 0.0
-                            for m in range(width):
-                                value += Phi[i, m] * P[m, j]
-                            W[i, j] = value
-                        else:
-                            W[i, j] = P[i, j] * (current_decay if i < n - 1 else 1.0)
-                for i in range(n):
-                    for j in range(i + 1):
-                        if j < width:
-                            value = 0.0
-                            for m in range(width):
-                                value += W[i, m] * Phi[j, m]
-                        else:
-                            value = W[i, j] * (current_decay if j < n - 1 else 1.0)
-                        P[i, j] = value
-                        P[j, i] = value
-                x[n - 3] *= current_decay
-                x[n - 2] *= current_decay
-                for i in (n - 3, n - 2):
-                    if P0[i, i] > 0.0:
-                        P[i, i] += q_c * H
-                if keep:
-                    # Phi of all substeps together
-                    for j in range(n):
-                        for i in range(width):
-                            value = 0.0
-                            for m in range(width):
-                                value += Phi[i, m] * moved[k, m, j]
-                            va[i] = value
-                        for i in range(width):
-                            moved[k, i, j] = va[i]
-                        moved[k, n - 3, j] *= current_decay
-                        moved[k, n - 2, j] *= current_decay
-                # process noise: of F, M, the effects' own states, and the rudder's error
-                for source in range(3 + width - N_BEFORE):
-                    for i in range(width):
-                        w[i] = 0.0
-                    if source == 0:
-                        q = q_F
-                        w[F] = 1.0
-                    elif source == 1:
-                        q = q_M if has_M else 0.0
-                        w[M] = 1.0
-                    elif source == 2:
-                        q = rudder_noise[k] ** 2
-                        square = U * U
-                        w[V], w[R] = hull[4] * square, hull[5] * square
-                    else:
-                        q = extra[source - 3]
-                        w[N_BEFORE + source - 3] = 1.0
-                    if q <= 0.0:
-                        continue
-                    _series(A, w, H, nodes, width, va, vb)
-                    for node in range(3):
-                        weight = q * H * simpson[node]
-                        for i in range(width):
-                            for j in range(width):
-                                P[i, j] += weight * nodes[node, i] * nodes[node, j]
-        if keep:
-            before[k] = P
-        if states.shape[0] > 0 and keep:
-            spread[k] = x
+                i = ROWS * (k - 1) + 2 * sub
+                _substep(
+                    *(x, P, inputs[i], inputs[i + 1], inputs[i + 2], step_s / SUBSTEPS, drive, decay, ship),
+                    *(live, after, table, values, slopes, stack, total, room),
+                )
         # linearised once, where the prediction stands; one measurement after the other moves on from there
-        row = inputs[ROWS * k]
-        _dynamics(x, row, ship, width, programs, code, constants, values, slopes, stack, total, k1, J)
+        _dynamics(x, inputs[ROWS * k], ship, width, programs, code, constants, values, slopes, stack, total, k1, J)
         for i in range(n):
             stood[i] = x[i]
-        if programs.shape[0] > 0:
-            values[VDOT], values[RDOT] = k1[V], k1[R]
-            for j in range(width):
-                slopes[VDOT, j], slopes[RDOT, j] = J[V, j], J[R, j]
+        values[VDOT], values[RDOT] = k1[V], k1[R]
+        for j in range(width):
+            slopes[VDOT, j], slopes[RDOT, j] = J[V, j], J[R, j]
         for channel in range(3):
-            late = offset_s[k, channel]
-            for i in range(n):
-                h[i] = 0.0
-            state = (V, R, PSI)[channel]
-            h[state] = 1.0
+            late, state = offset_s[k, channel], (V, R, PSI)[channel]
             value = stood[state] + late * k1[state]
-            for j in range(width):
-                h[j] += late * J[state, j]
+            for j in range(n):
+                h[j] = late * J[state, j] if j < width else 0.0
+            h[state] += 1.0
             if channel == 0:
                 h[n - 3], h[n - 2] = current_row[k, 0], current_row[k, 1]
                 value += h[n - 3] * stood[n - 3] + h[n - 2] * stood[n - 2]
             elif channel == 1:
                 h[n - 1] = 1.0
                 value += stood[n - 1]
-            if programs.shape[0] > 0:
-                total[:] = 0.0
-                _add(ON_LATERAL + channel, 0, programs, code, constants, values, slopes, stack, width, total)
-                value += total[0]
-                for j in range(width):
-                    h[j] += total[j + 1]
-            for i in range(n):
-                value += h[i] * (x[i] - stood[i])
+            total[:] = 0.0
+            _add(ON_LATERAL + channel, 0, programs, code, constants, values, slopes, stack, width, total)
+            value += total[0]
+            for j in range(width):
+                h[j] += total[j + 1]
             S = levels[3 + channel] ** 2
             for i in range(n):
-                value_i = 0.0
+                gain[i] = 0.0
                 for j in range(n):
-                    value_i += P[i, j] * h[j]
-                gain[i] = value_i
-                S += h[i] * value_i
+                    gain[i] += P[i, j] * h[j]
+                value += h[i] * (x[i] - stood[i])
+                S += h[i] * gain[i]
             predicted[k, channel], variance[k, channel] = value, S
             if not np.isfinite(value):
                 return -np.inf
@@ -365,22 +393,12 @@ def extended(  # type: ignore[no-untyped-def]
                 continue
             if not (S > 0.0):
                 return -np.inf
-            if withheld[k]:
-                continue
-            e = measured[k, channel] - value
-            log_likelihood -= 0.5 * (_LOG_2PI + np.log(S) + e * e / S)
-            for i in range(n):
-                x[i] += gain[i] * e / S
-            for i in range(n):
-                for j in range(i + 1):
-                    value_i = P[i, j] - gain[i] * gain[j] / S
-                    P[i, j] = value_i
-                    P[j, i] = value_i
+            if not withheld[k]:
+                e = measured[k, channel] - value
+                log_likelihood -= 0.5 * (_LOG_2PI + np.log(S) + e * e / S)
+                _take_in(x, P, h, e, S, gain)
         if states.shape[0] > 0:
             states[k] = x
-            if not keep:
-                for i in range(n):
-                    spread[k, i] = P[i, i]
-        if keep:
-            after[k] = P
+            for i in range(n):
+                spread[k, i] = P[i, i]
     return log_likelihood

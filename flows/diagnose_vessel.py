@@ -1,0 +1,125 @@
+"""The job that finds what a vessel's model lacks and stores the diagnosis."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict, dataclass
+from os import cpu_count
+from typing import Any
+
+from flows.progress import Progress, silent
+from flows.vessel_model import Own, inputs_of, known_effects, named, store_model
+from flows.vessel_runs import Chosen, VesselRuns, assembled, choose
+from pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from pipeline.diagnose.verdict import as_json
+from pipeline.model.effects import digest
+from schemas.model_spec import ModelSpec
+from warehouse import code_version, diagnoses
+from warehouse.diagnoses import StoredDiagnosis, diagnosis_id
+from warehouse.store import Warehouse
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """A diagnosis just made, with what it was made of."""
+
+    chosen: Chosen
+    runs: VesselRuns
+    diagnosis: Diagnosis
+
+
+def diagnose_vessel(
+    warehouse: Warehouse,
+    vessel: str,
+    spec: ModelSpec,
+    own: Own = Own(),
+    settings: DiagnosisSettings = DiagnosisSettings(),
+    progress: Progress = silent,
+) -> tuple[StoredDiagnosis, bool]:
+    """Diagnose a vessel; what was diagnosed before from the same inputs is not computed again.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    spec : ModelSpec
+        The model to begin from; its effects are taken as given.
+    own : Own, optional
+        Effects beyond the catalogue that are tried too.
+    settings : DiagnosisSettings, optional
+    progress : Progress, optional
+
+    Returns
+    -------
+    (StoredDiagnosis, bool)
+        And whether it is new.
+    """
+    chosen = choose(warehouse, vessel, progress)
+    inputs = _inputs(chosen, spec, own, settings)
+    found = diagnoses.find(warehouse, diagnosis_id(inputs))
+    if found is not None:
+        return found, False
+    base, _ = store_model(warehouse, chosen, spec, own, progress)
+    examined = examine(warehouse, chosen, spec, own, settings, progress)
+    content = as_json(examined.diagnosis)
+    made = StoredDiagnosis(
+        diagnosis_id=diagnosis_id(inputs),
+        vessel=vessel,
+        parameter_set_id=base.parameter_set_id,
+        start_utc_ns=min(s.start_utc_ns for s in chosen.segments),
+        verdict=content["verdict"],
+        effects=tuple(name for one in content["sets"] for name in one["effects"]),
+        content=content,
+        inputs=inputs,
+        code_version=code_version.fingerprint(),
+    )
+    diagnoses.insert(warehouse, made)
+    # as it is read back, so that new and known answers are the same
+    stored = diagnoses.find(warehouse, made.diagnosis_id)
+    assert stored is not None
+    return stored, True
+
+
+def examine(
+    warehouse: Warehouse,
+    chosen: Chosen,
+    spec: ModelSpec,
+    own: Own,
+    settings: DiagnosisSettings = DiagnosisSettings(),
+    progress: Progress = silent,
+    only: tuple[str, ...] = (),
+) -> Examined:
+    """Make a diagnosis with everything in it, for a report; nothing is stored.
+
+    ``only`` names the effects to screen instead of all.
+    """
+    runs = assembled(warehouse, chosen, spec, progress)
+    known = known_effects(own)
+    screened = {name: known[name] for name in only} if only else known
+    count = 0
+
+    def told(what: str) -> None:
+        nonlocal count
+        count += 1
+        # how many steps it takes is not known beforehand
+        progress(count, count + 5, what)
+
+    with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+        made = diagnose(
+            *(runs.runs, runs.spec, runs.start, screened, workers, settings),
+            given=named(spec.effects, known),
+            told=told,
+        )
+    progress(count, count, "done")
+    return Examined(chosen, runs, made)
+
+
+def _inputs(chosen: Chosen, spec: ModelSpec, own: Own, settings: DiagnosisSettings) -> dict[str, Any]:
+    told = inputs_of(chosen, spec, own).as_json()
+    return {
+        **told,
+        "estimator": "diagnosis",
+        "settings": asdict(settings),
+        "own": own.as_json(),
+        "catalogue": {name: digest(effect) for name, effect in known_effects(own).items()},
+    }

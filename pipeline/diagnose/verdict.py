@@ -1,0 +1,300 @@
+"""What a diagnosis comes to, in words that a naval architect can act on and in the keys that people script against."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from pipeline.diagnose.confirm import Confirmation
+from pipeline.diagnose.diagnosis import Diagnosis, Step
+from pipeline.diagnose.screen import Candidate
+from pipeline.model.terms.effect import Effect
+from pipeline.normalise.series import Float
+
+Verdict = Literal["adequate", "explained", "ambiguous", "unexplained", "insufficient_data"]
+#: log-likelihood that the flexible reference must still gain, in runs that did not fit it, to say that something is left
+LEFT_OVER = 12.0
+#: and which share of what it gained beside the plain model
+LEFT_SHARE = 0.2
+#: an effect whose possible size is smaller than this many standard errors cannot be seen
+POWER = 3.0
+#: a share of the whitened variance below which a significant effect is too small to matter
+NEGLIGIBLE = 5e-4
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One effect's verdict, and why."""
+
+    verdict: Literal["present", "negligible", "not_testable", "absent"]
+    why: str
+
+
+def verdict(diagnosis: Diagnosis) -> Verdict:
+    """Return what the diagnosis comes to.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    """
+    if diagnosis.before is None:
+        return "insufficient_data"
+    if something_left(diagnosis):
+        return "unexplained"
+    sizes = [len(step.chosen_from) for step in diagnosis.steps[1:]]
+    if not sizes:
+        return "adequate"
+    return "explained" if max(sizes) == 1 else "ambiguous"
+
+
+def something_left(diagnosis: Diagnosis) -> bool:
+    """Tell whether something that repeats itself is left beside the last model."""
+    before, after = diagnosis.before, diagnosis.after
+    if before is None or after is None:
+        return False
+    return after.gain > LEFT_OVER and after.repeats and after.gain > LEFT_SHARE * before.gain
+
+
+def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
+    """Return the verdict on one candidate of the first screen.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    candidate : Candidate
+        Of the plain model's screen.
+    """
+    effect = candidate.effect
+    for number, step in enumerate(diagnosis.steps[1:], start=1):
+        members = {c.effect.name: k for c, k in step.chosen_from}
+        if effect.name in members:
+            others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
+            alike = f"; these data would fit {_listed(others)} as well" if others else ""
+            return Finding("present", f"step {number}: {sized(effect, members[effect.name])}{alike}")
+    if candidate.missing:
+        return Finding("not_testable", f"the logs lack {_listed(list(candidate.missing))}")
+    if np.isnan(candidate.score):
+        return Finding(
+            "not_testable",
+            f"what the model has already imitates {_percent(candidate.absorption)} of it. {effect.separated_by}",
+        )
+    weak = _too_weak(candidate)
+    if weak:
+        return Finding("not_testable", f"{weak} {effect.separated_by}")
+    if candidate.p_adjusted >= diagnosis.settings.level:
+        return Finding("absent", _absent(candidate))
+    measured = sum(line.u.size // 2 for line in diagnosis.steps[0].fit.linearised)
+    if candidate.score / measured < NEGLIGIBLE:
+        return Finding("negligible", f"it explains {_percent(candidate.score / measured)} of the innovations' variance")
+    return _explained_away(diagnosis, candidate)
+
+
+def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
+    """Say why an effect that looked present by itself is not claimed."""
+    name = candidate.effect.name
+    added = [step.added.title for step in diagnosis.steps[1:] if step.added is not None]
+    last = {c.effect.name: c for c in diagnosis.steps[-1].screened}.get(name)
+    refits = [k for step in diagnosis.steps for c, k in step.refused if c.effect.name == name]
+    if added and (last is None or np.isnan(last.score) or last.p_adjusted >= diagnosis.settings.level):
+        return Finding("absent", f"significant by itself, and no more beside {_listed(added)}")
+    if refits:
+        return Finding("absent", f"significant by itself, refitted and refused: {refusal(refits[-1])}")
+    return Finding("absent", "significant by itself, but others explain more and it was not refitted")
+
+
+def refusal(one: Confirmation) -> str:
+    """Say which test a refitted effect did not stand."""
+    gains = np.concatenate([one.fold_gains, one.held_out_gains])
+    if not np.isfinite(one.fit.log_likelihood):
+        return "the fit runs away"
+    if one.at_bound:
+        return "its size ends at the bound of what is physical"
+    if one.bic_change > -6.0:
+        return f"it does not earn its parameters (BIC {one.bic_change:+.1f})"
+    if np.mean(gains > 0.0) <= 0.5 or np.sum(gains) <= 0.0:
+        return f"it predicts {int(np.sum(gains > 0.0))} of {gains.size} manoeuvres better that it was not fitted to"
+    return "another one is clearly better"
+
+
+def sized(effect: Effect, one: Confirmation) -> str:
+    """Return an effect's size with its standard errors, in the units people use."""
+    size = len(effect.parameters)
+    values, std = one.fit.values[-size:], one.fit.std[-size:]
+    told = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, values, std, strict=True)]
+    return f"{effect.title}, {', '.join(told)}"
+
+
+def _shown(name: str, value: float, std: float, unit: str) -> str:
+    factor, shown = (180.0 / np.pi, unit.replace("rad", "deg")) if unit in ("rad", "rad/s") else (1.0, unit)
+    digits = max(0, 1 - int(np.floor(np.log10(abs(std * factor))))) if np.isfinite(std) and std > 0.0 else 4
+    digits = min(digits, 8)
+    error = f" +- {std * factor:.{digits}f}" if np.isfinite(std) else ""
+    return f"{name} = {value * factor:.{digits}f}{error}{f' {shown}' if shown not in ('', '1') else ''}"
+
+
+def _too_weak(candidate: Candidate) -> str:
+    """Say that even the largest physical size would not be seen; empty where it would."""
+    made = np.isfinite(candidate.std)
+    parameters = [p for p, m in zip(candidate.effect.parameters, made, strict=True) if m]
+    reach = np.array([max(abs(p.low), abs(p.high)) for p in parameters])
+    if np.all(reach < POWER * candidate.std[made]):
+        return f"its standard error, {candidate.std[made][0]:.2g} {parameters[0].unit}, is no smaller than what is physical."
+    return ""
+
+
+def _absent(candidate: Candidate) -> str:
+    p, made = candidate.effect.parameters[0], np.isfinite(candidate.std)
+    if not made[0]:
+        return "no sign of it"
+    limit = abs(candidate.change[0]) + 2.0 * candidate.std[0]
+    return f"no sign of it; were there any, {p.name} would be within {limit:.2g} {p.unit}".rstrip()
+
+
+def sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what a person should read first, a sentence each."""
+    said = []
+    what = verdict(diagnosis)
+    for step in diagnosis.steps[1:]:
+        (candidate, best), *others = step.chosen_from
+        line = f"{candidate.effect.plain.rstrip('.')}: {sized(candidate.effect, best)}"
+        if others:
+            line += f"; the same data would fit {_listed([c.effect.title for c, _ in others])}"
+            line += f". To tell them apart: {candidate.effect.separated_by}"
+        said.append(line.rstrip(".") + ".")
+    if len(diagnosis.steps) > 1:
+        said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
+    if what == "insufficient_data":
+        said.append(
+            "One manoeuvre alone cannot tell an effect from chance: sail at least three zigzags, to both sides, at two "
+            "rudder angles, on two headings."
+        )
+    if what == "adequate":
+        said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
+    if what == "unexplained" and diagnosis.after is not None:
+        named = "None of the known effects explains all of it" if said else "None of the known effects explains it"
+        said.append(
+            f"{named}: a smooth force without a name still gains {diagnosis.after.gain:.0f} of log-likelihood in "
+            "manoeuvres that it was not fitted to."
+        )
+    return said
+
+
+def _fall(first: Step, last: Step) -> str:
+    a, b = first.held_out_error, last.held_out_error
+    if a is None or b is None:
+        a, b = first.in_sample_error, last.in_sample_error
+        where = "fitted manoeuvres (none is held out)"
+    else:
+        where = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
+    force = last.intensities[0] / first.intensities[0]
+    return (
+        f"The free-run error of {where} goes from {100 * a:.1f} to {100 * b:.1f} % of the motion, the intensity of the "
+        f"lateral disturbance to {100 * force:.0f} % of what it was."
+    )
+
+
+def _percent(share: float) -> str:
+    text = f"{100 * share:.2f}" if share < 0.9995 else f"{100 * share:.4f}"
+    return f"{text} %"
+
+
+def _listed(names: list[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+
+
+def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
+    """Return the diagnosis under the command line's keys, JSON content; what is not finite is None."""
+    sets = []
+    member: dict[str, str] = {}
+    for number, step in enumerate(diagnosis.steps[1:], start=1):
+        names = [c.effect.name for c, _ in step.chosen_from]
+        sets.append(
+            {
+                "set_id": f"S{number}",
+                "effects": names,
+                "separated_by": step.chosen_from[0][0].effect.separated_by if len(names) > 1 else "",
+                "refits": [_refit(c, k) for c, k in step.chosen_from],
+            }
+        )
+        member |= dict.fromkeys(names, f"S{number}")
+    return {
+        "verdict": verdict(diagnosis),
+        "sentences": sentences(diagnosis),
+        "candidates": [_candidate(diagnosis, c, member) for c in diagnosis.steps[0].screened],
+        "sets": sets,
+        "refused": [_refit(c, k) | {"why": refusal(k)} for step in diagnosis.steps for c, k in step.refused],
+        "ladder": [rung(number, step) for number, step in enumerate(diagnosis.steps)],
+        "left_over": None
+        if diagnosis.after is None or diagnosis.before is None
+        else {"gain_before": diagnosis.before.gain, "gain_after": diagnosis.after.gain, "runs": diagnosis.after.gains},
+        "fitted": [run.name for run in diagnosis.fitted],
+        "held_out": [run.name for run in diagnosis.held],
+        "gross_errors": diagnosis.gross_errors,
+    }
+
+
+def _candidate(diagnosis: Diagnosis, one: Candidate, member: dict[str, str]) -> dict[str, Any]:
+    found = finding(diagnosis, one)
+    return {
+        "effect": one.effect.name,
+        "title": one.effect.title,
+        "set_id": member.get(one.effect.name),
+        "score": one.score,
+        "p_adjusted": one.p_adjusted,
+        "expected_change": _values(one.effect, one.change, one.std),
+        "absorption": one.absorption,
+        "verdict": found.verdict,
+        "why": found.why,
+    }
+
+
+def _values(effect: Effect, values: Float, std: Float) -> dict[str, Any]:
+    return {
+        p.name: {"value": float(v), "std": float(s), "unit": p.unit}
+        for p, v, s in zip(effect.parameters, values, std, strict=True)
+    }
+
+
+def _refit(candidate: Candidate, one: Confirmation) -> dict[str, Any]:
+    size = len(candidate.effect.parameters)
+    return {
+        "effect": candidate.effect.name,
+        "parameters": _values(candidate.effect, one.fit.values[-size:], one.fit.std[-size:]),
+        "likelihood_ratio": one.likelihood_ratio,
+        "bic_change": one.bic_change,
+        "gains_left_out": one.fold_gains,
+        "gains_held_out": one.held_out_gains,
+        "at_bound": one.at_bound,
+        "converged": one.fit.converged,
+    }
+
+
+def rung(number: int, step: Step) -> dict[str, Any]:
+    """Return one rung of the ladder as JSON content."""
+    force, moment, current = step.intensities
+    return {
+        "step": number,
+        "added": None if step.added is None else step.added.name,
+        "in_sample_error": step.in_sample_error,
+        "held_out_error": step.held_out_error,
+        "held_out": {run.name: _rms(run.rms) for run in step.held},
+        "in_sample": {run.name: _rms(run.rms) for run in step.fitted},
+        "disturbance_intensity": {
+            "wind_force_m_s2_per_sqrt_s": float(force),
+            "moment_rad_s2_per_sqrt_s": float(moment),
+            "current_m_s_per_sqrt_s": float(current),
+        },
+        "log_likelihood": step.fit.log_likelihood,
+        "converged": step.fit.converged,
+        "hull": dict(zip(("a11", "a12", "a21", "a22", "b1", "b2"), (float(x) for x in step.fit.hull), strict=True)),
+        "effects": {
+            name: {"value": float(v), "std": float(s)}
+            for name, v, s in zip(step.fit.model.names, step.fit.values, step.fit.std[6:], strict=True)
+        },
+    }
+
+
+def _rms(rms: Float) -> dict[str, float]:
+    return dict(zip(("lateral_speed", "yaw_rate", "heading"), (float(x) for x in rms), strict=True))

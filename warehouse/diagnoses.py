@@ -1,0 +1,140 @@
+"""The table of diagnoses: rows are added and never changed."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from json import loads
+from typing import Any
+
+from schemas.errors import NotFound
+from warehouse import delta
+from warehouse.canonical import canonical_json, plain, sha256
+from warehouse.keys import quoted, vessel_key
+from warehouse.retry import with_retry
+from warehouse.store import Warehouse
+
+
+def diagnosis_id(inputs: Mapping[str, Any]) -> str:
+    """Return the id of what these inputs produce: ``dx-`` and 16 hex digits of the hash of their canonical JSON."""
+    return "dx-" + sha256(canonical_json(plain(inputs, name_non_finite=True)))[:16]
+
+
+@dataclass(frozen=True)
+class StoredDiagnosis:
+    """One diagnosis as it is kept.
+
+    Attributes
+    ----------
+    diagnosis_id, vessel : str
+    parameter_set_id : str
+        The model that was diagnosed.
+    start_utc_ns : int
+        First instant of the manoeuvres.
+    verdict : str
+    effects : tuple of str
+        Of all sets.
+    content, inputs : mapping
+        JSON content.
+    code_version : str
+    """
+
+    diagnosis_id: str
+    vessel: str
+    parameter_set_id: str
+    start_utc_ns: int
+    verdict: str
+    effects: tuple[str, ...]
+    content: Mapping[str, Any]
+    inputs: Mapping[str, Any]
+    code_version: str
+
+    def show(self) -> dict[str, Any]:
+        """Return the diagnosis as the command line's JSON object."""
+        return {
+            "vessel": self.vessel,
+            "diagnosis_id": self.diagnosis_id,
+            "parameter_set_id": self.parameter_set_id,
+            **self.content,
+            "provenance": dict(self.inputs),
+        }
+
+
+def insert(warehouse: Warehouse, one: StoredDiagnosis) -> bool:
+    """Add a diagnosis; one that is there already changes nothing.
+
+    Returns
+    -------
+    bool
+        Whether it is new.
+    """
+    row = {
+        "vessel_key": vessel_key(one.vessel),
+        "vessel": one.vessel,
+        "diagnosis_id": one.diagnosis_id,
+        "parameter_set_id": one.parameter_set_id,
+        "start_utc_ns": one.start_utc_ns,
+        "verdict": one.verdict,
+        "effects": list(one.effects),
+        "content_json": canonical_json(plain(one.content)),
+        "inputs_json": canonical_json(plain(one.inputs, name_non_finite=True)),
+        "code_version": one.code_version,
+    }
+
+    def attempt() -> bool:
+        table = delta.ensure_table(warehouse, "diagnoses")
+        if delta.rows(table, "diagnoses", {"diagnosis_id": one.diagnosis_id}).height:
+            return False
+        predicate = f"vessel_key = {quoted(row['vessel_key'])} AND diagnosis_id = {quoted(one.diagnosis_id)}"
+        delta.replace(table, "diagnoses", [row], predicate)
+        return True
+
+    return with_retry(attempt)
+
+
+def find(warehouse: Warehouse, name: str) -> StoredDiagnosis | None:
+    """Return a diagnosis by its id, None where there is none."""
+    frame = delta.read(warehouse, "diagnoses", {"diagnosis_id": name})
+    return _stored(frame.rows(named=True))[0] if frame.height else None
+
+
+def of_vessel(warehouse: Warehouse, vessel: str) -> list[StoredDiagnosis]:
+    """Return every diagnosis of a vessel, by first instant, then id."""
+    frame = delta.read(warehouse, "diagnoses", {"vessel_key": vessel_key(vessel)})
+    return _stored(frame.sort("start_utc_ns", "diagnosis_id").rows(named=True))
+
+
+def newest(warehouse: Warehouse, vessel: str, code_version: str) -> StoredDiagnosis:
+    """Return the diagnosis of a vessel that this code made from the most manoeuvres.
+
+    Raises
+    ------
+    NotFound
+        ``no_diagnosis``.
+    """
+    found = [one for one in of_vessel(warehouse, vessel) if one.code_version == code_version]
+    if not found:
+        raise NotFound(
+            "no_diagnosis",
+            f"{vessel!r} has not been diagnosed by this version of the code.",
+            f"Run `kempf diagnose --vessel {vessel}`.",
+            {"vessel": vessel},
+        )
+    return max(found, key=lambda one: (len(one.inputs["segments"]), one.start_utc_ns, one.diagnosis_id))
+
+
+def _stored(rows: Sequence[Mapping[str, Any]]) -> list[StoredDiagnosis]:
+    return [
+        StoredDiagnosis(
+            r["diagnosis_id"],
+            r["vessel"],
+            r["parameter_set_id"],
+            r["start_utc_ns"],
+            r["verdict"],
+            tuple(r["effects"]),
+            loads(r["content_json"]),
+            loads(r["inputs_json"]),
+            r["code_version"],
+        )
+        for r in rows
+    ]

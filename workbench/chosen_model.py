@@ -1,0 +1,85 @@
+"""Which model a command begins from: a stored set's, a file's, the one a vessel stands at, or the plain one."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from flows.files import read_model
+from flows.vessel_model import ESTIMATOR, Own
+from schemas.errors import UsageError
+from schemas.model_spec import ModelSpec
+from warehouse import parameter_sets
+from warehouse.parameter_set import ParameterSet
+from warehouse.store import Warehouse
+
+#: eq. (16) with the bias of the rate gyro left to the catalogue, which names it where there is one
+PLAIN = ModelSpec(name="plain", rate_bias=False)
+_LARGEST = 100_000
+
+
+def chosen_model(warehouse: Warehouse, vessel: str, set_id: str | None, model: Path | None) -> tuple[ModelSpec, Own]:
+    """Return the model to begin from and the effects of a person's own in it.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    set_id : str or None
+        Parameter set.
+    model : Path or None
+        Model file.
+
+    Raises
+    ------
+    UsageError
+        ``two_models``, ``set_of_another_vessel``.
+    """
+    if set_id is not None and model is not None:
+        raise UsageError("two_models", "Both --set and --model say where to begin.", "Give one of them.")
+    if model is not None:
+        return read_model(model), Own()
+    if set_id is None:
+        return PLAIN, Own()
+    found = parameter_sets.get(warehouse, set_id)
+    if found.vessel != vessel:
+        raise UsageError(
+            "set_of_another_vessel",
+            f"{found.parameter_set_id} is a parameter set of {found.vessel!r}, not of {vessel!r}.",
+            f"List hers with `kempf params list --vessel {vessel}`.",
+        )
+    return model_of(found)
+
+
+def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:
+    """Return the model of a stored set."""
+    spec = ModelSpec.model_validate(dict(one.model_spec))
+    return spec, Own.from_json(one.settings["own"]) if one.estimator == ESTIMATOR else Own()
+
+
+def read_effect_files(paths: Sequence[Path]) -> dict[str, str]:
+    """Return the texts of effect files by the names of the effects in them.
+
+    Raises
+    ------
+    UsageError
+        ``effect_file``: there is no such file, or it is no text.
+    KempfError
+        What is wrong in it, with its name.
+    """
+    from pipeline.model.effects import from_file
+
+    found = {}
+    for path in paths:
+        try:
+            if path.stat().st_size > _LARGEST:
+                raise UsageError(
+                    "effect_file", f"{path} is {path.stat().st_size} bytes long; an effect is a page.", "Name another."
+                )
+            text = path.read_text(encoding="utf-8")
+        except (OSError, UnicodeDecodeError) as error:
+            raise UsageError(
+                "effect_file", f"{path} cannot be read: {error}.", "Name a YAML file as in docs/effects.md."
+            ) from error
+        found[from_file(text, str(path)).name] = text
+    return found

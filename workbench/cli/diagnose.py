@@ -1,0 +1,97 @@
+"""``kempf diagnose``."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table, progress
+
+_SHOWN = 12
+
+
+@click.command("diagnose")
+@vessel_option(required=True)
+@click.option("--set", "set_id", metavar="ID", help="Begin from the model of this parameter set.")
+@click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Begin from this model, YAML.")
+@click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+              help="An effect of your own, YAML; tried beside the catalogue. May be repeated.")  # fmt: skip
+@click.option("--all", "everything", is_flag=True, help="Also the effects that are absent or cannot be tested.")
+@warehouse_option
+@json_option
+def command(
+    vessel: str,
+    set_id: str | None,
+    model: Path | None,
+    files: tuple[Path, ...],
+    everything: bool,
+    uri: str,
+    as_json: bool,
+) -> None:
+    """Find which physical effect a vessel's model lacks, and say how sure that is.
+
+    About three in ten manoeuvres are held out before anything is looked at. Every effect of the catalogue is screened,
+    what looks present is refitted and must predict manoeuvres that it was not fitted to; what these data cannot tell
+    apart is named together.
+    """
+    from flows.diagnose_vessel import diagnose_vessel
+    from flows.vessel_model import Own
+    from warehouse.store import Warehouse
+    from workbench.chosen_model import chosen_model, read_effect_files
+
+    warehouse = Warehouse(uri)
+    spec, own = chosen_model(warehouse, vessel, set_id, model)
+    own = own.beside(Own(files=read_effect_files(files)))
+    with progress() as tell:
+        found, _ = diagnose_vessel(warehouse, vessel, spec, own, progress=tell)
+    if as_json:
+        print_json(found.show())
+        return
+    _tell(found.show(), everything=everything)
+
+
+def _tell(told: Mapping[str, Any], *, everything: bool) -> None:
+    title = f"{told['vessel']}: {told['verdict'].replace('_', ' ')}"
+    click.echo(click.style(title, bold=True) + f"  ({told['diagnosis_id']})")
+    for sentence in told["sentences"]:
+        click.echo(f"  {sentence}")
+    ladder = [
+        [
+            str(one["step"]),
+            one["added"] or "plain model",
+            number(100 * one["in_sample_error"], 3),
+            "-" if one["held_out_error"] is None else number(100 * one["held_out_error"], 3),
+            number(one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"], 2),
+        ]
+        for one in told["ladder"]
+    ]
+    print_table(["step", "added", "fitted, %", "held out, %", "wind, m/s^2/s^0.5"], ladder, "Free-run error")
+    rows = [
+        [
+            one["effect"],
+            one["set_id"] or "-",
+            number(one["score"], 3),
+            _change(one["expected_change"]),
+            number(one["absorption"], 3),
+            one["verdict"].replace("_", " "),
+            one["why"],
+        ]
+        for one in told["candidates"]
+        if everything or one["verdict"] in ("present", "negligible") or one["score"] is not None
+    ]
+    head = ["effect", "set", "score", "expected change", "absorbed", "verdict", "why"]
+    print_table(head, rows if everything else rows[:_SHOWN], "Screened beside the plain model")
+    if not everything and len(told["candidates"]) > _SHOWN:
+        click.echo(f"  of {len(told['candidates'])} effects; --all shows every one, also what cannot be tested")
+    first = next((name for one in told["sets"] for name in one["effects"]), None)
+    if first:
+        click.echo(f"next: kempf effects add {first} --vessel {told['vessel']}, kempf ladder --vessel {told['vessel']}")
+
+
+def _change(change: Mapping[str, Mapping[str, Any]]) -> str:
+    told = [f"{n} {number(c['value'], 3)} +- {number(c['std'], 2)} {c['unit']}".rstrip() for n, c in change.items()]
+    return ", ".join(told)

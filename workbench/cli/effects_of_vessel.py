@@ -1,0 +1,163 @@
+"""``kempf effects try|add|undo``: effects on a vessel's own manoeuvres."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import click
+
+from schemas.errors import UsageError
+from workbench.cli.ladder import tell_rungs
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table, progress
+
+
+@click.command("try")
+@click.argument("formula")
+@vessel_option(required=True)
+@click.option("--name", default="own", show_default=True, help="What the effect is called.")
+@warehouse_option
+@json_option
+def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -> None:
+    """Try a formula of your own, such as 'yaw: r*abs(r)': what it would explain, and whether it holds.
+
+    Beside the model that the vessel stands at; nothing is stored.
+    """
+    from flows.diagnose_vessel import examine
+    from flows.vessel_model import Own, standing
+    from flows.vessel_runs import choose
+    from pipeline.diagnose.diagnosis import DiagnosisSettings
+    from pipeline.diagnose.verdict import as_json as told_as_json
+    from warehouse.store import Warehouse
+    from workbench.chosen_model import PLAIN, model_of
+
+    mine = Own(formulas={name: (formula,)})
+    mine.effects()  # a slip of the pen is told before anything is read
+    warehouse = Warehouse(uri)
+    now = standing(warehouse, vessel)
+    spec, own = model_of(now) if now else (PLAIN, Own())
+    with progress() as tell:
+        chosen = choose(warehouse, vessel, tell)
+        settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
+        found = examine(warehouse, chosen, spec, own.beside(mine), settings, tell, only=(name,))
+    told = told_as_json(found.diagnosis)
+    told = {"vessel": vessel, "formula": formula, "beside": list(spec.effects), **told}
+    if as_json:
+        print_json(told)
+        return
+    _tell_try(told)
+
+
+def _tell_try(told: Mapping[str, Any]) -> None:
+    (candidate,) = told["candidates"]
+    refits = [r for one in told["sets"] for r in one["refits"]] + told["refused"]
+    click.echo(click.style(f"{told['formula']} on {told['vessel']}", bold=True))
+    click.echo(f"  score {number(candidate['score'])}, p = {number(candidate['p_adjusted'], 2)}")
+    click.echo(f"  absorbed by the model as it is: {number(candidate['absorption'])}")
+    for one in refits:
+        for parameter, value in one["parameters"].items():
+            click.echo(f"  {parameter} = {number(value['value'])} +- {number(value['std'], 2)} {value['unit']}")
+        gains = [*one["gains_left_out"], *one["gains_held_out"]]
+        better = sum(g > 0 for g in gains)
+        click.echo(f"  refitted: BIC {number(one['bic_change'], 3)}, {better} of {len(gains)} manoeuvres better")
+    kept = bool(told["sets"])
+    click.echo("  it holds" if kept else f"  it does not hold: {_why(told, candidate)}")
+
+
+def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
+    return str(told["refused"][-1]["why"] if told["refused"] else candidate["why"])
+
+
+@click.command("add")
+@click.argument("name")
+@vessel_option(required=True)
+@click.option("--formula", help="The effect is your own: its formula.")
+@click.option("--file", "path", type=click.Path(path_type=Path), help="The effect is your own: its YAML file.")
+@warehouse_option
+@json_option
+def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str, as_json: bool) -> None:
+    """Add an effect to the model that a vessel stands at, refit, and show the error before and after."""
+    from flows.vessel_model import Own, chain, point, standing, store_model
+    from flows.vessel_runs import choose
+    from warehouse.store import Warehouse
+    from workbench.chosen_model import PLAIN, model_of, read_effect_files
+
+    if formula is not None and path is not None:
+        raise UsageError("two_effects", "Both --formula and --file say what the effect is.", "Give one of them.")
+    mine = Own({name: (formula,)} if formula is not None else {}, read_effect_files([path]) if path is not None else {})
+    if path is not None and name not in mine.files:
+        raise UsageError(
+            "effect_name", f"{path} holds the effect {next(iter(mine.files))!r}, not {name!r}.", "Name it as it is."
+        )
+    if formula is None and path is None:
+        _require_known(name)
+    warehouse = Warehouse(uri)
+    now = standing(warehouse, vessel)
+    spec, own = model_of(now) if now else (PLAIN, Own())
+    if name in spec.effects:
+        raise UsageError(
+            "effect_there", f"The model of {vessel!r} holds {name!r} already.", f"See `kempf ladder --vessel {vessel}`."
+        )
+    wanted = spec.model_copy(update={"effects": (*spec.effects, name)})
+    with progress() as tell:
+        made, _ = store_model(warehouse, choose(warehouse, vessel, tell), wanted, own.beside(mine), tell)
+    point(warehouse, made)
+    models = chain(warehouse, made)
+    rungs = [{**m.fit["rung"], "step": k, "parameter_set_id": m.parameter_set_id} for k, m in enumerate(models)]
+    if as_json:
+        print_json({"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": made.show()})
+        return
+    tell_rungs(rungs[-2:], vessel)
+    _tell_runs(rungs[-2], rungs[-1])
+    for warning in made.warnings:
+        click.echo(f"  {warning}")
+    click.echo(f"next: kempf ladder --vessel {vessel}, kempf effects undo --vessel {vessel}")
+
+
+def _require_known(name: str) -> None:
+    from pipeline.model.effects import get
+
+    get(name)
+
+
+def _tell_runs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
+    """Print the free-run errors manoeuvre by manoeuvre, before and after, fitted and held out apart."""
+    from math import degrees
+
+    units = {"yaw_rate": ("deg/s", degrees(1.0)), "heading": ("deg", degrees(1.0)), "lateral_speed": ("m/s", 1.0)}
+    rows = []
+    for sample, key in (("fitted", "in_sample"), ("held out", "held_out")):
+        for name, rms in before[key].items():
+            then = after[key].get(name)
+            if then is None:
+                continue
+            cells = []
+            for channel, (_, factor) in units.items():
+                cells += [number(_scaled(rms[channel], factor), 3), number(_scaled(then[channel], factor), 3)]
+            rows.append([name, sample, *cells])
+    head = ["manoeuvre", "sample"]
+    for channel, (unit, _) in units.items():
+        head += [f"{channel}, {unit}", "after"]
+    print_table(head, rows, "Free-run rms, before and after")
+
+
+def _scaled(value: float | None, factor: float) -> float | None:
+    return None if value is None else value * factor
+
+
+@click.command("undo")
+@vessel_option(required=True)
+@warehouse_option
+@json_option
+def undo(vessel: str, uri: str, as_json: bool) -> None:
+    """Go back to the model before the last effect was added; nothing is deleted."""
+    from flows.vessel_model import undo as go_back
+    from warehouse.store import Warehouse
+
+    now = go_back(Warehouse(uri), vessel)
+    if as_json:
+        print_json(now.show())
+    else:
+        click.echo(f"{vessel} stands at {now.model_name} again, {now.parameter_set_id}")

@@ -1,0 +1,61 @@
+"""``kempf ladder``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import click
+
+from schemas.errors import NotFound
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table
+
+
+@click.command("ladder")
+@vessel_option(required=True)
+@warehouse_option
+@json_option
+def command(vessel: str, uri: str, as_json: bool) -> None:
+    """Show the models that lead to the one a vessel stands at, and how the error fell from one to the next."""
+    from flows.vessel_model import chain, standing
+    from warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    model = standing(warehouse, vessel)
+    if model is None:
+        raise NotFound(
+            "no_model",
+            f"{vessel!r} stands at no model yet.",
+            f"Run `kempf diagnose --vessel {vessel}`, then `kempf effects add NAME --vessel {vessel}`.",
+            {"vessel": vessel},
+        )
+    rungs = [
+        {**one.fit["rung"], "step": step, "parameter_set_id": one.parameter_set_id}
+        for step, one in enumerate(chain(warehouse, model))
+    ]
+    if as_json:
+        print_json(rungs)
+    else:
+        tell_rungs(rungs, vessel)
+
+
+def tell_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
+    """Print rungs of a ladder as a table."""
+    rows = []
+    for one in rungs:
+        held, wind = one["held_out_error"], one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"]
+        change = [f"{name} {number(v['value'])} +- {number(v['std'], 2)}" for name, v in one["effects"].items()]
+        rows.append(
+            [
+                str(one["step"]),
+                one["added"] or "plain model",
+                number(100 * one["in_sample_error"], 3),
+                "-" if held is None else number(100 * held, 3),
+                number(wind, 2),
+                number(one["log_likelihood"], 7),
+                ", ".join(change) or "-",
+                one["parameter_set_id"],
+            ]
+        )
+    head = ["step", "added", "fitted, %", "held out, %", "wind, m/s^2/s^0.5", "log-likelihood", "effects", "set"]
+    print_table(head, rows, f"{vessel}: free-run error as a share of the motion")
