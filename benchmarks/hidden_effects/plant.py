@@ -16,7 +16,7 @@ from pipeline.simulate.compiled import compiled
 Float = NDArray[np.float64]
 
 #: Columns of the state: the six of `pipeline.simulate.plant.STATE`, roll angle and rate, the rudder behind a lag, the
-#: slow memory of the yaw rate, and the first-order wave motion: yaw angle and its rate, sway displacement and its rate.
+#: slow memory of the lateral speed, and the first-order motion in waves: yaw angle, sway displacement and their rates.
 STATE = ("v", "r", "psi", "north", "east", "V", "phi", "p", "lagged", "memory", "q_psi", "dq_psi", "q_y", "dq_y")
 N_STATE = 14
 
@@ -36,23 +36,23 @@ N_, H_, DAY_, KICK_, HYST_, FOUL_, VLATE_, WPSI_, WY_, NORTH_, EAST_, BASE_, WIN
 N_CONDITIONS = 13
 
 # Slots of theta; `effects.py` and `outsiders.py` say what each does.
-CROSS_FLOW, SWAY_QUAD, YAW_QUAD, ABSV_R, ABSR_V, SWAY_CUBIC, V2R, VR2, YAW_CUBIC = range(9)
-STALL, STRAIGHTEN, LAG, DEAD_TIME, BACKLASH, RATE_LIMIT, NEUTRAL, ASYMMETRY, WASH, WALK_Y, WALK_N = range(9, 20)
-EXPONENT, WIND_Y, WIND_N, WAVE_PSI, WAVE_Y, SHALLOW, ROLL, LOAD, MEMORY, MEMORY_S = range(20, 30)
-KICK, KICK_S, HYSTERESIS, HYSTERESIS_R, THRUSTER, BANK, BANK_M, LATE_LIFT, LATE_S, FOULING = range(30, 40)
-HARMONIC, DEAD_ZONE, DEAD_ZONE_V = range(40, 43)
-N_THETA = 43
+CROSS_FLOW, SWAY_QUAD, YAW_QUAD, SWAY_ABS_R, YAW_ABS_V, SWAY_CUBIC, YAW_CUBIC, YAW_V3 = range(8)
+SWAY_V2R, SWAY_VR2, YAW_V2R, YAW_VR2, SHALLOW, ROLL, LOAD, MEMORY = range(8, 16)
+STALL, STRAIGHTEN, LAG, DEAD_TIME, BACKLASH, RATE_LIMIT, NEUTRAL, ASYMMETRY, WASH, EXPONENT = range(16, 26)
+WALK_Y, WALK_N, WIND_Y, WIND_N, WAVE_PSI, WAVE_Y = range(26, 32)
+KICK, KICK_S, HYSTERESIS, HYSTERESIS_R, THRUSTER, BANK, BANK_M, LATE_LIFT, LATE_S, FOULING = range(32, 42)
+HARMONIC, DEAD_ZONE, DEAD_ZONE_V, SWAY_ABS_V, YAW_ABS_R = range(42, 47)
+N_THETA = 47
 
 _STRIPS = 40
-_WAVE_DAMPING = 0.07
+_WAVE_DAMPING = 0.1
 
 
 @compiled
 def effective_rudder(fed: float, v: float, V: float, theta: Float) -> float:
     """Return the rudder angle that the hull feels, rad."""
     d = fed + theta[NEUTRAL]
-    if d < 0.0:
-        d *= 1.0 - theta[ASYMMETRY]
+    d += theta[ASYMMETRY] * abs(d)
     drift = v / V
     return d * (1.0 - theta[STALL] * d * d + theta[STRAIGHTEN] * drift * drift)
 
@@ -73,14 +73,16 @@ def cross_flow(v: float, r: float, L: float) -> tuple[float, float]:
 def hull_effects(state: Float, theta: Float, L: float) -> tuple[float, float]:
     """Return what the hull effects of the catalogue add to dv/dt and dr/dt."""
     v, r, V = state[0], state[1], state[5]
-    dv = theta[SWAY_QUAD] * v * abs(v) + theta[ABSV_R] * abs(v) * r + theta[SWAY_CUBIC] * v**3 / V
-    dr = theta[YAW_QUAD] * r * abs(r) + theta[ABSR_V] * abs(r) * v + theta[YAW_CUBIC] * r**3 / V
-    dr += (theta[V2R] * v * v * r + theta[VR2] * v * r * r) / V
-    dr += theta[ROLL] * state[6] + theta[MEMORY] * V * state[9]
+    dv = theta[SWAY_QUAD] * v * abs(v) + theta[SWAY_ABS_R] * abs(r) * v + theta[SWAY_ABS_V] * abs(v) * r
+    dv += (theta[SWAY_CUBIC] * v**3 + theta[SWAY_V2R] * v * v * r + theta[SWAY_VR2] * v * r * r) / V
+    dv += theta[MEMORY] * V * (v - state[9])
+    dr = theta[YAW_QUAD] * r * abs(r) + theta[YAW_ABS_V] * abs(v) * r + theta[YAW_ABS_R] * abs(r) * v
+    dr += theta[ROLL] * V * V * state[6]
+    dr += (theta[YAW_CUBIC] * r**3 + theta[YAW_V3] * v**3 + theta[YAW_V2R] * v * v * r + theta[YAW_VR2] * v * r * r) / V
     if theta[CROSS_FLOW] != 0.0:
         force, moment = cross_flow(v, r, L)
         dv -= theta[CROSS_FLOW] * force
-        dr -= theta[CROSS_FLOW] * 12.0 / (L * L) * moment
+        dr -= theta[CROSS_FLOW] * 16.0 / (L * L) * moment
     return dv, dr
 
 
@@ -137,29 +139,30 @@ def derivative(state: Float, fed: float, forcing: Float, now: Float, hull: Float
     a11, a12, a21, a22, b1, b2, arm, V0, T_V, c_V, L, n0, T, heel, w_roll, z_roll, w_wave, wave_from, g = hull
     v, r, psi, V = state[0], state[1], state[2], state[5]
     rudder = effective_rudder(state[8] if theta[LAG] > 0.0 else fed, v, V, theta)
-    inflow = V * V * (V / V0) ** theta[EXPONENT] if theta[EXPONENT] != 0.0 else V * V
-    inflow *= 1.0 + theta[WASH] * ((now[N_] * V0 / (n0 * V)) ** 2 - 1.0)
+    ahead = V0 * now[N_] / n0
+    inflow = V * V * (ahead / V) ** theta[EXPONENT] if theta[EXPONENT] != 0.0 else V * V
+    inflow += theta[WASH] * (ahead * ahead - V * V)
     inflow *= 1.0 - theta[FOULING] * now[FOUL_]
     lift_v = v - theta[DEAD_ZONE] * min(max(v, -theta[DEAD_ZONE_V]), theta[DEAD_ZONE_V])
-    bottom = 1.0 + theta[SHALLOW] * (T / now[H_]) ** 2
+    load = 1.0 + theta[LOAD] * now[DAY_]
+    bottom = load + theta[SHALLOW] * (T / now[H_]) ** 2
     cosine, sine = np.cos(psi), np.sin(psi)
     out[3] = V * cosine - v * sine + forcing[1]
     out[4] = V * sine + v * cosine + forcing[2]
     hull_v, hull_r = hull_effects(state, theta, L)
     wind_v, wind_r = wind_and_screw(state, forcing, now, theta, out[3], out[4])
     out_v, out_r = outside_effects(state, rudder, now, theta, L)
-    out[0] = bottom * V * (a11 * lift_v + a12 * r) + b1 * inflow * rudder + forcing[0] + hull_v + wind_v + out_v
-    out[1] = bottom * V * (a21 * lift_v + a22 * r) + b2 * (1.0 + theta[LOAD] * now[DAY_]) * inflow * rudder
+    out[0] = V * (bottom * a11 * lift_v + a12 * r) + load * b1 * inflow * rudder + forcing[0] + hull_v + wind_v + out_v
+    out[1] = bottom * V * (a21 * lift_v + a22 * r) + load * b2 * inflow * rudder
     out[1] += arm * forcing[0] + hull_r + wind_r + out_r
     out[2] = r
-    ahead = V0 * now[N_] / n0
     turn = L * r / ahead
     out[5] = (ahead * (1.0 - c_V * turn * turn) - V) / T_V
     # she heels outward; a turn to starboard heels her to port, which is negative
     out[6] = state[7]
     out[7] = -2.0 * z_roll * w_roll * state[7] - w_roll**2 * (state[6] + heel * V * r / g)
     out[8] = (fed - state[8]) / theta[LAG] if theta[LAG] > 0.0 else 0.0
-    out[9] = (r - state[9]) / theta[MEMORY_S] if theta[MEMORY_S] > 0.0 else 0.0
+    out[9] = V * (v - state[9]) / (3.0 * L)
     out[10:14] = 0.0
     if theta[WAVE_PSI] != 0.0:
         w = abs(w_wave + w_wave**2 * V * np.cos(wave_from - psi) / g)
@@ -234,7 +237,7 @@ def feed(logged: Float, fed: Float, row: int, step_s: float, theta: Float) -> fl
             low = int(place)
             wanted = logged[low] + (place - low) * (logged[low + 1] - logged[low])
     if theta[RATE_LIMIT] > 0.0:
-        most = theta[RATE_LIMIT] * step_s
+        most = step_s / theta[RATE_LIMIT]
         wanted = min(max(wanted, fed[row - 1] - most), fed[row - 1] + most)
     if theta[BACKLASH] > 0.0:
         half = 0.5 * theta[BACKLASH]

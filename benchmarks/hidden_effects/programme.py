@@ -26,7 +26,7 @@ RUNS = (
 DAYS = len(RUNS)
 
 #: Steady course before a run, and the longest a run may take, in ship lengths at the trial speed.
-_STEADY_LENGTHS, _LONGEST_LENGTHS = 20.0, 75.0
+_STEADY_LENGTHS, _LONGEST_LENGTHS = 20.0, 100.0
 
 #: A ship whose own time is longer sails fewer runs of fewer legs a day: a leg of hers takes minutes.
 _SLOW_S, _RUNS_OF_SLOW = 30.0, 3

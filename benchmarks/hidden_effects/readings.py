@@ -22,6 +22,7 @@ Float = NDArray[np.float64]
 _RATES = {"gnss": 1.0, "heading": 5.0, "yaw_rate": 2.0, "rudder": 2.0, "log": 1.0, "wind": 1.0, "shaft": 1.0}
 _QUICK = {"gnss": 5.0, "heading": 10.0, "yaw_rate": 10.0, "rudder": 10.0, "log": 5.0}
 _SLOW = {"heading": 2.0, "yaw_rate": 1.0, "roll": 1.0}
+_LATE = {"gnss": "gnss_latency", "heading": "heading_latency", "yaw_rate": "gyro_latency"}
 _QUICK_SHIP_S, _SLOW_SHIP_S = 5.0, 30.0
 
 
@@ -71,11 +72,11 @@ def read(
         *(voyage.forcing[:, plant.FORCING.index("wind")], voyage.step_s, wind_from_rad, 0.0),
     )
     late = _Late(path.step_s, path.state, path.slope, path.rudder, path.order, path.forcing)
-    late.__dict__["latency_s"] = c if name == "gnss_latency" else 0.0
+    late.__dict__["latency_s"] = c
     records = []
     for one in settings.instruments:
         told = {"start_utc_ns": settings.start_utc_ns, "seed": settings.seed}
-        seen = late if one.name == "gnss" else path
+        seen = late if name == _LATE.get(one.name) else path
         record = measure(one, seen, hull, setting, **told, noise_scale=settings.noise_scale)
         records.append(_own(record, voyage, hull, settings.start_utc_ns, name, c))
     truth = Truth(hull.parameters, hull.wind_arm_per_m, path, ())
@@ -109,7 +110,7 @@ def _own(record: InstrumentRecord, voyage: Voyage, hull: Hull, start: int, name:
         case "yaw_rate" if name == "gyro_scale":
             values["yaw_rate_rad_s"] = values["yaw_rate_rad_s"] * (1.0 + c)
         case "log" if name == "log_scale":
-            values["speed_through_water_m_s"] = values["speed_through_water_m_s"] * (1.0 + c)
+            values["speed_through_water_m_s"] = values["speed_through_water_m_s"] / (1.0 + c)
         case _:
             return record
     return replace(record, values=values)

@@ -150,8 +150,6 @@ def added(days: tuple[Voyage, ...], hull: Hull, weathers: tuple[programme.Weathe
     """
     squares = np.zeros((2, 2))
     none = np.zeros(plant.N_THETA)
-    # what the passengers remember has been sailed with, so its time constant must stand on both sides
-    none[plant.MEMORY_S] = strengths[plant.MEMORY_S]
     for day, weather in zip(days, weathers, strict=True):
         rows = day.run > 0
         ship = constants(hull, weather.wave_from_rad)
@@ -181,7 +179,7 @@ def strength_of(
     sign = float(effect.sign) or (1.0 if stream(seed, "sign").random() < 0.5 else -1.0)
     if effect.sizes:
         return sign * effect.sizes[strength] * scales(hull)[effect.scale]
-    # the passengers' tails need their time constants while she sails without the effect itself
+    # what an effect needs beside its own parameter, such as the time of a kick, is there before
     days = tuple(voyage(hull, w, effect, 0.0, seed, day) for day, w in enumerate(weathers))
     unit = added(days, hull, weathers, theta(effect, 1.0, hull))
     return sign * min(SHARES[strength] / unit, effect.most)
@@ -212,6 +210,5 @@ def voyages(
         try:
             return c, tuple(voyage(hull, w, effect, c, seed, day) for day, w in enumerate(weathers))
         except VoyageFailed:
-            # of a rate limit it is the small values that are strong
-            c = c / _WEAKER if effect and effect.name == "rudder_rate_limit" else c * _WEAKER
+            c *= _WEAKER
     return c, tuple(voyage(hull, w, effect, c, seed, day) for day, w in enumerate(weathers))

@@ -32,7 +32,7 @@ from pipeline.simulate.nmea_log import to_nmea
 from pipeline.simulate.random_streams import stream
 from pipeline.simulate.trial import Trial, TrialSettings
 
-_CASES, _CSV_HZ = 320, 10.0
+_CASES, _CSV_HZ = 336, 10.0
 _TO: dict[str, tuple[str, Callable[[Trial], bytes]]] = {
     "csv": ("csv.gz", lambda trial: to_csv(trial, _CSV_HZ)),
     "mcap": ("mcap", to_mcap),
@@ -99,7 +99,9 @@ def _answer(
     moves = effect is not None and not effect.sensor and not effect.sizes
     return {
         **asdict(case),
-        "parameter": {"c": c, "unit": effect.unit if effect else "", "equation": effect.equation if effect else ""},
+        "parameters": effect.parameters(c) if effect else {},
+        "unit": effect.unit if effect else "",
+        "equation": effect.equation if effect else "",
         "share_of_rudder": sail.added(voyages, hull, weathers, strengths) if moves else None,
         "theta": {str(k): float(strengths[k]) for k in np.flatnonzero(strengths)},
         "hull_parameters": asdict(hull.parameters),

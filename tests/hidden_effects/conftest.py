@@ -12,7 +12,7 @@ from benchmarks.hidden_effects.write import write_case
 
 @pytest.fixture(scope="session")
 def sample() -> tuple[Case, ...]:
-    return design(320, 1)
+    return design(336, 1)
 
 
 @pytest.fixture(scope="session")

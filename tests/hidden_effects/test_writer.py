@@ -25,8 +25,8 @@ from warehouse.store import Warehouse
 def test_the_sample_is_balanced_and_large_enough(sample):
     kinds = Counter(case.kind for case in sample)
     effects = Counter(case.effect for case in sample)
-    assert len(sample) == len({case.case_id for case in sample}) == len({case.seed for case in sample}) == 320
-    assert kinds["none"] == 40
+    assert len(sample) == len({case.case_id for case in sample}) == len({case.seed for case in sample}) == 336
+    assert kinds["none"] == 42
     assert len(CATALOGUE) >= 20
     assert len(OUTSIDERS) >= 6
     assert set(effects) == {*CATALOGUE, *OUTSIDERS, "none"}
@@ -40,8 +40,8 @@ def test_the_sample_is_balanced_and_large_enough(sample):
         for name in (*CATALOGUE, *OUTSIDERS, "none"):
             own = Counter(getattr(case, of) for case in sample if case.effect == name)
             assert max(own.values()) - min([own[level] for level in levels]) <= 1
-    assert design(320, 1) == sample
-    assert design(320, 2) != sample
+    assert design(336, 1) == sample
+    assert design(336, 2) != sample
 
 
 def test_the_flows_take_a_case_in_and_find_its_zigzags(written, tmp_path: Path):
