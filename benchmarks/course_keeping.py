@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 import os
 from collections.abc import Callable
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, replace
 from math import radians
 
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
@@ -32,7 +32,7 @@ from pipeline.simulate.hulls import HULLS
 from pipeline.simulate.trial import PAPER_ENVIRONMENT
 from pipeline.steering.course_keeping import LawSettings, course_law
 from pipeline.steering.robustness import ClosedLoop, closed_loop
-from pipeline.steering.state_space import NoiseLevels
+from pipeline.steering.state_space import NoiseLevels, usual_levels
 from pipeline.steering.track import CourseChange, Performance, Track, course_change, keep_course, performance
 from schemas.errors import KempfError
 from schemas.model_spec import HULL_PARAMETERS, ModelSpec
@@ -52,7 +52,7 @@ TRUE, ML, OWN, FIRST, ANOTHER = (
 LAWS = (TRUE, ML, OWN, FIRST, ANOTHER)
 LEG_S, SETTLE_S, CHANGE_RAD = 1200.0, 300.0, radians(10.0)
 #: what really is: the simulator's instruments and weather; the stream is constant, the usual level lets it wander
-LEVELS = NoiseLevels(1e-3, 0.05, 0.05, radians(0.03), radians(0.05))
+LEVELS = replace(usual_levels(ModelSpec()), yaw_rate_rad_s=radians(0.03), heading_rad=radians(0.05))
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +87,10 @@ class Run:
 def noise_of(estimate: Estimate) -> NoiseLevels:
     level = {v.name: v.value for v in estimate.noise}
     names = ("sigma_F", "sigma_V", "sigma_v", "sigma_r", "sigma_psi")
-    usual = astuple(NoiseLevels())
-    return NoiseLevels(*(max(level.get(n, u), 0.02 * u) for n, u in zip(names, usual, strict=True)))
+    usual = astuple(usual_levels(ModelSpec()))
+    return NoiseLevels(
+        *(max(level.get(n, u), (1.0 if n in names[:2] else 0.02) * u) for n, u in zip(names, usual, strict=True))
+    )
 
 
 def run(ship: str, seed: int) -> Run:

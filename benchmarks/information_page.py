@@ -54,15 +54,17 @@ def _named(case: Case) -> str:
 def _setting(runs: int) -> list[str]:
     return [
         f"Simulated 20-minute 20/20 zigzags, {runs} a cell of the grid, half as many by y_v and y_r only and with "
-        "random walks, a quarter where one other source is changed. GNSS velocity 0.05 m/s, yaw rate 0.03 deg/s, "
-        "heading 0.05 deg and log 0.05 m/s at 1 Hz, rudder 0.1 deg at 4 Hz, all on one clock; times 0.3, 1 and 3. "
-        "Wind force 5e-3 m/s2 with a slow part of 1e-3, stream 0.3 m/s, base headings all round. The boat of 3 m (usv) "
-        "lives twelve times faster: 12 Hz, 48 Hz and 100 s, but with the same noise. Every cell of the grid has "
-        "its own draws.",
+        "disturbances that forget, a quarter where one other source is changed. GNSS velocity 0.05 m/s, yaw rate "
+        "0.03 deg/s, heading 0.05 deg and log 0.05 m/s at 1 Hz, rudder 0.1 deg at 4 Hz, all on one clock; times 0.3, "
+        "1 and 3. Wind force 5e-3 m/s2 with a slow part of 1e-3, stream 0.3 m/s, base headings all round. The boat of "
+        "3 m (usv) lives twelve times faster: 12 Hz, 48 Hz and 100 s, but with the same noise. Every cell of the grid "
+        "has its own draws.",
         "",
-        "Two bounds: **true**, the Cramer-Rao bound from the expected information at the simulator's parameters and "
-        "noise levels, averaged over the runs (noise levels unknown but for those that are nothing); **own**, the "
-        "root mean square of the standard errors that the estimator reports.",
+        "Two bounds: **true**, the Cramer-Rao bound from the expected information at the simulator's parameters, "
+        "noise levels and disturbances, averaged over the runs (the constant force unknown, the stream a constant from "
+        "an unknown beginning, noise levels unknown but for those that are nothing; the errors of rudder and log as "
+        "large as the estimator takes them for); **own**, the root mean square of the standard errors that the "
+        "estimator reports.",
         "",
         "![Errors over both bounds, coverage, bias, and the paper's errors](information_limit.png)",
         "",

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.model.ship import Hull
 from pipeline.normalise.series import Float
 from pipeline.steering.nomoto import require_numbers
-from pipeline.steering.state_space import NoiseLevels
+from pipeline.steering.state_space import NoiseLevels, usual_levels
 from schemas.errors import NotFound, UsageError
 from schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from warehouse import aliases, parameter_sets, vessels
@@ -24,8 +24,10 @@ _LEVELS = {
     "yaw_rate_rad_s": "sigma_r",
     "heading_rad": "sigma_psi",
 }
-#: below this part of the usual level an estimated one stands for zero, and an estimator would trust it blindly
-_LEAST = 0.02
+#: below this part of the usual level an estimated one stands for zero, and an estimator would trust it blindly; as its
+#: gain is a settled one, it has to find force and stream from nothing, however little they change once they are known
+_LEAST = {"wind_m_s2": 1.0, "current_m_s": 1.0}
+_LEAST_OF_A_MEASUREMENT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +117,7 @@ def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None
     require_numbers(hull, float(told))
     profile = vessels.get(warehouse, str(one.provenance["inputs"]["profile_sha256"]))
     arm = spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
-    noise, assumed = _noise(one)
+    noise, assumed = _noise(one, spec)
     warnings = [*one.warnings, *assumed]
     if not one.convergence.get("converged"):
         warnings.insert(0, f"the set did not converge: {one.convergence.get('reason')}")
@@ -135,15 +137,15 @@ def _covariance(one: ParameterSet) -> Float:
     return found
 
 
-def _noise(one: ParameterSet) -> tuple[NoiseLevels, list[str]]:
+def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
     levels = {p.name: p.value for p in one.noise}
-    usual, values, assumed = NoiseLevels(), {}, []
+    usual, values, assumed = usual_levels(spec), {}, []
     for field, name in _LEVELS.items():
         standard = float(getattr(usual, field))
-        level = levels.get(name)
-        values[field] = standard if level is None else max(float(level), _LEAST * standard)
+        level, least = levels.get(name), standard * _LEAST.get(field, _LEAST_OF_A_MEASUREMENT)
+        values[field] = standard if level is None else max(float(level), least)
         if level is None:
             assumed.append(f"{name} is not in the set: {standard:g} assumed for an estimator")
-        elif level < _LEAST * standard:
-            assumed.append(f"{name} is as good as zero in the set: {_LEAST * standard:g} taken for an estimator")
+        elif level < least:
+            assumed.append(f"{name} is {level:.2g} in the set: {least:.2g} taken, an estimator finds it from nothing")
     return NoiseLevels(**values), assumed

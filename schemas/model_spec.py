@@ -19,7 +19,9 @@ HULL_PARAMETERS: dict[str, str] = {
 }
 
 #: Noise levels of eqs. (16) and (18) that are estimated with them, and their units (continuous time, standard
-#: deviations): wind force, yaw acceleration beside it, unaccounted current, lateral speed, yaw rate, heading.
+#: deviations): wind force, yaw acceleration beside it, unaccounted current, lateral speed, yaw rate, heading. Those of
+#: the disturbances are their levels in the long run; within a time short beside their memory they only change by
+#: `pipeline.model.disturbances.change_within`.
 NOISE_PARAMETERS: dict[str, str] = {
     "sigma_F": "m/s^2",
     "sigma_M": "rad/s^2",
@@ -55,10 +57,11 @@ class ModelSpec(BaseModel):
     rudder_speed_exponent: float = Field(default=2.0, ge=0.0, le=2.0)
     #: whether the rate gyro may have a constant bias; it takes a heading beside the yaw rate to tell
     rate_bias: bool = True
-    #: mu_F, that of M, and mu_V of eq. (16), 1/s
-    wind_correlation_rate_per_s: float = Field(default=1 / 300.0, gt=0)
+    #: mu_F, that of M, and mu_V of eq. (16), 1/s. By default force and current hardly forget within a trial: random
+    #: walks, which may stand off nothing for as long as they like
+    wind_correlation_rate_per_s: float = Field(default=1e-5, gt=0)
     moment_correlation_rate_per_s: float = Field(default=1 / 30.0, gt=0)
-    current_correlation_rate_per_s: float = Field(default=1 / 1800.0, gt=0)
+    current_correlation_rate_per_s: float = Field(default=1e-6, gt=0)
     #: l of eq. (16), 1/m; None takes the vessel profile's
     wind_arm_per_m: float | None = None
     parent: str | None = None

@@ -10,23 +10,29 @@ from pipeline.identify.chain import F, M
 from pipeline.identify.doubts import doubts, not_white
 from pipeline.identify.estimate import Estimate, Value, discrete_values, hull_values
 from pipeline.identify.fit import one_step_fit
-from pipeline.identify.kernel import BIAS, C1, C2, FASTEST_PER_S, LOG_MEASUREMENT
+from pipeline.identify.kernel import BIAS, C1, C2, FASTEST_PER_S, LOG_F, LOG_M, LOG_MEASUREMENT, LOG_V
 from pipeline.identify.likelihood import Likelihood, Trace
 from pipeline.identify.search import Pass, Search, free
 from pipeline.identify.uncertainty import from_information, sandwich
+from pipeline.model.disturbances import change_within
 from pipeline.normalise.series import Float
-from schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS
+from schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
 
 #: rate at which the ship answers times the rudder's period, above which its samples leave too much open
 _RUDDER_TOO_SLOW = 0.3
 #: a bias of the rate gyro is told when it is so many standard errors from nothing
 _BIASED = 4.0
+#: with less than so many of her slowest time constants in a record, errors of the slow motion are not those of a bound
+_FEW_TIMES = 5.0
+#: time within which the changes of the disturbances are told
+_CHANGE_S = 600.0
+_HULL = len(HULL_PARAMETERS)
 _NAMES = (*HULL_PARAMETERS, *NOISE_PARAMETERS)
 
 
 def report(
     objective: Likelihood,
-    best: Search,
+    best: Search[Float],
     trace: Trace,
     discrete_step_s: float,
     details: dict[str, Any],
@@ -71,14 +77,19 @@ def report(
     hull_covariance = covariance[:6, :6]
     sigma = np.exp(theta[6:])
     noise = tuple(
-        Value(key, float(sigma[i]), float(sigma[i] * np.sqrt(covariance[6 + i, 6 + i])), unit)
+        Value(key, float(sigma[i]), _std_of_level(objective, best, covariance, 6 + i), unit)
         for i, (key, unit) in enumerate(NOISE_PARAMETERS.items())
         if objective.active[6 + i]
     )
     ends = _at_the_end(objective, trace)
     warnings = _warnings(objective, best, details["gross_errors"], heavy, bounds, ends)
     if known.weak:
-        warnings.append("some directions of the parameters are hardly determined by these data, see the report")
+        value, vector = known.weak[0]
+        told = ", ".join(_largest(vector, [_NAMES[i] for i in index]))
+        warnings.append(
+            f"these data hardly determine a direction of the parameters ({told}; eigenvalue {value:.1g} of 1): sail a "
+            "zigzag of other angles, or pool several"
+        )
     speed = record.mean_speed_m_s
     return Estimate(
         estimator="ml",
@@ -103,6 +114,7 @@ def report(
             "standard_errors": kind,
             "widened": widened,
             "at_the_end": ends,
+            "changes": _changes(noise, objective.spec),
             **details,
         },
         iterations=tuple(_iteration(count, one) for count, one in enumerate(best.passes)),
@@ -113,7 +125,7 @@ def report(
 
 def _warnings(
     objective: Likelihood,
-    best: Search,
+    best: Search[Float],
     taken_out: dict[str, int],
     heavy: tuple[str, ...],
     bounds: list[str],
@@ -127,8 +139,10 @@ def _warnings(
     ]
     if not best.converged:
         warnings.append(f"not converged: {best.reason}")
-    if bounds:
-        warnings.append(f"at a bound, not estimated: {', '.join(bounds)}")
+    # a disturbance that does not change within the record is no fault of it
+    unchanging = {_NAMES[i] for i in (LOG_F, LOG_M, LOG_V) if theta[i] <= objective.low[i]}
+    if pressed := [name for name in bounds if name not in unchanging]:
+        warnings.append(f"at a bound, not estimated: {', '.join(pressed)}")
     levels = range(LOG_MEASUREMENT, theta.size)
     if any(theta[i] <= objective.low[i] for i in levels if objective.active[i]):
         warnings.append(
@@ -140,6 +154,13 @@ def _warnings(
             f"the rudder is read every {record.rudder_period_s:.2g} s, too seldom for a ship that answers so fast: "
             "what it did in between is not known, and the standard errors do not say so; log the rudder faster"
         )
+    slowest, lasts = slowest_s(theta[:_HULL], record.mean_speed_m_s), float(record.time_s[-1])
+    if lasts < _FEW_TIMES * slowest:
+        warnings.append(
+            f"the record lasts {lasts:.0f} s, {lasts / slowest:.1f} times the {slowest:.0f} s in which her slowest "
+            f"motion dies or grows; from less than {_FEW_TIMES:g} times standard errors are rough: sail longer, or "
+            "pool several"
+        )
     bias = ends.get("rate_bias")
     if bias is not None and abs(bias["value"]) > _BIASED * bias["std"]:
         shown = np.rad2deg([bias["value"], bias["std"]])
@@ -148,6 +169,50 @@ def _warnings(
             "allowed for in the estimate"
         )
     return warnings
+
+
+def _std_of_level(objective: Likelihood, best: Search[Float], covariance: Float, i: int) -> float:
+    """Return the standard error of a noise level; of a disturbance at its lower bound, how large it could still be.
+
+    Near nothing the log-likelihood goes with sigma^2, whose variance is 4 sigma^4 over the information on log sigma; a
+    level whose square is as large as the standard deviation of that is what the data would not have noticed.
+    """
+    sigma, J = float(np.exp(best.theta[i])), float(best.information[i, i])
+    if i in (LOG_F, LOG_M, LOG_V) and best.theta[i] <= objective.low[i] and J > 0.0:
+        return float(np.sqrt(2.0 * sigma**2 / np.sqrt(J)))
+    return float(sigma * np.sqrt(covariance[i, i]))
+
+
+def slowest_s(hull: Float, speed_m_s: float) -> float:
+    """Return the slowest time constant of a ship, s, at a speed; of an unstable one that in which she leaves.
+
+    Parameters
+    ----------
+    hull : ndarray, shape (6,)
+    speed_m_s : float
+    """
+    rates = speed_m_s * np.linalg.eigvals(hull[:4].reshape(2, 2)).real
+    return float(1.0 / max(np.min(np.abs(rates)), 1e-12))
+
+
+def _changes(noise: tuple[Value, ...], spec: ModelSpec) -> dict[str, dict[str, Any]]:
+    """Return by how much the disturbances change within `_CHANGE_S`: of those that forget slowly all a record shows."""
+    rates = {
+        "sigma_F": spec.wind_correlation_rate_per_s,
+        "sigma_M": spec.moment_correlation_rate_per_s,
+        "sigma_V": spec.current_correlation_rate_per_s,
+    }
+    per_level = {name: change_within(1.0, _CHANGE_S, rate) for name, rate in rates.items()}
+    return {
+        one.name: {
+            "value": per_level[one.name] * one.value,
+            "std": None if np.isnan(one.std) else per_level[one.name] * one.std,
+            "unit": one.unit,
+            "within_s": _CHANGE_S,
+        }
+        for one in noise
+        if one.name in rates
+    }
 
 
 def _at_the_end(objective: Likelihood, trace: Trace) -> dict[str, dict[str, Any]]:

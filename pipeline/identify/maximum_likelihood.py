@@ -64,7 +64,7 @@ class MaximumLikelihoodSettings:
     coarse_instants: int = 300
     coarse_iterations: int = 25
     sigma_low: tuple[float, ...] = (1e-7, 1e-9, 1e-4, 1e-5, 1e-7, 1e-6)
-    sigma_high: tuple[float, ...] = (1.0, 0.1, 10.0, 10.0, 0.5, 1.0)
+    sigma_high: tuple[float, ...] = (10.0, 0.1, 100.0, 10.0, 0.5, 1.0)
     initial_std: tuple[float, ...] = INITIAL_STD
     gate_width: float = 5.0
     gate_share: float = 0.1
@@ -104,7 +104,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Maximu
 
 def search(
     record: Record, spec: ModelSpec, arm_per_m: float, settings: MaximumLikelihoodSettings
-) -> tuple[Likelihood, Search, Trace, dict[str, Any], tuple[str, ...]]:
+) -> tuple[Likelihood, Search[Float], Trace, dict[str, Any], tuple[str, ...]]:
     """Find the maximum for one segment, gross errors taken out.
 
     Returns
@@ -132,14 +132,15 @@ def search(
 
 def _from_all_starts(
     objective: Likelihood, settings: MaximumLikelihoodSettings
-) -> tuple[str, Search, dict[str, list[dict[str, Any]]]]:
+) -> tuple[str, Search[Float], dict[str, list[dict[str, Any]]]]:
     """Let the starting points race on the thinned record and carry the best to the end on the whole one."""
     coarse = settings.bind(thinned(objective.record, settings.coarse_instants), objective.spec, objective.arm_per_m)
-    entries = sorted(starting_points(objective.record), key=lambda start: -coarse.value(start[1]))[: settings.entries]
+    points = starting_points(objective.record, objective.spec)
+    entries = sorted(points, key=lambda start: -coarse.value(start[1]))[: settings.entries]
     race = [(name, climb(coarse, theta, settings.coarse_iterations, _RACE_DECREMENT)) for name, theta in entries]
     race.sort(key=lambda entry: -entry[1].log_likelihood)
 
-    def to_the_end(theta: Float) -> Search:
+    def to_the_end(theta: Float) -> Search[Float]:
         return climb(objective, theta, settings.max_iterations, settings.decrement)
 
     searches = [(name, to_the_end(found.theta)) for name, found in _distinct(race, settings.starts)]
@@ -158,7 +159,7 @@ def _from_all_starts(
     return name, best, {"starts": _summary(searches), "race": _summary(race)}
 
 
-def _distinct(race: list[tuple[str, Search]], starts: int) -> list[tuple[str, Search]]:
+def _distinct(race: list[tuple[str, Search[Float]]], starts: int) -> list[tuple[str, Search[Float]]]:
     """Return the best entries of the race that ended on different hills and are not out of reach of the best one."""
     best = race[0][1]
     chosen = [race[0]]
@@ -171,8 +172,8 @@ def _distinct(race: list[tuple[str, Search]], starts: int) -> list[tuple[str, Se
 
 
 def _without_gross_errors(
-    objective: Likelihood, best: Search, settings: MaximumLikelihoodSettings
-) -> tuple[Likelihood, Search, Trace, dict[str, int], tuple[str, ...]]:
+    objective: Likelihood, best: Search[Float], settings: MaximumLikelihoodSettings
+) -> tuple[Likelihood, Search[Float], Trace, dict[str, int], tuple[str, ...]]:
     """Take gross errors out and climb on, until none is left or the rounds run out."""
     taken_out: dict[str, int] = {}
     heavy: tuple[str, ...] = ()
@@ -194,5 +195,5 @@ def _without_gross_errors(
     return objective, best, trace, taken_out, heavy
 
 
-def _summary(searches: list[tuple[str, Search]]) -> list[dict[str, Any]]:
+def _summary(searches: list[tuple[str, Search[Float]]]) -> list[dict[str, Any]]:
     return [{"start": n, "log_likelihood": s.log_likelihood, "converged": s.converged} for n, s in searches]

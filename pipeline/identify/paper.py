@@ -32,11 +32,13 @@ class PaperSettings:
         Step of eq. (17), s; None takes the GNSS period.
     force_std_m_s2, current_std_m_s : float
         sigma_F and sigma_V of eq. (16); the paper's simulated trial has a force of 5e-3 m/s^2 and a current of 0.3 m/s.
+    wind_rate_per_s, current_rate_per_s : float or None
+        mu_F and mu_V of eq. (16), which belong to these levels; None takes those of the model specification.
     tolerance : float
         See `pipeline.identify.procedure.ProcedureSettings`.
     constant : bool
-        Force and current are constants, states with zero derivative, as in the paper's simulated trial; the
-        correlation rates of the model specification are not used.
+        Force and current are constants, states with zero derivative, as in the paper's simulated trial; no rates are
+        used.
     floor, run_on : bool
         See `pipeline.identify.procedure.ProcedureSettings`.
     """
@@ -45,10 +47,20 @@ class PaperSettings:
     step_s: float | None = None
     force_std_m_s2: float = 5e-3
     current_std_m_s: float = 0.3
+    wind_rate_per_s: float | None = 1 / 300
+    current_rate_per_s: float | None = 1 / 1800
     tolerance: float = 1e-4
     constant: bool = False
     floor: bool = True
     run_on: bool = False
+
+    def rates(self, spec: ModelSpec) -> tuple[float, float]:
+        """Return mu_F and mu_V, 1/s."""
+        wind, current = self.wind_rate_per_s, self.current_rate_per_s
+        return (
+            spec.wind_correlation_rate_per_s if wind is None else wind,
+            spec.current_correlation_rate_per_s if current is None else current,
+        )
 
 
 def ship(step_s: float, *disturbances: SlowDisturbance) -> LinearVehicle:
@@ -87,7 +99,7 @@ def run(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettin
     ----------
     record : Record
     spec : ModelSpec
-        Correlation rates of the disturbances.
+        Correlation rates of the disturbances where the settings leave them open.
     arm_per_m : float
         l of eq. (16), 1/m.
     settings : PaperSettings
@@ -99,8 +111,7 @@ def run(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettin
     course : Course
     """
     sampled = sample(record, settings.step_s)
-    rates = (spec.wind_correlation_rate_per_s, spec.current_correlation_rate_per_s)
-    wind_rate, current_rate = (0.0, 0.0) if settings.constant else rates
+    wind_rate, current_rate = (0.0, 0.0) if settings.constant else settings.rates(spec)
     vehicle = ship(
         sampled.step_s,
         wind_force(settings.force_std_m_s2, arm_per_m, wind_rate),
@@ -136,7 +147,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperS
     ----------
     record : Record
     spec : ModelSpec
-        Correlation rates of the disturbances.
+        Correlation rates of the disturbances where the settings leave them open.
     arm_per_m : float
         l of eq. (16), 1/m.
     settings : PaperSettings

@@ -15,6 +15,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from pipeline.identify import maximum_likelihood
+from pipeline.identify.arrow import Arrow, ArrowSteps
 from pipeline.identify.doubts import doubts, not_white
 from pipeline.identify.estimate import Estimate, discrete_values, hull_values
 from pipeline.identify.fit import one_step_fit
@@ -22,7 +23,7 @@ from pipeline.identify.likelihood import Likelihood
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.record import Record
 from pipeline.identify.scoring import Mask
-from pipeline.identify.search import Search, climb, free
+from pipeline.identify.search import Search, climb_by, free
 from pipeline.identify.uncertainty import from_information, sandwich
 from pipeline.normalise.series import Float
 from schemas.errors import DataRejected, KempfError
@@ -62,21 +63,18 @@ class _Pool:
         n = self.members[number].active.size - _HULL
         return slice(_HULL + n * number, _HULL + n * (number + 1))
 
-    def full(self, theta: Float) -> tuple[float, Float, Float]:
+    def full(self, theta: Float) -> tuple[float, Float, Arrow]:
         """Log-likelihood, score and information of all members, summed in their order."""
         numbers = range(len(self.members))
         found = list(self.workers.map(lambda i: self.members[i].full(self.own(theta, i)), numbers))
-        value, score, information = 0.0, np.zeros(theta.size), np.zeros((theta.size, theta.size))
-        for number, (one, its_score, its_information) in enumerate(found):
-            here = self.place(number)
+        value, score = 0.0, np.zeros(theta.size)
+        for number, (one, its_score, _) in enumerate(found):
             value += one
             score[:_HULL] += its_score[:_HULL]
-            score[here] = its_score[_HULL:]
-            information[:_HULL, :_HULL] += its_information[:_HULL, :_HULL]
-            information[:_HULL, here] = its_information[:_HULL, _HULL:]
-            information[here, :_HULL] = its_information[_HULL:, :_HULL]
-            information[here, here] = its_information[_HULL:, _HULL:]
-        return value, score, information
+            score[self.place(number)] = its_score[_HULL:]
+        information = np.array([its_information for _, _, its_information in found])
+        shared: Float = np.sum(information[:, :_HULL, :_HULL], axis=0)
+        return value, score, Arrow(shared, information[:, :_HULL, _HULL:], information[:, _HULL:, _HULL:])
 
 
 def identify(
@@ -120,7 +118,7 @@ def identify(
     pool = _Pool([objective for _, objective, _, _ in kept], workers)
     searches = [search for _, _, search, _ in kept]
     start = np.concatenate([_weighted_mean(searches), *(search.theta[_HULL:] for search in searches)])
-    best = climb(pool, start, settings.max_iterations, settings.decrement)
+    best = climb_by(ArrowSteps(), pool, start, settings.max_iterations, settings.decrement)
     if not np.isfinite(best.log_likelihood):
         raise DataRejected(
             "nothing_in_common",
@@ -133,7 +131,7 @@ def identify(
 
 def _alone(
     member: Member, spec: ModelSpec, settings: MaximumLikelihoodSettings
-) -> tuple[Likelihood, Search, dict[str, int]] | str:
+) -> tuple[Likelihood, Search[Float], dict[str, int]] | str:
     """Identify one member by itself, or say why it stays out of the pool."""
     try:
         objective, best, _, details, _ = maximum_likelihood.search(member.record, spec, member.arm_per_m, settings)
@@ -142,7 +140,7 @@ def _alone(
     return (objective, best, details["gross_errors"]) if best.converged else f"not converged: {best.reason}"
 
 
-def _weighted_mean(searches: Sequence[Search]) -> Float:
+def _weighted_mean(searches: Sequence[Search[Float]]) -> Float:
     """Mean of the separate hulls, each with the information it has beside its own levels."""
     weights = []
     for search in searches:
@@ -157,20 +155,22 @@ def _weighted_mean(searches: Sequence[Search]) -> Float:
 
 def _report(
     pool: _Pool,
-    best: Search,
-    kept: list[tuple[Member, Likelihood, Search, dict[str, int]]],
+    best: Search[Arrow],
+    kept: list[tuple[Member, Likelihood, Search[Float], dict[str, int]]],
     left_out: dict[str, str],
     settings: MaximumLikelihoodSettings,
 ) -> Estimate:
-    known = from_information(best.information, np.flatnonzero(free(pool, best.theta, best.score)))
-    covariance, kind = known.covariance[:_HULL, :_HULL], "information"
+    # of the hull alone, the members' levels unknown: their own covariances are nobody's question
+    complement, carried = best.information.masked(free(pool, best.theta, best.score)).eliminated()
+    known = from_information(complement, np.arange(_HULL))
+    covariance, kind = known.covariance, "information"
     traces = [m.trace(pool.own(best.theta, i), scores=True) for i, m in enumerate(pool.members)]
     fits = [one_step_fit(m.record, t.innovation, t.variance) for m, t in zip(pool.members, traces, strict=True)]
     if any(not_white(fit) for fit in fits):
-        scores = np.concatenate([_placed(pool, i, t.scores.sum(axis=1)) for i, t in enumerate(traces)])
+        scores = np.concatenate([_of_the_hull(t.scores.sum(axis=1), c) for t, c in zip(traces, carried, strict=True)])
         ends = np.cumsum([0.0, *(m.record.time_s[-1] + 1.0 for m in pool.members)])
         time = np.concatenate([m.record.time_s + end for m, end in zip(pool.members, ends[:-1], strict=True)])
-        robust = sandwich(known.covariance, scores, time, 12 * len(pool.members))[:_HULL, :_HULL]
+        robust = sandwich(covariance, scores, time, 12 * len(pool.members))
         if np.nanmax(np.diag(robust) / np.diag(covariance), initial=0.0) > 1.0:
             covariance, kind = robust, "sandwich"
     statistic = 2.0 * (sum(s.log_likelihood for _, _, s, _ in kept) - best.log_likelihood)
@@ -231,14 +231,13 @@ def _report(
     )
 
 
-def _placed(pool: _Pool, number: int, scores: Float) -> Float:
-    """Put a member's scores, shape (n, 12), where they belong in theta of the pool."""
-    wide = np.zeros((scores.shape[0], pool.active.size))
-    wide[:, :_HULL], wide[:, pool.place(number)] = scores[:, :_HULL], scores[:, _HULL:]
-    return wide
+def _of_the_hull(scores: Float, carried: Float) -> Float:
+    """Return what a member's scores, shape (n, 12), say of the hull beyond her own levels, shape (n, 6)."""
+    efficient: Float = scores[:, :_HULL] - scores[:, _HULL:] @ carried.T
+    return efficient
 
 
-def _member(member: Member, search: Search, hull: Float, gross: dict[str, int]) -> dict[str, object]:
+def _member(member: Member, search: Search[Float], hull: Float, gross: dict[str, int]) -> dict[str, object]:
     """Tell how far a member's own hull lies from the common one, in its own standard errors."""
     index = np.flatnonzero(np.diag(search.information) > 0.0)
     std = np.sqrt(np.diag(from_information(search.information, index).covariance)[:_HULL])

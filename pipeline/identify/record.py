@@ -9,7 +9,9 @@ import numpy as np
 from pipeline.identify.agreement import Channels, check_agreement
 from pipeline.identify.checks import check_manoeuvre, check_sway, check_way
 from pipeline.identify.jumps import find_jumps
+from pipeline.identify.speed_error import rudder_of_speed_error
 from pipeline.lateral_speed import LateralSpeed, lateral_speed, noise_std
+from pipeline.normalise.corners import with_corners
 from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.instruments import Instruments
 from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds, Series
@@ -35,12 +37,13 @@ class Record:
     start_utc_ns : int
         UTC of ``time_s`` = 0.
     time_s : ndarray, shape (n,)
-        Instants at which something was measured or the rudder was read.
+        Instants at which something was measured, the rudder was read or turned a corner.
     speed_m_s, rudder_rad : ndarray, shape (n,)
-        Inputs, interpolated linearly; the speed after its noise was taken out.
+        Inputs, interpolated linearly; the rudder between its readings and the corners that these show, the speed after
+        its noise was taken out.
     rudder_noise_rad_sqrt_s : ndarray, shape (n,)
         Intensity of the error of the rudder's force at the instants, as if the rudder made it, rad s^0.5: the noise of
-        its readings, and that of the speed, whose square the force goes with.
+        its readings, and that of the speed (`pipeline.identify.speed_error`).
     measured : ndarray, shape (n, 3)
         Columns `MEASUREMENTS` in m/s, rad/s, rad; NaN where not measured at that instant. The heading is counted from
         its first value.
@@ -125,17 +128,19 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     yaw, said = check_agreement(Channels(heading, course, ground_speed, yaw, *others), lateral)
     warnings += said
     lateral = _without_jumps(lateral, warnings)
-    timed = [lateral.time_utc_ns, heading.time_utc_ns, rudder.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
+    moved = with_corners(rudder, float(np.nan_to_num(noise_std(rudder))))
+    timed = [lateral.time_utc_ns, heading.time_utc_ns, moved.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
     instants = instants[inside]
     speed, speed_noise = _speed(instruments, lateral, instants, start_utc_ns, end_utc_ns, warnings)
     instants, speed = _trimmed(instants, speed, warnings)
-    delta = rudder.at(instants, gap_limit_s(rudder))
+    delta = moved.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
     warnings += [*check_manoeuvre(rudder, heading), *check_way(speed)]
     warnings += check_sway(lateral, heading, rudder, yaw) if yaw is not None else ()
     measured = _measured(instants, lateral, yaw, heading)
+    by_speed = rudder_of_speed_error(heading, rudder, instants, delta)
     noise = np.array([float(np.nanmedian(lateral.std_m_s)), noise_std(yaw) if yaw else np.nan, noise_std(heading)])
     return Record(
         start_utc_ns=int(instants[0]),
@@ -146,7 +151,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         heading_rad=heading.at(instants, gap_limit_s(heading)),
         heading_origin_rad=float(heading.value[0]),
         rudder_period_s=rudder.period_s,
-        rudder_noise_rad_sqrt_s=_rudder_noise(rudder, delta, speed, speed_noise),
+        rudder_noise_rad_sqrt_s=_rudder_noise(rudder, by_speed, speed, speed_noise),
         lateral=lateral,
         noise_start=noise,
         warnings=tuple(warnings),
@@ -249,11 +254,10 @@ def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:
     return replace(lateral, **sound)
 
 
-def _rudder_noise(rudder: Series, delta: Float, speed: Float, speed_noise: float) -> Float:
-    """Intensity of the rudder's error: b V^2 delta with V off by dV is b V^2 with delta off by 2 delta dV / V."""
+def _rudder_noise(rudder: Series, by_speed: Float, speed: Float, speed_noise: float) -> Float:
+    """Intensity of the rudder's error: its own, and that of the speed, see `pipeline.identify.speed_error`."""
     own = float(np.nan_to_num(noise_std(rudder))) * float(np.sqrt(rudder.period_s))
-    by_speed = 2.0 * np.abs(delta) / np.maximum(np.abs(speed), 0.1) * speed_noise
-    result: Float = np.sqrt(own**2 + by_speed**2)
+    result: Float = np.hypot(own, by_speed / np.maximum(np.abs(speed), 0.1) * speed_noise)
     return result
 
 

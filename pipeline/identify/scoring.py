@@ -58,6 +58,13 @@ def damped_step(score: Float, information: Float, free: Mask, damping: float) ->
     return step
 
 
-def newton_decrement(score: Float, information: Float, free: Mask) -> float:
-    """Return the log-likelihood that the quadratic model still promises, score' I^-1 score / 2."""
-    return float(0.5 * score @ damped_step(score, information, free, 0.0))
+class DenseSteps:
+    """Steps of the search on a matrix; what a curvature of another form offers too."""
+
+    def damped(self, score: Float, curvature: Float, free: Mask, damping: float) -> Float:
+        """See `damped_step`."""
+        return damped_step(score, curvature, free, damping)
+
+    def updated(self, curvature: Float, step: Float, fall: Float, free: Mask) -> Float:
+        """See `bfgs`."""
+        return bfgs(curvature, step, fall, free)

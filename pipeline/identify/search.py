@@ -6,11 +6,11 @@ Where the model lacks something the expected information is not the curvature, a
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from pipeline.identify.scoring import Mask, bfgs, damped_step, newton_decrement
+from pipeline.identify.scoring import DenseSteps, Mask
 from pipeline.normalise.series import Float
 
 #: with less log-likelihood than this to gain, steps tell more of the curvature than the expected information
@@ -19,18 +19,36 @@ _NEAR = 5.0
 _KEPT = 0.1
 #: damping after a step that did not rise: less changes only the weakest directions, and steps fail along others too
 _DAMPED = 0.1
+#: a step that does not rise is shortened so, so many times, before the damping grows: its direction is mostly good,
+#: and damping turns it towards the steepest rise, which creeps
+_SHORTER, _TRIES = 0.3, 3
 _HULL = 6
 
 
-class Objective(Protocol):
+#: the form that information and curvature have
+C = TypeVar("C")
+C_co = TypeVar("C_co", covariant=True)
+
+
+class Objective(Protocol[C_co]):
     """What can be climbed: theta begins with the six hull parameters, the rest are logarithms."""
 
     active: Mask
     low: Float
     high: Float
 
-    def full(self, theta: Float) -> tuple[float, Float, Float]:
+    def full(self, theta: Float) -> tuple[float, Float, C_co]:
         """Log-likelihood, score and expected information."""
+
+
+class Steps(Protocol[C]):
+    """How steps are made from a curvature of this form."""
+
+    def damped(self, score: Float, curvature: C, free: Mask, damping: float) -> Float:
+        """Solve (I + damping diag I) step = score over what is free; 0 for the rest."""
+
+    def updated(self, curvature: C, step: Float, fall: Float, free: Mask) -> C:
+        """Return the curvature corrected by what one step showed: by so much the score fell."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,29 +62,37 @@ class Pass:
 
 
 @dataclass(frozen=True, eq=False)
-class Search:
+class Search(Generic[C]):
     """Where a search ended and how it got there."""
 
     theta: Float
     log_likelihood: float
     score: Float
-    information: Float
+    information: C
     converged: bool
     reason: str
     passes: tuple[Pass, ...]
 
 
-def free(objective: Objective, theta: Float, score: Float) -> Mask:
+def free(objective: Objective[C], theta: Float, score: Float) -> Mask:
     """Return which elements may move: active and not pressed against a bound."""
     pressed: Mask = ((theta <= objective.low) & (score < 0)) | ((theta >= objective.high) & (score > 0))
     return objective.active & ~pressed
 
 
-def climb(objective: Objective, start: Float, max_iterations: int, decrement: float) -> Search:
+def climb(objective: Objective[Float], start: Float, max_iterations: int, decrement: float) -> Search[Float]:
+    """Climb from one start, the information a matrix; see `climb_by`."""
+    return climb_by(DenseSteps(), objective, start, max_iterations, decrement)
+
+
+def climb_by(
+    steps: Steps[C], objective: Objective[C], start: Float, max_iterations: int, decrement: float
+) -> Search[C]:
     """Climb from one start.
 
     Parameters
     ----------
+    steps : Steps
     objective : Objective
     start : ndarray, shape (n_theta,)
     max_iterations : int
@@ -88,18 +114,16 @@ def climb(objective: Objective, start: Float, max_iterations: int, decrement: fl
     passes = [Pass(theta, value, np.nan, damping)]
     for _ in range(max_iterations):
         movable = free(objective, theta, score)
-        gain = newton_decrement(score, curvature, movable)
+        # the log-likelihood that the quadratic model still promises
+        gain = float(0.5 * score @ steps.damped(score, curvature, movable, 0.0))
         if gain < decrement:
             converged, reason = True, "the log-likelihood still to be gained is below the limit"
             break
         found = None
         while damping < 1e9:
-            step = _bounded(damped_step(score, curvature, movable, damping), theta, scale)
-            candidate = np.clip(theta + step, objective.low, objective.high)
-            # with derivatives at once: nearly every step rises, and then they are wanted
-            there = objective.full(candidate)
-            if there[0] > value:
-                found = candidate
+            step = _bounded(steps.damped(score, curvature, movable, damping), theta, scale)
+            found, there = _risen(objective, theta, value, step)
+            if found is not None:
                 break
             damping = max(10.0 * damping, _DAMPED)
         if found is None:
@@ -112,9 +136,22 @@ def climb(objective: Objective, start: Float, max_iterations: int, decrement: fl
         if far and rise > _KEPT * gain:
             curvature = information
         else:
-            curvature = bfgs(information if far else curvature, step, before - score, movable)
+            curvature = steps.updated(information if far else curvature, step, before - score, movable)
         passes.append(Pass(theta, value, gain, damping))
     return Search(theta, value, score, information, converged, reason, tuple(passes))
+
+
+def _risen(
+    objective: Objective[C], theta: Float, value: float, step: Float
+) -> tuple[Float | None, tuple[float, Float, C]]:
+    """Return where along a step the log-likelihood has risen, None if nowhere tried, and what it is there."""
+    for shortened in range(_TRIES + 1):
+        candidate = np.clip(theta + _SHORTER**shortened * step, objective.low, objective.high)
+        # with derivatives at once: nearly every step rises, and then they are wanted
+        there = objective.full(candidate)
+        if there[0] > value:
+            return candidate, there
+    return None, there
 
 
 def _bounded(step: Float, theta: Float, scale: Float) -> Float:

@@ -8,27 +8,33 @@ from typing import Any
 import numpy as np
 
 from pipeline.identify.record import Record
+from pipeline.model.disturbances import level_of_change
 from pipeline.model.ship import mariner_like
 from pipeline.normalise.series import Float
+from schemas.model_spec import ModelSpec
 
 #: lengths whose Mariner-like ship is tried, m: from a harbour drone to a supertanker, a factor 1.6 apart
 _LENGTHS_M = tuple(float(f"{1.5 * 1.6**k:.4g}") for k in range(12))
 #: changes of the rudder's side that the race of the starting points needs at most; a zigzag of 20 minutes has about ten
 _TURNS = 30
+#: time within which the changes of force and stream are guessed
+_MINUTES_S = 300.0
 
 
-def starting_points(record: Record) -> list[tuple[str, Float]]:
+def starting_points(record: Record, spec: ModelSpec | None = None) -> list[tuple[str, Float]]:
     """Return named starting values of theta (see `pipeline.identify.kernel`).
 
     Parameters
     ----------
     record : Record
+    spec : ModelSpec, optional
+        Its correlation rates tell what level a plausible change within minutes belongs to; without it the default ones.
 
     Returns
     -------
     list of (str, ndarray of shape (12,))
     """
-    sigmas = _noise_start(record)
+    sigmas = _noise_start(record, spec or ModelSpec())
     # A ship that answers faster than this cannot be told from one that answers at once, and costs most to compute.
     shortest = 3.0 * record.mean_speed_m_s * float(np.median(np.diff(record.time_s)))
     lengths = [length for length in _LENGTHS_M if length > shortest] or [_LENGTHS_M[-1]]
@@ -36,7 +42,7 @@ def starting_points(record: Record) -> list[tuple[str, Float]]:
     return [(name, np.concatenate([hull, np.log(sigmas)])) for name, hull in points]
 
 
-def _noise_start(record: Record) -> Float:
+def _noise_start(record: Record, spec: ModelSpec) -> Float:
     """Noise levels to start from: generous, so that a poor hull is not punished into a corner."""
     spread = np.array([float(np.nanstd(column)) if np.isfinite(column).any() else 1.0 for column in record.measured.T])
     floor = np.nan_to_num(record.noise_start, nan=1e-3)
@@ -44,7 +50,9 @@ def _noise_start(record: Record) -> Float:
     force = 0.1 * float(np.nanstd(record.measured[:, 0])) / 10.0 + 1e-4
     # a yaw acceleration that would turn her through her spread of headings within a minute or so
     moment = 3e-4 * spread[2] + 1e-7
-    return np.concatenate([[force, moment, 0.1], np.maximum(measurement, 1e-5)])
+    forces = level_of_change(force, _MINUTES_S, spec.wind_correlation_rate_per_s)
+    stream = level_of_change(0.05, _MINUTES_S, spec.current_correlation_rate_per_s)
+    return np.concatenate([[forces, moment, stream], np.maximum(measurement, 1e-5)])
 
 
 def thinned(record: Record, instants: int) -> Record:

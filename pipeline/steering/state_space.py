@@ -16,6 +16,7 @@ from math import cos, isfinite, sin
 import numpy as np
 from scipy.linalg import expm
 
+from pipeline.model.disturbances import level_of_change
 from pipeline.model.ship import Hull
 from pipeline.normalise.series import Float
 from pipeline.steering.nomoto import require_numbers
@@ -26,6 +27,8 @@ from schemas.model_spec import ModelSpec
 OUTPUTS = {"lateral_speed": "m/s", "yaw_rate": "rad/s", "heading": "rad", "cross_track_speed": "m/s"}
 #: how many of them an instrument measures
 N_MEASURED = 3
+#: changes of the wind force, m/s^2, and of the current, m/s, and the times they take, s
+_CHANGES = ((1.1e-3, 300.0), (0.056, 1800.0))
 
 
 @dataclass(frozen=True)
@@ -35,16 +38,32 @@ class NoiseLevels:
     Attributes
     ----------
     wind_m_s2, current_m_s : float
-        Of the wind force and the current: sigma_F and sigma_V of eq. (16).
+        Of the wind force and the current in the long run: sigma_F and sigma_V of eq. (16), with the correlation rates
+        of the model they are used with (`usual_levels`).
     lateral_speed_m_s, yaw_rate_rad_s, heading_rad : float
         Of one measurement.
     """
 
-    wind_m_s2: float = 1e-3
-    current_m_s: float = 0.05
+    wind_m_s2: float
+    current_m_s: float
     lateral_speed_m_s: float = 0.05
     yaw_rate_rad_s: float = 5.2e-4
     heading_rad: float = 9e-4
+
+
+def usual_levels(spec: ModelSpec) -> NoiseLevels:
+    """Return the levels of usual weather and instruments: a force and a stream that change as `_CHANGES` says.
+
+    Parameters
+    ----------
+    spec : ModelSpec
+        Its correlation rates tell which levels in the long run these changes belong to.
+    """
+    (force, force_s), (stream, stream_s) = _CHANGES
+    return NoiseLevels(
+        level_of_change(force, force_s, spec.wind_correlation_rate_per_s),
+        level_of_change(stream, stream_s, spec.current_correlation_rate_per_s),
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +131,7 @@ def continuous(
     course_rad : float, optional
         Course round which eq. (19) is taken; matters with an earth-fixed current only.
     noise : NoiseLevels, optional
-        Default `NoiseLevels()`.
+        Default `usual_levels(spec)`.
     constant_disturbances : bool, optional
         Zero derivatives in place of the correlation rates; the noise that drives them stays.
 
@@ -126,7 +145,7 @@ def continuous(
     require_numbers(hull, speed_m_s)
     if not isfinite(course_rad):
         raise UsageError("course_not_finite", "The course is not a finite number.", "Give a course in degrees.")
-    told, V = noise or NoiseLevels(), speed_m_s
+    told, V = noise or usual_levels(spec), speed_m_s
     states = {"v": "m/s", "r": "rad/s", "psi": "rad"}
     if spec.wind == "force":
         states["F"] = "m/s^2"

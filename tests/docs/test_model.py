@@ -40,4 +40,4 @@ def test_defaults_are_as_told(key: str, told: str) -> None:
 
 def test_rates_are_as_told() -> None:
     assert ModelSpec().current == "earth"
-    assert (ModelSpec().wind_correlation_rate_per_s, ModelSpec().current_correlation_rate_per_s) == (1 / 300, 1 / 1800)
+    assert (ModelSpec().wind_correlation_rate_per_s, ModelSpec().current_correlation_rate_per_s) == (1e-5, 1e-6)

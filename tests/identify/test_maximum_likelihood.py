@@ -45,8 +45,11 @@ def test_all_six_lie_within_three_standard_errors(hull: str, seed: int) -> None:
     assert noise["sigma_r"].value == pytest.approx(np.deg2rad(0.03), rel=0.1)
     # heading noise times speed joins the 0.05 m/s of the velocity
     assert 0.045 < noise["sigma_v"].value < 0.06
-    assert 3e-4 < noise["sigma_F"].value < 1e-2
-    assert found.report["active_bounds"] == []
+    # the simulator's slow force, of 1e-3 m/s^2 and 300 s, has changed by 1.4 times its level after ten minutes
+    assert 5e-4 < found.report["changes"]["sigma_F"]["value"] < 5e-3
+    # its stream does not change at all
+    assert found.report["changes"]["sigma_V"]["value"] < 0.02
+    assert set(found.report["active_bounds"]) <= {"sigma_V"} and not any("bound" in w for w in found.warnings)
 
 
 def test_errors_shrink_with_noise_and_disturbance() -> None:

@@ -19,7 +19,7 @@ from tests.identify.simulated import record_of, sailed, truth_of
 
 #: The paper's own disturbances: a force and a lateral current that do not turn with the ship.
 CONSTANT = Environment(wind_force=Disturbance(5e-3), lateral_current=Disturbance(0.3))
-NEARLY_CONSTANT = ModelSpec(wind_correlation_rate_per_s=1e-6, current_correlation_rate_per_s=1e-6)
+NEARLY_CONSTANT = paper.PaperSettings(wind_rate_per_s=1e-6, current_rate_per_s=1e-6)
 #: R of usual instruments. The level found in a record without noise is next to nothing, and a filter that trusts such
 #: measurements with a wrong A hands its error to the disturbances: the paper's first warning.
 INSTRUMENTS = np.array([0.05, 5e-4, 1e-3])
@@ -38,7 +38,7 @@ def percent(found: Estimate, truth: np.ndarray) -> np.ndarray:
 @pytest.mark.parametrize("hull", ["mariner", "ferry"])
 def test_without_noise_constant_disturbances_are_found_and_the_hull_with_them(hull: str) -> None:
     record, arm, truth = quiet(hull)
-    found = paper.identify(record, NEARLY_CONSTANT, arm, paper.PaperSettings())
+    found = paper.identify(record, ModelSpec(), arm, NEARLY_CONSTANT)
     assert found.converged
     assert "converged" in found.report["reason"]
     # reached: mariner 5.5 % after 9 passes, ferry 3 % after 6
@@ -50,7 +50,7 @@ def test_without_noise_constant_disturbances_are_found_and_the_hull_with_them(hu
 
 def test_the_first_approximation_is_far_off_and_every_pass_is_on_record() -> None:
     record, arm, truth = quiet("mariner")
-    found = paper.identify(record, NEARLY_CONSTANT, arm, paper.PaperSettings())
+    found = paper.identify(record, ModelSpec(), arm, NEARLY_CONSTANT)
     first = least_squares.identify(record, least_squares.LeastSquaresSettings())
     assert [entry["iteration"] for entry in found.iterations] == list(range(len(found.iterations)))
     assert found.report["iterations"] == len(found.iterations) - 1
@@ -72,6 +72,14 @@ def test_with_the_usual_correlation_rates_it_still_moves_after_the_passes_that_t
     assert np.max(np.abs(percent(shown, truth))) < 10.0
 
 
+def test_rates_that_the_settings_leave_open_are_those_of_the_model() -> None:
+    record, arm, _ = quiet("ferry")
+    model = ModelSpec(wind_correlation_rate_per_s=1e-6, current_correlation_rate_per_s=1e-6)
+    open_rates = paper.PaperSettings(wind_rate_per_s=None, current_rate_per_s=None)
+    there, here = (paper.identify(record, *a) for a in ((model, arm, open_rates), (ModelSpec(), arm, NEARLY_CONSTANT)))
+    assert there.parameters == here.parameters
+
+
 def test_constants_as_states_with_zero_derivative_converge_and_run_on_makes_every_pass() -> None:
     record, arm, truth = quiet("mariner")
     short = paper.identify(record, ModelSpec(), arm, paper.PaperSettings(constant=True))
@@ -87,10 +95,10 @@ def test_a_filter_that_trusts_a_quiet_record_runs_away_and_the_bound_on_r_holds_
     trial = sailed("mariner", noise_scale=0.0, environment=CONSTANT, speed_loss=0.0)
     record = replace(record_of(trial), noise_start=0.01 * INSTRUMENTS)
     arm, truth = trial.truth.wind_arm_per_m, truth_of(trial)
-    literal = paper.identify(record, NEARLY_CONSTANT, arm, paper.PaperSettings(floor=False))
+    literal = paper.identify(record, ModelSpec(), arm, replace(NEARLY_CONSTANT, floor=False))
     assert literal.report["reason"].startswith("diverged in iteration")
     assert "times what was measured" in literal.report["reason"]
-    held = paper.identify(record, NEARLY_CONSTANT, arm, paper.PaperSettings())
+    held = paper.identify(record, ModelSpec(), arm, NEARLY_CONSTANT)
     assert np.max(np.abs(percent(held, truth))) < 15.0
 
 
