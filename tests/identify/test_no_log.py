@@ -245,6 +245,18 @@ def test_a_drift_that_no_linear_hull_has_is_not_taken_for_a_current() -> None:
     assert abs(trusting["mean_m_s"] - truth) > 5.0 * trusting["std_m_s"]
 
 
+def test_what_one_run_lacks_is_not_laid_upon_another() -> None:
+    trial, (record, other) = sailed(0.0)
+    measured = other.measured.copy()
+    measured[:, 0] -= 0.6 * np.sin(other.heading_rad - np.nanmean(other.heading_rad))
+    bent = replace(other, measured=measured)
+    estimate = identify_without_log(record, SPEC, trial.truth.wind_arm_per_m, SETTINGS, None, (bent,))
+    speed = estimate.report["speed"]
+    assert speed["runs"] == 2
+    assert abs(speed["mean_m_s"] - true_speed(trial, record)) < 3.0 * speed["std_m_s"]
+    assert abs(speed["hull_misfit_m_s"][0]) < 3.0 * speed["hull_misfit_m_s"][1]
+
+
 def test_a_hull_without_standard_errors_leaves_the_speed_without_one(monkeypatch: pytest.MonkeyPatch) -> None:
     trial, (record, _) = sailed(0.6)
     identify = maximum_likelihood.identify
