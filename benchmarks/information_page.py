@@ -61,7 +61,7 @@ def _setting(runs: int) -> list[str]:
         "has its own draws.",
         "",
         "Two bounds: **true**, the Cramer-Rao bound from the expected information at the simulator's parameters, "
-        "noise levels and disturbances, averaged over the runs (the constant force unknown, the stream a constant from "
+        "noise levels and disturbances, averaged over runs (the constant force unknown, the stream a constant from "
         "an unknown beginning, noise levels unknown but for those that are nothing; the errors of rudder and log as "
         "large as the estimator takes them for); **own**, the root mean square of the standard errors that the "
         "estimator reports.",

@@ -113,7 +113,8 @@ def gather(runs: Sequence[Run]) -> Cell:
     truth = good[0].truth
     error = np.array([r.value - r.truth for r in good])
     std = np.array([r.std for r in good])
-    information = np.mean([r.information for r in good], axis=0)
+    bounded = [r for r in good if r.information.size]
+    information = np.mean([r.information for r in bounded], axis=0)
     scale = np.abs(truth)
     names = sorted({name for r in good for name in r.levels})
     return Cell(
@@ -123,7 +124,7 @@ def gather(runs: Sequence[Run]) -> Cell:
         z=error / std,
         rms=np.sqrt(np.mean(error**2, axis=0)) / scale,
         bias=np.mean(error, axis=0) / scale,
-        bound=bound_of(information, good[0].free) / scale,
+        bound=bound_of(information, bounded[0].free) / scale,
         own=np.sqrt(np.mean(std**2, axis=0)) / scale,
         widened=sum(r.widened for r in good),
         levels={name: float(np.median([r.levels[name] for r in good if name in r.levels])) for name in names},
