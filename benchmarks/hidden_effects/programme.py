@@ -31,6 +31,9 @@ _STEADY_LENGTHS, _LONGEST_LENGTHS = 20.0, 100.0
 #: A ship whose own time is longer sails fewer runs of fewer legs a day: a leg of hers takes minutes.
 _SLOW_S, _RUNS_OF_SLOW = 30.0, 3
 
+#: A ship whose own time is shorter sails twice as many legs: they are seconds long.
+QUICK_SHIP_S = 5.0
+
 #: mean and std of the wind force as shares of the rudder's at 20 degrees; mean and std of the stream, m/s; wind, m/s
 _WEATHER = {
     "calm": (0.03, 0.015, 0.05, 0.01, 3.0),
@@ -68,7 +71,8 @@ def grid_s(hull: Hull) -> float:
 def orders(hull: Hull, seed: int, day: int) -> Float:
     """Return the programme of a day as `benchmarks.hidden_effects.plant.voyage` takes it, shape (n, 9).
 
-    Three or four times a steady course on a new heading, then a zigzag of five to seven legs.
+    Three or four times a steady course on a new heading, then a zigzag of five to seven legs, twice as many
+    of a boat.
 
     Parameters
     ----------
@@ -85,7 +89,7 @@ def orders(hull: Hull, seed: int, day: int) -> Float:
     for run, (degrees, side) in enumerate(RUNS[day][: _RUNS_OF_SLOW if time_s > _SLOW_S else None]):
         shaft = hull.shaft_speed_per_s * (1.0 if run == 0 else float(random.choice([1.0, 0.9, 0.8])))
         depth = hull.draught_m * float(random.choice([2.0, 3.0, 5.0, 10.0]))
-        legs = float(random.integers(5, 7 if time_s > _SLOW_S else 8))
+        legs = float(random.integers(5, 7 if time_s > _SLOW_S else 8)) * (2.0 if time_s < QUICK_SHIP_S else 1.0)
         rows.append([0.0, _STEADY_LENGTHS * time_s, heading, 0.0, 0.0, 0.0, 0.0, shaft, depth])
         angle = radians(degrees)
         rows.append([1.0, _LONGEST_LENGTHS * time_s, heading, angle, angle, side, legs, shaft, depth])

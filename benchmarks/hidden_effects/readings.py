@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.hidden_effects import plant
+from benchmarks.hidden_effects.programme import QUICK_SHIP_S
 from benchmarks.hidden_effects.sail import Voyage
 from pipeline.simulate.hulls import Hull
 from pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, SECOND_NS, Instrument, InstrumentRecord, measure
@@ -18,12 +19,21 @@ from pipeline.simulate.trial import Trial, TrialSettings, Truth
 
 Float = NDArray[np.float64]
 
-#: Samples a second; a ship whose own time is seconds carries faster ones, one that takes minutes slower ones.
+#: Samples a second and first sample, s; a ship whose own time is seconds carries faster ones, one that takes minutes
+#: slower ones. All sample on tenths of a second, to 2 ms, and the depth arrives last: so the rows of the delimited log,
+#: which start with it, find every reading equally old, and no channel is late that shall not be.
 _RATES = {"gnss": 1.0, "heading": 5.0, "yaw_rate": 2.0, "rudder": 2.0, "log": 1.0, "wind": 1.0, "shaft": 1.0}
+_RATES |= {"depth": 1.0, "roll": 2.0}
+_PHASES = {"gnss": 0.2, "heading": 0.0, "yaw_rate": 0.1, "rudder": 0.3, "log": 0.4, "wind": 0.6, "shaft": 0.3}
+_PHASES |= {"depth": 0.9, "roll": 0.1}
+_DEPTH_LATENCY_S = 0.05
 _QUICK = {"gnss": 5.0, "heading": 10.0, "yaw_rate": 10.0, "rudder": 10.0, "log": 5.0}
 _SLOW = {"heading": 2.0, "yaw_rate": 1.0, "roll": 1.0}
 _LATE = {"gnss": "gnss_latency", "heading": "heading_latency", "yaw_rate": "gyro_latency"}
-_QUICK_SHIP_S, _SLOW_SHIP_S = 5.0, 30.0
+_SLOW_SHIP_S = 30.0
+
+#: A boat's log and receiver are of the kind that a boat needs.
+_QUICK_NOISE = 0.3
 
 
 class _Late(Trajectory):
@@ -38,10 +48,19 @@ class _Late(Trajectory):
 
 def instruments(hull: Hull) -> tuple[Instrument, ...]:
     """Return what she carries."""
-    rates = _RATES | {"depth": 1.0, "roll": 2.0}
     time_s = hull.length_m / hull.trial_speed_m_s
-    rates |= _QUICK if time_s < _QUICK_SHIP_S else _SLOW if time_s > _SLOW_SHIP_S else {}
-    return tuple(replace(i, rate_hz=rates[i.name], phase_s=i.phase_s / rates[i.name]) for i in DEFAULT_INSTRUMENTS)
+    quick = time_s < QUICK_SHIP_S
+    rates = _RATES | (_QUICK if quick else _SLOW if time_s > _SLOW_SHIP_S else {})
+    found = []
+    for one in DEFAULT_INSTRUMENTS:
+        own = replace(one, rate_hz=rates[one.name], phase_s=_PHASES[one.name])
+        if one.name == "depth":
+            own = replace(own, jitter_s=0.0, latency_s=_DEPTH_LATENCY_S, latency_jitter_s=0.0)
+        if quick:
+            finer = {q: s * _QUICK_NOISE for q, s in one.noise.items() if q in ("velocity", "speed_through_water")}
+            own = replace(own, noise={**one.noise, **finer})
+        found.append(own)
+    return tuple(found)
 
 
 def read(
