@@ -1,0 +1,274 @@
+"""The job that puts a vessel's runs beside what a parameter set predicts of them. Nothing is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from flows.pool_vessel import ALIAS as POOLED_ALIAS
+from flows.progress import Progress, silent
+from flows.vessel_model import ALIAS, Own, known_effects, named
+from flows.vessel_runs import VesselRuns, assembled, choose, once
+from pipeline.compare.comparison import ComparedRun, judged, summary
+from pipeline.compare.horizon import Horizon, horizon_of
+from pipeline.compare.levels import fit_levels
+from pipeline.compare.looked import phases_s
+from pipeline.compare.overshoot import Turn, turns_of
+from pipeline.compare.run import compare_run
+from pipeline.compare.where import where
+from pipeline.diagnose.filtered import Filtered
+from pipeline.diagnose.run import Run
+from pipeline.diagnose.sensitivity import Point
+from pipeline.model.augmented import Augmented
+from pipeline.normalise.series import SECOND_NS, Float
+from schemas.errors import DataRejected, NotFound, UsageError
+from schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from warehouse import aliases, parameter_sets, segments, vessels
+from warehouse.parameter_set import ParameterSet
+from warehouse.segments import Segment
+from warehouse.store import Warehouse
+
+#: aliases asked for in this order where no set is named: a model with effects, one hull of all runs, one of a run
+ALIASES = (ALIAS, POOLED_ALIAS, aliases.CURRENT)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A vessel's runs beside what a parameter set predicts of them.
+
+    Attributes
+    ----------
+    vessel : str
+    parameter_set : ParameterSet
+    alias : str or None
+        By which the set was chosen; None where it was named.
+    horizon : Horizon
+    runs : tuple of ComparedRun
+        In order of time.
+    found : tuple of Segment
+        One a run.
+    skipped : dict of str to str
+        Why a segment is not among them, by its id.
+    """
+
+    vessel: str
+    parameter_set: ParameterSet
+    alias: str | None
+    horizon: Horizon
+    runs: tuple[ComparedRun, ...]
+    found: tuple[Segment, ...]
+    skipped: dict[str, str]
+
+    def show(self) -> dict[str, Any]:
+        """Return the comparison as the command line's JSON object."""
+        sample, error = judged(self.runs)
+        return {
+            "vessel": self.vessel,
+            "parameter_set_id": self.parameter_set.parameter_set_id,
+            "alias": self.alias,
+            "estimator": self.parameter_set.estimator,
+            "effects": list(self.parameter_set.model_spec.get("effects", ())),
+            "horizon": self.horizon.name,
+            "horizon_words": self.horizon.words,
+            "runs": [
+                {
+                    **run.show(),
+                    "psi0_deg": segment.psi0_deg,
+                    "delta0_deg": segment.delta0_deg,
+                    "start": segment.show("")["start"],
+                    "end": segment.show("")["end"],
+                }
+                for run, segment in zip(self.runs, self.found, strict=True)
+            ],
+            "summary": summary(self.runs),
+            "judged": {"sample": sample, "free_run_error_percent": error},
+            "skipped": self.skipped,
+        }
+
+    def where(self) -> dict[str, Any]:
+        """Say where the model fails, on fitted and on held-out runs apart; None where there are no such runs."""
+        found: dict[str, Any] = {}
+        for sample in ("fitted", "held_out"):
+            looked = [run.looked for run in self.runs if run.sample == sample]
+            found[sample] = where(looked) if looked else None
+        return found
+
+
+def compare_vessel(
+    warehouse: Warehouse,
+    vessel: str,
+    set_id: str | None = None,
+    horizon: str = "free",
+    progress: Progress = silent,
+) -> Comparison:
+    """Put every usable run of a vessel beside what a parameter set predicts of it.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    set_id : str, optional
+        Parameter set; by default that of the first of `ALIASES` that the vessel has.
+    horizon : str, optional
+        See `pipeline.compare.horizon.horizon_of`.
+    progress : Progress, optional
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter_set``, ``no_runs``, ``no_segments``, ``effect_unknown``.
+    UsageError
+        ``set_of_another_vessel``, ``horizon_unknown``.
+    DataRejected
+        ``set_without_parameters``, ``nothing_to_compare``.
+    """
+    asked = horizon_of(horizon)
+    vessels.require(warehouse, vessel)
+    chosen, alias = _chosen(warehouse, vessel, set_id)
+    hull, values, model = _parameters(chosen)
+    usable = choose(warehouse, vessel, progress)
+    data = assembled(warehouse, usable, ModelSpec.model_validate(dict(chosen.model_spec)), progress)
+    by_name = {segment.segment_id: segment for segment in usable.segments}
+    ordered = [by_name[run.name] for run in data.runs]
+    seen = _seen(warehouse, vessel, chosen)
+    held = [not _is_seen(segment, seen) for segment in ordered]
+    filtered = [Filtered(run, model, data.spec) for run in data.runs]
+    progress(0, len(filtered), "predicting")
+    points, told = _points(filtered, held, hull, values, chosen, data)
+    runs, found, skipped = [], [], dict(data.skipped)
+    for k, (one, segment) in enumerate(zip(filtered, ordered, strict=True)):
+        progress(k, len(filtered), f"predicting {segment.segment_id}")
+        try:
+            compared = compare_run(
+                *(one, points[k], asked),
+                held_out=held[k],
+                levels_from=told[k],
+                phases=phases_s(segment.detail.get("phases", ()), one.run.start_utc_ns),
+                turns=_turns(segment, one.run),
+            )
+        except DataRejected as error:
+            skipped[segment.segment_id] = error.message
+            continue
+        runs.append(compared)
+        found.append(segment)
+    progress(len(filtered), len(filtered), "predicted")
+    if not runs:
+        raise DataRejected(
+            "nothing_to_compare",
+            f"{chosen.parameter_set_id} predicts none of the {len(filtered)} runs of {vessel!r}: "
+            + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:3]),
+            "Ask for another horizon, or compare another parameter set with --set.",
+            {"skipped": skipped},
+        )
+    return Comparison(vessel, chosen, alias, asked, tuple(runs), tuple(found), skipped)
+
+
+def _chosen(warehouse: Warehouse, vessel: str, set_id: str | None) -> tuple[ParameterSet, str | None]:
+    if set_id is not None:
+        found = parameter_sets.get(warehouse, set_id)
+        if found.vessel != vessel:
+            raise UsageError(
+                "set_of_another_vessel",
+                f"{found.parameter_set_id} is a parameter set of {found.vessel!r}, not of {vessel!r}.",
+                f"List hers with `kempf params list --vessel {vessel!r}`.",
+                {"parameter_set_id": found.parameter_set_id, "vessel": found.vessel},
+            )
+        return found, None
+    pointed = aliases.of_vessel(warehouse, vessel)
+    for alias in ALIASES:
+        if alias in pointed:
+            return parameter_sets.get(warehouse, pointed[alias]), alias
+    raise NotFound(
+        "no_parameter_set",
+        f"{vessel!r} has no parameter set to compare with her runs.",
+        f"Make one with `kempf identify --vessel {vessel!r}`.",
+        {"vessel": vessel},
+    )
+
+
+def _parameters(chosen: ParameterSet) -> tuple[Float, Float, Augmented]:
+    """Return hull, parameters of the effects, and the model that they belong to."""
+    known = known_effects(Own.from_json(chosen.settings.get("own") or {}))
+    model = Augmented(named(chosen.model_spec.get("effects", ()), known))
+    found = {p.name: p.value for p in chosen.parameters}
+    names = (*HULL_PARAMETERS, *model.names)
+    lacking = [name for name in names if not np.isfinite(found.get(name, np.nan))]
+    if lacking:
+        raise DataRejected(
+            "set_without_parameters",
+            f"{chosen.parameter_set_id} has no value for {', '.join(lacking)}, which a prediction needs.",
+            "Compare a set with all six parameters; `kempf params list` names them.",
+            {"lacking": lacking},
+        )
+    values = np.array([found[name] for name in names])
+    return values[: len(HULL_PARAMETERS)], values[len(HULL_PARAMETERS) :], model
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a set was identified from: ids, bounds by log, and those of its segments that are still found."""
+
+    ids: frozenset[str]
+    bounds: tuple[tuple[str, int, int], ...]
+    found: tuple[Segment, ...]
+
+
+def _seen(warehouse: Warehouse, vessel: str, chosen: ParameterSet) -> _Seen:
+    inputs: Mapping[str, Any] = chosen.provenance.get("inputs") or {}
+    told = chosen.convergence
+    unseen = {*(told.get("held_out") or ()), *(told.get("left_out") or ())}
+    bounds = list(inputs.get("segments", ()))
+    # a model with effects names its held-out runs among its segments, in the order of the bounds
+    names = chosen.settings.get("segments") or [""] * len(bounds)
+    kept = [b for name, b in zip(names, bounds, strict=True) if name not in unseen]
+    ids = frozenset(chosen.segment_ids) - unseen
+    found = tuple(s for s in segments.current(warehouse, vessel) if s.segment_id in ids)
+    return _Seen(ids, tuple((b["log_id"], b["start_utc_ns"], b["end_utc_ns"]) for b in kept), found)
+
+
+def _is_seen(segment: Segment, seen: _Seen) -> bool:
+    """Tell whether a set was identified from a segment, under this id, with other bounds, or from another log of it."""
+    return (
+        segment.segment_id in seen.ids
+        or any(
+            log_id == segment.log_id and start < segment.end_utc_ns and segment.start_utc_ns < end
+            for log_id, start, end in seen.bounds
+        )
+        or any(len(once([segment, other])[0]) == 1 for other in seen.found)
+    )
+
+
+def _points(
+    filtered: list[Filtered], held: list[bool], hull: Float, values: Float, chosen: ParameterSet, data: VesselRuns
+) -> tuple[list[Point], list[str]]:
+    """Return where each run stands, and where its noise levels come from: those held out get the mean of the others."""
+    kept: Mapping[str, Any] = chosen.convergence.get("levels") or {}
+    own: list[Float | None] = []
+    told = []
+    for k, one in enumerate(filtered):
+        if held[k] and not all(held):
+            own.append(None)
+            told.append("mean of the fitted runs' logarithms")
+        elif one.run.name in kept:
+            own.append(np.array(kept[one.run.name], dtype=np.float64))
+            told.append("fitted with the parameters")
+        else:
+            found = fit_levels(one, hull, values, data.start.levels[k])
+            own.append(found.levels)
+            told.append("fitted to this run, parameters held" + ("" if found.converged else "; not converged"))
+    mean = np.mean([levels for levels in own if levels is not None], axis=0)
+    return [Point(hull, values, mean if levels is None else levels) for levels in own], told
+
+
+def _turns(segment: Segment, run: Run) -> tuple[Turn, ...]:
+    def seconds(ns: int) -> float:
+        return (ns - run.start_utc_ns) / SECOND_NS
+
+    overshoots = [
+        (o["number"], 1 if o["side"] == "starboard" else -1, seconds(o["peak_utc_ns"]), o["beyond_nominal_deg"])
+        for o in segment.detail.get("overshoots", ())
+    ]
+    return turns_of(overshoots, [seconds(t) for t in segment.executes_utc_ns], seconds(segment.end_utc_ns))

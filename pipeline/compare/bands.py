@@ -1,0 +1,108 @@
+"""Whitened innovations by frequency: the share of each band against the share that it has in white noise.
+
+The periodogram of white noise is the same at all frequencies, also where measurements are missing and zeros stand in
+their places; its mean over K frequencies is chi-squared with 2 K degrees of freedom (Priestley 1981, "Spectral analysis
+and time series", sec. 6.1).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from scipy.stats import beta
+
+from pipeline.compare.group import BAND, UNITS
+from pipeline.compare.looked import Looked
+from pipeline.diagnose.held_out import CHANNELS
+from pipeline.normalise.series import Float
+
+#: edges of the bands, Hz: octaves, so that the waves a ship meets lie within 0.08 to 0.16 Hz
+EDGES_HZ = tuple(0.0025 * 2.0**k for k in range(14))
+
+_FEWEST = 20
+
+
+def by_band(looked: Sequence[Looked]) -> dict[str, list[dict[str, Any]]]:
+    """Return what each band of frequencies holds, by channel.
+
+    Parameters
+    ----------
+    looked : sequence of Looked
+
+    Returns
+    -------
+    dict of str to list of dict
+        ``low_hz``, ``high_hz``, ``share`` of the whitened innovations' power, ``expected_share``, ``ratio`` of both (1
+        when white) with its 99 % ``band``, ``outside``, ``peak_hz`` where the power is largest, and ``free_run_rms``:
+        the free run's error within the band, in ``unit``.
+    """
+    found = {}
+    for i, name in enumerate(CHANNELS):
+        parts = [part for part in (_spectra(one, i) for one in looked) if part is not None]
+        if parts:
+            found[name] = _bands(parts, name)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class _Spectra:
+    """Of one run up to half the rate of the channel, shape (k,) each.
+
+    ``power`` is that of the whitened innovations, 1 a frequency where they are white; ``error`` is the part of the free
+    run's mean square error that each frequency holds.
+    """
+
+    frequency: Float
+    power: Float
+    error: Float
+
+
+def _spectra(one: Looked, channel: int) -> _Spectra | None:
+    z, e = one.whitened[:, channel], one.free.error[:, channel]
+    made, known = np.flatnonzero(np.isfinite(z)), np.isfinite(e)
+    if made.size < _FEWEST:
+        return None
+    stride = max(1, round(float(np.median(np.diff(made)))))
+    frequency: Float = np.fft.rfftfreq(z.size, one.filtered.run.step_s).astype(np.float64)
+    kept = (frequency > 0.0) & (frequency <= 0.5 / (one.filtered.run.step_s * stride) * (1.0 + 1e-9))
+    power: Float = np.abs(np.fft.rfft(np.nan_to_num(z))) ** 2 / made.size
+    # both halves of the spectrum, and the mirror images of a channel that is measured at some instants only
+    twice = 2.0 * stride / (z.size * max(int(np.count_nonzero(known)), 1))
+    error: Float = twice * np.abs(np.fft.rfft(np.where(known, np.nan_to_num(e), 0.0))) ** 2
+    return _Spectra(frequency[kept], power[kept], error[kept])
+
+
+def _bands(parts: Sequence[_Spectra], name: str) -> list[dict[str, Any]]:
+    unit, factor = UNITS[name]
+    frequency, power, error = (
+        np.concatenate([getattr(part, of) for part in parts]) for of in ("frequency", "power", "error")
+    )
+    whole, found = float(np.sum(power)), []
+    edges = [0.0, *EDGES_HZ]
+    for low, high in pairwise(edges):
+        inside = (frequency >= low) & (frequency < high)
+        k, rest = int(np.count_nonzero(inside)), int(np.count_nonzero(~inside))
+        if k == 0 or rest == 0:
+            continue
+        share, expected = float(np.sum(power[inside])) / whole, k / frequency.size
+        bounds = beta.ppf([0.5 - BAND / 2.0, 0.5 + BAND / 2.0], k, rest) / expected
+        ratio = share / expected
+        found.append(
+            {
+                "low_hz": low,
+                "high_hz": min(high, float(np.max(frequency))),
+                "share": share,
+                "expected_share": expected,
+                "ratio": ratio,
+                "band": [float(bounds[0]), float(bounds[1])],
+                "outside": not bounds[0] <= ratio <= bounds[1],
+                "peak_hz": float(frequency[inside][int(np.argmax(power[inside]))]),
+                "free_run_rms": factor * float(np.sqrt(np.sum(error[inside]) / len(parts))),
+                "unit": unit,
+            }
+        )
+    return found

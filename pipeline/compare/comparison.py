@@ -1,0 +1,217 @@
+"""Runs beside their predictions as they are told: one object a run, and means of fitted and of held-out ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from pipeline.compare.group import UNITS
+from pipeline.compare.looked import Looked
+from pipeline.compare.overshoot import Overshoot
+from pipeline.compare.predicted import Predicted
+
+FITTED, HELD_OUT = "fitted", "held_out"
+#: the order of the command line's JSON
+ORDER = ("yaw_rate", "heading", "lateral_speed")
+_SI = {"lateral_speed": "m/s", "yaw_rate": "rad/s", "heading": "rad"}
+_DEG = float(np.rad2deg(1.0))
+
+
+@dataclass(frozen=True, eq=False)
+class ComparedRun:
+    """One run beside its prediction.
+
+    Attributes
+    ----------
+    name : str
+        Of the run.
+    held_out : bool
+        Whether the parameters have not seen it.
+    predicted : Predicted
+        At the horizon asked for.
+    free : Predicted
+        The free run, for overshoots and for the threshold.
+    overshoots : tuple of Overshoot
+    looked : Looked
+        For `pipeline.compare.where.where`.
+    levels_from : str
+        Where the noise levels come from, in words.
+    """
+
+    name: str
+    held_out: bool
+    predicted: Predicted
+    free: Predicted
+    overshoots: tuple[Overshoot, ...]
+    looked: Looked
+    levels_from: str
+
+    @property
+    def sample(self) -> str:
+        """``fitted`` or ``held_out``."""
+        return HELD_OUT if self.held_out else FITTED
+
+    def show(self) -> dict[str, Any]:
+        """Return the run as JSON content; overshoots in deg, ``rms`` in SI and once more as people read it."""
+        one = self.predicted
+        rms = one.rms()
+        return {
+            "segment_id": self.name,
+            "held_out": self.held_out,
+            "sample": self.sample,
+            "fit_percent": _ordered(one.fit_percent()),
+            "rms": _ordered(rms),
+            "rms_unit": {name: _SI[name] for name in ORDER if name in rms},
+            "rms_told": {
+                name: {"value": UNITS[name][1] * rms[name], "unit": UNITS[name][0]} for name in ORDER if name in rms
+            },
+            "n": _ordered(one.count()),
+            "left_out_settling": one.settling,
+            "inside_95_percent": {
+                name: {"share": k / n, "inside": k, "of": n} for name, (k, n) in _ordered(one.inside_95()).items()
+            },
+            "overshoot_error_deg": [turn.error_deg for turn in self.overshoots],
+            "overshoot_horizon": "free",
+            "overshoots": [
+                {
+                    "number": turn.number,
+                    "side": "starboard" if turn.side > 0 else "port",
+                    "measured_deg": turn.measured_deg,
+                    "predicted_deg": turn.predicted_deg,
+                    "error_deg": turn.error_deg,
+                }
+                for turn in self.overshoots
+            ],
+            "started_from": started_from(self),
+            "noise_levels": self.levels_from,
+        }
+
+
+def _ordered(found: dict[str, Any]) -> dict[str, Any]:
+    return {name: found[name] for name in ORDER if name in found}
+
+
+def started_from(run: ComparedRun) -> dict[str, Any]:
+    """Return what a prediction began with, and what it took for wind and current.
+
+    Parameters
+    ----------
+    run : ComparedRun
+    """
+    horizon = run.predicted.horizon
+    if horizon.kind == "one step":
+        return {
+            "initial_state": "the filter's, from every measurement before",
+            "disturbances": "wind force, moment and current as the filter estimates them at that instant",
+        }
+    if horizon.seconds is not None:
+        return {
+            "initial_state": f"the filter's, from the measurements up to {0.75 * horizon.seconds:g} to "
+            f"{horizon.seconds:g} s before, of {3 * horizon.seconds:g} s and more",
+            "disturbances": "wind force, moment and current as estimated then, carried on by their correlation rates",
+        }
+    assert run.predicted.constants is not None
+    v, r, psi, force, moment, first, second, bias = (float(x) for x in run.predicted.constants)
+    has, earth = run.looked.filtered.present(), run.looked.filtered.spec.current == "earth"
+    state = {"lateral_speed_m_s": v, "yaw_rate_deg_s": _DEG * r, "heading_from_first_deg": _DEG * psi}
+    told = (
+        (has[3], "wind_force_m_s2", force),
+        (has[4], "yaw_acceleration_rad_s2", moment),
+        (has[5], "current_north_m_s" if earth else "current_lateral_m_s", first),
+        (has[6], "current_east_m_s", second),
+        (has[7], "rate_bias_deg_s", _DEG * bias),
+    )
+    return {
+        "initial_state": state,
+        "disturbances": {name: value for there, name, value in told if there},
+        "note": "constants fitted to this very run, the same few for every model; whatever changes on the way is error",
+    }
+
+
+def summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
+    """Return means over the runs, fitted and held out apart, each with the standard error over runs.
+
+    Parameters
+    ----------
+    runs : sequence of ComparedRun
+
+    Returns
+    -------
+    dict
+        ``fitted`` and ``held_out``, None where there is no such run: ``runs``, ``fit_percent`` and ``rms_told`` by
+        channel, ``inside_95_percent`` by channel over all runs, ``overshoot_error_deg`` with ``mean``, ``std_error``,
+        ``mean_size``, ``n`` and ``not_predicted``, and ``free_run_error_percent``.
+    """
+    found: dict[str, Any] = {}
+    for sample in (FITTED, HELD_OUT):
+        of = [run for run in runs if run.sample == sample]
+        found[sample] = _summary(of) if of else None
+    return found
+
+
+def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
+    fits = [run.predicted.fit_percent() for run in runs]
+    rms = [run.predicted.rms() for run in runs]
+    inside = [run.predicted.inside_95() for run in runs]
+    there = [name for name in ORDER if any(name in fit for fit in fits)]
+    covered = {}
+    for name in there:
+        counts = [one[name] for one in inside if name in one]
+        if counts:
+            k, n = (sum(column) for column in zip(*counts, strict=True))
+            covered[name] = {"share": k / n, "inside": k, "of": n}
+    errors = [turn.error_deg for run in runs for turn in run.overshoots]
+    known = [e for e in errors if e is not None]
+    return {
+        "runs": len(runs),
+        "fit_percent": {name: _mean([fit[name] for fit in fits if name in fit]) for name in there},
+        "rms_told": {
+            name: {**_mean([UNITS[name][1] * one[name] for one in rms if name in one]), "unit": UNITS[name][0]}
+            for name in there
+        },
+        "inside_95_percent": covered,
+        "overshoot_error_deg": {
+            **_mean(known),
+            "mean_size": float(np.mean(np.abs(known))) if known else None,
+            "n": len(known),
+            "not_predicted": len(errors) - len(known),
+        },
+        "free_run_error_percent": _mean([free_run_error(run) for run in runs]),
+    }
+
+
+def free_run_error(run: ComparedRun) -> float:
+    """Return 100 less the fit % of the free run, mean over the channels.
+
+    Parameters
+    ----------
+    run : ComparedRun
+    """
+    return 100.0 - float(np.mean([fit for fit in run.free.fit_percent().values() if np.isfinite(fit)]))
+
+
+def judged(runs: Sequence[ComparedRun]) -> tuple[str, float]:
+    """Return the sample that a threshold is put to, held out where there is any, and its free-run error in percent.
+
+    Parameters
+    ----------
+    runs : sequence of ComparedRun
+        At least one.
+    """
+    held = [run for run in runs if run.held_out]
+    return (HELD_OUT, _error(held)) if held else (FITTED, _error(runs))
+
+
+def _error(runs: Sequence[ComparedRun]) -> float:
+    return float(np.mean([free_run_error(run) for run in runs]))
+
+
+def _mean(values: Sequence[float]) -> dict[str, float | None]:
+    """Return mean and standard error over runs; the error None of a single one."""
+    if not values:
+        return {"mean": None, "std_error": None}
+    n = len(values)
+    return {"mean": float(np.mean(values)), "std_error": float(np.std(values, ddof=1) / np.sqrt(n)) if n > 1 else None}

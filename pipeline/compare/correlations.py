@@ -1,0 +1,122 @@
+"""Correlations of whitened innovations with themselves and with what the ship was given, at lags up to a minute.
+
+For a right model each lies within +-2.58 / sqrt(N) with probability 99 % (Ljung 1999, "System identification", sec.
+16.6); all lags together are put to the test of Ljung & Box (1978, Biometrika 65).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2, norm
+
+from pipeline.compare.group import BAND
+from pipeline.compare.looked import Looked
+from pipeline.diagnose.held_out import CHANNELS
+from pipeline.diagnose.run import Run
+from pipeline.model.terms.symbols import CHANNEL_SYMBOLS
+from pipeline.normalise.series import Float
+
+#: lags go up to this time, and to so many steps at most
+_LONGEST_S, _MOST = 60.0, 120
+_WIDTH = float(norm.ppf(0.5 + BAND / 2.0))
+#: pairs below which nothing is told of a lag
+_FEWEST_PAIRS = 20
+
+
+def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
+    """Return auto- and cross-correlations of every channel's whitened innovations, over all runs together.
+
+    Parameters
+    ----------
+    looked : sequence of Looked
+
+    Returns
+    -------
+    dict
+        By channel ``auto`` and ``cross`` with ``rudder``, ``rudder_rate``, ``heading_sine``, ``heading_cosine``,
+        ``speed`` and, where the wind was logged, ``wind`` (squared speed times the sine of its angle): ``lag_s``,
+        ``rho``, ``band``, ``outside`` (how many lags), ``expected_outside``, ``largest`` and ``largest_lag_s``; of
+        ``auto`` also ``ljung_box``, its degrees of freedom and p-value. A positive lag: what was given came first.
+    """
+    step = looked[0].filtered.run.step_s
+    most = int(min(_LONGEST_S / step, _MOST))
+    given = [_given(one.filtered.run) for one in looked]
+    names = [name for name in given[0] if all(name in one for one in given)]
+    found: dict[str, Any] = {}
+    for i, channel in enumerate(CHANNELS):
+        z = [one.whitened[:, i] for one in looked]
+        if sum(int(np.count_nonzero(np.isfinite(column))) for column in z) < _FEWEST_PAIRS:
+            continue
+        lags = list(range(1, most + 1))
+        auto, pairs = _pooled(z, z, lags)
+        cross = {}
+        for name in names:
+            rho, counts = _pooled(z, [one[name] for one in given], [0, *lags])
+            cross[name] = _told(rho, counts, step * np.array([0, *lags]))
+        found[channel] = {
+            "auto": {**_told(auto, pairs, step * np.array(lags)), **_ljung_box(auto, pairs)},
+            "cross": cross,
+        }
+    return found
+
+
+def _given(run: Run) -> dict[str, Float]:
+    """Return what a run was given, without its mean, shape (n,) each; what does not change is left out."""
+    given = {
+        "rudder": run.rudder_rad,
+        "rudder_rate": np.gradient(run.rudder_rad, run.step_s),
+        "heading_sine": np.sin(run.heading_rad),
+        "heading_cosine": np.cos(run.heading_rad),
+        "speed": run.speed_m_s,
+    }
+    if {"wind_speed", "wind_angle"} <= run.channels:
+        rows = (run.inputs.shape[0] - 1) // (run.measured.shape[0] - 1)
+        symbols = list(CHANNEL_SYMBOLS)
+        speed, angle = (run.inputs[::rows, 2 + symbols.index(s)] for s in ("U", "gamma"))
+        given["wind"] = speed**2 * np.sin(angle)
+    return {name: value - np.mean(value) for name, value in given.items() if np.ptp(value) > 0.0}
+
+
+def _pooled(z: Sequence[Float], other: Sequence[Float], lags: Sequence[int]) -> tuple[Float, Float]:
+    """Return the correlation of z now with the other so many steps before, and the number of pairs, over all runs."""
+    rho, pairs = np.full(len(lags), np.nan), np.zeros(len(lags))
+    for k, lag in enumerate(lags):
+        product, one, two, count = 0.0, 0.0, 0.0, 0
+        for a, b in zip(z, other, strict=True):
+            now, before = (a[lag:], b[: b.size - lag]) if lag else (a, b)
+            good = np.isfinite(now) & np.isfinite(before)
+            product += float(now[good] @ before[good])
+            one += float(now[good] @ now[good])
+            two += float(before[good] @ before[good])
+            count += int(np.count_nonzero(good))
+        if count >= _FEWEST_PAIRS and one > 0.0 and two > 0.0:
+            rho[k], pairs[k] = product / np.sqrt(one * two), count
+    return rho, pairs
+
+
+def _told(rho: Float, pairs: Float, lag_s: Float) -> dict[str, Any]:
+    good = np.isfinite(rho)
+    if not good.any():
+        return {"lag_s": [], "rho": [], "band": None, "outside": 0, "expected_outside": 0.0, "largest": None}
+    rho, pairs, lag_s = rho[good], pairs[good], lag_s[good]
+    at = int(np.argmax(np.abs(rho)))
+    return {
+        "lag_s": lag_s.tolist(),
+        "rho": rho.tolist(),
+        "band": _WIDTH / float(np.sqrt(np.median(pairs))),
+        "outside": int(np.count_nonzero(np.abs(rho) * np.sqrt(pairs) > _WIDTH)),
+        "expected_outside": (1.0 - BAND) * rho.size,
+        "largest": float(rho[at]),
+        "largest_lag_s": float(lag_s[at]),
+    }
+
+
+def _ljung_box(rho: Float, pairs: Float) -> dict[str, Any]:
+    good = np.isfinite(rho)
+    freedom = int(np.count_nonzero(good))
+    statistic = float(np.sum(rho[good] ** 2 * (pairs[good] + 2.0)))
+    p_value = float(chi2.sf(statistic, freedom)) if freedom else None
+    return {"ljung_box": statistic, "degrees_of_freedom": freedom, "p_value": p_value}

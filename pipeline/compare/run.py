@@ -1,0 +1,63 @@
+"""One run compared: prediction at the horizon, free run, overshoots, and what the search for misfits needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline.compare.comparison import ComparedRun
+from pipeline.compare.horizon import Horizon, horizon_of
+from pipeline.compare.looked import Looked, PhaseInterval
+from pipeline.compare.overshoot import Turn, compare_overshoots
+from pipeline.compare.predicted import of_free_run, predict
+from pipeline.diagnose import sensitivity
+from pipeline.diagnose.filtered import Filtered
+from pipeline.diagnose.held_out import free_run_of
+from pipeline.diagnose.sensitivity import Point
+
+_HEADING = 2
+
+
+def compare_run(
+    filtered: Filtered,
+    point: Point,
+    horizon: Horizon,
+    *,
+    held_out: bool,
+    levels_from: str = "fitted with the parameters",
+    phases: Sequence[PhaseInterval] = (),
+    turns: Sequence[Turn] = (),
+) -> ComparedRun:
+    """Compare one run with its prediction.
+
+    Parameters
+    ----------
+    filtered : Filtered
+    point : Point
+    horizon : Horizon
+    held_out : bool
+        Whether the parameters have not seen this run.
+    levels_from : str, optional
+        Where the noise levels come from, in words.
+    phases : sequence of PhaseInterval, optional
+    turns : sequence of Turn, optional
+        Its overshoots.
+
+    Raises
+    ------
+    DataRejected
+        ``prediction_diverges``, ``horizon_too_long``.
+    """
+    run = filtered.run
+    found = free_run_of(filtered, point.hull, point.values)
+    free = of_free_run(filtered, found, horizon_of("free"))
+    return ComparedRun(
+        name=run.name,
+        held_out=held_out,
+        predicted=free if horizon.kind == "free run" else predict(filtered, point, horizon),
+        free=free,
+        overshoots=compare_overshoots(
+            run.time_s, run.measured[:, _HEADING], found.predicted[:, _HEADING], tuple(turns)
+        ),
+        looked=Looked(filtered, sensitivity.passed(filtered, point), found, tuple(phases)),
+        levels_from=levels_from,
+    )

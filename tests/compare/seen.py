@@ -1,0 +1,63 @@
+"""Runs as comparison takes them: of simulated ships, and such as the model itself would sail."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from pipeline.compare.looked import Looked, PhaseInterval
+from pipeline.diagnose import sensitivity
+from pipeline.diagnose.filtered import Filtered
+from pipeline.diagnose.held_out import free_run_of
+from pipeline.diagnose.run import Run, Ship, make_run, step_of
+from pipeline.diagnose.sensitivity import Point
+from pipeline.model.augmented import Augmented
+from pipeline.model.extended import ROWS
+from pipeline.simulate.trial import Trial
+from schemas.model_spec import ModelSpec
+from tests.identify.simulated import instruments_of, record_of
+
+#: the disturbance model of the simulator with its arm known, and still water
+SPEC = ModelSpec(moment="none", rate_bias=False)
+QUIET = SPEC.model_copy(update={"wind": "none", "current": "none"})
+#: standard deviations of lateral speed, yaw rate, heading, SI
+NOISE = np.array([0.03, 5e-4, 2e-3])
+LENGTH_M = 160.0
+
+
+def run_of(trial: Trial, spec: ModelSpec = SPEC, name: str = "seg-1") -> Run:
+    record = record_of(trial)
+    ship = Ship(LENGTH_M, 8.0, trial.truth.wind_arm_per_m)
+    return make_run(name, record, instruments_of(trial), spec, ship, step_of([record], LENGTH_M))
+
+
+def filtered_of(trial: Trial, spec: ModelSpec = SPEC, name: str = "seg-1") -> Filtered:
+    return Filtered(run_of(trial, spec, name), Augmented(), spec)
+
+
+def levels_of(noise: np.ndarray = NOISE) -> np.ndarray:
+    """Logarithms of levels: hardly a disturbance, this noise."""
+    return np.log(np.array([1e-7, 1e-9, 1e-5, *noise]))
+
+
+def sailed_by_model(run: Run, hull: np.ndarray, *, seed: int = 1, late_s: float = 0.0, scale: float = 1.0) -> Filtered:
+    """The run with measurements that the model in still water makes, every instant and channel, with white noise.
+
+    ``late_s``: by how much the rudder reaches the hull later than it is logged.
+    """
+    inputs = run.inputs.copy()
+    shift = round(late_s / (run.step_s / ROWS))
+    if shift:
+        inputs[:, 1] = np.concatenate([np.full(shift, inputs[0, 1]), inputs[:-shift, 1]])
+    n = run.measured.shape[0]
+    exact = replace(run, rudder_noise=np.zeros(n), offset_s=np.zeros((n, 3)), measured=np.zeros((n, 3)))
+    clean = Filtered(replace(exact, inputs=inputs), Augmented(), QUIET).free(hull, np.zeros(0), np.zeros(8))
+    noise = scale * NOISE * np.random.default_rng(seed).standard_normal((n, 3))
+    return Filtered(replace(exact, measured=clean + noise), Augmented(), QUIET)
+
+
+def looked_at(filtered: Filtered, hull: np.ndarray, phases: tuple[PhaseInterval, ...] = ()) -> Looked:
+    point = Point(hull, np.zeros(0), levels_of())
+    free = free_run_of(filtered, hull, np.zeros(0))
+    return Looked(filtered, sensitivity.passed(filtered, point), free, phases)

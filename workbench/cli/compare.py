@@ -1,0 +1,199 @@
+"""``kempf compare``."""
+
+from __future__ import annotations
+
+import sys
+from math import isfinite
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from schemas.errors import ThresholdExceeded, UsageError
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from flows.compare_vessel import Comparison
+
+_CHANNELS = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
+_SAMPLES = {"held_out": "held out", "fitted": "fitted"}
+
+
+@click.command("compare")
+@vessel_option(required=True)
+@click.option("--set", "set_id", metavar="ID", help="Parameter set; default: alias model, else pooled, else current.")
+@click.option(
+    "--horizon",
+    default="free",
+    show_default=True,
+    metavar="1|10s|60s|free",
+    help="One step, so many seconds ahead, or freely from the first instant on.",
+)
+@click.option("--where", "with_where", is_flag=True, help="Say also where the model fails.")
+@click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help="Draw measured over predicted, .png.")
+@click.option(
+    "--fail-above",
+    type=float,
+    metavar="PERCENT",
+    help="Exit code 5 where the mean free-run error (100 - fit %) of held-out runs, else of fitted ones, is larger.",
+)
+@warehouse_option
+@json_option
+def command(
+    vessel: str,
+    set_id: str | None,
+    horizon: str,
+    with_where: bool,
+    figure: Path | None,
+    fail_above: float | None,
+    uri: str,
+    as_json: bool,
+) -> None:
+    """Put what was measured beside what a parameter set predicts, on fitted and on held-out manoeuvres apart.
+
+    A run that the set was identified from is fitted, every other held out. A free run takes no measurement in: its
+    initial state and a constant wind force and current are fitted to the run itself.
+    """
+    from flows.compare_vessel import compare_vessel
+    from warehouse.store import Warehouse
+
+    if fail_above is not None and not isfinite(fail_above):
+        raise UsageError("threshold", f"--fail-above {fail_above} is no limit.", "Give a percentage such as 20.")
+    if figure is not None and figure.suffix not in (".png", ".svg", ".pdf"):
+        raise UsageError(
+            "figure_format", f"--figure {figure} ends in {figure.suffix!r}; expected .png, .svg or .pdf.", "Rename it."
+        )
+    with progress() as tell:
+        found = compare_vessel(Warehouse(uri), vessel, set_id, horizon, tell)
+    document = found.show()
+    if with_where:
+        document["where"] = found.where()
+    if figure is not None:
+        _draw(found, figure)
+    error = document["judged"]["free_run_error_percent"]
+    exceeded = fail_above is not None and not error <= fail_above
+    if fail_above is not None:
+        document["fail_above"] = {"limit_percent": fail_above, "exceeded": exceeded, **document["judged"]}
+    if as_json:
+        print_json(document)
+    else:
+        _tell(document)
+    if exceeded:
+        assert fail_above is not None
+        named = _SAMPLES[document["judged"]["sample"]]
+        click.echo(f"the free-run error of {named} runs is {error:.2f} %, above {fail_above:g} %", err=True)
+        sys.exit(ThresholdExceeded.exit_code)
+
+
+def _draw(found: Comparison, figure: Path) -> None:
+    from workbench.figures.measured_over_predicted import draw_measured_over_predicted
+
+    title = f"{found.vessel}, {found.parameter_set.parameter_set_id}: {found.horizon.words}"
+    try:
+        draw_measured_over_predicted(found.runs, figure, title)
+    except OSError as error:
+        raise UsageError(
+            "cannot_write", f"Writing {figure} failed: {error.strerror}.", "Give another file with --figure."
+        ) from error
+
+
+def _tell(document: dict[str, Any]) -> None:
+    by = f" (alias {document['alias']})" if document["alias"] else ""
+    effects = f", effects {', '.join(document['effects'])}" if document["effects"] else ", without effects"
+    click.echo(
+        click.style(f"{document['vessel']}: {document['parameter_set_id']}{by}, {document['estimator']}", bold=True)
+        + effects
+    )
+    click.echo(f"horizon: {document['horizon_words']}; fit % = 100 (1 - |y - y^| / |y - mean y|)")
+    start = document["runs"][0]["started_from"]
+    if "note" in start:
+        click.echo(f"initial state and disturbances: {start['note']}")
+    else:
+        click.echo(f"initial state: {start['initial_state']}; {start['disturbances']}")
+    for sample, title in _SAMPLES.items():
+        _tell_sample(title, [r for r in document["runs"] if r["sample"] == sample], document["summary"][sample])
+    for name, why in document["skipped"].items():
+        click.echo(f"  left out: {name}: {why}", err=True)
+    for sample, title in _SAMPLES.items():
+        if document.get("where", {}).get(sample):
+            _tell_where(title, document["where"][sample])
+
+
+def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | None) -> None:
+    if mean is None:
+        click.echo(click.style(f"{title}: no run", bold=True))
+        return
+    there = [name for name in _CHANNELS if name in mean["fit_percent"]]
+    head = ["run", "zigzag", "start UTC"]
+    for name in there:
+        head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_told'][name]['unit']}"]
+    head += ["overshoot errors deg (free run)"]
+    rows = []
+    for run in runs:
+        row = [run["segment_id"], f"{run['psi0_deg']:g}/{run['delta0_deg']:g}", run["start"][:16]]
+        for name in there:
+            row += [_percent(run["fit_percent"].get(name)), number(run["rms_told"].get(name, {}).get("value"), 3)]
+        rows.append([*row, " ".join(_signed(e) for e in run["overshoot_error_deg"]) or "-"])
+    print_table(head, rows, f"{title}: {len(runs)} run{'s' if len(runs) > 1 else ''}")
+    parts = [f"{_CHANNELS[name]} {_with_error(mean['fit_percent'][name])} %" for name in there]
+    click.echo(f"  mean fit: {', '.join(parts)}")
+    turns = mean["overshoot_error_deg"]
+    if turns["n"]:
+        click.echo(
+            f"  overshoot, predicted less measured: {_with_error(turns)} deg over {turns['n']}, "
+            f"mean size {turns['mean_size']:.2f} deg"
+            + (f"; {turns['not_predicted']} not predicted" if turns["not_predicted"] else "")
+        )
+    inside = mean["inside_95_percent"]
+    if inside:
+        shares = [f"{_CHANNELS[name]} {100 * inside[name]['share']:.1f} %" for name in there if name in inside]
+        click.echo(f"  inside the 95 % interval: {', '.join(shares)}")
+    click.echo(f"  free-run error (100 - fit %, mean over channels): {_with_error(mean['free_run_error_percent'])} %")
+
+
+def _tell_where(title: str, where: dict[str, Any]) -> None:
+    click.echo(click.style(f"where it fails, {title} runs (whitened rms: 1 where the model is right)", bold=True))
+    if not where["stands_out"]:
+        click.echo("  no phase, side, bin or run stands out from what a right model leaves")
+    rows = [
+        [
+            _CHANNELS[one["channel"]],
+            f"{one['of'].removeprefix('by_').replace('_', ' ')}: {one['which'].replace('_', ' ')}",
+            f"{one['n']}",
+            f"{one['whitened_rms']:.2f}",
+            f"{one['band'][0]:.2f} to {one['band'][1]:.2f}",
+        ]
+        for one in where["stands_out"]
+    ]
+    if rows:
+        print_table(["channel", "where", "n", "whitened rms", "99 % band"], rows)
+    for channel, bands in where["by_band"].items():
+        out = [b for b in bands if b["outside"] and b["ratio"] > 1.0]
+        if out:
+            most = max(out, key=lambda b: float(b["ratio"]))
+            click.echo(
+                f"  {_CHANNELS[channel]}: {most['ratio']:.1f} times the power of white noise between "
+                f"{most['low_hz']:g} and {most['high_hz']:g} Hz, most at {most['peak_hz']:.3g} Hz"
+            )
+    rows = [[w["start"], w["end"], w["run"], _CHANNELS[w["channel"]], w["measure"], _size(w)] for w in where["worst"]]
+    print_table(["start UTC", "end UTC", "run", "channel", "horizon", "error"], rows, "  worst stretches")
+
+
+def _size(window: dict[str, Any]) -> str:
+    if window["measure"] == "one step":
+        return f"whitened rms {window['whitened_rms']:.2f}"
+    return f"rms {number(window['free_run_rms'], 3)} {window['unit']}, {window['times_its_rms']:.1f} x"
+
+
+def _percent(value: float | None) -> str:
+    return "-" if value is None else f"{value:.2f}"
+
+
+def _signed(value: float | None) -> str:
+    return "-" if value is None else f"{value:+.2f}"
+
+
+def _with_error(told: dict[str, Any]) -> str:
+    error = told["std_error"]
+    return f"{told['mean']:.2f}" + ("" if error is None else f" +- {error:.2f}")

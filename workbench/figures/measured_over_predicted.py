@@ -1,0 +1,124 @@
+"""Measured over predicted, one row a run: yaw rate, heading, lateral speed with fit %, badge and intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BytesIO
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.compare.ahead import WIDTH_95
+from pipeline.compare.comparison import ORDER, ComparedRun
+from pipeline.compare.group import UNITS
+from pipeline.diagnose.held_out import CHANNELS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_NAMES = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
+#: of Okabe & Ito (2008), told apart by the colour-blind: predicted, and badges of held-out and fitted runs
+_PREDICTED, _HELD_OUT, _FITTED = "#0072B2", "#D55E00", "#555555"
+
+
+def measured_over_predicted(runs: Sequence[ComparedRun], title: str) -> Figure:
+    """Draw runs beside their predictions.
+
+    Parameters
+    ----------
+    runs : sequence of ComparedRun
+    title : str
+        Above the figure; names the horizon.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    there = [name for name in ORDER if any(name in run.predicted.count() for run in runs)]
+    figure = Figure(figsize=(4.4 * len(there) + 0.4, 2.9 * len(runs) + 0.9), layout="constrained")
+    FigureCanvasAgg(figure)
+    heights = [3.0, 1.0] * len(runs)
+    axes = figure.subplots(2 * len(runs), len(there), squeeze=False, height_ratios=heights)
+    for k, run in enumerate(runs):
+        row, strips = axes[2 * k], axes[2 * k + 1]
+        for name, panel, strip in zip(there, row, strips, strict=True):
+            _panel(panel, run, name)
+            _strip(strip, run, name)
+            strip.sharex(panel)
+            panel.tick_params(labelbottom=False)
+        badge, colour = ("held out", _HELD_OUT) if run.held_out else ("fitted", _FITTED)
+        style = {"boxstyle": "round,pad=0.25", "facecolor": colour, "edgecolor": "none"}
+        row[0].set_title(run.name, loc="left", fontsize=8)
+        row[-1].annotate(
+            *(badge, (1.0, 1.0), (0, 4), "axes fraction", "offset points"),
+            **{"ha": "right", "va": "bottom", "fontsize": 8, "color": "white", "bbox": style},
+        )
+    for strip in axes[-1]:
+        strip.set_xlabel("time, s", fontsize=8)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    figure.suptitle(title, fontsize=10)
+    return figure
+
+
+def _panel(panel: Any, run: ComparedRun, name: str) -> None:
+    one, i = run.predicted, CHANNELS.index(name)
+    unit, factor = UNITS[name]
+    measured = factor * run.looked.filtered.run.measured[:, i]
+    made = np.isfinite(measured)
+    panel.plot(one.time_s[made], measured[made], color="0.55", lw=2.2, label="measured")
+    predicted = factor * one.predicted[:, i]
+    if np.isfinite(one.std[:, i]).any():
+        width = factor * WIDTH_95 * one.std[:, i]
+        style = {"color": _PREDICTED, "alpha": 0.25, "lw": 0, "label": "95 % interval of the prediction"}
+        panel.fill_between(one.time_s, predicted - width, predicted + width, **style)
+        # while the initial state is not known the prediction is no statement
+        predicted = np.where(np.isfinite(one.error[:, i]), predicted, np.nan)
+    panel.plot(one.time_s, predicted, color=_PREDICTED, lw=1.0, label="predicted")
+    fit = one.fit_percent().get(name)
+    if fit is not None:
+        panel.set_title(f"fit {fit:.1f} %", fontsize=8)
+    panel.set_ylabel(f"{_NAMES[name]}, {unit}", fontsize=8)
+    panel.tick_params(labelsize=7)
+    panel.grid(lw=0.3)
+
+
+def _strip(strip: Any, run: ComparedRun, name: str) -> None:
+    """Draw measured less predicted, with its interval where the model gives one."""
+    one, i = run.predicted, CHANNELS.index(name)
+    error, width = (UNITS[name][1] * column for column in (one.error[:, i], WIDTH_95 * one.std[:, i]))
+    if np.isfinite(width).any():
+        strip.fill_between(one.time_s, -width, width, color=_PREDICTED, alpha=0.25, lw=0)
+    strip.plot(one.time_s, error, color="black", lw=0.7)
+    known = error[np.isfinite(error)]
+    if known.size:
+        # one wild reading must not flatten the rest
+        reach = 1.3 * max(float(np.percentile(np.abs(known), 99.0)), 1e-12)
+        strip.set_ylim(-reach, reach)
+    strip.set_ylabel("error", fontsize=8)
+    strip.tick_params(labelsize=7)
+    strip.grid(lw=0.3)
+
+
+def as_png(figure: Figure) -> bytes:
+    """Return a figure as the bytes of a PNG, the same every time."""
+    data = BytesIO()
+    figure.savefig(data, format="png", dpi=90, metadata={"Software": None})
+    return data.getvalue()
+
+
+def draw_measured_over_predicted(runs: Sequence[ComparedRun], path: Path, title: str) -> None:
+    """Draw `measured_over_predicted` into a file.
+
+    Parameters
+    ----------
+    runs : sequence of ComparedRun
+    path : Path
+        Ending ``.png``, ``.svg`` or ``.pdf``.
+    title : str
+    """
+    import matplotlib as mpl
+
+    metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
+    with mpl.rc_context({"svg.hashsalt": "kempf"}):
+        measured_over_predicted(runs, title).savefig(path, dpi=90, metadata=metadata.get(path.suffix))
