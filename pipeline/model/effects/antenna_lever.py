@@ -12,7 +12,7 @@ EFFECT = Effect(
     equation="y_v += x r",
     reference="Fossen 2021, Handbook of marine craft hydrodynamics and motion control, 2nd ed.; eq. (18)",
     parameters=(
-        Parameter("x", "m", -200.0, 200.0, (3.0,), "how far ahead of its place in the profile the antenna stands"),
+        Parameter("x", "m", -200.0, 200.0, (1.5,), "how far ahead of its place in the profile the antenna stands"),
     ),
     terms={"lateral_speed": "x*r"},
     confounded_with=(

@@ -1,31 +1,23 @@
 """Cross-flow drag: every strip of the hull resists its own sideways speed with the square of it.
 
-The integral over the length is taken by Gauss and Legendre's rule with six nodes. One drag coefficient serves sway
-and yaw: their inertias, added mass included, stand as those of a hull whose radius of gyration is a quarter of her
-length.
+The integral over the length is exact: with the greater M and the less m of the speeds |v| amidships and |r| L / 2 of
+the ends by the turn alone, the mean of |v + x r| (v + x r) is v (M + m^2 / (3 M)), and the moment likewise. One drag
+coefficient serves sway and yaw: their inertias, added mass included, stand as those of a hull whose radius of
+gyration is a quarter of her length.
 """
 
 from __future__ import annotations
-
-import numpy as np
 
 from pipeline.model.terms.effect import Effect, Parameter
 
 #: inertia in sway times the length squared over that in yaw
 _INERTIA = 16.0
-
-
-def _strip(weighted: bool) -> str:
-    nodes, weights = np.polynomial.legendre.leggauss(6)
-    terms = []
-    for x, weight in zip((0.5 * nodes).tolist(), (0.5 * weights).tolist(), strict=True):
-        speed = f"(v{x:+.12g}*L*r)"
-        terms.append(f"{weight * (x if weighted else 1.0):+.12g}*abs{speed}*{speed}")
-    return "".join(terms)
-
-
-_SWAY = f"-c/L*({_strip(weighted=False)})"
-_YAW = f"-{_INERTIA:g}*c/L**2*({_strip(weighted=True)})"
+#: sideways speed amidships, and that of the ends by the turn alone
+_DRIFT, _SWING = "abs(v)", "abs(L*r/2)"
+_LESS, _MORE = f"min({_DRIFT}, {_SWING})", f"max({_DRIFT}, {_SWING})"
+_SWAY = f"-c*v/L*({_MORE} + {_LESS}**2/(3*max({_MORE}, 0.000001)))"
+_INNER = f"{_SWING}**2/8 + {_LESS}**2/4 - {_LESS}**4/(24*max({_SWING}**2, 0.000000000001))"
+_YAW = f"-{_INERTIA:g}*c/L**2*(sign(r)*({_INNER}) + L*r/6*max({_DRIFT} - {_SWING}, 0))"
 
 EFFECT = Effect(
     name="cross_flow_drag",
@@ -49,7 +41,7 @@ EFFECT = Effect(
             "1",
             -1.0,
             12.0,
-            (1.0,),
+            (0.1,),
             "drag coefficient times draught, length squared and half the density, over the mass with added mass",
         ),
     ),

@@ -19,7 +19,7 @@ EFFECT = Effect(
         "Technol. 20"
     ),
     parameters=(
-        Parameter("c", "1", -15.0, 15.0, (2.0,), "change of the rudder's force at a drift angle of one radian"),
+        Parameter("c", "1", -15.0, 15.0, (1.0,), "change of the rudder's force at a drift angle of one radian"),
     ),
     terms={"rudder": "c*delta*(v/max(V, 0.1))**2"},
     confounded_with="yaw_v2r, yaw_v3, rudder_stall",

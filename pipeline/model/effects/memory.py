@@ -21,7 +21,9 @@ EFFECT = Effect(
         "Cummins 1962, The impulse response function and ship motions, DTMB report 1661; Fossen 2021, Handbook of "
         "marine craft hydrodynamics and motion control, 2nd ed."
     ),
-    parameters=(Parameter("c", "1", -2.0, 5.0, (0.2,), "side force without dimension of a drift that has just begun"),),
+    parameters=(
+        Parameter("c", "1", -2.0, 5.0, (0.05,), "side force without dimension of a drift that has just begun"),
+    ),
     terms={"sway": "-c*V*(v - m1)/L"},
     states=(ExtraState("m1", "V*(v - m1)/(3*L)"),),
     confounded_with="a11 and a12: a zigzag never holds a drift for long enough; the slow wind force",

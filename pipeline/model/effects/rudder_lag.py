@@ -56,7 +56,7 @@ EFFECT = Effect(
         "van Amerongen 1982, Adaptive steering of ships, thesis, TU Delft; Fossen 2021, Handbook of marine craft "
         "hydrodynamics and motion control, 2nd ed."
     ),
-    parameters=(Parameter("tau", "s", 0.0, 30.0, (0.5,), "time constant of the lag"),),
+    parameters=(Parameter("tau", "s", 0.0, 30.0, (0.3,), "time constant of the lag"),),
     rudder_course=rudder_course,
     confounded_with="dead_time, rate_limit, heading_latency, gyro_latency",
     separated_by=(

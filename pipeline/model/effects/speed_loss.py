@@ -22,8 +22,8 @@ EFFECT = Effect(
         "1981, Ship propulsion losses related to automatic steering and prime mover control, thesis, TU Denmark"
     ),
     parameters=(
-        Parameter("c", "1", -0.5, 3.0, (0.5,), "share of the centrifugal force that brakes her, over that of her mass"),
-        Parameter("k", "1", -0.05, 0.6, (0.1,), "drag of the rudder without dimension, over the mass with added mass"),
+        Parameter("c", "1", -0.5, 3.0, (0.1,), "share of the centrifugal force that brakes her, over that of her mass"),
+        Parameter("k", "1", -0.05, 0.6, (0.03,), "drag of the rudder without dimension, over the mass with added mass"),
     ),
     terms={"speed": "-m1"},
     states=(ExtraState("m1", "-c*v*r + k*V**2*delta**2/L - 0.2*V*m1/L"),),

@@ -14,7 +14,7 @@ EFFECT = Effect(
         "Norrbin 1971, Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA "
         "publ. 68; Fossen 2021, Handbook of marine craft hydrodynamics and motion control, 2nd ed."
     ),
-    parameters=(Parameter("c", "1", -3.0, 15.0, (0.5,), "coefficient without dimension, positive where it opposes"),),
+    parameters=(Parameter("c", "1", -3.0, 15.0, (0.1,), "coefficient without dimension, positive where it opposes"),),
     terms={"sway": "-c*abs(r)*v"},
     confounded_with="sway_quadratic, sway_vr2, cross_flow_drag",
     separated_by=(

@@ -13,7 +13,7 @@ EFFECT = Effect(
     reference=(
         "Norrbin 1971, Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA publ. 68"
     ),
-    parameters=(Parameter("c", "1", -15.0, 15.0, (1.0,), "coefficient without dimension, of either sign"),),
+    parameters=(Parameter("c", "1", -15.0, 15.0, (0.1,), "coefficient without dimension, of either sign"),),
     terms={"sway": "c*abs(v)*r"},
     confounded_with="sway_abs_r_v, sway_v2r, cross_flow_drag",
     separated_by=(

@@ -15,7 +15,7 @@ EFFECT = Effect(
         "Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. "
         "Technol. 20"
     ),
-    parameters=(Parameter("c", "1", -3.0, 30.0, (3.0,), "coefficient without dimension, positive where it opposes"),),
+    parameters=(Parameter("c", "1", -3.0, 30.0, (1.0,), "coefficient without dimension, positive where it opposes"),),
     terms={"sway": "-c*v**3/(max(V, 0.1)*L)"},
     confounded_with="sway_quadratic, sway_v2r, sway_vr2, cross_flow_drag",
     separated_by=(

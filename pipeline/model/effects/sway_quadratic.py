@@ -15,7 +15,7 @@ EFFECT = Effect(
         "publ. 68; Blanke 1981, Ship propulsion losses related to automatic steering and prime mover control, "
         "thesis, TU Denmark"
     ),
-    parameters=(Parameter("c", "1", -1.0, 15.0, (1.0,), "coefficient without dimension, positive where it opposes"),),
+    parameters=(Parameter("c", "1", -1.0, 15.0, (0.2,), "coefficient without dimension, positive where it opposes"),),
     terms={"sway": "-c*v*abs(v)/L"},
     confounded_with="cross_flow_drag, sway_cubic, sway_abs_r_v",
     separated_by=(

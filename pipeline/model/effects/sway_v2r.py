@@ -15,7 +15,7 @@ EFFECT = Effect(
         "Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. "
         "Technol. 20"
     ),
-    parameters=(Parameter("c", "1", -20.0, 20.0, (2.0,), "coefficient without dimension, of either sign"),),
+    parameters=(Parameter("c", "1", -20.0, 20.0, (0.4,), "coefficient without dimension, of either sign"),),
     terms={"sway": "c*v**2*r/max(V, 0.1)"},
     confounded_with="sway_cubic, sway_vr2, cross_flow_drag",
     separated_by=(

@@ -15,7 +15,7 @@ EFFECT = Effect(
         "Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. "
         "Technol. 20"
     ),
-    parameters=(Parameter("c", "1", -3.0, 10.0, (0.5,), "coefficient without dimension, positive where it opposes"),),
+    parameters=(Parameter("c", "1", -3.0, 10.0, (0.1,), "coefficient without dimension, positive where it opposes"),),
     terms={"sway": "-c*v*r**2*L/max(V, 0.1)"},
     confounded_with="sway_cubic, sway_v2r, sway_abs_r_v, cross_flow_drag",
     separated_by=(

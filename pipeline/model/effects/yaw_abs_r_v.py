@@ -13,7 +13,7 @@ EFFECT = Effect(
     reference=(
         "Norrbin 1971, Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA publ. 68"
     ),
-    parameters=(Parameter("c", "1", -40.0, 40.0, (2.0,), "coefficient without dimension, of either sign"),),
+    parameters=(Parameter("c", "1", -40.0, 40.0, (0.3,), "coefficient without dimension, of either sign"),),
     terms={"yaw": "c*abs(r)*v/L"},
     confounded_with="yaw_abs_v_r, yaw_vr2, cross_flow_drag",
     separated_by=(

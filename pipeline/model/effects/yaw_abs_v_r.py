@@ -14,7 +14,7 @@ EFFECT = Effect(
         "Norrbin 1971, Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA "
         "publ. 68; Fossen 2021, Handbook of marine craft hydrodynamics and motion control, 2nd ed."
     ),
-    parameters=(Parameter("c", "1", -5.0, 40.0, (2.0,), "coefficient without dimension, positive where it opposes"),),
+    parameters=(Parameter("c", "1", -5.0, 40.0, (0.3,), "coefficient without dimension, positive where it opposes"),),
     terms={"yaw": "-c*abs(v)*r/L"},
     confounded_with="yaw_quadratic, yaw_v2r, cross_flow_drag",
     separated_by=(

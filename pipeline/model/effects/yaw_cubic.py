@@ -15,7 +15,7 @@ EFFECT = Effect(
         "Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. "
         "Technol. 20; van Amerongen 1982, Adaptive steering of ships, thesis, TU Delft"
     ),
-    parameters=(Parameter("c", "1", -3.0, 15.0, (0.5,), "coefficient without dimension, positive where it opposes"),),
+    parameters=(Parameter("c", "1", -3.0, 15.0, (0.2,), "coefficient without dimension, positive where it opposes"),),
     terms={"yaw": "-c*r**3*L/max(V, 0.1)"},
     confounded_with="yaw_quadratic, yaw_v2r, yaw_vr2, rudder_stall",
     separated_by=(

@@ -13,7 +13,7 @@ EFFECT = Effect(
     reference=(
         "Norrbin 1971, Theory and observations on the use of a mathematical model for ship manoeuvring, SSPA publ. 68"
     ),
-    parameters=(Parameter("c", "1", -2.0, 15.0, (0.5,), "coefficient without dimension, positive where it opposes"),),
+    parameters=(Parameter("c", "1", -2.0, 15.0, (0.1,), "coefficient without dimension, positive where it opposes"),),
     terms={"yaw": "-c*r*abs(r)"},
     confounded_with="yaw_cubic, yaw_abs_v_r, cross_flow_drag, rudder_stall",
     separated_by=(

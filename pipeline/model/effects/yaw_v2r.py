@@ -15,9 +15,7 @@ EFFECT = Effect(
         "Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. "
         "Technol. 20"
     ),
-    parameters=(
-        Parameter("c", "1", -20.0, 150.0, (10.0,), "coefficient without dimension, positive where it opposes"),
-    ),
+    parameters=(Parameter("c", "1", -20.0, 150.0, (1.0,), "coefficient without dimension, positive where it opposes"),),
     terms={"yaw": "-c*v**2*r/(max(V, 0.1)*L)"},
     confounded_with="yaw_abs_v_r, yaw_v3, yaw_vr2, yaw_cubic, cross_flow_drag",
     separated_by=(

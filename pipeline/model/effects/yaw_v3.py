@@ -15,7 +15,7 @@ EFFECT = Effect(
         "Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. "
         "Technol. 20"
     ),
-    parameters=(Parameter("c", "1", -100.0, 100.0, (10.0,), "coefficient without dimension, of either sign"),),
+    parameters=(Parameter("c", "1", -100.0, 100.0, (3.0,), "coefficient without dimension, of either sign"),),
     terms={"yaw": "c*v**3/(max(V, 0.1)*L**2)"},
     confounded_with="yaw_v2r, yaw_vr2, cross_flow_drag",
     separated_by=(

@@ -15,7 +15,7 @@ EFFECT = Effect(
         "Yoshimura 2015, Introduction of MMG standard method for ship maneuvering predictions, J. Mar. Sci. "
         "Technol. 20"
     ),
-    parameters=(Parameter("c", "1", -40.0, 40.0, (2.0,), "coefficient without dimension, of either sign"),),
+    parameters=(Parameter("c", "1", -40.0, 40.0, (0.5,), "coefficient without dimension, of either sign"),),
     terms={"yaw": "c*v*r**2/max(V, 0.1)"},
     confounded_with="yaw_v2r, yaw_cubic, cross_flow_drag",
     separated_by=(

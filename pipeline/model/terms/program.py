@@ -13,9 +13,12 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.model.terms.symbols import COMPUTED_SYMBOLS, STATE_SYMBOLS
 from pipeline.normalise.series import Float
 
-#: deepest stack of a program
+#: variables before this place may move with the states; ship, channels and parameters have no derivatives to carry
+MOVING = len(STATE_SYMBOLS) + len(COMPUTED_SYMBOLS)
+#: deepest stack of a program; a bit for each place must fit into an integer
 DEPTH = 24
 #: instructions; the second number of an instruction is an index for the first two
 CONSTANT, VARIABLE, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, NEGATE = 0, 1, 2, 3, 4, 5, 6, 7
@@ -49,35 +52,45 @@ def evaluate(code, constants, values, slopes, stack, width):  # type: ignore[no-
     values : ndarray, shape (n,)
         Value of every variable.
     slopes : ndarray, shape (n, width)
-        Its derivatives.
+        Its derivatives; those from `MOVING` on are taken for 0.
     stack : ndarray, shape (DEPTH, 1 + width)
         Room to work in.
     width : int
         Derivatives that are carried.
     """
-    top = -1
+    top, carries = -1, 0
     for k in range(code.shape[0]):
         what, index = code[k, 0], code[k, 1]
         if what == CONSTANT:
             top += 1
             stack[top, 0] = constants[index]
-            for j in range(1, width + 1):
-                stack[top, j] = 0.0
+            carries &= ~(1 << top)
         elif what == VARIABLE:
             top += 1
             stack[top, 0] = values[index]
-            for j in range(width):
-                stack[top, j + 1] = slopes[index, j]
+            if index < MOVING:
+                for j in range(width):
+                    stack[top, j + 1] = slopes[index, j]
+                carries |= 1 << top
+            else:
+                carries &= ~(1 << top)
         elif what <= POWER or what >= MIN:
             top -= 1
-            _two(what, stack[top], stack[top + 1], width)
+            pair = (carries >> top) & 3
+            _two(what, stack, top, width, pair & 1, pair & 2)
+            if pair:
+                carries |= 1 << top
         else:
-            _one(what, stack[top], width)
+            _one(what, stack, top, width, (carries >> top) & 1)
+    if not carries & 1:
+        for j in range(1, width + 1):
+            stack[0, j] = 0.0
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _two(what, left, right, width):  # type: ignore[no-untyped-def]
-    a, b = left[0], right[0]
+# one branch an instruction, not split further: a call between them costs as much as they do
+def _two(what, stack, top, width, from_left, from_right):  # type: ignore[no-untyped-def]  # noqa: PLR0912
+    a, b = stack[top, 0], stack[top + 1, 0]
     by_a, by_b, value = 1.0, 1.0, 0.0
     if what == ADD:
         value = a + b
@@ -88,23 +101,31 @@ def _two(what, left, right, width):  # type: ignore[no-untyped-def]
     elif what == DIVIDE:
         value = a / b
         by_a, by_b = 1.0 / b, -value / b
+    elif what == POWER and b == 2.0:
+        value, by_a, by_b = a * a, 2.0 * a, 0.0
     elif what == POWER:
-        value = a**b
+        # the exponent is a number: what is parsed has no other
+        value, by_b = a**b, 0.0
         by_a = b * a ** (b - 1.0) if b != 0.0 else 0.0
-        # an exponent that is no function of the state needs no logarithm of a negative base
-        by_b = value * np.log(a) if a > 0.0 else 0.0
     elif what == MIN:
         value, by_a, by_b = (a, 1.0, 0.0) if a <= b else (b, 0.0, 1.0)
     else:
         value, by_a, by_b = (a, 1.0, 0.0) if a >= b else (b, 0.0, 1.0)
-    left[0] = value
-    for j in range(1, width + 1):
-        left[j] = by_a * left[j] + by_b * right[j]
+    stack[top, 0] = value
+    if from_left and from_right:
+        for j in range(1, width + 1):
+            stack[top, j] = by_a * stack[top, j] + by_b * stack[top + 1, j]
+    elif from_left:
+        for j in range(1, width + 1):
+            stack[top, j] *= by_a
+    elif from_right:
+        for j in range(1, width + 1):
+            stack[top, j] = by_b * stack[top + 1, j]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _one(what, number, width):  # type: ignore[no-untyped-def]
-    a = number[0]
+def _one(what, stack, top, width, carries):  # type: ignore[no-untyped-def]
+    a = stack[top, 0]
     slope, value = 0.0, 0.0
     if what == NEGATE:
         value, slope = -a, -1.0
@@ -127,6 +148,7 @@ def _one(what, number, width):  # type: ignore[no-untyped-def]
     else:
         value = np.tanh(a)
         slope = 1.0 - value * value
-    number[0] = value
-    for j in range(1, width + 1):
-        number[j] *= slope
+    stack[top, 0] = value
+    if carries:
+        for j in range(1, width + 1):
+            stack[top, j] *= slope
