@@ -24,6 +24,8 @@ _RUDDER_TOO_SLOW = 0.3
 _BIASED = 4.0
 #: with less than so many of her slowest time constants in a record, errors of the slow motion are not those of a bound
 _FEW_TIMES = 5.0
+#: relative standard error from which on a weak direction is told
+_VAGUE = 0.1
 #: time within which the changes of the disturbances are told
 _CHANGE_S = 600.0
 _HULL = len(HULL_PARAMETERS)
@@ -83,13 +85,11 @@ def report(
     )
     ends = _at_the_end(objective, trace)
     warnings = _warnings(objective, best, details["gross_errors"], heavy, bounds, ends)
-    if known.weak:
-        value, vector = known.weak[0]
-        told = ", ".join(_largest(vector, [_NAMES[i] for i in index]))
-        warnings.append(
-            f"these data hardly determine a direction of the parameters ({told}; eigenvalue {value:.1g} of 1): sail a "
-            "zigzag of other angles, or pool several"
-        )
+    names = [_NAMES[i] for i in index]
+    # as shares of the hull parameters; those of the logarithms are shares already
+    scale = np.concatenate([np.abs(theta[:_HULL]), np.ones(theta.size - _HULL)])
+    off = dict(zip(names, (np.sqrt(np.diag(covariance)) / scale)[index], strict=True))
+    warnings += _vague(known.weak, names, off)
     speed = record.mean_speed_m_s
     return Estimate(
         estimator="ml",
@@ -108,8 +108,7 @@ def report(
             "condition": known.condition,
             "active_bounds": bounds,
             "weak_directions": [
-                {"eigenvalue": value, "direction": _largest(vector, [_NAMES[i] for i in index])}
-                for value, vector in known.weak
+                {"eigenvalue": value, "direction": _largest(vector, names)} for value, vector in known.weak
             ],
             "standard_errors": kind,
             "widened": widened,
@@ -181,6 +180,17 @@ def _std_of_level(objective: Likelihood, best: Search[Float], covariance: Float,
     if i in (LOG_F, LOG_M, LOG_V) and best.theta[i] <= objective.low[i] and J > 0.0:
         return float(np.sqrt(2.0 * sigma**2 / np.sqrt(J)))
     return float(sigma * np.sqrt(covariance[i, i]))
+
+
+def _vague(weak: tuple[tuple[float, Float], ...], names: list[str], off: dict[str, float]) -> list[str]:
+    """Tell the weak directions in which some relative standard error ``off`` is large: others are known well enough."""
+    told = [(value, list(_largest(vector, names))) for value, vector in weak]
+    return [
+        f"these data hardly determine a direction of the parameters ({', '.join(largest)}; eigenvalue {value:.1g} of "
+        "1): sail a zigzag of other angles, or pool several"
+        for value, largest in told
+        if not max(off[name] for name in largest) <= _VAGUE
+    ]
 
 
 def slowest_s(hull: Float, speed_m_s: float) -> float:
