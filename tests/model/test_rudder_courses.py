@@ -1,0 +1,103 @@
+"""What effects make of the rudder's course, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.model.effects import catalogue
+from pipeline.model.terms.effect import Effect
+
+ALL = catalogue()
+courses = pytest.mark.parametrize("effect", [e for e in ALL.values() if e.rudder_course], ids=lambda e: e.name)
+
+
+def zigzag(step: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
+    """A rudder put over and back at 3 deg/s, on an even axis."""
+    time = np.arange(0.0, 80.0 + step / 2, step)
+    corners = [0.0, 5.0, 11.7, 30.0, 43.3, 60.0, 73.3, 80.0]
+    return time, np.interp(time, corners, [0.0, 0.0, 0.35, 0.35, -0.35, -0.35, 0.35, 0.35])
+
+
+def one(effect: Effect, k: int) -> np.ndarray:
+    return np.array([p.steps[min(k, len(p.steps) - 1)] for p in effect.parameters])
+
+
+@courses
+def test_without_its_parameter_the_course_is_unchanged(effect: Effect) -> None:
+    time, rudder = zigzag()
+    assert effect.rudder_course is not None
+    assert np.array_equal(effect.rudder_course(time, rudder, np.zeros(1)), rudder)
+    assert np.allclose(effect.rudder_course(time, rudder, np.full(1, 1e-9)), rudder, atol=1e-8)
+
+
+@courses
+def test_a_course_is_deterministic_causal_and_leaves_its_input_alone(effect: Effect) -> None:
+    time, rudder = zigzag()
+    kept = rudder.copy()
+    assert effect.rudder_course is not None
+    for k in range(3):
+        first = effect.rudder_course(time, rudder, one(effect, k))
+        assert first.shape == rudder.shape and np.all(np.isfinite(first))
+        assert np.array_equal(first, effect.rudder_course(time, rudder, one(effect, k)))
+        later = rudder.copy()
+        later[400:] = 0.1
+        assert np.array_equal(effect.rudder_course(time, later, one(effect, k))[:400], first[:400])
+        assert np.max(np.abs(first)) <= np.max(np.abs(rudder)) + 1e-12
+        assert np.allclose(effect.rudder_course(time, -rudder, one(effect, k)), -first, atol=1e-15)
+    assert np.array_equal(rudder, kept)
+    still = np.full(time.size, 0.2)
+    assert np.allclose(effect.rudder_course(time, still, one(effect, 0)), still, atol=1e-15)
+    assert effect.rudder_course(time[:1], rudder[:1], one(effect, 0)).shape == (1,)
+
+
+def test_lag_is_the_exact_response_to_a_ramp() -> None:
+    course = ALL["rudder_lag"].rudder_course
+    assert course is not None
+    time = np.arange(0.0, 20.0, 0.25)
+    for tau in (0.05, 0.7, 4.0):
+        exact = 0.03 * (time - tau * (1.0 - np.exp(-time / tau)))
+        assert np.allclose(course(time, 0.03 * time, np.array([tau])), exact, atol=1e-13)
+
+
+def test_lag_does_not_depend_on_the_step() -> None:
+    course = ALL["rudder_lag"].rudder_course
+    assert course is not None
+    fine, coarse = zigzag(0.025), zigzag(0.1)
+    told = np.array([1.5])
+    assert np.allclose(course(*fine, told)[::4], course(coarse[0], fine[1][::4], told), atol=1e-12)
+
+
+def test_dead_time_shifts() -> None:
+    course = ALL["dead_time"].rudder_course
+    assert course is not None
+    time, rudder = zigzag()
+    late = course(time, rudder, np.array([1.2]))
+    assert np.allclose(late[12:], rudder[:-12], atol=1e-12)
+    assert np.all(late[:12] == rudder[0])
+
+
+def test_backlash_is_a_play() -> None:
+    course = ALL["backlash"].rudder_course
+    assert course is not None
+    time, rudder = zigzag()
+    taken = course(time, rudder, np.array([0.05]))
+    assert np.max(np.abs(taken - rudder)) == pytest.approx(0.025)
+    assert taken[250] == pytest.approx(0.325) and taken[500] == pytest.approx(-0.325)
+    small = 0.02 * np.sin(time)
+    assert np.all(course(time, small, np.array([0.05])) == 0.0)
+
+
+def test_rate_limit_is_exact_between_the_instants() -> None:
+    course = ALL["rate_limit"].rudder_course
+    assert course is not None
+    rng = np.random.default_rng(7)
+    knots = np.cumsum(rng.normal(0.0, 0.05, 40))
+    coarse = np.arange(0.0, 40.0)
+    fine = np.arange(0.0, 39.0 + 5e-4, 1e-3)
+    slowness = np.array([20.0])
+    reference = course(fine, np.interp(fine, coarse, knots), slowness)
+    assert np.allclose(course(coarse, knots, slowness), reference[::1000], atol=1e-12)
+    assert np.max(np.abs(np.diff(reference))) <= 1e-3 / 20.0 + 1e-15
+    stepped = np.where(coarse < 5.0, 0.0, 0.3)
+    assert course(coarse, stepped, slowness)[4:12] == pytest.approx([0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.3])
