@@ -17,7 +17,7 @@ from pipeline.diagnose.flexible import Flexible, flexible
 from pipeline.diagnose.held_out import FreeRun, free_run
 from pipeline.diagnose.pooled_fit import Fit
 from pipeline.diagnose.run import Run
-from pipeline.diagnose.screen import Candidate, screen
+from pipeline.diagnose.screen import Candidate, score, screen
 from pipeline.diagnose.sets import WINDOW, shortlist, undecided
 from pipeline.diagnose.split import split
 from pipeline.diagnose.staged import staged
@@ -27,8 +27,10 @@ from pipeline.normalise.series import Float
 from schemas.model_spec import ModelSpec
 
 Told = Callable[[str], None]
-#: how many times its score a refit gains at most, as far as has been seen
-_FORETOLD = 3.0
+#: how many times its score a refit gains at most, as far as has been seen; a hull bent by what is missing hides much
+_FORETOLD = 10.0
+#: standard errors from nothing below which an effect added before does not earn its place
+_SEEN = 2.0
 
 
 @dataclass(frozen=True)
@@ -177,9 +179,44 @@ def diagnose(
         found = best[0][1].fit
         told(f"step {len(steps)}: screening beside {best[0][0].effect.title}")
         steps.append(_step(found, best[0][0].effect, tuple(best), worse, held, screen(found, effects, workers)))
+        idle = _idle(steps)
+        if idle is not None:
+            told(f"step {len(steps) - 1}: {idle.title} no longer earns its place")
+            steps = _without(idle, steps, held, effects, workers)
     told("measuring what is left")
     after = flexible(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
     return Diagnosis(tuple(steps), before, after, tuple(one.run for one in base.runs), tuple(held), gross, settings)
+
+
+def _idle(steps: Sequence[Step]) -> Effect | None:
+    """Return an effect added before the last one that is absent in the last fit, None where all earn their place."""
+    fit, at = steps[-1].fit, 0
+    added = {step.added.name for step in steps[1:-1] if step.added is not None}
+    for effect in fit.model.effects:
+        own = slice(at, at + len(effect.parameters))
+        at = own.stop
+        value, std = fit.values[own], fit.std[6:][own]
+        if effect.name in added and not np.any(np.abs(value) > _SEEN * np.nan_to_num(std, nan=0.0)):
+            return effect
+    return None
+
+
+def _without(
+    idle: Effect, steps: list[Step], held: Sequence[Run], effects: Mapping[str, Effect], workers: Executor
+) -> list[Step]:
+    """Climb the ladder again without an effect; what was refused on the way stays told."""
+    made = [steps[0]]
+    for step in steps[1:]:
+        if step.added is None or step.added.name == idle.name:
+            continue
+        base = made[-1].fit
+        candidate = score(base, step.added)
+        one = confirm(base, candidate, held, workers)
+        refused = tuple(pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused))
+        others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
+        screened = screen(one.fit, effects, workers)
+        made.append(_step(one.fit, step.added, ((candidate, one),), others, held, screened))
+    return made
 
 
 def _refused(step: Step, tried: list[tuple[Candidate, Confirmation]]) -> Step:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -211,17 +211,3 @@ def linearise(filtered: Filtered, point: Point) -> Linearised:
     found = list(sensitivity.columns(filtered, point, base))
     J = np.column_stack([column for _, column in found])
     return Linearised(base, sensitivity.whitened(base), np.nan_to_num(J), [index for index, _ in found])
-
-
-def with_model(base: Fit, model: Augmented, values: Float, workers: Executor, *, max_iterations: int = 25) -> Fit:
-    """Fit another model to the same runs, starting where one stands.
-
-    Parameters
-    ----------
-    base : Fit
-    model : Augmented
-    values : ndarray, shape (p,)
-        Start of the effects.
-    """
-    filtered = tuple(replace(one, model=model) for one in base.runs)
-    return climb(filtered, base.hull, base.levels, values, workers, max_iterations)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,10 +19,14 @@ from pipeline.diagnose.run import Run
 from pipeline.diagnose.screen import Candidate, score
 from pipeline.diagnose.start import Start
 from pipeline.model.augmented import Augmented
+from pipeline.model.ship import mariner_like
 from pipeline.model.terms.effect import Effect
 from pipeline.normalise.series import Float
 from schemas.errors import DataRejected
 from schemas.model_spec import ModelSpec
+
+#: iterations of an entry of the race, and of the climb to the end
+_RACE, _TO_THE_END = 6, 60
 
 
 def plain(runs: Sequence[Run], spec: ModelSpec, start: Start, workers: Executor) -> tuple[Fit, int]:
@@ -42,6 +47,9 @@ def plain(runs: Sequence[Run], spec: ModelSpec, start: Start, workers: Executor)
 def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
     """Fit a model with one effect more.
 
+    A hull fitted without a lag of the rudder has bent itself to stand in for it, and from there the way to the true
+    hull leads through worse ones. So an effect with a threshold races from several sizes and two hulls.
+
     Parameters
     ----------
     base : Fit
@@ -50,7 +58,35 @@ def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
     workers : Executor
     """
     model = base.model.with_effect(candidate.effect)
-    return pooled_fit.with_model(base, model, np.concatenate([base.values, _begin(candidate)]), workers)
+    begin = _begin(candidate)
+    first = candidate.effect.parameters[0]
+    entries = [(base.hull, begin)]
+    if len(first.steps) > 1:
+        ordinary = mariner_like(base.runs[0].run.ship.length_m).array()
+        sizes = [np.concatenate([[size], begin[1:]]) for size in first.steps]
+        entries += [(hull, size) for hull in (base.hull, ordinary) for size in sizes]
+    if len(entries) > 1:
+        race = [_climbed(base, model, hull, size, workers, _RACE) for hull, size in entries]
+        best = max(race, key=lambda one: one.log_likelihood)
+        hull, begin, levels = best.hull, best.values[base.values.size :], best.levels
+    else:
+        hull, levels = base.hull, base.levels
+    return _climbed(base, model, hull, begin, workers, _TO_THE_END, levels)
+
+
+def _climbed(
+    base: Fit,
+    model: Augmented,
+    hull: Float,
+    begin: Float,
+    workers: Executor,
+    iterations: int,
+    levels: Float | None = None,
+) -> Fit:
+    filtered = tuple(replace(one, model=model) for one in base.runs)
+    values = np.concatenate([base.values, begin])
+    start = base.levels if levels is None else levels
+    return pooled_fit.climb(filtered, hull, start, values, workers, iterations)
 
 
 def _begin(candidate: Candidate) -> Float:
@@ -58,7 +94,7 @@ def _begin(candidate: Candidate) -> Float:
     parameters = candidate.effect.parameters
     inside = np.clip(candidate.change, [p.low for p in parameters], [p.high for p in parameters])
     # at 0 a threshold has no slope of its own
-    if len(parameters[0].steps) > 1 and inside[0] <= 0.0 <= parameters[0].low + 0.0:
+    if len(parameters[0].steps) > 1 and parameters[0].low == 0.0 and inside[0] <= 0.0:
         inside[0] = candidate.steps[0]
     return np.asarray(inside, dtype=np.float64)
 

@@ -20,6 +20,8 @@ LEFT_OVER = 12.0
 LEFT_SHARE = 0.2
 #: an effect whose possible size is smaller than this many standard errors cannot be seen
 POWER = 3.0
+#: log-likelihood that an effect must gain in a manoeuvre to be seen in it
+SEEN_IN_RUN = 2.0
 #: a share of the whitened variance below which a significant effect is too small to matter
 NEGLIGIBLE = 5e-4
 
@@ -215,6 +217,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
                 "set_id": f"S{number}",
                 "effects": names,
                 "separated_by": step.chosen_from[0][0].effect.separated_by if len(names) > 1 else "",
+                "since_utc_ns": _since(diagnosis, step.chosen_from[0][1]),
                 "refits": [_refit(c, k) for c, k in step.chosen_from],
             }
         )
@@ -248,6 +251,15 @@ def _candidate(diagnosis: Diagnosis, one: Candidate, member: dict[str, str]) -> 
         "verdict": found.verdict,
         "why": found.why,
     }
+
+
+def _since(diagnosis: Diagnosis, one: Confirmation) -> int | None:
+    """Return the beginning of the first manoeuvre that is predicted better with the effect by parameters it had no say
+    in, UTC ns; None where there is none."""
+    runs = (*diagnosis.fitted, *diagnosis.held)
+    gains = (*one.fold_gains, *one.held_out_gains)
+    starts = [run.start_utc_ns for run, gain in zip(runs, gains, strict=True) if gain > SEEN_IN_RUN]
+    return min(starts, default=None)
 
 
 def _values(effect: Effect, values: Float, std: Float) -> dict[str, Any]:

@@ -45,29 +45,28 @@ def _add(kind, place, programs, code, constants, values, slopes, stack, width, t
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _dynamics(  # type: ignore[no-untyped-def]
-    x, row, ship, width, programs, code, constants, values, slopes, stack, total, f, J
+    x, row, ship, width, carried, programs, code, constants, values, slopes, stack, total, f, J
 ):
-    """Fill f = dx/dt of chain and effects' states, shape (width,), and its derivatives J, shape (width, width)."""
+    """Fill f = dx/dt of chain and effects' states, shape (width,), and its derivatives J, shape (width, width).
+
+    ``carried`` is ``width``, or 0 where J is not wanted.
+    """
     a11, a12, a21, a22, b1, b2, arm, mu_F, mu_M, exponent, V0 = ship
     for i in range(width):
         values[i] = x[i]
-        for j in range(width):
-            J[i, j] = 0.0
-            slopes[i, j] = 1.0 if i == j else 0.0
-        f[i] = 0.0
     for i in range(N_INPUT - 2):
         values[CHANNEL + i] = row[2 + i]
     busy = programs.shape[0] > 0
-    for kind in range(2):
-        where = SPEED if kind == 0 else DELTA
-        values[where] = row[kind]
-        for j in range(width):
-            slopes[where, j] = 0.0
-        if busy:
+    values[SPEED], values[DELTA] = row[0], row[1]
+    for j in range(carried):
+        slopes[SPEED, j] = slopes[DELTA, j] = 0.0
+    if busy:
+        for kind in range(2):
+            where = SPEED if kind == 0 else DELTA
             total[:] = 0.0
-            _add(kind, 0, programs, code, constants, values, slopes, stack, width, total)
+            _add(kind, 0, programs, code, constants, values, slopes, stack, carried, total)
             values[where] += total[0]
-            for j in range(width):
+            for j in range(carried):
                 slopes[where, j] = total[j + 1]
     U, delta = values[SPEED], values[DELTA]
     square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
@@ -75,26 +74,25 @@ def _dynamics(  # type: ignore[no-untyped-def]
     f[V] = a11 * U * v + a12 * U * r + b1 * square * delta + x[F]
     f[R] = a21 * U * v + a22 * U * r + b2 * square * delta + arm * x[F] + x[M]
     f[PSI], f[F], f[M] = r, -mu_F * x[F], -mu_M * x[M]
-    J[V, V], J[V, R], J[V, F] = a11 * U, a12 * U, 1.0
-    J[R, V], J[R, R], J[R, F], J[R, M] = a21 * U, a22 * U, arm, 1.0
-    J[PSI, R], J[F, F], J[M, M] = 1.0, -mu_F, -mu_M
-    if busy:
+    if carried > 0:
+        for i in range(width):
+            for j in range(width):
+                J[i, j] = 0.0
+        J[V, V], J[V, R], J[V, F] = a11 * U, a12 * U, 1.0
+        J[R, V], J[R, R], J[R, F], J[R, M] = a21 * U, a22 * U, arm, 1.0
+        J[PSI, R], J[F, F], J[M, M] = 1.0, -mu_F, -mu_M
         for j in range(width):
-            d = slopes[DELTA, j]
-            J[V, j] += b1 * square * d
-            J[R, j] += b2 * square * d
-        for kind in range(2):
+            J[V, j] += b1 * square * slopes[DELTA, j]
+            J[R, j] += b2 * square * slopes[DELTA, j]
+    if busy:
+        for kind in range(2 + width - N_BEFORE):
+            target = kind if kind < 2 else N_BEFORE + kind - 2
+            on, place = (ON_SWAY + kind, 0) if kind < 2 else (ON_EXTRA, kind - 2)
             total[:] = 0.0
-            _add(ON_SWAY + kind, 0, programs, code, constants, values, slopes, stack, width, total)
-            f[kind] += total[0]
-            for j in range(width):
-                J[kind, j] += total[j + 1]
-        for i in range(N_BEFORE, width):
-            total[:] = 0.0
-            _add(ON_EXTRA, i - N_BEFORE, programs, code, constants, values, slopes, stack, width, total)
-            f[i] = total[0]
-            for j in range(width):
-                J[i, j] = total[j + 1]
+            _add(on, place, programs, code, constants, values, slopes, stack, carried, total)
+            f[target] = total[0] + (f[target] if kind < 2 else 0.0)
+            for j in range(carried):
+                J[target, j] += total[j + 1]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -229,17 +227,17 @@ def _substep(  # type: ignore[no-untyped-def]
     programs, code, constants = table
     k1, k2, k3, k4, xs, A, J, Phi, term, work, nodes, w, va, vb, W = room
     width = k1.size
-    _dynamics(x, start, ship, width, programs, code, constants, values, slopes, stack, total, k1, J)
+    _dynamics(x, start, ship, width, 0, programs, code, constants, values, slopes, stack, total, k1, J)
     for i in range(width):
         xs[i] = x[i] + 0.5 * h * k1[i]
-    _dynamics(xs, middle, ship, width, programs, code, constants, values, slopes, stack, total, k2, J)
+    _dynamics(xs, middle, ship, width, 0, programs, code, constants, values, slopes, stack, total, k2, J)
     for i in range(width):
         xs[i] = x[i] + 0.5 * h * k2[i]
-    _dynamics(xs, middle, ship, width, programs, code, constants, values, slopes, stack, total, k3, A)
+    _dynamics(xs, middle, ship, width, width, programs, code, constants, values, slopes, stack, total, k3, A)
     U = values[SPEED]
     for i in range(width):
         xs[i] = x[i] + h * k3[i]
-    _dynamics(xs, end, ship, width, programs, code, constants, values, slopes, stack, total, k4, J)
+    _dynamics(xs, end, ship, width, 0, programs, code, constants, values, slopes, stack, total, k4, J)
     for i in range(width):
         x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     for i in after:
@@ -332,6 +330,8 @@ def extended(  # type: ignore[no-untyped-def]
     values[SHIP : SHIP + 6] = hull
     values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
     values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
+    for i in range(width):
+        slopes[i, i] = 1.0
     stack, total, extra = np.zeros((DEPTH, width + 1)), np.zeros(width + 1), np.zeros(width - N_BEFORE)
     live, after = _live_states(P0, width)
     _begin(P, programs, code, constants, values, slopes, stack, total, extra)
@@ -356,7 +356,7 @@ def extended(  # type: ignore[no-untyped-def]
                     *(live, after, table, values, slopes, stack, total, room),
                 )
         # linearised once, where the prediction stands; one measurement after the other moves on from there
-        _dynamics(x, inputs[ROWS * k], ship, width, programs, code, constants, values, slopes, stack, total, k1, J)
+        _dynamics(x, inputs[ROWS * k], ship, width, width, *table, values, slopes, stack, total, k1, J)
         for i in range(n):
             stood[i] = x[i]
         values[VDOT], values[RDOT] = k1[V], k1[R]

@@ -15,7 +15,8 @@ _SHOWN = 12
 
 
 @click.command("diagnose")
-@vessel_option(required=True)
+@vessel_option()
+@click.option("--fleet", is_flag=True, help="Every vessel of the warehouse, as a Prefect flow, and a summary.")
 @click.option("--set", "set_id", metavar="ID", help="Begin from the model of this parameter set.")
 @click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Begin from this model, YAML.")
 @click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
@@ -24,7 +25,8 @@ _SHOWN = 12
 @warehouse_option
 @json_option
 def command(
-    vessel: str,
+    vessel: str | None,
+    fleet: bool,
     set_id: str | None,
     model: Path | None,
     files: tuple[Path, ...],
@@ -38,6 +40,13 @@ def command(
     what looks present is refitted and must predict manoeuvres that it was not fitted to; what these data cannot tell
     apart is named together.
     """
+    if fleet == (vessel is not None):
+        raise click.UsageError("Say whose model: --vessel NAME, or --fleet for all.")
+    if vessel is None:
+        if set_id is not None or model is not None or files:
+            raise click.UsageError("--fleet begins from the plain model; --set, --model and --effect-file need a vessel.")
+        _fleet(uri, as_json=as_json)
+        return
     from flows.diagnose_vessel import diagnose_vessel
     from flows.vessel_model import Own
     from warehouse.store import Warehouse
@@ -52,6 +61,33 @@ def command(
         print_json(found.show())
         return
     _tell(found.show(), everything=everything)
+
+
+def _fleet(uri: str, *, as_json: bool) -> None:
+    from flows.fleet_diagnosis import diagnose
+
+    rows = diagnose(uri)
+    if as_json:
+        print_json(rows)
+        return
+    table = [
+        [
+            one["vessel"],
+            one["verdict"].replace("_", " "),
+            one["effects"] or "-",
+            one["since"][:19] or "-",
+            _percent(one["held_out_before"]),
+            _percent(one["held_out_after"]),
+            one["note"],
+        ]
+        for one in rows
+    ]
+    head = ["vessel", "verdict", "lacks", "since UTC", "held out, %", "after", "note"]
+    print_table(head, table, "What the models of the fleet lack")
+
+
+def _percent(share: float | None) -> str:
+    return "-" if share is None else number(100 * share, 3)
 
 
 def _tell(told: Mapping[str, Any], *, everything: bool) -> None:
