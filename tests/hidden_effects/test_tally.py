@@ -1,0 +1,70 @@
+"""The score of made-up answers whose counts are known by hand."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from benchmarks.hidden_effects.draw import draw_confusion
+from benchmarks.hidden_effects.score import page
+from benchmarks.hidden_effects.tally import Judged, Share, targets
+
+
+def judged(kind: str, effect: str, verdict: str, sets: list[list[str]], ratio: float = 100.0, value: float = 1.0):
+    parameters = {"c": {"value": value, "std": 0.1, "unit": "1"}}
+    named = [{"effects": s, "refits": [{"effect": n, "parameters": parameters} for n in s]} for s in sets]
+    ladder = [{"held_out_error": 0.4}, {"held_out_error": 0.22}]
+    told = {"verdict": verdict, "sets": named, "ladder": ladder, "candidates": []}
+    truth = {"kind": kind, "effect": effect, "hull": "ferry", "noise": 1.0, "disturbance": "calm", "strength": 1}
+    truth["parameters"] = {"c": 1.0}
+    oracle = {"likelihood_ratio": ratio, "held_out": 0.21} if kind == "catalogue" else {}
+    return Judged(truth, {"diagnosis": told, "seconds": {"diagnose": 3.0}}, oracle)
+
+
+CASES = [
+    judged("none", "none", "adequate", []),
+    judged("none", "none", "explained", [["backlash"]]),
+    judged("outsider", "bank_shear", "unexplained", [["waves"]]),
+    judged("outsider", "bank_shear", "explained", [["waves"]]),
+    judged("catalogue", "rudder_lag", "explained", [["rudder_lag"]]),
+    judged("catalogue", "rudder_lag", "ambiguous", [["dead_time", "rudder_lag"]], value=1.3),
+    judged("catalogue", "rudder_lag", "explained", [["rate_limit"]]),
+    judged("catalogue", "rudder_lag", "adequate", [], ratio=20.0),
+]
+
+
+def test_every_target_counts_what_it_says() -> None:
+    found = {asked: told for asked, _, told in targets(CASES)}
+    begins = {
+        "true effect in a named set": "67 % (2 of 3",
+        "exact name": "50 % (1 of 2",
+        "mean size": "1.33",
+        "any claim": "50 % (1 of 2",
+        "outside the catalogue: unexplained": "50 % (1 of 2",
+        "outside the catalogue: a confident": "50 % (1 of 2",
+        "present though": "0 % (0 of 8",
+        "held-out error": "100 % (3 of 3",
+        "95 % interval": "50 % (1 of 2",
+    }
+    for asked, told in begins.items():
+        (line,) = [text for name, text in found.items() if name.startswith(asked)]
+        assert line.startswith(told), asked
+
+
+def test_the_interval_of_a_share_is_wilsons() -> None:
+    # its ends are where the distance from what was found is 1.96 standard errors of the true share
+    z2 = 1.96**2
+    low, high = sorted(np.roots([1 + z2 / 10, -(2 * 0.1 + z2 / 10), 0.1**2]))
+    assert str(Share(1, 10)) == f"10 % (1 of 10; 95 %: {100 * low:.0f} to {100 * high:.0f} %)"
+    assert str(Share(0, 0)) == "no case"
+
+
+def test_the_page_and_its_picture_are_made(tmp_path: Path) -> None:
+    lines = page(CASES, 336)
+    assert lines[0].startswith("8 of 336 cases were diagnosed: 4 catalogue, 2 none, 2 outsider.")
+    assert next(line for line in lines if line.startswith("| rudder_lag")).startswith("| rudder_lag | 4 | 3 | 2 | 2 |")
+    draw_confusion(CASES, tmp_path / "map.png")
+    assert (tmp_path / "map.png").stat().st_size > 5000
+    assert judged("catalogue", "x", "explained", []).against_plain == pytest.approx(0.55)
