@@ -11,7 +11,7 @@ import numpy as np
 from flows.pool_vessel import ALIAS as POOLED_ALIAS
 from flows.progress import Progress, silent
 from flows.vessel_model import ALIAS, Own, known_effects, named
-from flows.vessel_runs import VesselRuns, assembled, choose, once
+from flows.vessel_runs import assembled, choose, once
 from pipeline.compare.comparison import ComparedRun, judged, summary
 from pipeline.compare.horizon import Horizon, horizon_of
 from pipeline.compare.levels import fit_levels
@@ -22,6 +22,7 @@ from pipeline.compare.where import where
 from pipeline.diagnose.filtered import Filtered
 from pipeline.diagnose.run import Run
 from pipeline.diagnose.sensitivity import Point
+from pipeline.diagnose.start import Start
 from pipeline.model.augmented import Augmented
 from pipeline.normalise.series import SECOND_NS, Float
 from schemas.errors import DataRejected, NotFound, UsageError
@@ -137,15 +138,16 @@ def compare_vessel(
     held = [not _is_seen(segment, seen) for segment in ordered]
     filtered = [Filtered(run, model, data.spec) for run in data.runs]
     progress(0, len(filtered), "predicting")
-    points, told = _points(filtered, held, hull, values, chosen, data)
+    levels = _levels(filtered, held, hull, values, chosen, data.start)
     runs, found, skipped = [], [], dict(data.skipped)
     for k, (one, segment) in enumerate(zip(filtered, ordered, strict=True)):
         progress(k, len(filtered), f"predicting {segment.segment_id}")
         try:
             compared = compare_run(
-                *(one, points[k], asked),
+                *(one, Point(hull, values, levels[k].foreseen), asked),
                 held_out=held[k],
-                levels_from=told[k],
+                levels_from=levels[k].told,
+                own_levels=levels[k].own,
                 phases=phases_s(segment.detail.get("phases", ()), one.run.start_utc_ns),
                 turns=_turns(segment, one.run),
             )
@@ -241,26 +243,37 @@ def _is_seen(segment: Segment, seen: _Seen) -> bool:
     )
 
 
-def _points(
-    filtered: list[Filtered], held: list[bool], hull: Float, values: Float, chosen: ParameterSet, data: VesselRuns
-) -> tuple[list[Point], list[str]]:
-    """Return where each run stands, and where its noise levels come from: those held out get the mean of the others."""
+@dataclass(frozen=True, eq=False)
+class _Levels:
+    """Noise levels of one run, logarithms, shape (6,): to predict with, and fitted to the run itself."""
+
+    foreseen: Float
+    own: Float
+    told: str
+
+
+def _levels(
+    filtered: list[Filtered], held: list[bool], hull: Float, values: Float, chosen: ParameterSet, start: Start
+) -> list[_Levels]:
+    """Return the noise levels of each run; a held-out run is predicted with the mean of the fitted ones' logarithms."""
     kept: Mapping[str, Any] = chosen.convergence.get("levels") or {}
-    own: list[Float | None] = []
-    told = []
+    own, told = [], []
     for k, one in enumerate(filtered):
-        if held[k] and not all(held):
-            own.append(None)
-            told.append("mean of the fitted runs' logarithms")
-        elif one.run.name in kept:
+        if one.run.name in kept and not held[k]:
             own.append(np.array(kept[one.run.name], dtype=np.float64))
             told.append("fitted with the parameters")
         else:
-            found = fit_levels(one, hull, values, data.start.levels[k])
+            found = fit_levels(one, hull, values, start.levels[k])
             own.append(found.levels)
             told.append("fitted to this run, parameters held" + ("" if found.converged else "; not converged"))
-    mean = np.mean([levels for levels in own if levels is not None], axis=0)
-    return [Point(hull, values, mean if levels is None else levels) for levels in own], told
+    seen = [levels for levels, out in zip(own, held, strict=True) if not out]
+    mean = np.mean(seen, axis=0) if seen else None
+    return [
+        _Levels(levels, levels, words)
+        if mean is None or not out
+        else _Levels(mean, levels, "mean of the fitted runs' logarithms; in where: fitted to this run, parameters held")
+        for levels, out, words in zip(own, held, told, strict=True)
+    ]
 
 
 def _turns(segment: Segment, run: Run) -> tuple[Turn, ...]:

@@ -13,6 +13,7 @@ from pipeline.diagnose import sensitivity
 from pipeline.diagnose.filtered import Filtered
 from pipeline.diagnose.held_out import free_run_of
 from pipeline.diagnose.sensitivity import Point
+from pipeline.normalise.series import Float
 
 _HEADING = 2
 
@@ -24,6 +25,7 @@ def compare_run(
     *,
     held_out: bool,
     levels_from: str = "fitted with the parameters",
+    own_levels: Float | None = None,
     phases: Sequence[PhaseInterval] = (),
     turns: Sequence[Turn] = (),
 ) -> ComparedRun:
@@ -38,6 +40,9 @@ def compare_run(
         Whether the parameters have not seen this run.
     levels_from : str, optional
         Where the noise levels come from, in words.
+    own_levels : ndarray, shape (6,), optional
+        Logarithms of levels fitted to this run, for the search for misfits; by default those of ``point``: a noisier
+        sensor is no misfit.
     phases : sequence of PhaseInterval, optional
     turns : sequence of Turn, optional
         Its overshoots.
@@ -48,6 +53,7 @@ def compare_run(
         ``prediction_diverges``, ``horizon_too_long``.
     """
     run = filtered.run
+    own = point if own_levels is None else Point(point.hull, point.values, own_levels)
     found = free_run_of(filtered, point.hull, point.values)
     free = of_free_run(filtered, found, horizon_of("free"))
     return ComparedRun(
@@ -58,6 +64,6 @@ def compare_run(
         overshoots=compare_overshoots(
             run.time_s, run.measured[:, _HEADING], found.predicted[:, _HEADING], tuple(turns)
         ),
-        looked=Looked(filtered, sensitivity.passed(filtered, point), found, tuple(phases)),
+        looked=Looked(filtered, sensitivity.passed(filtered, own), found, tuple(phases)),
         levels_from=levels_from,
     )

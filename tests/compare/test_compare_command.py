@@ -114,6 +114,17 @@ def test_a_set_from_elsewhere_is_put_to_a_held_out_run(own: Path) -> None:
     assert document["runs"][0]["noise_levels"].startswith("fitted to this run")
 
 
+def test_runs_that_a_model_held_out_stay_held_out(own: Path, document: dict) -> None:
+    warehouse = Warehouse(str(own))
+    known = parameter_sets.get(warehouse, document["parameter_set_id"])
+    (name,) = known.segment_ids
+    held = {**known.convergence, "held_out": [name]}
+    settings = {**known.settings, "segments": [name]}
+    made = replace(known, parameter_set_id="ps-00000000000000bb", convergence=held, settings=settings)
+    parameter_sets.insert(warehouse, [made])
+    assert [run["held_out"] for run in asked(own, "--set", made.parameter_set_id)["runs"]] == [True]
+
+
 def test_where_it_fails_is_told_by_sample(place: Path) -> None:
     document = asked(place, "--where")
     assert document["where"]["held_out"] is None
