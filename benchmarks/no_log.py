@@ -373,6 +373,7 @@ def page(results: list[Result], ships: list[Found]) -> list[str]:
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--runs", type=int, default=6, help="runs a kind and stream")
+    parser.add_argument("--days", type=int, default=2, help="trial days a ship of the measured ones, one log each")
     parser.add_argument("--processes", type=int, default=1)
     parser.add_argument("--data", type=Path, default=result_page.DATA)
     options = parser.parse_args()
@@ -381,7 +382,7 @@ def main() -> None:
     wanted = cases(options.runs)
     with ProcessPoolExecutor(options.processes, mp_context=get_context("spawn")) as pool:
         jobs = [pool.submit(run, *one) for one in wanted]
-        every = no_log_fleet.zigzags(options.data)
+        every = no_log_fleet.zigzags(options.data, options.days)
         voyages = [pool.submit(no_log_fleet.compare, one, no_log_fleet.companions(one, every)) for one in every]
         for number, job in enumerate(jobs):
             results += job.result()
@@ -391,7 +392,8 @@ def main() -> None:
             ships += voyage.result()
             print(f"{number + 1}/{len(voyages)} {every[number].ship} {every[number].day}", file=sys.stderr)
     draw(results)
-    result_page.write("no_log", "What it costs to have no log", page(results, ships), options=f"--runs {options.runs}")
+    told = f"--runs {options.runs} --days {options.days}"
+    result_page.write("no_log", "What it costs to have no log", page(results, ships), options=told)
 
 
 if __name__ == "__main__":

@@ -29,3 +29,11 @@ def test_example_runs() -> None:
     assert abs(speed["mean_m_s"] - true_speed(trial, records[0])) < 3.0 * speed["std_m_s"]
     for word in ("mean_m_s", "std_m_s", "current_along_m_s", "correlation_with_current_along", "rounds"):
         assert word in speed
+
+
+def test_what_it_quotes_was_measured() -> None:
+    measured = (ROOT / "benchmarks" / "results" / "no_log.md").read_text(encoding="utf-8").splitlines()
+    section = TEXT.partition("## What it costs")[2].partition("\n## ")[0]
+    quoted = [line for line in section.splitlines() if line.startswith("|")]
+    assert len(quoted) > 8
+    assert set(quoted) <= set(measured)
