@@ -8,7 +8,7 @@ from os import cpu_count
 from typing import Any
 
 from flows.progress import Progress, silent
-from flows.vessel_model import Own, inputs_of, known_effects, named, store_model
+from flows.vessel_model import NONE_OF_ONES_OWN, Own, inputs_of, known_effects, named, store_model
 from flows.vessel_runs import Chosen, VesselRuns, assembled, choose
 from pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 from pipeline.diagnose.verdict import as_json
@@ -17,6 +17,8 @@ from schemas.model_spec import ModelSpec
 from warehouse import code_version, diagnoses
 from warehouse.diagnoses import StoredDiagnosis, diagnosis_id
 from warehouse.store import Warehouse
+
+STANDARD = DiagnosisSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,8 +34,8 @@ def diagnose_vessel(
     warehouse: Warehouse,
     vessel: str,
     spec: ModelSpec,
-    own: Own = Own(),
-    settings: DiagnosisSettings = DiagnosisSettings(),
+    own: Own = NONE_OF_ONES_OWN,
+    settings: DiagnosisSettings = STANDARD,
     progress: Progress = silent,
 ) -> tuple[StoredDiagnosis, bool]:
     """Diagnose a vessel; what was diagnosed before from the same inputs is not computed again.
@@ -85,7 +87,7 @@ def examine(
     chosen: Chosen,
     spec: ModelSpec,
     own: Own,
-    settings: DiagnosisSettings = DiagnosisSettings(),
+    settings: DiagnosisSettings = STANDARD,
     progress: Progress = silent,
     only: tuple[str, ...] = (),
 ) -> Examined:

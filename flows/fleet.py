@@ -1,4 +1,4 @@
-"""The Prefect flows: ``ingest``, ``identify`` and ``reprocess``. Few fat tasks; every flow leaves a table artifact.
+"""The Prefect flows: ``ingest``, ``identify``, ``reprocess``, ``diagnose``. Few fat tasks; all leave a table artifact.
 
 The work is in the jobs beside this file; here it is only put into batches, retried and reported.
 """
@@ -22,7 +22,9 @@ from prefect.runtime import flow_run
 from prefect.task_runners import ThreadPoolTaskRunner
 
 from flows import ingest_logs
+from flows.diagnose_vessel import diagnose_vessel
 from flows.files import read_profiles
+from flows.fleet_diagnosis import summary
 from flows.identify_vessel import Request, identify_vessel
 from flows.pool_vessel import pool_vessel
 from flows.reprocess_vessel import VesselReport, reprocess_vessel
@@ -176,3 +178,45 @@ def reprocess(
     ]
     create_table_artifact(key="kempf-reprocess", table=rows, description="The fleet")
     return reports
+
+
+@task(name="diagnose-batch", retries=1, retry_delay_seconds=5)
+def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any]) -> list[dict[str, Any]]:
+    """Diagnose vessels one after the other, each on all cores; one that fails is reported, the others are done."""
+    model, told = ModelSpec.model_validate(spec), []
+    for vessel in vessels:
+        try:
+            found, _ = diagnose_vessel(Warehouse(warehouse), vessel, model)
+            told.append(found.show())
+        except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
+            told.append({"vessel": vessel, "verdict": "failed", "error": as_told(error).to_json()["error"]})
+        get_run_logger().info("%s: %s", vessel, told[-1]["verdict"])
+    return told
+
+
+@flow(name="diagnose")
+def diagnose(
+    warehouse: str = "kempf-data", vessels: list[str] | None = None, spec: dict[str, Any] | None = None
+) -> list[dict[str, Any]]:
+    """Find what the models of the fleet lack.
+
+    Parameters
+    ----------
+    warehouse : str, optional
+        Its address.
+    vessels : list of str, optional
+        Only these; the whole fleet by default.
+    spec : dict, optional
+        Model to begin from; the plain one by default.
+
+    Returns
+    -------
+    list of dict
+        One row an effect and vessel, see `flows.fleet_diagnosis.summary`.
+    """
+    store = Warehouse(warehouse)
+    store.require()
+    names = sorted(set(vessels)) if vessels else vessel_table.names(store)
+    rows = summary(diagnose_batch(warehouse, names, spec or {"name": "plain", "rate_bias": False}))
+    create_table_artifact(key="kempf-diagnose", table=rows, description="What the models of the fleet lack")
+    return rows

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from flows.parameter_set_of import without_arm, arm_of
+from flows.parameter_set_of import arm_of, without_arm
 from flows.progress import Progress, silent
 from flows.vessel_runs import Chosen, VesselRuns, assemble, assembled
 from pipeline.diagnose.diagnosis import Step, step_of
@@ -68,6 +68,9 @@ class Own:
     def beside(self, other: Own) -> Own:
         """Return the effects of both; of one name the other's."""
         return Own({**self.formulas, **other.formulas}, {**self.files, **other.files})
+
+
+NONE_OF_ONES_OWN = Own()
 
 
 def known_effects(own: Own) -> dict[str, Effect]:
@@ -240,7 +243,7 @@ def _fitted(
     return _as_parameter_set(step, runs, profile, inputs, vessel, told, parent, gross)
 
 
-def _as_parameter_set(  # noqa: PLR0913 - what a set is made of
+def _as_parameter_set(
     step: Step,
     runs: VesselRuns,
     profile: VesselProfile,

@@ -68,7 +68,7 @@ def insert(warehouse: Warehouse, one: StoredDiagnosis) -> bool:
     bool
         Whether it is new.
     """
-    row = {
+    row: dict[str, Any] = {
         "vessel_key": vessel_key(one.vessel),
         "vessel": one.vessel,
         "diagnosis_id": one.diagnosis_id,

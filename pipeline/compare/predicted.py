@@ -165,7 +165,7 @@ def _ahead(filtered: Filtered, point: Point, horizon: Horizon, seconds: float) -
         far = withheld & (since >= steps - part)
         if not far.any():
             continue
-        passed = filtered.run_filter(point.hull, np.exp(point.levels), point.values, withheld=withheld)  # type: ignore[arg-type]
+        passed = filtered.run_filter(point.hull, np.exp(point.levels), point.values, withheld=withheld)
         _require_finite(passed, filtered)
         predicted[far], error[far] = passed.predicted[far], passed.innovation[far]
         std[far] = np.sqrt(passed.variance[far])

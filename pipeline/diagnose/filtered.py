@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.diagnose.run import Run
+from pipeline.identify.scoring import Mask
 from pipeline.model.augmented import Augmented
 from pipeline.model.extended import N_AFTER, N_BEFORE, extended
 from pipeline.normalise.series import Float
@@ -57,19 +58,23 @@ class Filtered:
     def present(self) -> Float:
         """Which of (v, r, psi, F, M, c_1, c_2, b) the disturbance model has, shape (8,)."""
         current = self.spec.current != "none"
-        used = np.isfinite(self.run.measured).any(axis=0)
+        used = self._measured()
         two = current and self.spec.current == "earth"
-        bias = self.spec.rate_bias and bool(used[1] and used[2])
+        bias = self.spec.rate_bias and used[1] and used[2]
         wind, moment = self.spec.wind != "none", self.spec.moment == "gauss-markov"
         return np.array([1.0, 1.0, 1.0, wind, moment, current, two, bias])
+
+    def _measured(self) -> list[bool]:
+        """Which of the three measurements the run has."""
+        return [bool(np.isfinite(column).any()) for column in self.run.measured.T]
 
     def levels_used(self) -> list[bool]:
         """Which of the six noise levels these data and this specification have."""
         has = self.present()
-        return [bool(has[3]), bool(has[4]), bool(has[5]), *np.isfinite(self.run.measured).any(axis=0).tolist()]
+        return [bool(has[3]), bool(has[4]), bool(has[5]), *self._measured()]
 
     def run_filter(
-        self, hull: Float, levels: Float, values: Float, *, states: bool = False, withheld: Float | None = None
+        self, hull: Float, levels: Float, values: Float, *, states: bool = False, withheld: Mask | None = None
     ) -> Passed:
         """Run the filter.
 
@@ -114,7 +119,7 @@ class Filtered:
         P0: Float,
         *,
         states: bool,
-        withheld: Float | None,
+        withheld: Mask | None,
         still: bool = False,
     ) -> Passed:
         run, spec = self.run, self.spec

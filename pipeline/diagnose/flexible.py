@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from concurrent.futures import Executor
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -73,8 +74,9 @@ class Flexible:
         Log-likelihood that it adds in runs that did not fit it, summed over them; negative where nothing repeats.
     gains : ndarray, shape (runs,)
     shrinkage : float
-    force : tuple of ndarray, shape (n, 2)
-        By run, the missing sway, m/s^2, and yaw acceleration, rad/s^2, that it would add.
+        Of those tried, the one that gains most.
+    coefficients : ndarray, shape (len(TERMS),)
+        Size of every term of `TERMS`, fitted to all runs.
     """
 
     gain: float
@@ -110,7 +112,7 @@ def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> Flexible:
     unit = np.where(kept, 1.0 / np.where(kept, norm, 1.0), 0.0)
     Z = clean * unit
     ends = np.cumsum([0, *sizes])
-    parts = [slice(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+    parts = [slice(a, b) for a, b in pairwise(ends)]
     grams = [Z[p].T @ Z[p] for p in parts]
     moments = [Z[p].T @ known.u[p] for p in parts]
     whole, moment = np.sum(grams, axis=0), np.sum(moments, axis=0)

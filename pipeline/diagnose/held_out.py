@@ -46,19 +46,32 @@ class FreeRun:
     def rms(self) -> Float:
         """Root mean square error by channel, shape (3,), NaN where not measured."""
         with np.errstate(invalid="ignore"):
-            return np.sqrt(np.nansum(self.error**2, axis=0) / np.sum(np.isfinite(self.error), axis=0))
+            found: Float = np.sqrt(np.nansum(self.error**2, axis=0) / np.sum(np.isfinite(self.error), axis=0))
+        return found
 
     @property
     def relative(self) -> Float:
         """Error by channel over the spread of the measurements, 1 - fit % / 100 as MATLAB's ``compare`` has it."""
         measured = self.error + self.predicted
-        result: Float = self.rms / np.nanstd(measured, axis=0)
+        result: Float = self.rms / spread(measured)
         return result
 
     @property
     def score(self) -> float:
         """The relative errors of the channels in one number, their root mean square."""
         return float(np.sqrt(np.nanmean(self.relative**2)))
+
+
+def spread(measured: Float) -> Float:
+    """Return the standard deviation by channel, shape (3,), 1 where it was not measured.
+
+    Parameters
+    ----------
+    measured : ndarray, shape (n, 3)
+    """
+    made = np.isfinite(measured).any(axis=0)
+    found: Float = np.where(made, np.nanstd(np.where(made, measured, 0.0), axis=0), 1.0)
+    return found
 
 
 def free_run(fit: Fit, run: Run) -> FreeRun:
@@ -77,18 +90,18 @@ def free_run(fit: Fit, run: Run) -> FreeRun:
 def free_run_of(filtered: Filtered, hull: Float, values: Float) -> FreeRun:
     """As `free_run`, for a model and parameters that stand by themselves."""
     run = filtered.run
-    used = np.flatnonzero(filtered.present())
+    used = np.flatnonzero(filtered.present()).tolist()
     start = np.zeros(8)
     first = [column[np.isfinite(column)][:3] for column in run.measured.T]
     for i in range(3):
         start[i] = float(np.mean(first[i])) if first[i].size else 0.0
-    spread = np.nan_to_num(np.nanstd(run.measured, axis=0), nan=1.0)
     made = np.isfinite(run.measured)
-    weight = (1.0 / np.maximum(spread, 1e-9))[None, :] * np.ones_like(run.measured)
+    weight = (1.0 / np.maximum(spread(run.measured), 1e-9))[None, :] * np.ones_like(run.measured)
 
     def errors(constants: Float) -> Float:
         predicted = filtered.free(hull, values, constants)
-        return ((run.measured - predicted) * weight)[made]
+        found: Float = ((run.measured - predicted) * weight)[made]
+        return found
 
     constants, base = start.copy(), errors(start)
     if not np.all(np.isfinite(base)):

@@ -1,4 +1,4 @@
-"""Maximum likelihood of a model with effects over several runs: hull and effects shared, noise levels each run's own."""
+"""Maximum likelihood of a model with effects over several runs: hull and effects shared, noise levels by run."""
 
 from __future__ import annotations
 

@@ -78,22 +78,26 @@ class Run:
     @property
     def time_s(self) -> Float:
         """Instants, s, shape (n,)."""
-        return self.step_s * np.arange(self.measured.shape[0])
+        time: Float = self.step_s * np.arange(self.measured.shape[0], dtype=np.float64)
+        return time
 
     @property
     def fine_time_s(self) -> Float:
         """Instants of the input table, s."""
-        return self.step_s / ROWS * np.arange(self.inputs.shape[0])
+        time: Float = self.step_s / ROWS * np.arange(self.inputs.shape[0], dtype=np.float64)
+        return time
 
     @property
     def speed_m_s(self) -> Float:
         """Speed through the water at the instants, shape (n,)."""
-        return self.inputs[::ROWS, 0]
+        speed: Float = self.inputs[::ROWS, 0]
+        return speed
 
     @property
     def rudder_rad(self) -> Float:
         """Rudder at the instants, shape (n,)."""
-        return self.inputs[::ROWS, 1]
+        rudder: Float = self.inputs[::ROWS, 1]
+        return rudder
 
     def with_day(self, day: int) -> Run:
         """Return the run with the number of its log."""
@@ -154,7 +158,7 @@ def make_run(
     measured, offset = np.full((n, 3), np.nan), np.zeros((n, 3))
     for i, column in enumerate(record.measured.T):
         measured[:, i], offset[:, i] = _averaged(record.time_s, column, step_s, n)
-    fine = step_s / ROWS * np.arange(ROWS * (n - 1) + 1)
+    fine: Float = step_s / ROWS * np.arange(ROWS * (n - 1) + 1, dtype=np.float64)
     known = np.isfinite(record.heading_rad)
     inputs = np.zeros((fine.size, N_INPUT))
     inputs[:, 0] = np.interp(fine, record.time_s, record.speed_m_s)
@@ -165,7 +169,9 @@ def make_run(
         if column is not None:
             inputs[:, 2 + k] = column
             have.add(channel)
-    heading = np.interp(fine, record.time_s[known], record.heading_rad[known]) if known.any() else 0.0 * fine
+    heading: Float = 0.0 * fine
+    if known.any():
+        heading = np.interp(fine, record.time_s[known], record.heading_rad[known])
     inputs[:, -3], inputs[:, -2], inputs[:, -1] = heading, fine, day
     coarse = heading[::ROWS]
     shaft = 2 + list(CHANNEL_SYMBOLS).index("n")

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.diagnose import pooled_fit
+from pipeline.diagnose.held_out import spread
 from pipeline.diagnose.pooled_fit import Fit
 from pipeline.diagnose.run import Run
 from pipeline.identify import maximum_likelihood
@@ -93,8 +94,8 @@ def _alone(record: Record, spec: ModelSpec, arm_per_m: float) -> Float | None:
 
 def _levels(record: Record, run: Run) -> Float:
     """Noise levels to start from: those of the readings, smaller where several were averaged, and a little more."""
-    spread = np.nan_to_num(np.nanstd(run.measured, axis=0), nan=1.0)
     noise = np.nan_to_num(record.noise_start, nan=1e-3)
     readings = np.isfinite(record.measured).sum(axis=0) / np.maximum(np.isfinite(run.measured).sum(axis=0), 1)
-    level = np.maximum(noise / np.sqrt(np.maximum(readings, 1.0)), 0.02 * spread)
-    return np.log(np.concatenate([_INTENSITIES, np.maximum(level, 1e-5)]))
+    level = np.maximum(noise / np.sqrt(np.maximum(readings, 1.0)), 0.02 * spread(run.measured))
+    found: Float = np.log(np.concatenate([_INTENSITIES, np.maximum(level, 1e-5)]))
+    return found

@@ -14,7 +14,7 @@ from pipeline.model.terms.effect import Effect
 from pipeline.normalise.series import Float
 
 Verdict = Literal["adequate", "explained", "ambiguous", "unexplained", "insufficient_data"]
-#: log-likelihood that the flexible reference must still gain, in runs that did not fit it, to say that something is left
+#: log-likelihood that the flexible reference must still gain, in runs that did not fit it: something is left
 LEFT_OVER = 12.0
 #: and which share of what it gained beside the plain model
 LEFT_SHARE = 0.2
@@ -75,22 +75,26 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
             others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
             alike = f"; these data would fit {_listed(others)} as well" if others else ""
             return Finding("present", f"step {number}: {sized(effect, members[effect.name])}{alike}")
-    if candidate.missing:
-        return Finding("not_testable", f"the logs lack {_listed(list(candidate.missing))}")
-    if np.isnan(candidate.score):
-        return Finding(
-            "not_testable",
-            f"what the model has already imitates {_percent(candidate.absorption)} of it. {effect.separated_by}",
-        )
-    weak = _too_weak(candidate)
-    if weak:
-        return Finding("not_testable", f"{weak} {effect.separated_by}")
+    untestable = _untestable(candidate)
+    if untestable:
+        return Finding("not_testable", untestable)
     if candidate.p_adjusted >= diagnosis.settings.level:
         return Finding("absent", _absent(candidate))
     measured = sum(line.u.size // 2 for line in diagnosis.steps[0].fit.linearised)
     if candidate.score / measured < NEGLIGIBLE:
         return Finding("negligible", f"it explains {_percent(candidate.score / measured)} of the innovations' variance")
     return _explained_away(diagnosis, candidate)
+
+
+def _untestable(candidate: Candidate) -> str:
+    """Say why nothing can be told of an effect from these data; empty where something can."""
+    if candidate.missing:
+        return f"the logs lack {_listed(list(candidate.missing))}"
+    if np.isnan(candidate.score):
+        share = _percent(candidate.absorption)
+        return f"what the model has already imitates {share} of it. {candidate.effect.separated_by}"
+    weak = _too_weak(candidate)
+    return f"{weak} {candidate.effect.separated_by}" if weak else ""
 
 
 def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
@@ -142,7 +146,8 @@ def _too_weak(candidate: Candidate) -> str:
     parameters = [p for p, m in zip(candidate.effect.parameters, made, strict=True) if m]
     reach = np.array([max(abs(p.low), abs(p.high)) for p in parameters])
     if np.all(reach < POWER * candidate.std[made]):
-        return f"its standard error, {candidate.std[made][0]:.2g} {parameters[0].unit}, is no smaller than what is physical."
+        error = f"{candidate.std[made][0]:.2g} {parameters[0].unit}".rstrip()
+        return f"its standard error, {error}, is no smaller than what is physical."
     return ""
 
 
@@ -254,8 +259,10 @@ def _candidate(diagnosis: Diagnosis, one: Candidate, member: dict[str, str]) -> 
 
 
 def _since(diagnosis: Diagnosis, one: Confirmation) -> int | None:
-    """Return the beginning of the first manoeuvre that is predicted better with the effect by parameters it had no say
-    in, UTC ns; None where there is none."""
+    """Return when the effect is seen first, UTC ns; None where no manoeuvre shows it by itself.
+
+    Seen in a manoeuvre is what predicts it better with parameters that it had no say in.
+    """
     runs = (*diagnosis.fitted, *diagnosis.held)
     gains = (*one.fold_gains, *one.held_out_gains)
     starts = [run.start_utc_ns for run, gain in zip(runs, gains, strict=True) if gain > SEEN_IN_RUN]

@@ -14,6 +14,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from pipeline.model.moments import add_noise, carry_covariance, exponential, take_in
 from pipeline.model.terms.program import DEPTH, evaluate
 from pipeline.model.terms.symbols import SYMBOLS
 
@@ -96,99 +97,6 @@ def _dynamics(  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _exponential(A, h, live, Phi, term, work):  # type: ignore[no-untyped-def]
-    """Fill Phi with exp(A h) to the fourth order, over the live states; the others stay what they are."""
-    for i in live:
-        for j in live:
-            term[i, j] = 1.0 if i == j else 0.0
-            Phi[i, j] = term[i, j]
-    for order in range(1, 5):
-        s = h / order
-        for i in live:
-            for j in live:
-                value = 0.0
-                for m in live:
-                    value += A[i, m] * term[m, j]
-                work[i, j] = s * value
-        for i in live:
-            for j in live:
-                term[i, j] = work[i, j]
-                Phi[i, j] += term[i, j]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _covariance(P, Phi, decay, live, after, W):  # type: ignore[no-untyped-def]
-    """Let P <- F P F' where F is Phi on the live states and ``decay`` on those after them."""
-    for i in live:
-        for j in live:
-            value = 0.0
-            for m in live:
-                value += Phi[i, m] * P[m, j]
-            W[i, j] = value
-        for j in after:
-            value = 0.0
-            for m in live:
-                value += Phi[i, m] * P[m, j]
-            W[i, j] = value * decay[j]
-    for i in live:
-        for j in live:
-            if j > i:
-                break
-            value = 0.0
-            for m in live:
-                value += W[i, m] * Phi[j, m]
-            P[i, j] = value
-            P[j, i] = value
-        for j in after:
-            P[i, j] = W[i, j]
-            P[j, i] = W[i, j]
-    for i in after:
-        for j in after:
-            P[i, j] *= decay[i] * decay[j]
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _noise(P, A, w, q, h, live, nodes, a, b):  # type: ignore[no-untyped-def]
-    """Add to P what white noise of intensity q along w does over h seconds: Simpson's rule on exp(A s) w."""
-    for i in live:
-        a[i] = w[i]
-        for node in range(3):
-            nodes[node, i] = w[i]
-    half, whole = 1.0, 1.0
-    for order in range(1, 5):
-        half *= 0.5 * h / order
-        whole *= h / order
-        for i in live:
-            total = 0.0
-            for j in live:
-                total += A[i, j] * a[j]
-            b[i] = total
-        for i in live:
-            a[i] = b[i]
-            nodes[1, i] += half * a[i]
-            nodes[2, i] += whole * a[i]
-    for i in live:
-        for j in live:
-            P[i, j] += (
-                q * h / 6.0 * (nodes[0, i] * nodes[0, j] + 4.0 * nodes[1, i] * nodes[1, j] + nodes[2, i] * nodes[2, j])
-            )
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _take_in(x, P, h, e, S, gain):  # type: ignore[no-untyped-def]
-    """Take in one scalar measurement of innovation e and variance S; ``gain`` holds P h."""
-    n = x.size
-    for i in range(n):
-        g = gain[i] / S
-        if g != 0.0:
-            x[i] += g * e
-            for j in range(i + 1):
-                value = P[i, j] - g * gain[j]
-                P[i, j] = value
-                P[j, i] = value
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
 def _begin(P, programs, code, constants, values, slopes, stack, total, extra):  # type: ignore[no-untyped-def]
     """Add the initial variance of the effects' own states to P, and fill the intensities of what drives them."""
     width = P.shape[0] - N_AFTER
@@ -242,8 +150,8 @@ def _substep(  # type: ignore[no-untyped-def]
         x[i] += h / 6.0 * (k1[i] + 2.0 * k2[i] + 2.0 * k3[i] + k4[i])
     for i in after:
         x[i] *= decay[i]
-    _exponential(A, h, live, Phi, term, work)
-    _covariance(P, Phi, decay, live, after, W)
+    exponential(A, h, live, Phi, term, work)
+    carry_covariance(P, Phi, decay, live, after, W)
     for i in after:
         if i < x.size - 1:
             P[i, i] += drive[3] * h
@@ -257,7 +165,78 @@ def _substep(  # type: ignore[no-untyped-def]
             w[V], w[R] = ship[4] * U * U, ship[5] * U * U
         else:
             w[(F, M)[source] if source < 2 else N_BEFORE + source - 3] = 1.0
-        _noise(P, A, w, q, h, live, nodes, va, vb)
+        add_noise(P, A, w, q, h, live, nodes, va, vb)
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _measurements(  # type: ignore[no-untyped-def]
+    k,
+    x,
+    P,
+    row,
+    measured,
+    offset_s,
+    withheld,
+    current_row,
+    levels,
+    ship,
+    table,
+    values,
+    slopes,
+    stack,
+    total,
+    room,
+    predicted,
+    variance,
+    log_likelihood,
+):
+    """Predict the measurements of instant ``k``, take them in, and return the log-likelihood with theirs in it."""
+    programs, code, constants = table
+    k1, J, gain, h, stood = room
+    n, width = x.size, k1.size
+    # linearised once, where the prediction stands; one measurement after the other moves on from there
+    _dynamics(x, row, ship, width, width, programs, code, constants, values, slopes, stack, total, k1, J)
+    for i in range(n):
+        stood[i] = x[i]
+    values[VDOT], values[RDOT] = k1[V], k1[R]
+    for j in range(width):
+        slopes[VDOT, j], slopes[RDOT, j] = J[V, j], J[R, j]
+    for channel in range(3):
+        late, state = offset_s[channel], (V, R, PSI)[channel]
+        value = stood[state] + late * k1[state]
+        for j in range(n):
+            h[j] = late * J[state, j] if j < width else 0.0
+        h[state] += 1.0
+        if channel == 0:
+            h[n - 3], h[n - 2] = current_row[0], current_row[1]
+            value += h[n - 3] * stood[n - 3] + h[n - 2] * stood[n - 2]
+        elif channel == 1:
+            h[n - 1] = 1.0
+            value += stood[n - 1]
+        total[:] = 0.0
+        _add(ON_LATERAL + channel, 0, programs, code, constants, values, slopes, stack, width, total)
+        value += total[0]
+        for j in range(width):
+            h[j] += total[j + 1]
+        S = levels[3 + channel] ** 2
+        for i in range(n):
+            gain[i] = 0.0
+            for j in range(n):
+                gain[i] += P[i, j] * h[j]
+            value += h[i] * (x[i] - stood[i])
+            S += h[i] * gain[i]
+        predicted[k, channel], variance[k, channel] = value, S
+        if not np.isfinite(value):
+            return -np.inf
+        if np.isnan(measured[channel]):
+            continue
+        if not (S > 0.0):
+            return -np.inf
+        if not withheld:
+            e = measured[channel] - value
+            log_likelihood -= 0.5 * (_LOG_2PI + np.log(S) + e * e / S)
+            take_in(x, P, h, e, S, gain)
+    return log_likelihood
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -355,48 +334,12 @@ def extended(  # type: ignore[no-untyped-def]
                     *(x, P, inputs[i], inputs[i + 1], inputs[i + 2], step_s / SUBSTEPS, drive, decay, ship),
                     *(live, after, table, values, slopes, stack, total, room),
                 )
-        # linearised once, where the prediction stands; one measurement after the other moves on from there
-        _dynamics(x, inputs[ROWS * k], ship, width, width, *table, values, slopes, stack, total, k1, J)
-        for i in range(n):
-            stood[i] = x[i]
-        values[VDOT], values[RDOT] = k1[V], k1[R]
-        for j in range(width):
-            slopes[VDOT, j], slopes[RDOT, j] = J[V, j], J[R, j]
-        for channel in range(3):
-            late, state = offset_s[k, channel], (V, R, PSI)[channel]
-            value = stood[state] + late * k1[state]
-            for j in range(n):
-                h[j] = late * J[state, j] if j < width else 0.0
-            h[state] += 1.0
-            if channel == 0:
-                h[n - 3], h[n - 2] = current_row[k, 0], current_row[k, 1]
-                value += h[n - 3] * stood[n - 3] + h[n - 2] * stood[n - 2]
-            elif channel == 1:
-                h[n - 1] = 1.0
-                value += stood[n - 1]
-            total[:] = 0.0
-            _add(ON_LATERAL + channel, 0, programs, code, constants, values, slopes, stack, width, total)
-            value += total[0]
-            for j in range(width):
-                h[j] += total[j + 1]
-            S = levels[3 + channel] ** 2
-            for i in range(n):
-                gain[i] = 0.0
-                for j in range(n):
-                    gain[i] += P[i, j] * h[j]
-                value += h[i] * (x[i] - stood[i])
-                S += h[i] * gain[i]
-            predicted[k, channel], variance[k, channel] = value, S
-            if not np.isfinite(value):
-                return -np.inf
-            if np.isnan(measured[k, channel]):
-                continue
-            if not (S > 0.0):
-                return -np.inf
-            if not withheld[k]:
-                e = measured[k, channel] - value
-                log_likelihood -= 0.5 * (_LOG_2PI + np.log(S) + e * e / S)
-                _take_in(x, P, h, e, S, gain)
+        log_likelihood = _measurements(
+            *(k, x, P, inputs[ROWS * k], measured[k], offset_s[k], withheld[k], current_row[k], levels, ship),
+            *(table, values, slopes, stack, total, (k1, J, gain, h, stood), predicted, variance, log_likelihood),
+        )
+        if log_likelihood == -np.inf:
+            return -np.inf
         if states.shape[0] > 0:
             states[k] = x
             for i in range(n):

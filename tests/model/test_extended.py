@@ -25,7 +25,7 @@ STEP, N = 1.0, 240
 
 
 def run_of(step: float = STEP, n: int = N, *, seed: int = 0) -> Run:
-    """A zigzag of rudder, a speed that varies, a heading that swings, and measurements that are only noise around it."""
+    """A zigzag of rudder, a speed that varies, a heading that swings, measurements that are only noise around it."""
     random = np.random.default_rng(seed)
     fine = step / ROWS * np.arange(ROWS * (n - 1) + 1)
     inputs = np.zeros((fine.size, N_INPUT))
@@ -99,9 +99,7 @@ def test_a_free_run_with_drag_is_that_of_another_integrator():
     def slope(t: float, x: np.ndarray) -> list[float]:
         return drag(x, np.interp(t, run.time_s, run.speed_m_s), np.interp(t, run.time_s, run.rudder_rad), 1.7)
 
-    told = solve_ivp(
-        slope, (0.0, run.time_s[-1]), start[:3], t_eval=run.time_s, rtol=1e-10, atol=1e-12, max_step=0.25
-    )
+    told = solve_ivp(slope, (0.0, run.time_s[-1]), start[:3], t_eval=run.time_s, rtol=1e-10, atol=1e-12, max_step=0.25)
     assert found == pytest.approx(told.y.T, abs=2e-5)
     plain = Filtered(run, Augmented(), SPEC).free(HULL, np.zeros(0), start)
     assert np.max(np.abs(plain - found)) > 0.05  # the term is no rounding

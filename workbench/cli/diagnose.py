@@ -44,7 +44,7 @@ def command(
         raise click.UsageError("Say whose model: --vessel NAME, or --fleet for all.")
     if vessel is None:
         if set_id is not None or model is not None or files:
-            raise click.UsageError("--fleet begins from the plain model; --set, --model and --effect-file need a vessel.")
+            raise click.UsageError("--set, --model and --effect-file need a --vessel; --fleet begins plain.")
         _fleet(uri, as_json=as_json)
         return
     from flows.diagnose_vessel import diagnose_vessel
@@ -64,7 +64,7 @@ def command(
 
 
 def _fleet(uri: str, *, as_json: bool) -> None:
-    from flows.fleet_diagnosis import diagnose
+    from flows.fleet import diagnose
 
     rows = diagnose(uri)
     if as_json:

@@ -23,6 +23,7 @@ command.add_command(effects_of_vessel.try_formula)
 command.add_command(effects_of_vessel.add)
 command.add_command(effects_of_vessel.undo)
 
+
 @command.command("list")
 @click.option("--group", type=click.Choice(["hull", "rudder", "propulsion", "environment", "sensor", "other"]))
 @click.option("--markdown", is_flag=True, help="Print the table of docs/effects.md.")
