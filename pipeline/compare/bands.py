@@ -37,8 +37,8 @@ def by_band(looked: Sequence[Looked]) -> dict[str, list[dict[str, Any]]]:
     -------
     dict of str to list of dict
         ``low_hz``, ``high_hz``, ``share`` of the whitened innovations' power, ``expected_share``, ``ratio`` of both (1
-        when white) with its 99 % ``band``, ``outside``, ``peak_hz`` where the power is largest, and ``free_run_rms``:
-        the free run's error within the band, in ``unit``.
+        when white) with its 99 % ``band``, ``outside``, ``p_value`` of a ratio as large, ``peak_hz`` where the power is
+        largest, and ``free_run_rms``: the free run's error within the band, in ``unit``.
     """
     found = {}
     for i, name in enumerate(CHANNELS):
@@ -100,6 +100,7 @@ def _bands(parts: Sequence[_Spectra], name: str) -> list[dict[str, Any]]:
                 "ratio": ratio,
                 "band": [float(bounds[0]), float(bounds[1])],
                 "outside": not bounds[0] <= ratio <= bounds[1],
+                "p_value": float(beta.sf(share, k, rest)),
                 "peak_hz": float(frequency[inside][int(np.argmax(power[inside]))]),
                 "free_run_rms": factor * float(np.sqrt(np.sum(error[inside]) / len(parts))),
                 "unit": unit,

@@ -38,8 +38,10 @@ def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
     dict
         By channel ``auto`` and ``cross`` with ``rudder``, ``rudder_rate``, ``heading_sine``, ``heading_cosine``,
         ``speed`` and, where the wind was logged, ``wind`` (squared speed times the sine of its angle): ``lag_s``,
-        ``rho``, ``band``, ``outside`` (how many lags), ``expected_outside``, ``largest`` and ``largest_lag_s``; of
-        ``auto`` also ``ljung_box``, its degrees of freedom and p-value. A positive lag: what was given came first.
+        ``rho``, ``band``, ``outside`` (how many lags; neighbours go together where what was given is smooth),
+        ``expected_outside``, ``largest``, ``largest_lag_s`` and ``p_adjusted``, the probability of as large a one at
+        any of the lags (Bonferroni); of ``auto`` also ``ljung_box``, its degrees of freedom and p-value. A positive
+        lag: what was given came first.
     """
     step = looked[0].filtered.run.step_s
     most = int(min(_LONGEST_S / step, _MOST))
@@ -100,7 +102,8 @@ def _pooled(z: Sequence[Float], other: Sequence[Float], lags: Sequence[int]) -> 
 def _told(rho: Float, pairs: Float, lag_s: Float) -> dict[str, Any]:
     good = np.isfinite(rho)
     if not good.any():
-        return {"lag_s": [], "rho": [], "band": None, "outside": 0, "expected_outside": 0.0, "largest": None}
+        nothing = {"band": None, "outside": 0, "expected_outside": 0.0, "largest": None, "largest_lag_s": None}
+        return {"lag_s": [], "rho": [], **nothing, "p_adjusted": None}
     rho, pairs, lag_s = rho[good], pairs[good], lag_s[good]
     at = int(np.argmax(np.abs(rho)))
     return {
@@ -111,6 +114,7 @@ def _told(rho: Float, pairs: Float, lag_s: Float) -> dict[str, Any]:
         "expected_outside": (1.0 - BAND) * rho.size,
         "largest": float(rho[at]),
         "largest_lag_s": float(lag_s[at]),
+        "p_adjusted": min(1.0, 2.0 * rho.size * float(norm.sf(np.max(np.abs(rho) * np.sqrt(pairs))))),
     }
 
 

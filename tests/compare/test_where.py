@@ -58,6 +58,7 @@ def test_the_true_model_is_white_everywhere() -> None:
     for channel in found["correlations"].values():
         assert channel["auto"]["p_value"] > 1e-3
         assert channel["auto"]["outside"] <= 6
+        assert all(cross["p_adjusted"] > 1e-3 for cross in channel["cross"].values())
     outside = [band["outside"] for bands in found["by_band"].values() for band in bands]
     assert sum(outside) <= 3
 
@@ -81,6 +82,7 @@ def test_a_rudder_that_answers_2_s_late_shows_while_it_moves_and_against_the_rud
     cross = found["correlations"]["yaw_rate"]["cross"]["rudder_rate"]
     assert cross["outside"] > 5 * cross["expected_outside"]
     assert abs(cross["largest"]) > 3.0 * cross["band"]
+    assert cross["p_adjusted"] < 1e-6
     # b2 is positive, and the late rudder's yaw acceleration is missing while it moves to starboard
     assert cross["largest"] < 0.0 and cross["largest_lag_s"] <= 6.0
     # the worst stretches lie where the rudder moves

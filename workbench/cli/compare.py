@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from flows.compare_vessel import Comparison
 
 _CHANNELS = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
+#: probability below which a band or a correlation is told
+_LEVEL = 0.01
 _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
 
 
@@ -168,16 +170,34 @@ def _tell_where(title: str, where: dict[str, Any]) -> None:
     ]
     if rows:
         print_table(["channel", "where", "n", "whitened rms", "99 % band"], rows)
+    count = sum(len(bands) for bands in where["by_band"].values())
     for channel, bands in where["by_band"].items():
-        out = [b for b in bands if b["outside"] and b["ratio"] > 1.0]
+        out = [b for b in bands if count * b["p_value"] < _LEVEL]
         if out:
             most = max(out, key=lambda b: float(b["ratio"]))
             click.echo(
                 f"  {_CHANNELS[channel]}: {most['ratio']:.1f} times the power of white noise between "
                 f"{most['low_hz']:g} and {most['high_hz']:g} Hz, most at {most['peak_hz']:.3g} Hz"
             )
+    for channel, told in where["correlations"].items():
+        _tell_correlation(_CHANNELS[channel], told)
     rows = [[w["start"], w["end"], w["run"], _CHANNELS[w["channel"]], w["measure"], _size(w)] for w in where["worst"]]
     print_table(["start UTC", "end UTC", "run", "channel", "horizon", "error"], rows, "  worst stretches")
+
+
+def _tell_correlation(channel: str, told: dict[str, Any]) -> None:
+    """Say that a channel's innovations go with themselves or with what the ship was given, where they do."""
+    p_value = told["auto"]["p_value"]
+    if p_value is not None and p_value < _LEVEL:
+        click.echo(f"  {channel}: errors one step ahead hang together (Ljung-Box p = {p_value:.1g})")
+    found = [(name, one) for name, one in told["cross"].items() if one["largest"] is not None]
+    found = [(name, one) for name, one in found if one["p_adjusted"] < _LEVEL]
+    if found:
+        name, one = min(found, key=lambda pair: float(pair[1]["p_adjusted"]))
+        click.echo(
+            f"  {channel}: errors go with {name.replace('_', ' ')} {one['largest_lag_s']:g} s before, correlation "
+            f"{one['largest']:+.2f} (99 % band +-{one['band']:.2f})"
+        )
 
 
 def _size(window: dict[str, Any]) -> str:
