@@ -63,7 +63,7 @@ class MaximumLikelihoodSettings:
     entries: int = 2
     coarse_instants: int = 300
     coarse_iterations: int = 25
-    sigma_low: tuple[float, ...] = (1e-7, 1e-9, 1e-4, 1e-5, 1e-7, 1e-6)
+    sigma_low: tuple[float, ...] = (1e-6, 1e-9, 3e-3, 1e-5, 1e-7, 1e-6)
     sigma_high: tuple[float, ...] = (10.0, 0.1, 100.0, 10.0, 0.5, 1.0)
     initial_std: tuple[float, ...] = INITIAL_STD
     gate_width: float = 5.0

@@ -22,6 +22,8 @@ _DAMPED = 0.1
 #: a step that does not rise is shortened so, so many times, before the damping grows: its direction is mostly good,
 #: and damping turns it towards the steepest rise, which creeps
 _SHORTER, _TRIES = 0.3, 3
+#: a logarithm that falls by more than this in a step, with less than so much left to gain, is on its way to nothing
+_SINKING, _LITTLE = 0.2, 0.05
 _HULL = 6
 
 
@@ -129,9 +131,10 @@ def climb_by(
         if found is None:
             converged, reason = gain < 1e-3, "no step raises the log-likelihood any more"
             break
-        damping = damping / 10.0 if damping > 1e-9 else 0.0
-        step, before = found - theta, score
-        rise, far = there[0] - value, gain > _NEAR
+        damping, far = damping / 10.0 if damping > 1e-9 else 0.0, gain > _NEAR
+        if gain < _LITTLE:
+            found, there = _sunk(objective, theta, found, there)
+        step, before, rise = found - theta, score, there[0] - value
         theta, (value, score, information) = found, there
         if far and rise > _KEPT * gain:
             curvature = information
@@ -152,6 +155,23 @@ def _risen(
         if there[0] > value:
             return candidate, there
     return None, there
+
+
+def _sunk(
+    objective: Objective[C], theta: Float, found: Float, there: tuple[float, Float, C]
+) -> tuple[Float, tuple[float, Float, C]]:
+    """Let levels that sink go to their lower bounds at once, where that is higher still.
+
+    The log-likelihood goes with the square of a level near nothing, so that by its logarithm every step goes only a
+    part of the way, and the same part again.
+    """
+    sinking: Mask = (found - theta < -_SINKING) & (there[1] < 0.0) & (found > objective.low)
+    sinking[:_HULL] = False
+    if not sinking.any():
+        return found, there
+    bottom = np.where(sinking, objective.low, found)
+    lower = objective.full(bottom)
+    return (bottom, lower) if lower[0] > there[0] else (found, there)
 
 
 def _bounded(step: Float, theta: Float, scale: Float) -> Float:

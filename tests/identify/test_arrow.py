@@ -103,10 +103,10 @@ def test_cost_is_linear_in_members() -> None:
     def fastest(call: Callable[[], object]) -> float:
         times = []
         for _ in range(7):
-            start = time.perf_counter()
+            start = time.process_time()
             call()
-            times.append(time.perf_counter() - start)
+            times.append(time.process_time() - start)
         return min(times)
 
     # sixteen times the members: sixteen times the time and not 4096, with room for a busy machine
-    assert fastest(of(3200)) < 50.0 * fastest(of(200))
+    assert fastest(of(3200)) < 100.0 * fastest(of(200))
