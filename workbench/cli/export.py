@@ -1,4 +1,4 @@
-"""``kempf export yaml|csv|control|mat``: a parameter set as a file for other programs."""
+"""``kempf export yaml|csv|control|mat|mcap``: a parameter set, or runs and predictions, as a file for others."""
 
 from __future__ import annotations
 
@@ -10,15 +10,15 @@ from typing import Any, TypeVar
 import click
 
 from schemas.errors import UsageError
-from workbench.cli.options import json_option, warehouse_option
-from workbench.terminal import print_json
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import print_json, progress
 
 F = TypeVar("F", bound=Callable[..., Any])
 
 
 @click.group("export")
 def command() -> None:
-    """Write a parameter set as a file that other programs read.
+    """Write a parameter set, or runs with their predictions, as a file that other programs read.
 
     A unique beginning of its id is enough. Without --out it goes to stdout. Nothing is overwritten.
     """
@@ -80,6 +80,38 @@ def mat_file(
         )
     model = _linear(uri, set_id, speed, step, course)
     _deliver("mat", model.ship.parameter_set.parameter_set_id, as_mat(model), out, as_json)
+
+
+@command.command("mcap")
+@vessel_option(required=True)
+@click.option("--set", "set_id", metavar="ID", help="Parameter set; default: alias model, else pooled, else current.")
+@click.option(
+    "--output", "--out", "out", type=click.Path(path_type=Path), metavar="FILE", required=True, help="Write here."
+)
+@warehouse_option
+@json_option
+def mcap_file(vessel: str, set_id: str | None, out: Path, uri: str, as_json: bool) -> None:
+    """Measured and predicted channels of a vessel's runs side by side, for Foxglove and PlotJuggler.
+
+    One step ahead with 95 % intervals, and the free run; UTC nanoseconds, JSON messages with a schema, zstd.
+    """
+    from flows.compare_vessel import compare_vessel
+    from warehouse.store import Warehouse
+    from workbench.export import write_new
+    from workbench.export_mcap import about, to_mcap
+    from workbench.new_file import require_new
+
+    require_new(out, "--output")
+    with progress() as tell:
+        found = compare_vessel(Warehouse(uri), vessel, set_id, "1", tell)
+    data = to_mcap(found.runs, about(found))
+    write_new(out, data, "--output")
+    name = found.parameter_set.parameter_set_id
+    if as_json:
+        told = {"vessel": vessel, "parameter_set_id": name, "format": "mcap", "out": str(out), "runs": len(found.runs)}
+        print_json({**told, "skipped": found.skipped})
+    else:
+        click.echo(f"{vessel}, {name}: {len(found.runs)} runs written to {out}", err=True)
 
 
 def _linear(uri: str, set_id: str, speed: float | None, step: float, course: float) -> Any:

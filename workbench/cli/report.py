@@ -1,0 +1,67 @@
+"""``kempf report``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import print_json, progress
+
+
+@click.command("report")
+@vessel_option(required=True)
+@click.option("--set", "set_id", metavar="ID", help="Begin from the model of this parameter set.")
+@click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Begin from this model, YAML.")
+@click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+              help="An effect of your own, YAML; tried beside the catalogue. May be repeated.")  # fmt: skip
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="Write here; default: the vessel's name with .html. Nothing is overwritten.",
+)
+@warehouse_option
+@json_option
+def command(
+    vessel: str,
+    set_id: str | None,
+    model: Path | None,
+    files: tuple[Path, ...],
+    output: Path | None,
+    uri: str,
+    as_json: bool,
+) -> None:
+    """Write one HTML file that tells what a vessel's model lacks, with every figure in it.
+
+    The file asks for nothing outside itself and can be sent as it is. It diagnoses the vessel as `kempf diagnose` does.
+    """
+    from flows.vessel_model import Own
+    from warehouse.store import Warehouse
+    from workbench.chosen_model import chosen_model, read_effect_files
+    from workbench.export import write_new
+    from workbench.new_file import require_new
+    from workbench.report.made import made
+
+    path = Path(f"{vessel}.html".replace("/", "_")) if output is None else output
+    require_new(path, "--output")
+    warehouse = Warehouse(uri)
+    spec, own = chosen_model(warehouse, vessel, set_id, model)
+    own = own.beside(Own(files=read_effect_files(files)))
+    with progress() as tell:
+        found = made(warehouse, vessel, spec, own, tell)
+    write_new(path, found.html, "--output")
+    if as_json:
+        print_json(
+            {
+                "vessel": vessel,
+                "diagnosis_id": found.diagnosis_id,
+                "verdict": found.content.verdict,
+                "headline": found.content.headline,
+                "out": str(path),
+            }
+        )
+        return
+    click.echo(f"{vessel}: {found.content.headline}")
+    click.echo(f"{path}: {len(found.html) / 1e6:.1f} MB, one file, to be opened in any browser", err=True)

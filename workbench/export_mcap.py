@@ -1,0 +1,183 @@
+"""A vessel's runs as an MCAP file: measured and predicted beside each other on topics of their own, for log viewers.
+
+JSON messages with a JSON Schema, times in UTC nanoseconds, chunks compressed with zstd (https://mcap.dev/spec). What is
+not there is left out of a message: no viewer reads NaN.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from pipeline.compare.ahead import WIDTH_95
+from pipeline.compare.comparison import ComparedRun
+from pipeline.compare.predicted import Predicted
+from pipeline.diagnose.run import Run
+from pipeline.normalise.series import SECOND_NS, Float
+
+#: written into the header instead of the writer's version, so that an upgrade of it leaves the bytes alone
+_LIBRARY = "kempf"
+_CHUNK_BYTES = 262_144
+_DEG = float(np.rad2deg(1.0))
+#: column of the measurements, unit people use, and factor to it
+_CHANNELS = {
+    "lateral_speed": (0, "m_s", 1.0),
+    "yaw_rate": (1, "deg_s", _DEG),
+    "heading": (2, "deg", _DEG),
+}
+_WORDS = {
+    "m_s": "m/s",
+    "deg_s": "deg/s",
+    "deg": "deg",
+}
+
+
+if TYPE_CHECKING:
+    from flows.compare_vessel import Comparison
+
+
+@dataclass(frozen=True)
+class _Topic:
+    """One topic: its name, its schema's name and properties with their descriptions."""
+
+    name: str
+    schema: str
+    properties: Mapping[str, str]
+
+
+def to_mcap(runs: Sequence[ComparedRun], about: Mapping[str, str]) -> bytes:
+    """Return runs as an MCAP file.
+
+    Parameters
+    ----------
+    runs : sequence of ComparedRun
+        Compared one step ahead; each bears its free run as well.
+    about : mapping of str to str
+        What the file tells of itself: vessel, ids, settings; a metadata record of it.
+
+    Returns
+    -------
+    bytes
+        Topics ``/measured/X``, ``/predicted/one_step/X`` with ``low_95`` and ``high_95``, ``/predicted/free_run/X`` for
+        X in ``lateral_speed``, ``yaw_rate``, ``heading`` (true, not wrapped at 360 deg); ``/input/rudder``,
+        ``/input/speed``; ``/run`` names each manoeuvre where it begins and ends. Equal content gives equal bytes.
+    """
+    from mcap.writer import CompressionType, Writer
+
+    out = BytesIO()
+    writer = Writer(out, chunk_size=_CHUNK_BYTES, compression=CompressionType.ZSTD)
+    writer.start(profile="", library=_LIBRARY)
+    channels: dict[str, int] = {}
+    messages = []
+    for run in sorted(runs, key=lambda one: (one.looked.filtered.run.start_utc_ns, one.name)):
+        for topic, stamp, content in _of_run(run):
+            if topic.name not in channels:
+                schema = writer.register_schema(f"kempf.{topic.schema}", "jsonschema", _schema(topic))
+                channels[topic.name] = writer.register_channel(topic.name, "json", schema)
+            messages.append((stamp, channels[topic.name], content))
+    writer.add_metadata("kempf", dict(about))
+    # within one instant in the order of the topics
+    messages.sort(key=lambda one: (one[0], one[1]))
+    for sequence, (stamp, channel, content) in enumerate(messages):
+        data = json.dumps(content, separators=(",", ":"), allow_nan=False).encode()
+        writer.add_message(channel, stamp, data, stamp, sequence=sequence)
+    writer.finish()  # type: ignore[no-untyped-call]
+    return out.getvalue()
+
+
+def about(found: Comparison) -> dict[str, str]:
+    """Return what a file tells of where its predictions come from.
+
+    Parameters
+    ----------
+    found : Comparison
+    """
+    told = {
+        "vessel": found.vessel,
+        "parameter_set_id": found.parameter_set.parameter_set_id,
+        "estimator": found.parameter_set.estimator,
+        "effects": ", ".join(found.parameter_set.model_spec.get("effects", ())),
+        "code_version": str(found.parameter_set.provenance.get("code_version", "")),
+    }
+    for run in found.runs:
+        told[run.name] = f"{run.sample.replace('_', ' ')}; noise levels {run.levels_from}"
+    return told
+
+
+def _schema(topic: _Topic) -> bytes:
+    kinds = {"held_out": "boolean", "segment_id": "string", "event": "string"}
+    properties = {
+        name: {"type": kinds.get(name, "number"), "description": words} for name, words in topic.properties.items()
+    }
+    return json.dumps({"type": "object", "title": f"kempf.{topic.schema}", "properties": properties}).encode()
+
+
+def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
+    taken = run.looked.filtered.run
+    instant = taken.start_utc_ns + np.round(taken.time_s * SECOND_NS).astype(np.int64)
+    begins = _Topic(
+        "/run",
+        "run",
+        {"event": "begin or end", "segment_id": "manoeuvre", "held_out": "whether the parameters have not seen it"},
+    )
+    for event, at in (("begin", instant[0]), ("end", instant[-1])):
+        yield begins, int(at), {"event": event, "segment_id": run.name, "held_out": run.held_out}
+    for name, (column, unit, factor) in _CHANNELS.items():
+        zero = factor * _first_heading(taken) if name == "heading" else 0.0
+        # a prediction is made for the moment of its measurement, a little off the grid's instant
+        late = instant + np.round(taken.offset_s[:, column] * SECOND_NS).astype(np.int64)
+        words = f"{name.replace('_', ' ')}, {_WORDS[unit]}"
+        field = f"{name}_{unit}"
+        measured = factor * taken.measured[:, column] + zero
+        yield from _series(_topic(f"/measured/{name}", f"measured {words}", field), late, {field: measured})
+        yield from _predicted(run.predicted, "one_step", name, words, late, zero)
+        yield from _predicted(run.free, "free_run", name, words, late, zero)
+    yield from _series(
+        _topic("/input/rudder", "rudder angle, deg, starboard positive", "rudder_angle_deg"),
+        instant,
+        {"rudder_angle_deg": _DEG * taken.rudder_rad},
+    )
+    yield from _series(
+        _topic("/input/speed", "speed through the water, m/s", "speed_through_water_m_s"),
+        instant,
+        {"speed_through_water_m_s": taken.speed_m_s},
+    )
+
+
+def _first_heading(run: Run) -> float:
+    """Return the true heading, rad, that the measured one is counted from."""
+    known = np.isfinite(run.measured[:, 2])
+    return float(np.median(run.heading_rad[known] - run.measured[known, 2])) if known.any() else 0.0
+
+
+def _predicted(
+    one: Predicted, horizon: str, name: str, words: str, instant: Any, zero: float
+) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
+    column, unit, factor = _CHANNELS[name]
+    field = f"{name}_{unit}"
+    columns = {field: factor * one.predicted[:, column] + zero}
+    properties = {field: f"predicted {words}, {horizon.replace('_', ' ')}"}
+    if np.isfinite(one.std[:, column]).any():
+        half = WIDTH_95 * factor * one.std[:, column]
+        columns |= {"low_95": columns[field] - half, "high_95": columns[field] + half}
+        properties |= {"low_95": "lower end of the 95 % interval", "high_95": "upper end of the 95 % interval"}
+    topic = _Topic(f"/predicted/{horizon}/{name}", f"{horizon}.{name}", properties)
+    yield from _series(topic, instant, columns)
+
+
+def _topic(name: str, words: str, field: str) -> _Topic:
+    return _Topic(name, name.strip("/").replace("/", "."), {field: words})
+
+
+def _series(topic: _Topic, instant: Any, columns: Mapping[str, Float]) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
+    names = list(columns)
+    table = np.column_stack([columns[name] for name in names])
+    for stamp, row in zip(instant.tolist(), table.tolist(), strict=True):
+        content = {name: value for name, value in zip(names, row, strict=True) if np.isfinite(value)}
+        if names[0] in content:
+            yield topic, stamp, content

@@ -1,0 +1,105 @@
+"""Correlations of the innovations with themselves and with what the ship was given, with the band of 99 %."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
+
+#: in the order of the columns; the others stand in the table
+_SHOWN = ("itself", "rudder", "heading_sine", "heading_cosine", "speed", "wind")
+WORDS = {
+    "itself": "itself",
+    "rudder": "rudder",
+    "rudder_rate": "rudder's rate",
+    "heading_sine": "sine of heading",
+    "heading_cosine": "cosine of heading",
+    "speed": "speed",
+    "wind": "wind force",
+}
+_ORDER = ("heading", "yaw_rate", "lateral_speed")
+
+Pairs = dict[tuple[str, str], Mapping[str, Any]]
+
+
+def pairs(correlations: Mapping[str, Any]) -> Pairs:
+    """Return every correlation that there is by channel and what it is with.
+
+    Parameters
+    ----------
+    correlations : mapping
+        Of `pipeline.compare.correlations.correlations`.
+    """
+    found: Pairs = {}
+    for channel in _ORDER:
+        if channel not in correlations:
+            continue
+        every = {"itself": correlations[channel]["auto"], **correlations[channel]["cross"]}
+        found |= {(channel, name): one for name, one in every.items() if one["lag_s"]}
+    return found
+
+
+def draw_correlations(before: Mapping[str, Any], after: Mapping[str, Any], *, improved: bool) -> Any:
+    """Draw one row a channel, one column for itself and each input.
+
+    Parameters
+    ----------
+    before, after : mapping
+        Of the plain model and of the last.
+    improved : bool
+        Whether these are two.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+    """
+    first, last = pairs(before), pairs(after)
+    rows = list(dict.fromkeys(channel for channel, _ in last))
+    columns = [name for name in _SHOWN if any(other == name for _, other in last)]
+    with style():
+        figure = new_figure(0.9 + 1.5 * len(rows))
+        panels = figure.subplots(len(rows), len(columns), sharey=True, sharex=True, squeeze=False)
+        for row, channel in zip(panels, rows, strict=True):
+            row[0].set_ylabel(channel.replace("_", " "))
+            for panel, other in zip(row, columns, strict=True):
+                one = last.get((channel, other))
+                if one is None:
+                    panel.set_visible(False)
+                    continue
+                panel.axhspan(-one["band"], one["band"], color="0.87", lw=0, label="99 of 100 belong here")
+                panel.axhline(0.0, color="black", lw=0.5)
+                if improved and (channel, other) in first:
+                    plain = first[channel, other]
+                    panel.plot(plain["lag_s"], plain["rho"], color=PLAIN, lw=0.9, ls="--", label="plain model")
+                label, colour = ("model with effects", FULL) if improved else ("plain model", PLAIN)
+                panel.plot(one["lag_s"], one["rho"], color=colour, lw=0.9, label=label)
+        for panel, other in zip(panels[0], columns, strict=True):
+            panel.set_title(WORDS[other])
+        largest = max(abs(one["largest"]) for one in (*first.values(), *last.values()))
+        panels[0, 0].set_ylim(-max(0.15, 1.08 * largest), max(0.15, 1.08 * largest))
+        figure.supxlabel("by how much the innovation comes later, s", fontsize=9)
+        handles, labels = panels[0, 0].get_legend_handles_labels()
+        figure.legend(handles, labels, loc="outside upper right", ncols=3)
+        return figure
+
+
+def describe_correlations(after: Mapping[str, Any]) -> str:
+    """Return the figure in words.
+
+    Parameters
+    ----------
+    after : mapping
+        Of the last model.
+    """
+    found = pairs(after)
+    worst = sorted(found, key=lambda key: (-found[key]["outside"] / len(found[key]["lag_s"]), key))[:3]
+    told = "; ".join(
+        f"{channel.replace('_', ' ')} with {WORDS[other]}, {found[channel, other]['outside']} of "
+        f"{len(found[channel, other]['lag_s'])}"
+        for channel, other in worst
+    )
+    return (
+        "Correlations of the whitened one-step innovations with their own past and with what the ship was given, lags "
+        f"to a minute. Lags outside the 99 % band under the last model, the most: {told}."
+    )

@@ -1,0 +1,100 @@
+"""A vessel's report from the warehouse: diagnosed, gathered, written as a page."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+
+from flows.diagnose_vessel import diagnose_vessel, examine
+from flows.progress import Progress, silent
+from flows.vessel_model import Own
+from flows.vessel_runs import choose
+from pipeline.diagnose.diagnosis import DiagnosisSettings
+from schemas.model_spec import ModelSpec
+from schemas.profile import VesselProfile
+from warehouse import code_version, vessels
+from warehouse.diagnoses import StoredDiagnosis
+from warehouse.store import Warehouse
+from workbench.report.content import ReportContent
+from workbench.report.gather import gather
+from workbench.report.page import page
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """A report with what it shows.
+
+    Attributes
+    ----------
+    diagnosis_id : str
+        Of the stored diagnosis that it tells of.
+    content : ReportContent
+    html : str
+    """
+
+    diagnosis_id: str
+    content: ReportContent
+    html: str
+
+
+def made(
+    warehouse: Warehouse,
+    vessel: str,
+    spec: ModelSpec,
+    own: Own,
+    progress: Progress = silent,
+    settings: DiagnosisSettings | None = None,
+) -> Report:
+    """Make a vessel's report.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    spec : ModelSpec
+        The model to begin from.
+    own : Own
+        Effects beyond the catalogue.
+    progress : Progress, optional
+    settings : DiagnosisSettings, optional
+
+    Raises
+    ------
+    NotFound
+        ``no_vessel``, ``no_segments``, ``no_runs``.
+    """
+    settings = settings or DiagnosisSettings()
+    stored, _ = diagnose_vessel(warehouse, vessel, spec, own, settings, progress)
+    # the curves are not stored: they are made again from the same inputs
+    examined = examine(warehouse, choose(warehouse, vessel, progress), spec, own, settings, progress)
+    profile = vessels.get(warehouse, examined.chosen.profile_sha256)
+    content = gather(
+        vessel,
+        examined.diagnosis,
+        examined.chosen.segments,
+        examined.chosen.file_names,
+        _ship(profile),
+        _provenance(stored, examined.chosen.profile_sha256, examined.runs.spec, settings)
+        + [(f"left out, {name}", why) for name, why in sorted(examined.runs.skipped.items())],
+    )
+    progress(0, 1, "drawing")
+    return Report(stored.diagnosis_id, content, page(content))
+
+
+def _ship(profile: VesselProfile) -> dict[str, str]:
+    told = {"length": profile.length_m, "beam": profile.beam_m, "draught": profile.draught_m}
+    return {name: f"{value:g} m" for name, value in told.items() if value is not None}
+
+
+def _provenance(
+    stored: StoredDiagnosis, profile_sha256: str, spec: ModelSpec, settings: DiagnosisSettings
+) -> list[tuple[str, str]]:
+    return [
+        ("diagnosis", stored.diagnosis_id),
+        ("parameter set it began from", stored.parameter_set_id),
+        ("code", stored.code_version),
+        ("commit of the source", code_version.git_commit() or "not known"),
+        *((f"package {name}", version) for name, version in sorted(code_version.packages().items())),
+        ("vessel profile, SHA-256", profile_sha256),
+        *((f"model, {name}", str(value)) for name, value in sorted(spec.model_dump(mode="json").items())),
+        *((f"setting, {name}", str(value)) for name, value in sorted(asdict(settings).items())),
+    ]
