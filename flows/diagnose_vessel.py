@@ -61,8 +61,9 @@ def diagnose_vessel(
     found = diagnoses.find(warehouse, diagnosis_id(inputs))
     if found is not None:
         return found, False
-    base, _ = store_model(warehouse, chosen, spec, own, progress)
-    examined = examine(warehouse, chosen, spec, own, settings, progress)
+    runs = assembled(warehouse, chosen, spec, progress)
+    base, _ = store_model(warehouse, chosen, spec, own, progress, runs=runs)
+    examined = examine(warehouse, chosen, spec, own, settings, progress, runs=runs)
     content = as_json(examined.diagnosis)
     made = StoredDiagnosis(
         diagnosis_id=diagnosis_id(inputs),
@@ -90,12 +91,13 @@ def examine(
     settings: DiagnosisSettings = STANDARD,
     progress: Progress = silent,
     only: tuple[str, ...] = (),
+    runs: VesselRuns | None = None,
 ) -> Examined:
     """Make a diagnosis with everything in it, for a report; nothing is stored.
 
     ``only`` names the effects to screen instead of all.
     """
-    runs = assembled(warehouse, chosen, spec, progress)
+    runs = runs or assembled(warehouse, chosen, spec, progress)
     known = known_effects(own)
     screened = {name: known[name] for name in only} if only else known
     count = 0

@@ -37,6 +37,8 @@ from warehouse.store import Warehouse
 #: the estimator of these sets, and the alias of the model that a vessel stands at
 ESTIMATOR, ALIAS = "ml-effects", "model"
 _STEP_S = 1.0
+#: eq. (16) with the bias of the rate gyro left to the catalogue, which names it where there is one
+PLAIN = ModelSpec(name="plain", rate_bias=False)
 
 
 @dataclass(frozen=True)
@@ -128,6 +130,7 @@ def store_model(
     own: Own,
     progress: Progress = silent,
     flow_run: str | None = None,
+    runs: VesselRuns | None = None,
 ) -> tuple[ParameterSet, bool]:
     """Fit and store a model and every model on the way to it; the vessel then stands at it.
 
@@ -140,6 +143,8 @@ def store_model(
     own : Own
     progress : Progress, optional
     flow_run : str, optional
+    runs : VesselRuns, optional
+        The manoeuvres, where the caller has read them.
 
     Returns
     -------
@@ -152,10 +157,10 @@ def store_model(
     if name in stored:
         return parameter_sets.get(warehouse, name), False
     parent = None
+    runs = runs or assembled(warehouse, chosen, spec, progress)
     if spec.effects:
         before = spec.model_copy(update={"effects": spec.effects[:-1]})
-        parent = store_model(warehouse, chosen, before, own, progress, flow_run)[0].parameter_set_id
-    runs = assembled(warehouse, chosen, spec, progress)
+        parent = store_model(warehouse, chosen, before, own, progress, flow_run, runs)[0].parameter_set_id
     told = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
     profile = vessels.get(warehouse, chosen.profile_sha256)
     progress(0, 1, f"fitting {spec.effects[-1] if spec.effects else 'the plain model'}")

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import cached_property
 from os import cpu_count
 
 import numpy as np
@@ -15,7 +16,7 @@ from flows.refresh_logs import refresh_logs
 from pipeline.diagnose.run import Run, Ship, make_run, step_of
 from pipeline.diagnose.split import split
 from pipeline.diagnose.start import Start, start_of
-from pipeline.identify.record import make_record
+from pipeline.identify.record import Record, make_record
 from pipeline.normalise.instruments import Instruments, from_readings
 from schemas.errors import KempfError, NotFound
 from schemas.model_spec import ModelSpec
@@ -41,16 +42,22 @@ class VesselRuns:
         With the arm and the moment decided.
     runs : tuple of Run
         In order of time; named by their segments.
-    start : Start
-        Hull and noise levels to start a fit from; the held-out runs have no part in the hull.
+    records : tuple of Record
+        What the runs were made of.
     skipped : dict of str to str
         Why a segment is no run, by its id.
     """
 
     spec: ModelSpec
     runs: tuple[Run, ...]
-    start: Start
+    records: tuple[Record, ...]
     skipped: dict[str, str]
+
+    @cached_property
+    def start(self) -> Start:
+        """Hull and noise levels to start a fit from; the held-out runs have no part in the hull."""
+        with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+            return start_of(self.records, self.runs, self.spec, split(self.runs)[0], workers)
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,11 +152,11 @@ def assembled(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: P
     for done, (log_id, ingest_id) in enumerate(chosen.ingests.items()):
         progress(done, len(chosen.ingests), f"reading {chosen.file_names[log_id]}")
         instruments[log_id] = from_readings(readings.read(warehouse, ingest_id))
-    progress(len(chosen.ingests), len(chosen.ingests), "finding a ship to start from")
+    progress(len(chosen.ingests), len(chosen.ingests), "laying the manoeuvres out")
     profile = vessels.get(warehouse, chosen.profile_sha256)
     bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
     made = assemble(instruments, profile, bounds, spec)
-    return VesselRuns(made.spec, made.runs, made.start, chosen.skipped | made.skipped)
+    return VesselRuns(made.spec, made.runs, made.records, chosen.skipped | made.skipped)
 
 
 def assemble(
@@ -197,9 +204,7 @@ def assemble(
         make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id])
         for name, one, record in records
     )
-    with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
-        start = start_of([record for _, _, record in records], runs, ready, split(runs)[0], workers)
-    return VesselRuns(ready, runs, start, skipped)
+    return VesselRuns(ready, runs, tuple(record for _, _, record in records), skipped)
 
 
 def once(found: Sequence[Segment]) -> tuple[list[Segment], dict[str, str]]:

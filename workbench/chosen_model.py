@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flows.files import read_model
-from flows.vessel_model import ESTIMATOR, Own
+from flows.vessel_model import ESTIMATOR, PLAIN, Own
 from schemas.errors import UsageError
 from schemas.model_spec import ModelSpec
 from warehouse import parameter_sets
 from warehouse.parameter_set import ParameterSet
 from warehouse.store import Warehouse
 
-#: eq. (16) with the bias of the rate gyro left to the catalogue, which names it where there is one
-PLAIN = ModelSpec(name="plain", rate_bias=False)
 _LARGEST = 100_000
 
 

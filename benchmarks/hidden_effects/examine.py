@@ -18,8 +18,8 @@ from typing import Any
 from flows.diagnose_vessel import diagnose_vessel
 from flows.files import read_profiles
 from flows.ingest_logs import ingest
+from flows.vessel_model import PLAIN
 from schemas.errors import KempfError
-from schemas.model_spec import ModelSpec
 from warehouse.store import Warehouse
 
 
@@ -39,7 +39,7 @@ def examine(folder: Path) -> dict[str, Any]:
         read = time.perf_counter()
         found: dict[str, Any] = {"zigzags": [len(one.segments) for one in taken]}
         try:
-            stored, _ = diagnose_vessel(warehouse, folder.name, ModelSpec())
+            stored, _ = diagnose_vessel(warehouse, folder.name, PLAIN)
             found["diagnosis"] = dict(stored.content)
         except KempfError as error:
             found |= error.to_json()

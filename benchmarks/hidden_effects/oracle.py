@@ -18,13 +18,13 @@ import numpy as np
 
 from flows.files import read_profiles
 from flows.ingest_logs import ingest
+from flows.vessel_model import PLAIN
 from flows.vessel_runs import vessel_runs
 from pipeline.diagnose.held_out import free_run
 from pipeline.diagnose.split import split
 from pipeline.diagnose.staged import staged
 from pipeline.model.effects import catalogue
 from schemas.errors import KempfError
-from schemas.model_spec import ModelSpec
 from warehouse.store import Warehouse
 
 
@@ -43,7 +43,7 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
         logs = sorted(p for p in folder.iterdir() if p.name != "profile.yaml")
         ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
         try:
-            found = vessel_runs(warehouse, folder.name, ModelSpec())
+            found = vessel_runs(warehouse, folder.name, PLAIN)
             chosen, left = split(found.runs)
             fitted, start = [found.runs[i] for i in chosen], found.start.of(chosen)
             with ThreadPoolExecutor(max_workers=cpu_count()) as workers:

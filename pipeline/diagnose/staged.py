@@ -27,6 +27,8 @@ from schemas.model_spec import ModelSpec
 
 #: iterations of an entry of the race, and of the climb to the end
 _RACE, _TO_THE_END = 6, 60
+#: runs that the race goes over
+_RUNS_OF_RACE = 3
 
 
 def plain(runs: Sequence[Run], spec: ModelSpec, start: Start, workers: Executor) -> tuple[Fit, int]:
@@ -66,12 +68,13 @@ def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
         sizes = [np.concatenate([[size], begin[1:]]) for size in first.steps]
         entries += [(hull, size) for hull in (base.hull, ordinary) for size in sizes]
     if len(entries) > 1:
-        race = [_climbed(base, model, hull, size, workers, _RACE) for hull, size in entries]
+        few = slice(0, _RUNS_OF_RACE)
+        race = [_climbed(base, model, hull, size, workers, _RACE, few) for hull, size in entries]
         best = max(race, key=lambda one: one.log_likelihood)
-        hull, begin, levels = best.hull, best.values[base.values.size :], best.levels
+        hull, begin = best.hull, best.values[base.values.size :]
     else:
-        hull, levels = base.hull, base.levels
-    return _climbed(base, model, hull, begin, workers, _TO_THE_END, levels)
+        hull = base.hull
+    return _climbed(base, model, hull, begin, workers, _TO_THE_END)
 
 
 def _climbed(
@@ -81,12 +84,11 @@ def _climbed(
     begin: Float,
     workers: Executor,
     iterations: int,
-    levels: Float | None = None,
+    chosen: slice = slice(None),
 ) -> Fit:
-    filtered = tuple(replace(one, model=model) for one in base.runs)
+    filtered = tuple(replace(one, model=model) for one in base.runs[chosen])
     values = np.concatenate([base.values, begin])
-    start = base.levels if levels is None else levels
-    return pooled_fit.climb(filtered, hull, start, values, workers, iterations)
+    return pooled_fit.climb(filtered, hull, base.levels[chosen], values, workers, iterations)
 
 
 def _begin(candidate: Candidate) -> Float:

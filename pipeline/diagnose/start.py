@@ -15,6 +15,7 @@ from pipeline.diagnose.run import Run
 from pipeline.identify import maximum_likelihood
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.record import Record
+from pipeline.identify.starts import thinned
 from pipeline.model.augmented import Augmented
 from pipeline.model.ship import mariner_like
 from pipeline.normalise.series import Float
@@ -24,6 +25,8 @@ from schemas.model_spec import ModelSpec
 #: intensities to start from, SI: of what drives the wind force, the moment and the current
 _INTENSITIES = (1e-4, 1e-6, 1e-3)
 _SHORT_CLIMB, _ENTRIES = 5, 4
+#: instants that a record is thinned to
+_INSTANTS = 400
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,14 +63,15 @@ def start_of(
     """
     levels = np.array([_levels(record, run) for record, run in zip(records, runs, strict=True)])
     arm = runs[0].ship.arm_per_m
-    found = list(workers.map(lambda i: _alone(records[i], spec, arm), chosen))
+    few = list(chosen)[: _ENTRIES - 1]
+    found = list(workers.map(lambda i: _alone(records[i], spec, arm), few))
     alone = [one for one in found if one is not None]
     hulls = [np.median(alone, axis=0), *alone] if alone else []
     hulls = [*hulls[: _ENTRIES - 1], mariner_like(runs[0].ship.length_m).array()]
     raced: list[Fit] = []
     for hull in hulls:
         one = pooled_fit.fit(
-            *(Augmented(), [runs[i] for i in chosen], spec, hull, levels[list(chosen)], np.zeros(0), workers),
+            *(Augmented(), [runs[i] for i in few], spec, hull, levels[few], np.zeros(0), workers),
             max_iterations=_SHORT_CLIMB,
         )
         if np.isfinite(one.log_likelihood):
@@ -79,14 +83,15 @@ def start_of(
             "Look at the channels (heading, yaw rate, speed, rudder) of these segments.",
         )
     best = max(raced, key=lambda one: one.log_likelihood)
-    levels[list(chosen)] = best.levels
+    levels[few] = best.levels
     return Start(best.hull, levels)
 
 
 def _alone(record: Record, spec: ModelSpec, arm_per_m: float) -> Float | None:
     """Identify one segment by itself; None where that fails."""
     try:
-        found = maximum_likelihood.identify(record, spec, arm_per_m, MaximumLikelihoodSettings())
+        # a rough hull is enough: it only begins the race
+        found = maximum_likelihood.identify(thinned(record, _INSTANTS), spec, arm_per_m, MaximumLikelihoodSettings())
     except KempfError:
         return None
     return found.hull.array() if np.all(np.isfinite(found.hull.array())) else None

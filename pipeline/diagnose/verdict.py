@@ -18,6 +18,8 @@ Verdict = Literal["adequate", "explained", "ambiguous", "unexplained", "insuffic
 LEFT_OVER = 12.0
 #: and which share of what it gained beside the plain model
 LEFT_SHARE = 0.2
+#: said of an effect that improves the prediction while something that repeats itself is left
+STANDS_IN = "it stands in for something that none of the known effects explains"
 #: an effect whose possible size is smaller than this many standard errors cannot be seen
 POWER = 3.0
 #: log-likelihood that an effect must gain in a manoeuvre to be seen in it
@@ -71,6 +73,8 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
     effect = candidate.effect
     for number, step in enumerate(diagnosis.steps[1:], start=1):
         members = {c.effect.name: k for c, k in step.chosen_from}
+        if effect.name in members and something_left(diagnosis):
+            return Finding("absent", f"{STANDS_IN}: {sized(effect, members[effect.name])}")
         if effect.name in members:
             others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
             alike = f"; these data would fit {_listed(others)} as well" if others else ""
@@ -165,6 +169,9 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     what = verdict(diagnosis)
     for step in diagnosis.steps[1:]:
         (candidate, best), *others = step.chosen_from
+        if what == "unexplained":
+            said.append(f"{sized(candidate.effect, best).capitalize()} helps, but {STANDS_IN}.")
+            continue
         line = f"{candidate.effect.plain.rstrip('.')}: {sized(candidate.effect, best)}"
         if others:
             line += f"; the same data would fit {_listed([c.effect.title for c, _ in others])}"
@@ -180,9 +187,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     if what == "adequate":
         said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
     if what == "unexplained" and diagnosis.after is not None:
-        named = "None of the known effects explains all of it" if said else "None of the known effects explains it"
         said.append(
-            f"{named}: a smooth force without a name still gains {diagnosis.after.gain:.0f} of log-likelihood in "
+            "None of the known effects explains it: a smooth force without a name still gains {diagnosis.after.gain:.0f} of log-likelihood in "
             "manoeuvres that it was not fitted to."
         )
     return said
@@ -231,7 +237,8 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": verdict(diagnosis),
         "sentences": sentences(diagnosis),
         "candidates": [_candidate(diagnosis, c, member) for c in diagnosis.steps[0].screened],
-        "sets": sets,
+        "sets": [] if something_left(diagnosis) else sets,
+        "stand_ins": sets if something_left(diagnosis) else [],
         "refused": [_refit(c, k) | {"why": refusal(k)} for step in diagnosis.steps for c, k in step.refused],
         "ladder": [rung(number, step) for number, step in enumerate(diagnosis.steps)],
         "left_over": None
@@ -248,7 +255,7 @@ def _candidate(diagnosis: Diagnosis, one: Candidate, member: dict[str, str]) -> 
     return {
         "effect": one.effect.name,
         "title": one.effect.title,
-        "set_id": member.get(one.effect.name),
+        "set_id": None if something_left(diagnosis) else member.get(one.effect.name),
         "score": one.score,
         "p_adjusted": one.p_adjusted,
         "expected_change": _values(one.effect, one.change, one.std),
