@@ -39,8 +39,8 @@ def draw_confusion(cases: Sequence[Judged], path: Path) -> None:
             axes.plot(j, i, "o", mfc="none", mec="tab:orange", ms=11)
     axes.set_xticks(range(len(columns)), columns, rotation=90, fontsize=7)
     axes.set_yticks(range(len(names)), names, fontsize=7)
-    axes.set_xlabel("first name given, or verdict (ring: the named set held the true effect)")
-    axes.set_ylabel("true effect")
+    axes.set_xlabel("first name given, or verdict\n(ring: the named set held the true effect)", fontsize=8)
+    axes.set_ylabel("true effect", fontsize=8)
     figure.savefig(path, dpi=130, metadata={"Software": None})
     plt.close(figure)
 
