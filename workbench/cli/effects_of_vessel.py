@@ -26,12 +26,12 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     Beside the model that the vessel stands at; nothing is stored.
     """
     from flows.diagnose_vessel import examine
-    from flows.vessel_model import Own, standing
+    from flows.vessel_model import PLAIN, Own, standing
     from flows.vessel_runs import choose
     from pipeline.diagnose.diagnosis import DiagnosisSettings
     from pipeline.diagnose.verdict import as_json as told_as_json
     from warehouse.store import Warehouse
-    from workbench.chosen_model import PLAIN, model_of
+    from workbench.chosen_model import model_of
 
     mine = Own(formulas={name: (formula,)})
     mine.effects()  # a slip of the pen is told before anything is read
@@ -79,10 +79,10 @@ def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
 @json_option
 def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str, as_json: bool) -> None:
     """Add an effect to the model that a vessel stands at, refit, and show the error before and after."""
-    from flows.vessel_model import Own, chain, point, standing, store_model
+    from flows.vessel_model import PLAIN, Own, chain, point, standing, store_model
     from flows.vessel_runs import choose
     from warehouse.store import Warehouse
-    from workbench.chosen_model import PLAIN, model_of, read_effect_files
+    from workbench.chosen_model import model_of, read_effect_files
 
     if formula is not None and path is not None:
         raise UsageError("two_effects", "Both --formula and --file say what the effect is.", "Give one of them.")
