@@ -68,7 +68,7 @@ def gather(
         verdict=verdict(diagnosis),
         headline=headline(diagnosis),
         sentences=tuple(sentences(diagnosis)),
-        next_steps=next_steps(diagnosis),
+        next_steps=next_steps(diagnosis, vessel),
         ranked=ranked,
         names=tuple(c.effect.title for c in shown),
         alike=np.array([[alike(a, b) for b in shown] for a in shown]).reshape(len(shown), len(shown)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from shlex import quote
+
 from pipeline.diagnose.diagnosis import Diagnosis
 from pipeline.diagnose.verdict import finding, verdict
 
@@ -28,27 +30,29 @@ def headline(diagnosis: Diagnosis) -> str:
     return "The plain model lacks something that none of the known effects explains."
 
 
-def next_steps(diagnosis: Diagnosis) -> tuple[str, ...]:
+def next_steps(diagnosis: Diagnosis, vessel: str) -> tuple[str, ...]:
     """Return what a person should do now, the most useful first.
 
     Parameters
     ----------
     diagnosis : Diagnosis
+    vessel : str
     """
     what = verdict(diagnosis)
+    name = quote(vessel)
     told: list[str] = []
     if what == "insufficient_data":
         told.append("Sail at least three zigzags, to both sides, at two rudder angles and on two headings.")
     for step in diagnosis.steps[1:]:
         effect, others = step.chosen_from[0][0].effect, [c.effect for c, _ in step.chosen_from[1:]]
-        told.append(f"Add it to her model: kempf effects add {effect.name} --vessel NAME.")
+        told.append(f"Add it to her model: kempf effects add {effect.name} --vessel {name}.")
         if others:
             names = _listed([effect.title, *(one.title for one in others)])
             told.append(f"To tell {names} apart: {_sentence(effect.separated_by)}")
     if what == "unexplained":
         told.append(
             "See where the misfit sits: the strips of innovations, the correlations and the missing force below. "
-            'Try a term of your own: kempf effects try "yaw: r*abs(r)" --vessel NAME.'
+            f'Try a term of your own: kempf effects try "yaw: r*abs(r)" --vessel {name}.'
         )
     lacking: dict[str, list[str]] = {}
     for candidate in diagnosis.steps[0].screened:
