@@ -10,6 +10,8 @@ from typing import Any
 from flows.progress import Progress, silent
 from flows.vessel_model import NONE_OF_ONES_OWN, Own, inputs_of, known_effects, named, store_model
 from flows.vessel_runs import Chosen, VesselRuns, assembled, choose
+from pipeline.compare.diagnosed import where_left
+from pipeline.compare.looked import PhaseInterval, phases_s
 from pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 from pipeline.diagnose.verdict import as_json
 from pipeline.model.effects import digest
@@ -64,7 +66,7 @@ def diagnose_vessel(
     runs = assembled(warehouse, chosen, spec, progress)
     base, _ = store_model(warehouse, chosen, spec, own, progress, runs=runs)
     examined = examine(warehouse, chosen, spec, own, settings, progress, runs=runs)
-    content = as_json(examined.diagnosis)
+    content = {**as_json(examined.diagnosis), "where": where_left(examined.diagnosis, _phases(examined))}
     made = StoredDiagnosis(
         diagnosis_id=diagnosis_id(inputs),
         vessel=vessel,
@@ -116,6 +118,11 @@ def examine(
         )
     progress(count, count, "done")
     return Examined(chosen, runs, made)
+
+
+def _phases(examined: Examined) -> dict[str, tuple[PhaseInterval, ...]]:
+    detail = {segment.segment_id: segment.detail for segment in examined.chosen.segments}
+    return {run.name: phases_s(detail[run.name].get("phases", ()), run.start_utc_ns) for run in examined.runs.runs}
 
 
 def _inputs(chosen: Chosen, spec: ModelSpec, own: Own, settings: DiagnosisSettings) -> dict[str, Any]:

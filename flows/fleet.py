@@ -29,6 +29,7 @@ from flows.identify_vessel import Request, identify_vessel
 from flows.pool_vessel import pool_vessel
 from flows.reprocess_vessel import VesselReport, reprocess_vessel
 from flows.unforeseen import as_told
+from flows.vessel_model import PLAIN
 from schemas.model_spec import ModelSpec
 from warehouse import vessels as vessel_table
 from warehouse.instant import iso_utc
@@ -217,6 +218,6 @@ def diagnose(
     store = Warehouse(warehouse)
     store.require()
     names = sorted(set(vessels)) if vessels else vessel_table.names(store)
-    rows = summary(diagnose_batch(warehouse, names, spec or {"name": "plain", "rate_bias": False}))
+    rows = summary(diagnose_batch(warehouse, names, spec or PLAIN.model_dump(mode="json")))
     create_table_artifact(key="kempf-diagnose", table=rows, description="What the models of the fleet lack")
     return rows

@@ -188,8 +188,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
     if what == "unexplained" and diagnosis.after is not None:
         said.append(
-            "None of the known effects explains it: a smooth force without a name still gains {diagnosis.after.gain:.0f} of log-likelihood in "
-            "manoeuvres that it was not fitted to."
+            "None of the known effects explains it: a smooth force without a name still gains "
+            f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."
         )
     return said
 
