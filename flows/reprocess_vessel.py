@@ -11,6 +11,8 @@ from flows.progress import Progress, silent
 from flows.refresh_logs import refresh_logs
 from flows.rerun_set import rerun
 from flows.unforeseen import as_told
+from flows.vessel_model import ALIAS, ESTIMATOR, Own, point, standing, store_model
+from flows.vessel_runs import choose
 from schemas.errors import KempfError
 from schemas.model_spec import ModelSpec
 from warehouse import aliases, code_version, logs, parameter_sets, runs, segments
@@ -108,6 +110,8 @@ def reprocess_vessel(
                 report.new_sets += outcome.new
                 report.kept_sets += outcome.parameter_set is not None and not outcome.new
             _pool(warehouse, vessel, one, outcomes, report, flow_run, progress)
+        if report.segments and request is None:
+            _model(warehouse, vessel, report, flow_run, progress)
         _withdraw(warehouse, vessel, report)
         if not changed_only:
             _verify(warehouse, vessel, report)
@@ -132,8 +136,8 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
     for name in parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list():
         one = parameter_sets.get(warehouse, name)
         request = Request(ModelSpec.model_validate(dict(one.model_spec)), one.estimator)
-        if request.estimator == POOLED:
-            continue  # it comes of the separate ones
+        if request.estimator in (POOLED, ESTIMATOR):
+            continue  # the one comes of the separate ones, the other is a model of all runs at once
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
     return [asked[key] for key in sorted(asked)] or [Request()]
 
@@ -156,6 +160,22 @@ def _pool(
     if pooled is not None:
         report.new_sets += pooled[1]
         report.kept_sets += not pooled[1]
+
+
+def _model(warehouse: Warehouse, vessel: str, report: VesselReport, flow_run: str | None, progress: Progress) -> None:
+    """Bring the model with effects that the vessel stands at up to date; where that fails she stands where she was."""
+    now = standing(warehouse, vessel)
+    if now is None:
+        return
+    spec, own = ModelSpec.model_validate(dict(now.model_spec)), Own.from_json(now.settings["own"])
+    try:
+        made, new = store_model(warehouse, choose(warehouse, vessel), spec, own, progress, flow_run)
+    except KempfError as error:
+        report.fail(ALIAS, error)
+        return
+    point(warehouse, made)
+    report.new_sets += new
+    report.kept_sets += not new
 
 
 def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:

@@ -1,0 +1,79 @@
+"""Runs of one ship with a hidden effect, from a plant that shares no code with the estimator, no file in between."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+
+from benchmarks.hidden_effects import programme, readings, sail
+from benchmarks.hidden_effects.effects import CATALOGUE, HiddenEffect
+from benchmarks.hidden_effects.outsiders import OUTSIDERS
+from pipeline.diagnose.diagnosis import Diagnosis, diagnose
+from pipeline.diagnose.run import Run, Ship, make_run
+from pipeline.diagnose.split import split
+from pipeline.diagnose.start import Start, start_of
+from pipeline.identify.record import make_record
+from pipeline.model.effects import catalogue
+from pipeline.normalise.instruments import Instruments
+from pipeline.normalise.series import SECOND_NS, Series
+from pipeline.simulate.trial import Trial, TrialSettings
+from schemas.channels import CHANNELS
+from schemas.model_spec import ModelSpec
+
+CHANNEL_OF = {channel.column: channel for channel in CHANNELS.values()}
+#: some that a rudder, a hull and a sensor can have; the whole catalogue takes too long for a test
+SOME = ("rudder_lag", "dead_time", "cross_flow_drag", "sway_quadratic", "yaw_quadratic", "gyro_bias")
+WORKERS = ThreadPoolExecutor(2)
+_STEP_S, _LEAD_S, _LEGS = 2.0, 20.0, 4
+
+
+@dataclass(frozen=True, eq=False)
+class Sailed:
+    """Four zigzags of one ship, ready to be diagnosed; ``c`` is the size of her effect."""
+
+    runs: tuple[Run, ...]
+    start: Start
+    spec: ModelSpec
+    c: float
+
+    def diagnosis(self, names: Sequence[str] = SOME, **settings: Any) -> Diagnosis:
+        known = catalogue()
+        effects = {name: known[name] for name in names}
+        return diagnose(self.runs, self.spec, self.start, effects, WORKERS, **settings)
+
+
+@lru_cache(maxsize=8)
+def sailed(effect: str = "none", *, strength: int = 2, seed: int = 3, noise: float = 1.0) -> Sailed:
+    """Sail a day of the mariner-like ship in a moderate sea."""
+    hull = programme.ship("mariner", seed)
+    weather = programme.weather(hull, "moderate", seed, 0)
+    hidden: HiddenEffect | None = (CATALOGUE | OUTSIDERS).get(effect)
+    c = sail.strength_of(hull, (weather,), hidden, strength, seed) if hidden else 0.0
+    voyage = sail.voyage(hull, weather, hidden, c, seed, 0)
+    settings = TrialSettings(hull, (), instruments=readings.instruments(hull), seed=seed, noise_scale=noise)
+    sensor = (hidden.name, c) if hidden and hidden.sensor else None
+    trial = readings.read(hull, voyage, weather.wind_from_rad, settings, sensor)
+    instruments = instruments_of(trial)
+    spec = ModelSpec(rate_bias=False, wind_arm_per_m=hull.wind_arm_per_m)
+    ship = Ship(hull.length_m, hull.draught_m, hull.wind_arm_per_m)
+    records = [
+        make_record(instruments, *(settings.start_utc_ns + round(t * SECOND_NS) for t in (e[0] - _LEAD_S, e[_LEGS])))
+        for e in voyage.executes_s
+    ]
+    runs = tuple(make_run(f"run {k}", r, instruments, spec, ship, _STEP_S) for k, r in enumerate(records))
+    return Sailed(runs, start_of(records, runs, spec, split(runs)[0], WORKERS), spec, c)
+
+
+def instruments_of(trial: Trial) -> Instruments:
+    series = {}
+    for record in trial.instruments:
+        for column, value in record.values.items():
+            channel = CHANNEL_OF[column]
+            held = np.unwrap(value) if channel.wrap == "circle" else value
+            series[channel.name] = Series(record.measured_utc_ns, held)
+    return Instruments(series, dict.fromkeys(series, "simulated"), ())

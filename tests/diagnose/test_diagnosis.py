@@ -1,0 +1,127 @@
+"""Diagnoses of a ship whose hidden effect a plant of its own made: none, a lag, a drag, and one outside the catalogue."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings
+from pipeline.diagnose.split import split
+from pipeline.diagnose.verdict import as_json, finding, sentences, verdict
+from tests.diagnose.sailing import SOME, Sailed, sailed
+
+LAG = ("rudder_lag", "cross_flow_drag")
+
+
+@pytest.fixture(scope="module")
+def calm() -> tuple[Sailed, Diagnosis]:
+    ship = sailed("none")
+    return ship, ship.diagnosis((*SOME, "heading_misalignment", "antenna_lever", "shallow_water"))
+
+
+@pytest.fixture(scope="module")
+def late() -> tuple[Sailed, Diagnosis]:
+    ship = sailed("rudder_lag", strength=1)
+    return ship, ship.diagnosis(LAG)
+
+
+@pytest.fixture(scope="module")
+def dragged() -> tuple[Sailed, Diagnosis]:
+    ship = sailed("cross_flow_drag")
+    return ship, ship.diagnosis(("cross_flow_drag", "sway_quadratic", "gyro_bias"))
+
+
+def value_of(diagnosis: Diagnosis, name: str) -> tuple[float, float]:
+    fit = diagnosis.steps[-1].fit
+    at = fit.model.names.index(name)
+    return float(fit.values[at]), float(fit.std[6 + at])
+
+
+def test_nothing_is_claimed_of_a_ship_without_an_effect(calm: tuple[Sailed, Diagnosis]) -> None:
+    _, found = calm
+    assert verdict(found) == "adequate"
+    assert len(found.steps) == 1
+    assert len(found.fitted) == 3 and len(found.held) == 1
+    told = as_json(found)
+    assert told["sets"] == [] and {c["verdict"] for c in told["candidates"]} <= {"absent", "not_testable"}
+    assert told["ladder"][0]["held_out_error"] < 0.1
+    assert sentences(found) == ["No effect of the catalogue improves the prediction of manoeuvres that were not fitted."]
+
+
+def test_a_lag_is_found_with_its_size_and_the_held_out_error_falls(late: tuple[Sailed, Diagnosis]) -> None:
+    ship, found = late
+    assert verdict(found) == "explained"
+    assert [step.added.name for step in found.steps[1:] if step.added] == ["rudder_lag"]
+    tau, std = value_of(found, "rudder_lag.tau")
+    assert 0.0 < std < 0.2 and abs(tau - ship.c) < 3.0 * std
+    first, last = found.steps[0], found.steps[-1]
+    assert first.held_out_error is not None and last.held_out_error is not None
+    assert last.held_out_error < 0.5 * first.held_out_error
+    # what the wind had to stand in for is the rudder's now
+    assert last.intensities[0] < 0.2 * first.intensities[0]
+    assert found.before is not None and found.after is not None
+    assert found.after.gain < 0.2 * found.before.gain
+    said = sentences(found)
+    assert f"tau = {tau:.3f} +- {std:.3f} s" in said[0] and "held-out" in said[1]
+
+
+def test_a_drag_is_in_the_named_set(dragged: tuple[Sailed, Diagnosis]) -> None:
+    ship, found = dragged
+    assert verdict(found) in ("explained", "ambiguous")
+    named = [c.effect.name for c, _ in found.steps[1].chosen_from]
+    assert "cross_flow_drag" in named
+    if found.steps[1].added is not None and found.steps[1].added.name == "cross_flow_drag":
+        c, std = value_of(found, "cross_flow_drag.c")
+        assert abs(c - ship.c) < 3.0 * std
+    last = {one["effect"]: one for one in as_json(found)["candidates"]}
+    assert last["cross_flow_drag"]["verdict"] == "present" and last["gyro_bias"]["verdict"] == "absent"
+
+
+def test_an_effect_that_no_catalogue_names_is_not_given_a_wrong_name() -> None:
+    found = sailed("kick_at_executes").diagnosis(("yaw_quadratic", "gyro_bias"))
+    assert verdict(found) == "unexplained"
+    told = as_json(found)
+    assert "None of the known effects explains it" in told["sentences"][-1]
+    assert told["left_over"]["gain_after"] > 12.0 and len(told["left_over"]["runs"]) == 3
+    assert "{" not in "".join(told["sentences"])
+
+
+def test_what_the_logs_lack_or_zigzags_cannot_tell_is_not_testable(calm: tuple[Sailed, Diagnosis]) -> None:
+    _, found = calm
+    told = {one.effect.name: finding(found, one) for one in found.steps[0].screened}
+    assert told["heading_misalignment"].verdict in ("absent", "not_testable")
+    lacking = replace(found.steps[0].screened[0], missing=("water_depth",))
+    said = finding(found, lacking)
+    assert said.verdict == "not_testable" and "water_depth" in said.why
+
+
+def test_held_out_runs_change_no_fitted_bit(late: tuple[Sailed, Diagnosis]) -> None:
+    ship, found = late
+    (out,) = split(ship.runs)[1]
+    measured = ship.runs[out].measured + np.random.default_rng(1).normal(0.0, 0.05, ship.runs[out].measured.shape)
+    runs = tuple(replace(run, measured=measured) if k == out else run for k, run in enumerate(ship.runs))
+    again = replace(ship, runs=runs).diagnosis(LAG, settings=DiagnosisSettings(most_steps=0))
+    first, other = found.steps[0], again.steps[0]
+    assert np.array_equal(other.fit.hull, first.fit.hull) and np.array_equal(other.fit.levels, first.fit.levels)
+    assert other.fit.log_likelihood == first.fit.log_likelihood
+    assert [c.score for c in other.screened] == [c.score for c in first.screened]
+    assert other.held_out_error != first.held_out_error
+
+
+def test_one_manoeuvre_is_not_enough() -> None:
+    ship = sailed("none")
+    found = replace(ship, runs=ship.runs[:1], start=ship.start.of([0])).diagnosis(("gyro_bias",))
+    assert verdict(found) == "insufficient_data"
+    assert not found.held and found.steps[0].held_out_error is None
+    assert "sail at least three zigzags" in sentences(found)[-1]
+
+
+def test_a_channel_that_the_runs_lack_is_named() -> None:
+    ship = sailed("none")
+    runs = tuple(replace(run, channels=run.channels - {"water_depth"}) for run in ship.runs)
+    found = replace(ship, runs=runs).diagnosis(("shallow_water",), settings=DiagnosisSettings(most_steps=0))
+    (one,) = as_json(found)["candidates"]
+    assert one["verdict"] == "not_testable" and one["why"] == "the logs lack water_depth"
+    assert np.isnan(one["score"])
