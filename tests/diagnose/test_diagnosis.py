@@ -1,4 +1,4 @@
-"""Diagnoses of a ship whose hidden effect a plant of its own made: none, a lag, a drag, and one outside the catalogue."""
+"""Diagnoses of a ship with a hidden effect, made by a plant of its own: none, a lag, a drag, one of no catalogue."""
 
 from __future__ import annotations
 
@@ -47,7 +47,8 @@ def test_nothing_is_claimed_of_a_ship_without_an_effect(calm: tuple[Sailed, Diag
     told = as_json(found)
     assert told["sets"] == [] and {c["verdict"] for c in told["candidates"]} <= {"absent", "not_testable"}
     assert told["ladder"][0]["held_out_error"] < 0.1
-    assert sentences(found) == ["No effect of the catalogue improves the prediction of manoeuvres that were not fitted."]
+    (said,) = sentences(found)
+    assert said == "No effect of the catalogue improves the prediction of manoeuvres that were not fitted."
 
 
 def test_a_lag_is_found_with_its_size_and_the_held_out_error_falls(late: tuple[Sailed, Diagnosis]) -> None:

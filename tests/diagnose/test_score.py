@@ -1,4 +1,4 @@
-"""The score of an effect that is not there, over many noises, is chi-squared; of one that is there, it finds its size."""
+"""The score of an effect that is absent is chi-squared over many noises; of one that is there it finds the size."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_the_score_of_what_is_not_there_is_chi_squared(quiet: Run) -> None:
 
 
 @pytest.mark.parametrize(("name", "size"), [("sway_quadratic", 0.3), ("gyro_scale", 0.02)])
-def test_the_expected_change_beside_a_fitted_hull_is_the_effect_that_is_there(quiet: Run, name: str, size: float) -> None:
+def test_the_expected_change_beside_a_fitted_hull_is_the_effect(quiet: Run, name: str, size: float) -> None:
     hull = mariner_like(quiet.ship.length_m).array()
     model = Augmented((catalogue()[name],))
     truth = Filtered(quiet, model, STILL).free(hull, np.array([size]), _START)

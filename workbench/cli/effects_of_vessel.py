@@ -30,6 +30,7 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     from flows.vessel_runs import choose
     from pipeline.diagnose.diagnosis import DiagnosisSettings
     from pipeline.diagnose.verdict import as_json as told_as_json
+    from warehouse.canonical import plain
     from warehouse.store import Warehouse
     from workbench.chosen_model import model_of
 
@@ -43,7 +44,7 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
         settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
         found = examine(warehouse, chosen, spec, own.beside(mine), settings, tell, only=(name,))
     told = told_as_json(found.diagnosis)
-    told = {"vessel": vessel, "formula": formula, "beside": list(spec.effects), **told}
+    told = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **told})
     if as_json:
         print_json(told)
         return
