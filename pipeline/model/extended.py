@@ -11,6 +11,8 @@ It shares nothing with `pipeline.identify.kernel` but eq. (16), and without effe
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
@@ -18,6 +20,9 @@ from pipeline.model.moments import add_noise, carry_covariance, exponential, tak
 from pipeline.model.terms.program import DEPTH, evaluate
 from pipeline.model.terms.symbols import SYMBOLS
 
+#: how what runs at every instant is compiled: put into its caller, and without counting references to arrays, which
+#: takes longer than the arithmetic; such a function may fill arrays but not make them
+STEP: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": True, "_nrt": False}
 #: rows of the input table from one instant to the next, and substeps; a substep reads three rows
 ROWS, SUBSTEPS = 4, 2
 #: places of symbols among the variables; states come first, in the filter's order
@@ -34,7 +39,7 @@ ON_NOISE, ON_INITIAL = 8, 9
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**STEP)
 def _add(kind, place, programs, code, constants, values, slopes, stack, width, total):  # type: ignore[no-untyped-def]
     """Add every program of a kind (and place, for extra states) to ``total``, shape (1 + width,)."""
     for p in range(programs.shape[0]):
@@ -44,7 +49,7 @@ def _add(kind, place, programs, code, constants, values, slopes, stack, width, t
                 total[j] += stack[0, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**STEP)
 def _dynamics(  # type: ignore[no-untyped-def]
     x, row, ship, width, carried, programs, code, constants, values, slopes, stack, total, f, J
 ):
@@ -96,7 +101,7 @@ def _dynamics(  # type: ignore[no-untyped-def]
                 J[target, j] += total[j + 1]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**STEP)
 def _begin(P, programs, code, constants, values, slopes, stack, total, extra):  # type: ignore[no-untyped-def]
     """Add the initial variance of the effects' own states to P, and fill the intensities of what drives them."""
     width = P.shape[0] - N_AFTER
@@ -124,7 +129,7 @@ def _live_states(P0, width):  # type: ignore[no-untyped-def]
     return before[:m], after[:k]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**STEP)
 def _substep(  # type: ignore[no-untyped-def]
     x, P, start, middle, end, h, drive, decay, ship, live, after, table, values, slopes, stack, total, room
 ):
@@ -168,7 +173,7 @@ def _substep(  # type: ignore[no-untyped-def]
         add_noise(P, A, w, q, h, live, nodes, va, vb)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(**STEP)
 def _measurements(  # type: ignore[no-untyped-def]
     k,
     x,

@@ -41,7 +41,7 @@ class Program:
     constants: Float
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
 def evaluate(code, constants, values, slopes, stack, width):  # type: ignore[no-untyped-def]
     """Run a program; the result with its derivatives stands in ``stack[0]``.
 
@@ -87,7 +87,7 @@ def evaluate(code, constants, values, slopes, stack, width):  # type: ignore[no-
             stack[0, j] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
 # one branch an instruction, not split further: a call between them costs as much as they do
 def _two(what, stack, top, width, from_left, from_right):  # type: ignore[no-untyped-def]  # noqa: PLR0912
     a, b = stack[top, 0], stack[top + 1, 0]
@@ -123,7 +123,7 @@ def _two(what, stack, top, width, from_left, from_right):  # type: ignore[no-unt
             stack[top, j] = by_b * stack[top + 1, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
 def _one(what, stack, top, width, carries):  # type: ignore[no-untyped-def]
     a = stack[top, 0]
     slope, value = 0.0, 0.0
