@@ -16,8 +16,8 @@ from pipeline.normalise.series import Float
 Verdict = Literal["adequate", "explained", "ambiguous", "unexplained", "insufficient_data"]
 #: log-likelihood that the flexible reference must still gain, in runs that did not fit it: something is left
 LEFT_OVER = 12.0
-#: and which share of what it gained beside the plain model
-LEFT_SHARE = 0.2
+#: so many effects are a string, which stands in for something else where the first has less than this share of the gain
+STRING, FIRST_SHARE = 3, 0.8
 #: said of an effect that improves the prediction while something that repeats itself is left
 STANDS_IN = "it stands in for something that none of the known effects explains"
 #: an effect whose possible size is smaller than this many standard errors cannot be seen
@@ -54,11 +54,16 @@ def verdict(diagnosis: Diagnosis) -> Verdict:
 
 
 def something_left(diagnosis: Diagnosis) -> bool:
-    """Tell whether something that repeats itself is left beside the last model."""
-    before, after = diagnosis.before, diagnosis.after
-    if before is None or after is None:
-        return False
-    return after.gain > LEFT_OVER and after.repeats and after.gain > LEFT_SHARE * before.gain
+    """Tell whether something is there that the catalogue does not name.
+
+    Either the flexible reference still finds what repeats itself, or it took a string of effects of which the first
+    explains little: terms that together imitate what none of them is.
+    """
+    after = diagnosis.after
+    if after is not None and after.gain > LEFT_OVER and after.repeats:
+        return True
+    ratios = [step.chosen_from[0][1].likelihood_ratio for step in diagnosis.steps[1:]]
+    return len(ratios) >= STRING and ratios[0] < FIRST_SHARE * sum(ratios)
 
 
 def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
