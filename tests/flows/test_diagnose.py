@@ -3,30 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 
-from benchmarks.hidden_effects import programme, readings, sail
-from benchmarks.hidden_effects.effects import CATALOGUE
+from benchmarks import late_rudder
 from flows.diagnose_vessel import diagnose_vessel
+from flows.files import read_profiles
 from flows.fleet_diagnosis import summary
 from flows.ingest_logs import ingest
 from flows.rerun_set import rerun
 from flows.vessel_model import PLAIN
 from pipeline.model import effects
-from pipeline.simulate.instruments import SECOND_NS
-from pipeline.simulate.logger_profile import logger_profile
-from pipeline.simulate.mcap_log import to_mcap
-from pipeline.simulate.trial import Trial, TrialSettings
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf, refused
 from warehouse import aliases, parameter_sets
 from warehouse.store import Warehouse
 
-VESSEL = "late"
+VESSEL = late_rudder.VESSEL
 SOME = ("rudder_lag", "gyro_bias", "shallow_water")
 
 
@@ -46,37 +42,18 @@ class Late:
         return ran.json
 
 
-def until(trial: Trial, end_s: float) -> Trial:
-    """Cut the log off: three zigzags are enough to fit two and hold one out."""
-    end, records = trial.settings.start_utc_ns + round(end_s * SECOND_NS), []
-    for one in trial.instruments:
-        n = int(one.measured_utc_ns.searchsorted(end))
-        values = {name: column[:n] for name, column in one.values.items()}
-        measured, arrival = one.measured_utc_ns[:n], one.arrival_utc_ns[:n]
-        records.append(replace(one, measured_utc_ns=measured, arrival_utc_ns=arrival, values=values))
-    return replace(trial, instruments=tuple(records))
-
-
 @pytest.fixture(scope="module")
 def late(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Late]:
-    hull, seed = programme.ship("mariner", 3), 3
-    weather = programme.weather(hull, "moderate", seed, 0)
-    hidden = CATALOGUE["rudder_lag"]
-    c = sail.strength_of(hull, (weather,), hidden, 1, seed)
-    voyage = sail.voyage(hull, weather, hidden, c, seed, 0)
-    settings = TrialSettings(hull, (), instruments=readings.instruments(hull), seed=seed)
-    trial = until(readings.read(hull, voyage, weather.wind_from_rad, settings, None), voyage.executes_s[2][-1] + 30.0)
     folder = tmp_path_factory.mktemp("late")
-    (folder / "day.mcap").write_bytes(to_mcap(trial))
-    profile = logger_profile(settings).model_copy(update={"vessel": VESSEL})
+    late_rudder.write(folder)
     warehouse = fresh(folder / "w")
-    done = ingest(warehouse, [folder / "day.mcap"], given=profile)
+    done = ingest(warehouse, [folder / "day.mcap"], given=read_profiles([folder / "late.yaml"]))
     assert [len(o.segments) for o in done] == [3]
     few = {name: effect for name, effect in effects.catalogue().items() if name in SOME}
     with pytest.MonkeyPatch.context() as patched:
         # the whole catalogue takes too long for a test
         patched.setattr(effects, "catalogue", lambda: few)
-        yield Late(warehouse, c)
+        yield Late(warehouse, late_rudder.LAG_S)
 
 
 @pytest.fixture(scope="module")
