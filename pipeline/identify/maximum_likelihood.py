@@ -14,6 +14,7 @@ import numpy as np
 
 from pipeline.identify.estimate import Estimate
 from pipeline.identify.gating import gate
+from pipeline.identify.kernel import LOG_F, LOG_M, LOG_V
 from pipeline.identify.likelihood import INITIAL_STD, Likelihood, Trace
 from pipeline.identify.likelihood_report import report
 from pipeline.identify.record import Record
@@ -143,7 +144,9 @@ def _from_all_starts(
     def to_the_end(theta: Float) -> Search[Float]:
         return climb(objective, theta, settings.max_iterations, settings.decrement)
 
-    searches = [(name, to_the_end(found.theta)) for name, found in _distinct(race, settings.starts)]
+    started = dict(entries)
+    finals = [(name, _raised(found.theta, started[name], coarse)) for name, found in _distinct(race, settings.starts)]
+    searches = [(name, to_the_end(theta)) for name, theta in finals]
     if not any(np.isfinite(search.log_likelihood) for _, search in searches):
         # the race ran into ships that the whole record excludes: from the starting points themselves, then
         searches = [(name, to_the_end(theta)) for name, theta in entries]
@@ -157,6 +160,17 @@ def _from_all_starts(
             {"searches": _summary(searches)},
         )
     return name, best, {"starts": _summary(searches), "race": _summary(race)}
+
+
+def _raised(theta: Float, start: Float, coarse: Likelihood) -> Float:
+    """Return the end of a race with disturbances that it let sink to nothing raised to a tenth of where they began.
+
+    The thinned record says little of them, and the way up from nothing is long.
+    """
+    raised = theta.copy()
+    sunk = [i for i in (LOG_F, LOG_M, LOG_V) if coarse.active[i] and theta[i] <= coarse.low[i]]
+    raised[sunk] = start[sunk] - np.log(10.0)
+    return raised
 
 
 def _distinct(race: list[tuple[str, Search[Float]]], starts: int) -> list[tuple[str, Search[Float]]]:
