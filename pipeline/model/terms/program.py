@@ -8,6 +8,7 @@ that a person writes reaches the filter with its exact linearisation and without
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numba import njit
@@ -18,6 +19,8 @@ from pipeline.normalise.series import Float
 
 #: variables before this place may move with the states; ship, channels and parameters have no derivatives to carry
 MOVING = len(STATE_SYMBOLS) + len(COMPUTED_SYMBOLS)
+#: a program fills arrays and makes none: counting references to them would take longer than its arithmetic
+_UNCOUNTED: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
 #: deepest stack of a program; a bit for each place must fit into an integer
 DEPTH = 24
 #: instructions; the second number of an instruction is an index for the first two
@@ -41,7 +44,7 @@ class Program:
     constants: Float
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(**_UNCOUNTED)
 def evaluate(code, constants, values, slopes, stack, width):  # type: ignore[no-untyped-def]
     """Run a program; the result with its derivatives stands in ``stack[0]``.
 
@@ -87,7 +90,7 @@ def evaluate(code, constants, values, slopes, stack, width):  # type: ignore[no-
             stack[0, j] = 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(**_UNCOUNTED)
 # one branch an instruction, not split further: a call between them costs as much as they do
 def _two(what, stack, top, width, from_left, from_right):  # type: ignore[no-untyped-def]  # noqa: PLR0912
     a, b = stack[top, 0], stack[top + 1, 0]
@@ -123,7 +126,7 @@ def _two(what, stack, top, width, from_left, from_right):  # type: ignore[no-unt
             stack[top, j] = by_b * stack[top + 1, j]
 
 
-@njit(cache=True, nogil=True, error_model="numpy", _nrt=False)
+@njit(**_UNCOUNTED)
 def _one(what, stack, top, width, carries):  # type: ignore[no-untyped-def]
     a = stack[top, 0]
     slope, value = 0.0, 0.0
