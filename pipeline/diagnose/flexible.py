@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from pipeline.diagnose.formula import Term, search
 from pipeline.diagnose.pooled_fit import Fit
 from pipeline.diagnose.screen import Nuisance, candidate_columns, nuisance
 from pipeline.diagnose.sensitivity import N_HULL
@@ -77,12 +78,15 @@ class Flexible:
         Of those tried, the one that gains most.
     coefficients : ndarray, shape (len(TERMS),)
         Size of every term of `TERMS`, fitted to all runs.
+    formula : tuple of Term
+        The few terms that explain most of it; exploratory.
     """
 
     gain: float
     gains: Float
     shrinkage: float
     coefficients: Float
+    formula: tuple[Term, ...]
 
     @property
     def repeats(self) -> bool:
@@ -127,4 +131,4 @@ def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> Flexible:
         if sum(gains) > best[0]:
             best = (sum(gains), np.array(gains), shrinkage)
     w = np.linalg.solve(whole + np.eye(Z.shape[1]) * best[2] / 100.0, moment)
-    return Flexible(best[0], best[1], best[2], w * unit)
+    return Flexible(best[0], best[1], best[2], w * unit, search(clean * kept, known.u, parts, TERMS))

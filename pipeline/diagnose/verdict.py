@@ -196,6 +196,9 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             "None of the known effects explains it: a smooth force without a name still gains "
             f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."
         )
+        if diagnosis.after.formula:
+            terms = "; ".join(f"{one.target}: {one.expression}" for one in diagnosis.after.formula)
+            said.append(f"Exploratory, a formula to try and no finding: {terms}.")
     return said
 
 
@@ -248,7 +251,18 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "ladder": [rung(number, step) for number, step in enumerate(diagnosis.steps)],
         "left_over": None
         if diagnosis.after is None or diagnosis.before is None
-        else {"gain_before": diagnosis.before.gain, "gain_after": diagnosis.after.gain, "runs": diagnosis.after.gains},
+        else {
+            "gain_before": diagnosis.before.gain,
+            "gain_after": diagnosis.after.gain,
+            "runs": diagnosis.after.gains,
+            "formula": {
+                "exploratory": True,
+                "terms": [
+                    {"target": one.target, "expression": one.expression, "gain_left_out": one.gain}
+                    for one in diagnosis.after.formula
+                ],
+            },
+        },
         "fitted": [run.name for run in diagnosis.fitted],
         "held_out": [run.name for run in diagnosis.held],
         "gross_errors": diagnosis.gross_errors,
