@@ -20,7 +20,7 @@ from pipeline.simulate.logger_profile import logger_profile
 from pipeline.simulate.mcap_log import to_mcap
 from pipeline.simulate.trial import Trial, TrialSettings
 
-VESSEL, LAG_S = "late", 2.5
+VESSEL, LAG_S = "late", 2.0
 _SEED, _ZIGZAGS, _AFTER_S = 3, 3, 30.0
 
 

@@ -18,7 +18,7 @@ LAG = ("rudder_lag", "cross_flow_drag")
 @pytest.fixture(scope="module")
 def calm() -> tuple[Sailed, Diagnosis]:
     ship = sailed("none")
-    return ship, ship.diagnosis((*SOME, "heading_misalignment", "antenna_lever", "shallow_water"))
+    return ship, ship.diagnosis((*SOME, "heading_misalignment", "heading_latency", "gyro_latency"))
 
 
 @pytest.fixture(scope="module")

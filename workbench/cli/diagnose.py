@@ -129,5 +129,8 @@ def _tell(told: Mapping[str, Any], *, everything: bool) -> None:
 
 
 def _change(change: Mapping[str, Mapping[str, Any]]) -> str:
-    told = [f"{n} {number(c['value'], 3)} +- {number(c['std'], 2)} {c['unit']}".rstrip() for n, c in change.items()]
+    told = [
+        f"{n} {number(c['value'], 3)} +- {number(c['std'], 2)} {c['unit'].removesuffix('1')}".rstrip()
+        for n, c in change.items()
+    ]
     return ", ".join(told)

@@ -1,0 +1,50 @@
+"""docs/diagnosis.md is true: its tour runs to its output, its thresholds and verdicts are those of the code."""
+
+from __future__ import annotations
+
+import re
+from importlib import import_module
+from pathlib import Path
+from typing import get_args
+
+from pipeline.diagnose.flexible import TERMS
+from pipeline.diagnose.verdict import Finding, Verdict
+from tests.docs.console import Command, Names, Shell, difference, steps
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8")
+
+
+def test_the_tour_runs_to_its_output(tmp_path: Path) -> None:
+    shell, names = Shell(tmp_path), Names()
+    try:
+        shell.run(f"export PYTHONPATH='{ROOT}'")
+        for step in steps(TEXT):
+            assert isinstance(step, Command)
+            found, code = shell.run(names.resolved(step.line))
+            assert code == 0, found
+            assert difference(step.shown, found, names) is None, step.line
+    finally:
+        shell.close()
+
+
+def test_the_thresholds_are_those_of_the_code() -> None:
+    rows = re.findall(r"^\| [^|]+ \| ([\d.]+) \| `(\w+)\.([\w.]+)` \|$", TEXT, flags=re.MULTILINE)
+    assert len(rows) == TEXT.partition("## Thresholds")[2].partition("\n## ")[0].count("\n|") - 2
+    for value, module, path in rows:
+        found = import_module(f"pipeline.diagnose.{module}")
+        for name in path.split("."):
+            found = getattr(found, name)
+        assert float(value) == found, path
+
+
+def test_every_verdict_is_told() -> None:
+    section = TEXT.partition("## The verdicts")[2].partition("\n## ")[0]
+    whole, _, single = section.partition("Each effect has a verdict")
+    told = [set(re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)) for part in (whole, single)]
+    of_an_effect = get_args(import_module("typing").get_type_hints(Finding)["verdict"])
+    assert told == [set(get_args(Verdict)), set(of_an_effect)]
+
+
+def test_the_reference_has_as_many_terms_as_are_told() -> None:
+    assert f"{len(TERMS)} smooth terms" in TEXT
