@@ -192,10 +192,16 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     if what == "adequate":
         said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
     if what == "unexplained" and diagnosis.after is not None:
-        said.append(
-            "None of the known effects explains it: a smooth force without a name still gains "
-            f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."
-        )
+        if diagnosis.after.gain > LEFT_OVER:
+            said.append(
+                "None of the known effects explains it: a smooth force without a name still gains "
+                f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."
+            )
+        else:
+            said.append(
+                f"None of the known effects explains it: it took {len(diagnosis.steps) - 1} of them, and the first "
+                "explains too little to be what is missing."
+            )
         if diagnosis.after.formula:
             terms = "; ".join(f"{one.target}: {one.expression}" for one in diagnosis.after.formula)
             said.append(f"Exploratory, a formula to try and no finding: {terms}.")
