@@ -133,13 +133,14 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
     if default is not None:
         return [default]
     asked: dict[str, Request] = {}
-    for name in parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list():
+    names = parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list()
+    for name in names:
         one = parameter_sets.get(warehouse, name)
         request = Request(ModelSpec.model_validate(dict(one.model_spec)), one.estimator)
         if request.estimator in (POOLED, ESTIMATOR):
             continue  # the one comes of the separate ones, the other is a model of all runs at once
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
-    return [asked[key] for key in sorted(asked)] or [Request()]
+    return [asked[key] for key in sorted(asked)] if names else [Request()]
 
 
 def _pool(

@@ -8,12 +8,15 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from prefect.logging import disable_run_logger
 
 from benchmarks import late_rudder
 from flows.diagnose_vessel import diagnose_vessel
 from flows.files import read_profiles
+from flows.fleet import diagnose_batch
 from flows.fleet_diagnosis import summary
 from flows.ingest_logs import ingest
+from flows.reprocess_vessel import reprocess_vessel
 from flows.rerun_set import rerun
 from flows.vessel_model import PLAIN
 from pipeline.model import effects
@@ -150,6 +153,21 @@ def test_a_model_with_effects_is_a_parameter_set_like_any_other(late: Late, told
     # sets of all runs at once are no points in time
     changes = late.json("history", "--vessel", VESSEL, "--changes")["changes"]
     assert all(one["parameter_set_ids"] == [] for one in changes)
+
+
+def test_reprocessing_keeps_the_model_that_she_stands_at(late: Late, told: dict[str, Any]) -> None:
+    before = parameter_sets.summaries(late.warehouse, VESSEL)["parameter_set_id"].to_list()
+    report = reprocess_vessel(late.warehouse, VESSEL)
+    assert report.status == "unchanged" and report.kept_sets == 1, report
+    assert parameter_sets.summaries(late.warehouse, VESSEL)["parameter_set_id"].to_list() == before
+    assert aliases.of_vessel(late.warehouse, VESSEL)["model"] in before
+
+
+def test_a_vessel_that_fails_does_not_stop_the_fleet(late: Late, told: dict[str, Any]) -> None:
+    with disable_run_logger():
+        found = diagnose_batch.fn(late.warehouse.uri, ["nobody", VESSEL], PLAIN.model_dump(mode="json"))
+    assert [one["verdict"] for one in found] == ["failed", "explained"]
+    assert [row["effects"] for row in summary(found)] == ["", "rudder_lag"]
 
 
 @pytest.mark.parametrize(
