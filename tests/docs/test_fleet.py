@@ -21,25 +21,29 @@ def flows() -> dict[str, list[str]]:
     return found
 
 
-def test_the_deployment_is_a_flow_and_its_parameters_are_the_flows() -> None:
-    (deployment,) = SETTINGS["deployments"]
-    path, _, name = deployment["entrypoint"].partition(":")
-    assert (ROOT / path).is_file()
-    assert set(deployment["parameters"]) <= set(flows()[name])
-    assert f"{name}/{deployment['name']}" in TEXT
-    assert deployment["parameters"]["warehouse"] == "{{ $KEMPF_WAREHOUSE }}"
+def test_every_deployment_is_a_flow_and_its_parameters_are_the_flows() -> None:
+    names = []
+    for deployment in SETTINGS["deployments"]:
+        path, _, name = deployment["entrypoint"].partition(":")
+        assert (ROOT / path).is_file()
+        assert set(deployment["parameters"]) <= set(flows()[name])
+        assert f"{name}/{deployment['name']}" in TEXT
+        assert deployment["parameters"]["warehouse"] == "{{ $KEMPF_WAREHOUSE }}"
+        names.append(name)
+    assert names == ["reprocess", "diagnose"]
 
 
-def test_the_page_names_the_pool_the_schedule_and_the_artifacts() -> None:
-    (deployment,) = SETTINGS["deployments"]
-    pool = deployment["work_pool"]["name"]
-    assert f"work-pool create {pool} --type process" in TEXT
-    assert f"worker start --pool {pool}" in TEXT
-    assert [s["cron"] for s in deployment["schedules"]] == ["0 2 * * *"]
-    assert "02:00 UTC every night" in TEXT
+def test_the_page_names_the_pool_the_schedules_and_the_artifacts() -> None:
+    pools = {deployment["work_pool"]["name"] for deployment in SETTINGS["deployments"]}
+    assert pools == {"kempf"}
+    assert "work-pool create kempf --type process" in TEXT
+    assert "worker start --pool kempf" in TEXT
+    crons = [[s["cron"] for s in deployment["schedules"]] for deployment in SETTINGS["deployments"]]
+    assert crons == [["0 2 * * *"], ["0 4 * * 0"]]
+    assert "02:00 UTC every night" in TEXT and "04:00 UTC every Sunday" in TEXT
     source = (ROOT / "flows" / "fleet.py").read_text(encoding="utf-8")
     keys = re.findall(r'create_table_artifact\(key="([\w-]+)"', source)
-    assert sorted(keys) == ["kempf-identify", "kempf-ingest", "kempf-reprocess"]
+    assert sorted(keys) == ["kempf-diagnose", "kempf-identify", "kempf-ingest", "kempf-reprocess"]
     for key in keys:
         assert key in TEXT
 
