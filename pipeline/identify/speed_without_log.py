@@ -204,10 +204,10 @@ def speed_without_log(motion: Motion, start: Float | None = None) -> tuple[Speed
     found = smooth(system)
     names = ("T", "wander of V", "noise of y_u")
     T, wander, noise = (float(p) for p in np.exp(parameters))
-    std = np.sqrt(np.einsum("kii->ki", found.covariance))
+    std = _root(np.einsum("kii->ki", found.covariance))
     row = system.H[:, Y_U, CURRENT]
     along = np.einsum("ki,ki->k", row, found.mean[:, CURRENT])
-    along_std = np.sqrt(np.einsum("ki,kij,kj->k", row, found.covariance[:, CURRENT, CURRENT], row))
+    along_std = _root(np.einsum("ki,kij,kj->k", row, found.covariance[:, CURRENT, CURRENT], row))
     shared = np.einsum("ki,ki->k", row, found.covariance[:, CURRENT, V])
     speed = Speed(
         speed_m_s=tuple(found.mean[span, V] for span in rows),
@@ -225,6 +225,11 @@ def speed_without_log(motion: Motion, start: Float | None = None) -> tuple[Speed
         log_likelihood=value,
     )
     return speed, motion, fitted
+
+
+def _root(variance: Float) -> Float:
+    """Return standard deviations; where the digits run out a variance may fall below 0, and is not known then."""
+    return np.sqrt(np.where(variance >= 0.0, variance, np.nan))
 
 
 def _gated(runs: tuple[Run, ...], white: Float, rows: tuple[slice, ...]) -> tuple[Run, ...]:
