@@ -8,10 +8,11 @@ from typing import Any
 
 import numpy as np
 
+from flows.manoeuvres import once, same
 from flows.pool_vessel import ALIAS as POOLED_ALIAS
 from flows.progress import Progress, silent
 from flows.vessel_model import ALIAS, Own, known_effects, named
-from flows.vessel_runs import assembled, choose, once
+from flows.vessel_runs import assembled, choose
 from pipeline.compare.comparison import ComparedRun, judged, summary
 from pipeline.compare.horizon import Horizon, horizon_of
 from pipeline.compare.levels import fit_levels
@@ -239,7 +240,7 @@ def _is_seen(segment: Segment, seen: _Seen) -> bool:
             log_id == segment.log_id and start < segment.end_utc_ns and segment.start_utc_ns < end
             for log_id, start, end in seen.bounds
         )
-        or any(len(once([segment, other])[0]) == 1 for other in seen.found)
+        or any(len(once([segment, other], same)[0]) == 1 for other in seen.found)
     )
 
 

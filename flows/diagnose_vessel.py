@@ -8,7 +8,7 @@ from os import cpu_count
 from typing import Any
 
 from flows.progress import Progress, silent
-from flows.vessel_model import NONE_OF_ONES_OWN, Own, inputs_of, known_effects, named, store_model
+from flows.vessel_model import NONE_OF_ONES_OWN, Fitted, Own, inputs_of, known_effects, named, store_model
 from flows.vessel_runs import Chosen, VesselRuns, assembled, choose
 from pipeline.compare.diagnosed import where_left
 from pipeline.compare.looked import PhaseInterval, phases_s
@@ -63,13 +63,31 @@ def diagnose_vessel(
     found = diagnoses.find(warehouse, diagnosis_id(inputs))
     if found is not None:
         return found, False
-    runs = assembled(warehouse, chosen, spec, progress)
-    base, _ = store_model(warehouse, chosen, spec, own, progress, runs=runs)
-    examined = examine(warehouse, chosen, spec, own, settings, progress, runs=runs)
-    content = {**as_json(examined.diagnosis), "where": where_left(examined.diagnosis, _phases(examined))}
+    return _kept(warehouse, examine(warehouse, chosen, spec, own, settings, progress), spec, own, inputs), True
+
+
+def diagnose_in_full(
+    warehouse: Warehouse, vessel: str, spec: ModelSpec, own: Own, settings: DiagnosisSettings, progress: Progress
+) -> tuple[StoredDiagnosis, Examined]:
+    """Diagnose a vessel as `diagnose_vessel`, and return also what is not stored: it is computed in any case."""
+    chosen = choose(warehouse, vessel, progress)
+    inputs = _inputs(chosen, spec, own, settings)
+    examined = examine(warehouse, chosen, spec, own, settings, progress)
+    found = diagnoses.find(warehouse, diagnosis_id(inputs))
+    return found or _kept(warehouse, examined, spec, own, inputs), examined
+
+
+def _kept(
+    warehouse: Warehouse, examined: Examined, spec: ModelSpec, own: Own, inputs: dict[str, Any]
+) -> StoredDiagnosis:
+    """Store a diagnosis and the model that was diagnosed."""
+    chosen, found = examined.chosen, examined.diagnosis
+    fitted = Fitted(examined.runs, found.way, found.gross_errors)
+    base, _ = store_model(warehouse, chosen, spec, own, fitted=fitted)
+    content = {**as_json(found), "where": where_left(found, _phases(examined))}
     made = StoredDiagnosis(
         diagnosis_id=diagnosis_id(inputs),
-        vessel=vessel,
+        vessel=chosen.vessel,
         parameter_set_id=base.parameter_set_id,
         start_utc_ns=min(s.start_utc_ns for s in chosen.segments),
         verdict=content["verdict"],
@@ -82,7 +100,7 @@ def diagnose_vessel(
     # as it is read back, so that new and known answers are the same
     stored = diagnoses.find(warehouse, made.diagnosis_id)
     assert stored is not None
-    return stored, True
+    return stored
 
 
 def examine(
@@ -93,13 +111,12 @@ def examine(
     settings: DiagnosisSettings = STANDARD,
     progress: Progress = silent,
     only: tuple[str, ...] = (),
-    runs: VesselRuns | None = None,
 ) -> Examined:
-    """Make a diagnosis with everything in it, for a report; nothing is stored.
+    """Make a diagnosis with everything in it; nothing is stored.
 
     ``only`` names the effects to screen instead of all.
     """
-    runs = runs or assembled(warehouse, chosen, spec, progress)
+    runs = assembled(warehouse, chosen, spec, progress)
     known = known_effects(own)
     screened = {name: known[name] for name in only} if only else known
     count = 0

@@ -123,6 +123,13 @@ def identify(
     return rows
 
 
+def _names(warehouse: str, vessels: Sequence[str] | None) -> list[str]:
+    """Return the vessels asked for, or all of a warehouse that must be there; sorted."""
+    store = Warehouse(warehouse)
+    store.require()
+    return sorted(set(vessels)) if vessels else vessel_table.names(store)
+
+
 @task(name="reprocess-batch", retries=1, retry_delay_seconds=5)
 def reprocess_batch(warehouse: str, vessels: list[str], changed_only: bool, run: str | None) -> list[dict[str, Any]]:
     """Bring a batch of vessels up to date; a vessel that fails is reported, the others are done."""
@@ -162,9 +169,7 @@ def reprocess(
     list of dict
         One report a vessel, sorted by name.
     """
-    store = Warehouse(warehouse)
-    store.require()
-    names = sorted(set(vessels)) if vessels else vessel_table.names(store)
+    names = _names(warehouse, vessels)
     run = str(flow_run.get_id()) if flow_run.get_id() else None
     n_batches = min(len(names), _WORKERS * _BATCHES_A_WORKER)
     batches = [names[k::n_batches] for k in range(n_batches)]
@@ -215,9 +220,7 @@ def diagnose(
     list of dict
         One row an effect and vessel, see `flows.fleet_diagnosis.summary`.
     """
-    store = Warehouse(warehouse)
-    store.require()
-    names = sorted(set(vessels)) if vessels else vessel_table.names(store)
+    names = _names(warehouse, vessels)
     rows = summary(diagnose_batch(warehouse, names, spec or PLAIN.model_dump(mode="json")))
     create_table_artifact(key="kempf-diagnose", table=rows, description="What the models of the fleet lack")
     return rows

@@ -61,9 +61,9 @@ def as_parameter_set(
         segment_ids=segment_ids,
         log_ids=inputs.log_ids,
         start_utc_ns=min(bounds.start_utc_ns for bounds in inputs.bounds),
-        parameters=_stored(result.parameters),
-        discrete=_stored(result.discrete),
-        noise=_stored(result.noise),
+        parameters=stored(result.parameters),
+        discrete=stored(result.discrete),
+        noise=stored(result.noise),
         covariance_names=tuple(HULL_PARAMETERS),
         covariance=tuple(tuple(float(x) for x in row) for row in result.covariance),
         fit=result.fit,
@@ -75,5 +75,6 @@ def as_parameter_set(
     )
 
 
-def _stored(values: Sequence[Value]) -> tuple[Stored, ...]:
+def stored(values: Sequence[Value]) -> tuple[Stored, ...]:
+    """Return values in the form in which they are kept."""
     return tuple(Stored(v.name, v.value, v.std, v.unit) for v in values)

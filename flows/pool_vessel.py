@@ -8,6 +8,7 @@ from os import cpu_count
 from typing import Any
 
 from flows.identify_vessel import IdentifyOutcome, Request
+from flows.manoeuvres import once, overlap
 from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
 from flows.without_log import without_log
@@ -21,7 +22,6 @@ from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 from warehouse import aliases, code_version, logs, parameter_sets, provenance, readings, vessels
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
-from warehouse.segments import Segment
 from warehouse.store import Warehouse
 
 #: the estimator of pooled sets, and the one whose outcomes are pooled
@@ -78,7 +78,7 @@ def pool_vessel(
         return None
     # one profile is one reading of the logs; a log that could not be read anew stays out
     profile_sha256 = rows[max(chosen, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
-    chosen = _once([s for s in chosen if rows[s.ingest_id].profile_sha256 == profile_sha256])
+    chosen, _ = once([s for s in chosen if rows[s.ingest_id].profile_sha256 == profile_sha256], overlap)
     if len(chosen) < 2:
         return None
     chosen.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
@@ -109,18 +109,6 @@ def pool_vessel(
     if made.convergence.get("converged"):
         aliases.point(warehouse, vessel, made.parameter_set_id, alias=ALIAS)
     return made, not known
-
-
-def _once(found: Sequence[Segment]) -> list[Segment]:
-    """Return each manoeuvre once: two logs of one voyage hold the same noise of the sea, and twice is not two.
-
-    Of segments that overlap in time the longest stays, of equal ones the first by log.
-    """
-    kept: list[Segment] = []
-    for one in sorted(found, key=lambda s: (s.start_utc_ns - s.end_utc_ns, s.log_id, s.start_utc_ns)):
-        if all(one.end_utc_ns <= other.start_utc_ns or other.end_utc_ns <= one.start_utc_ns for other in kept):
-            kept.append(one)
-    return kept
 
 
 def build_pooled(

@@ -11,7 +11,7 @@ from flows.progress import Progress, silent
 from flows.refresh_logs import refresh_logs
 from flows.rerun_set import rerun
 from flows.unforeseen import as_told
-from flows.vessel_model import ALIAS, ESTIMATOR, Own, point, standing, store_model
+from flows.vessel_model import ALIAS, ESTIMATOR, model_of, point, standing, store_model
 from flows.vessel_runs import choose
 from schemas.errors import KempfError
 from schemas.model_spec import ModelSpec
@@ -168,7 +168,7 @@ def _model(warehouse: Warehouse, vessel: str, report: VesselReport, flow_run: st
     now = standing(warehouse, vessel)
     if now is None:
         return
-    spec, own = ModelSpec.model_validate(dict(now.model_spec)), Own.from_json(now.settings["own"])
+    spec, own = model_of(now)
     try:
         made, new = store_model(warehouse, choose(warehouse, vessel), spec, own, progress, flow_run)
     except KempfError as error:

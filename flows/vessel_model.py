@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from flows.parameter_set_of import arm_of, without_arm
+from flows.parameter_set_of import arm_of, stored, without_arm
 from flows.progress import Progress, silent
 from flows.vessel_runs import Chosen, VesselRuns, assemble, assembled
 from pipeline.diagnose.diagnosis import Step, step_of
@@ -123,6 +123,33 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
     )
 
 
+@dataclass(frozen=True, eq=False)
+class Fitted:
+    """A vessel's manoeuvres and the fits that lead to a model, the plain one first.
+
+    Attributes
+    ----------
+    runs : VesselRuns
+    fits : tuple of Fit
+        With one effect more each.
+    gross_errors : int
+        Measurements left out before the first.
+    """
+
+    runs: VesselRuns
+    fits: tuple[Fit, ...]
+    gross_errors: int
+
+
+def fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own) -> Fitted:
+    """Fit a model and every model on the way to it."""
+    used = named(spec.effects, known_effects(own))
+    chosen, _ = split(runs.runs)
+    with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+        fits, gross = staged([runs.runs[i] for i in chosen], runs.spec, runs.start.of(chosen), used, workers)
+    return Fitted(runs, tuple(fits), gross)
+
+
 def store_model(
     warehouse: Warehouse,
     chosen: Chosen,
@@ -130,9 +157,9 @@ def store_model(
     own: Own,
     progress: Progress = silent,
     flow_run: str | None = None,
-    runs: VesselRuns | None = None,
+    fitted: Fitted | None = None,
 ) -> tuple[ParameterSet, bool]:
-    """Fit and store a model and every model on the way to it; the vessel then stands at it.
+    """Store a model and every model on the way to it, each the parent of the next, in one commit.
 
     Parameters
     ----------
@@ -143,30 +170,32 @@ def store_model(
     own : Own
     progress : Progress, optional
     flow_run : str, optional
-    runs : VesselRuns, optional
-        The manoeuvres, where the caller has read them.
+    fitted : Fitted, optional
+        The model's fits, where the caller has them; else they are made here.
 
     Returns
     -------
     (ParameterSet, bool)
         The model, and whether it is new.
     """
-    inputs = inputs_of(chosen, spec, own)
-    name = parameter_set_id(inputs)
-    stored = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
-    if name in stored:
-        return parameter_sets.get(warehouse, name), False
-    parent = None
-    runs = runs or assembled(warehouse, chosen, spec, progress)
-    if spec.effects:
-        before = spec.model_copy(update={"effects": spec.effects[:-1]})
-        parent = store_model(warehouse, chosen, before, own, progress, flow_run, runs)[0].parameter_set_id
-    told = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
+    way = [spec.model_copy(update={"effects": spec.effects[:k]}) for k in range(len(spec.effects) + 1)]
+    wanted = [inputs_of(chosen, one, own) for one in way]
+    names = [parameter_set_id(inputs) for inputs in wanted]
+    there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
+    if names[-1] in there:
+        return parameter_sets.get(warehouse, names[-1]), False
+    if fitted is None:
+        runs = assembled(warehouse, chosen, spec, progress)
+        progress(0, 1, f"fitting {spec.effects[-1] if spec.effects else 'the plain model'}")
+        fitted = fitted_model(runs, spec, own)
     profile = vessels.get(warehouse, chosen.profile_sha256)
-    progress(0, 1, f"fitting {spec.effects[-1] if spec.effects else 'the plain model'}")
-    made = _fitted(runs, profile, inputs, chosen.vessel, told, parent)
-    parameter_sets.insert(warehouse, [made])
-    return made, True
+    made = []
+    for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
+        if name not in there:
+            told = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
+            made.append(_as_parameter_set(fit, fitted, profile, inputs, chosen.vessel, told, parent))
+    parameter_sets.insert(warehouse, made)
+    return made[-1], True
 
 
 def point(warehouse: Warehouse, model: ParameterSet) -> None:
@@ -178,6 +207,18 @@ def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     """Return the model that a vessel stands at, None where she has none yet."""
     pointed = aliases.of_vessel(warehouse, vessel).get(ALIAS)
     return parameter_sets.get(warehouse, pointed) if pointed else None
+
+
+def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:
+    """Return the model of a stored set and the effects of a person's own in it."""
+    spec = ModelSpec.model_validate(dict(one.model_spec))
+    return spec, Own.from_json(one.settings["own"]) if one.estimator == ESTIMATOR else Own()
+
+
+def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:
+    """Return the model that a vessel stands at, the plain one where she has none yet."""
+    now = standing(warehouse, vessel)
+    return model_of(now) if now else (PLAIN, Own())
 
 
 def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
@@ -208,6 +249,14 @@ def chain(warehouse: Warehouse, model: ParameterSet) -> list[ParameterSet]:
     return found
 
 
+def rungs_to(warehouse: Warehouse, model: ParameterSet) -> list[dict[str, Any]]:
+    """Return the rungs of the ladder that lead to a model, the plain one first, as JSON content."""
+    return [
+        {**one.fit["rung"], "step": step, "parameter_set_id": one.parameter_set_id}
+        for step, one in enumerate(chain(warehouse, model))
+    ]
+
+
 def build_model(
     instruments: Mapping[str, Instruments],
     profile: VesselProfile,
@@ -231,34 +280,24 @@ def build_model(
     """
     spec = ModelSpec.model_validate(dict(inputs.model_spec))
     runs = assemble(instruments, profile, list(zip(inputs.settings["segments"], inputs.bounds, strict=True)), spec)
-    return _fitted(runs, profile, inputs, vessel, told, parent)
-
-
-def _fitted(
-    runs: VesselRuns, profile: VesselProfile, inputs: Inputs, vessel: str, told: dict[str, Any], parent: str | None
-) -> ParameterSet:
-    spec = ModelSpec.model_validate(dict(inputs.model_spec))
-    used = named(spec.effects, known_effects(Own.from_json(inputs.settings["own"])))
-    fitted, held = split(runs.runs)
-    with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
-        fits, gross = staged([runs.runs[i] for i in fitted], runs.spec, runs.start.of(fitted), used, workers)
-    step = step_of(fits[-1], [runs.runs[i] for i in held])
-    if parent is None and spec.effects:
-        raise NotFound("no_parent", f"The model {spec.effects} has no parent.", "Make it with `kempf effects add`.")
-    return _as_parameter_set(step, runs, profile, inputs, vessel, told, parent, gross)
+    fitted = fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
+    return _as_parameter_set(fitted.fits[-1], fitted, profile, inputs, vessel, told, parent)
 
 
 def _as_parameter_set(
-    step: Step,
-    runs: VesselRuns,
+    fit: Fit,
+    fitted: Fitted,
     profile: VesselProfile,
     inputs: Inputs,
     vessel: str,
     told: dict[str, Any],
     parent: str | None,
-    gross: int,
 ) -> ParameterSet:
-    fit, spec = step.fit, ModelSpec.model_validate(dict(inputs.model_spec))
+    runs, spec = fitted.runs, ModelSpec.model_validate(dict(inputs.model_spec))
+    if parent is None and spec.effects:
+        raise NotFound("no_parent", f"The model {spec.effects} has no parent.", "Make it with `kempf effects add`.")
+    _, left = split(runs.runs)
+    step = step_of(fit, [runs.runs[i] for i in left])
     covariance = fit.covariance
     speed = float(np.mean([np.mean(one.run.speed_m_s) for one in fit.runs]))
     held = [run.name for run in step.held]
@@ -274,10 +313,7 @@ def _as_parameter_set(
         log_ids=inputs.log_ids,
         start_utc_ns=min(bounds.start_utc_ns for bounds in inputs.bounds),
         parameters=_parameters(fit),
-        discrete=tuple(
-            Stored(v.name, v.value, v.std, v.unit)
-            for v in discrete_values(fit.hull, np.nan_to_num(covariance[:6, :6]), speed, _STEP_S)
-        ),
+        discrete=stored(discrete_values(fit.hull, np.nan_to_num(covariance[:6, :6]), speed, _STEP_S)),
         noise=(),
         covariance_names=(*HULL_PARAMETERS, *fit.model.names),
         covariance=tuple(tuple(float(x) for x in row) for row in covariance),
@@ -291,7 +327,7 @@ def _as_parameter_set(
             "speed_m_s": speed,
             "step_s": _STEP_S,
             "grid_step_s": fit.runs[0].run.step_s,
-            "gross_errors": gross,
+            "gross_errors": fitted.gross_errors,
             "held_out": held,
             "levels": {one.run.name: list(levels) for one, levels in zip(fit.runs, fit.levels, strict=True)},
             "left_out": runs.skipped,

@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from os import cpu_count
 
-import numpy as np
-
+from flows.manoeuvres import once, same
 from flows.parameter_set_of import arm_of
 from flows.progress import Progress, silent
 from flows.refresh_logs import refresh_logs
@@ -28,8 +27,6 @@ from warehouse.store import Warehouse
 
 #: where the profile does not tell a length; only the scale of non-dimensional coefficients hangs on it
 _LENGTH_M = 100.0
-#: executes this close in two logs are one
-_SAME_INSTANT_S = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,7 +108,8 @@ def choose(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Ch
             {"vessel": vessel},
         )
     profile_sha256 = rows[max(found, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
-    kept, skipped = once([s for s in found if rows[s.ingest_id].profile_sha256 == profile_sha256])
+    # a broken-off zigzag stays: its rudder moved too
+    kept, skipped = once([s for s in found if rows[s.ingest_id].profile_sha256 == profile_sha256], same)
     for segment in found:
         if rows[segment.ingest_id].profile_sha256 != profile_sha256:
             skipped[segment.segment_id] = "its log is read with an older profile"
@@ -205,32 +203,3 @@ def assemble(
         for name, one, record in records
     )
     return VesselRuns(ready, runs, tuple(record for _, _, record in records), skipped)
-
-
-def once(found: Sequence[Segment]) -> tuple[list[Segment], dict[str, str]]:
-    """Return each manoeuvre once, and why the others are left out.
-
-    Two logs of one voyage hold the same noise of the sea, and twice is not two. Of equal ones the longest stays, then
-    the first by log. Broken-off zigzags stay: their rudder moved too.
-    """
-    kept: list[Segment] = []
-    left: dict[str, str] = {}
-    for one in sorted(found, key=lambda s: (s.start_utc_ns - s.end_utc_ns, s.log_id, s.start_utc_ns)):
-        twin = next((other for other in kept if _same(one, other)), None)
-        if twin is None:
-            kept.append(one)
-        else:
-            left[one.segment_id] = f"another log holds the same manoeuvre, {twin.segment_id}"
-    return kept, left
-
-
-def _same(one: Segment, other: Segment) -> bool:
-    """Tell whether two segments are one manoeuvre: at the same time, to the same side, executes at the same instants.
-
-    The time alone does not tell: logs of a tank count from one stated start.
-    """
-    if one.end_utc_ns <= other.start_utc_ns or other.end_utc_ns <= one.start_utc_ns:
-        return False
-    theirs = np.array(other.executes_utc_ns)
-    late = [float(np.min(np.abs(theirs - ns))) * 1e-9 for ns in one.executes_utc_ns]
-    return one.first_side == other.first_side and max(late, default=0.0) < _SAME_INSTANT_S

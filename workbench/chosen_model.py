@@ -6,11 +6,10 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from flows.files import read_model
-from flows.vessel_model import ESTIMATOR, PLAIN, Own
+from flows.vessel_model import PLAIN, Own, model_of
 from schemas.errors import UsageError
 from schemas.model_spec import ModelSpec
 from warehouse import parameter_sets
-from warehouse.parameter_set import ParameterSet
 from warehouse.store import Warehouse
 
 _LARGEST = 100_000
@@ -47,12 +46,6 @@ def chosen_model(warehouse: Warehouse, vessel: str, set_id: str | None, model: P
             f"List hers with `kempf params list --vessel {vessel}`.",
         )
     return model_of(found)
-
-
-def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:
-    """Return the model of a stored set."""
-    spec = ModelSpec.model_validate(dict(one.model_spec))
-    return spec, Own.from_json(one.settings["own"]) if one.estimator == ESTIMATOR else Own()
 
 
 def read_effect_files(paths: Sequence[Path]) -> dict[str, str]:

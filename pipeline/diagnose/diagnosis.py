@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -102,8 +102,10 @@ class Diagnosis:
 
     Attributes
     ----------
+    way : tuple of Fit
+        The plain model, then with one given effect more after the other; the last one is diagnosed.
     steps : tuple of Step
-        The plain model first.
+        The diagnosed model first.
     before, after : Flexible or None
         The flexible reference beside the plain model and beside the last; None with a single run.
     fitted, held : tuple of Run
@@ -111,6 +113,7 @@ class Diagnosis:
     settings : DiagnosisSettings
     """
 
+    way: tuple[Fit, ...]
     steps: tuple[Step, ...]
     before: Flexible | None
     after: Flexible | None
@@ -172,7 +175,7 @@ def diagnose(
             tried.append((candidate, confirm(last.fit, candidate, held, workers)))
         best = undecided([pair for pair in tried if pair[1].holds])
         if not best:
-            steps[-1] = _refused(last, tried)
+            steps[-1] = replace(last, refused=(*last.refused, *tried))
             break
         names = {candidate.effect.name for candidate, _ in best}
         worse = tuple(pair for pair in tried if pair[0].effect.name not in names)
@@ -185,7 +188,8 @@ def diagnose(
             steps = _without(idle, steps, held, effects, workers)
     told("measuring what is left")
     after = flexible(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
-    return Diagnosis(tuple(steps), before, after, tuple(one.run for one in base.runs), tuple(held), gross, settings)
+    fitted = tuple(one.run for one in base.runs)
+    return Diagnosis(tuple(fits), tuple(steps), before, after, fitted, tuple(held), gross, settings)
 
 
 def _idle(steps: Sequence[Step]) -> Effect | None:
@@ -206,21 +210,17 @@ def _without(
 ) -> list[Step]:
     """Climb the ladder again without an effect; what was refused on the way stays told."""
     made = [steps[0]]
+    refused = [pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused)]
     for step in steps[1:]:
         if step.added is None or step.added.name == idle.name:
             continue
         base = made[-1].fit
         candidate = score(base, step.added)
         one = confirm(base, candidate, held, workers)
-        refused = tuple(pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused))
         others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
         screened = screen(one.fit, effects, workers)
         made.append(_step(one.fit, step.added, ((candidate, one),), others, held, screened))
     return made
-
-
-def _refused(step: Step, tried: list[tuple[Candidate, Confirmation]]) -> Step:
-    return Step(step.fit, step.added, step.chosen_from, (*step.refused, *tried), step.screened, step.fitted, step.held)
 
 
 def step_of(fit: Fit, held: Sequence[Run]) -> Step:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -98,12 +98,6 @@ class Run:
         """Rudder at the instants, shape (n,)."""
         rudder: Float = self.inputs[::ROWS, 1]
         return rudder
-
-    def with_day(self, day: int) -> Run:
-        """Return the run with the number of its log."""
-        inputs = self.inputs.copy()
-        inputs[:, -1] = day
-        return replace(self, day=day, inputs=inputs)
 
 
 def step_of(records: list[Record], length_m: float) -> float:

@@ -22,8 +22,7 @@ from pipeline.diagnose import sensitivity
 from pipeline.diagnose.filtered import Filtered
 from pipeline.diagnose.pooled_fit import Fit, Linearised
 from pipeline.diagnose.sensitivity import N_HULL, Point
-from pipeline.model.augmented import Augmented
-from pipeline.model.terms.effect import Effect, Parameter
+from pipeline.model.terms.effect import Effect
 from pipeline.normalise.series import Float
 
 #: share of an effect that the fitted parameters imitate, above which nothing can be told of it
@@ -177,13 +176,8 @@ def _scored(base: Fit, known: Nuisance, effect: Effect) -> Candidate:
 
 def _grid(effect: Effect) -> list[tuple[float, ...]]:
     """Return the points at which an effect is tried: its first parameter and those of shape over all their steps."""
-    choices = [p.steps if k == 0 or _is_shape(p) else p.steps[:1] for k, p in enumerate(effect.parameters)]
+    choices = [p.steps if k == 0 or p.shapes else p.steps[:1] for k, p in enumerate(effect.parameters)]
     return list(product(*choices))
-
-
-def _is_shape(parameter: Parameter) -> bool:
-    """Tell a parameter that is never 0, such as a frequency: it shapes the effect and does not make it."""
-    return not parameter.low <= 0.0 <= parameter.high
 
 
 def candidate_columns(base: Fit, effect: Effect, steps: Sequence[float]) -> Float | None:
@@ -196,10 +190,10 @@ def candidate_columns(base: Fit, effect: Effect, steps: Sequence[float]) -> Floa
     """
     model = base.model.with_effect(effect)
     at = base.values.size
-    shape = np.array([step if _is_shape(p) else 0.0 for p, step in zip(effect.parameters, steps, strict=True)])
+    shape = np.array([step if p.shapes else 0.0 for p, step in zip(effect.parameters, steps, strict=True)])
     columns = []
     for k, (parameter, step) in enumerate(zip(effect.parameters, steps, strict=True)):
-        if _is_shape(parameter):
+        if parameter.shapes:
             continue
         parts = []
         for number, (filtered, line) in enumerate(zip(base.runs, base.linearised, strict=True)):
@@ -228,7 +222,7 @@ def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float,
     gradient = clean.T @ known.u
     found = inverse @ gradient
     score = float(gradient @ found)
-    made = np.array([not _is_shape(p) for p in effect.parameters])
+    made = np.array([not p.shapes for p in effect.parameters])
     change, std = np.array(steps, dtype=np.float64), unknown.copy()
     change[made], std[made] = found, np.sqrt(np.diag(inverse))
     return Candidate(
@@ -248,7 +242,7 @@ def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float,
 def _plausible(effect: Effect, change: Float) -> bool:
     """Tell whether the change goes where the effect can be at all: a rudder cannot answer before it moves."""
     inside = [np.clip(x, p.low, p.high) for x, p in zip(change, effect.parameters, strict=True)]
-    return any(x != 0.0 for x, p in zip(inside, effect.parameters, strict=True) if not _is_shape(p))
+    return any(x != 0.0 for x, p in zip(inside, effect.parameters, strict=True) if not p.shapes)
 
 
 def _adjusted(p_values: Sequence[float]) -> list[float]:
@@ -264,8 +258,3 @@ def _adjusted(p_values: Sequence[float]) -> list[float]:
     result = np.empty(m)
     result[order] = smallest
     return [float(x) for x in result]
-
-
-def model_of(names: Sequence[str], effects: Mapping[str, Effect]) -> Augmented:
-    """Return the model with these effects of a catalogue, in order."""
-    return Augmented(tuple(effects[name] for name in names))

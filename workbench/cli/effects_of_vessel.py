@@ -26,19 +26,17 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     Beside the model that the vessel stands at; nothing is stored.
     """
     from flows.diagnose_vessel import examine
-    from flows.vessel_model import PLAIN, Own, standing
+    from flows.vessel_model import Own, standing_model
     from flows.vessel_runs import choose
     from pipeline.diagnose.diagnosis import DiagnosisSettings
     from pipeline.diagnose.verdict import as_json as told_as_json
     from warehouse.canonical import plain
     from warehouse.store import Warehouse
-    from workbench.chosen_model import model_of
 
     mine = Own(formulas={name: (formula,)})
     mine.effects()  # a slip of the pen is told before anything is read
     warehouse = Warehouse(uri)
-    now = standing(warehouse, vessel)
-    spec, own = model_of(now) if now else (PLAIN, Own())
+    spec, own = standing_model(warehouse, vessel)
     with progress() as tell:
         chosen = choose(warehouse, vessel, tell)
         settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
@@ -81,10 +79,10 @@ def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
 @json_option
 def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str, as_json: bool) -> None:
     """Add an effect to the model that a vessel stands at, refit, and show the error before and after."""
-    from flows.vessel_model import PLAIN, Own, chain, point, standing, store_model
+    from flows.vessel_model import Own, point, rungs_to, standing_model, store_model
     from flows.vessel_runs import choose
     from warehouse.store import Warehouse
-    from workbench.chosen_model import model_of, read_effect_files
+    from workbench.chosen_model import read_effect_files
 
     if formula is not None and path is not None:
         raise UsageError("two_effects", "Both --formula and --file say what the effect is.", "Give one of them.")
@@ -96,8 +94,7 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
     if formula is None and path is None:
         _require_known(name)
     warehouse = Warehouse(uri)
-    now = standing(warehouse, vessel)
-    spec, own = model_of(now) if now else (PLAIN, Own())
+    spec, own = standing_model(warehouse, vessel)
     if name in spec.effects:
         raise UsageError(
             "effect_there", f"The model of {vessel!r} holds {name!r} already.", f"See `kempf ladder --vessel {vessel}`."
@@ -106,8 +103,7 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
     with progress() as tell:
         made, _ = store_model(warehouse, choose(warehouse, vessel, tell), wanted, own.beside(mine), tell)
     point(warehouse, made)
-    models = chain(warehouse, made)
-    rungs = [{**m.fit["rung"], "step": k, "parameter_set_id": m.parameter_set_id} for k, m in enumerate(models)]
+    rungs = rungs_to(warehouse, made)
     if as_json:
         print_json({"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": made.show()})
         return

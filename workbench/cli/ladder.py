@@ -17,7 +17,7 @@ from workbench.terminal import number, print_json, print_table
 @json_option
 def command(vessel: str, uri: str, as_json: bool) -> None:
     """Show the models that lead to the one a vessel stands at, and how the error fell from one to the next."""
-    from flows.vessel_model import chain, standing
+    from flows.vessel_model import rungs_to, standing
     from warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
@@ -29,10 +29,7 @@ def command(vessel: str, uri: str, as_json: bool) -> None:
             f"Run `kempf diagnose --vessel {vessel}`, then `kempf effects add NAME --vessel {vessel}`.",
             {"vessel": vessel},
         )
-    rungs = [
-        {**one.fit["rung"], "step": step, "parameter_set_id": one.parameter_set_id}
-        for step, one in enumerate(chain(warehouse, model))
-    ]
+    rungs = rungs_to(warehouse, model)
     if as_json:
         print_json(rungs)
     else:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 
-from flows.diagnose_vessel import diagnose_vessel, examine
+from flows.diagnose_vessel import diagnose_in_full
 from flows.progress import Progress, silent
 from flows.vessel_model import Own
-from flows.vessel_runs import choose
 from pipeline.diagnose.diagnosis import DiagnosisSettings
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
@@ -63,9 +62,8 @@ def made(
         ``no_vessel``, ``no_segments``, ``no_runs``.
     """
     settings = settings or DiagnosisSettings()
-    stored, _ = diagnose_vessel(warehouse, vessel, spec, own, settings, progress)
-    # the curves are not stored: they are made again from the same inputs
-    examined = examine(warehouse, choose(warehouse, vessel, progress), spec, own, settings, progress)
+    # the curves are not stored, so a known diagnosis is made again from the same inputs
+    stored, examined = diagnose_in_full(warehouse, vessel, spec, own, settings, progress)
     profile = vessels.get(warehouse, examined.chosen.profile_sha256)
     content = gather(
         vessel,
