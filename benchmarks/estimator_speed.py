@@ -70,7 +70,8 @@ def rows_of(record: Record, rows: Any) -> Record:
     n = record.time_s.size
     kept = {f.name: getattr(record, f.name) for f in fields(record)}
     taken = {k: v[rows] for k, v in kept.items() if isinstance(v, np.ndarray) and v.shape[0] == n}
-    return replace(record, **{**taken, "time_s": taken["time_s"] - taken["time_s"][0]})
+    since = taken.pop("time_s") - record.time_s[rows][0]
+    return replace(record, time_s=since, speed_error=record.speed_error.at(rows), **taken)
 
 
 def sail(hull: str, seed: int, samples: int) -> Sailed:

@@ -1,9 +1,9 @@
 """The likelihood of eq. (16) as a model of statsmodels, the way a user of that package would write it.
 
-The same states (v, r, F, c_N, c_E), the same measurements y_v and y_r, the same exact steps with the logged speed and a
-rudder that moves linearly; statsmodels filters (compiled) and maximises (L-BFGS, derivatives by differences). The steps
-of all instants are made at once in numpy. Reference: Fulton (2015), "Estimating time series models by state space
-methods in Python: statsmodels".
+The same states (v, r, F, c_N, c_E, e), the same measurements y_v and y_r, the same exact steps with the logged speed
+and a rudder that moves linearly; statsmodels filters (compiled) and maximises (L-BFGS, derivatives by differences).
+The steps of all instants are made at once in numpy. Reference: Fulton (2015), "Estimating time series models by state
+space methods in Python: statsmodels".
 """
 
 from __future__ import annotations
@@ -42,7 +42,7 @@ class ShipLikelihood(MLEModel):  # type: ignore[misc, unused-ignore]
     """
 
     def __init__(self, record: Record, spec: ModelSpec, arm_per_m: float, scale: Any) -> None:
-        super().__init__(record.measured[:, :2], k_states=5, k_posdef=5, loglikelihood_burn=0)
+        super().__init__(record.measured[:, :2], k_states=6, k_posdef=6, loglikelihood_burn=0)
         self.arm, self.scale = arm_per_m, np.asarray(scale, dtype=np.float64)
         self.wind_rate = spec.wind_correlation_rate_per_s
         self.step_s, u = np.diff(record.time_s), record.rudder_rad
@@ -51,11 +51,15 @@ class ShipLikelihood(MLEModel):  # type: ignore[misc, unused-ignore]
         self.rudder_variance = record.rudder_noise_rad_sqrt_s[1:] ** 2 / self.step_s
         self.decay = np.exp(-spec.current_correlation_rate_per_s * self.step_s)
         n = record.time_s.size
-        design = np.zeros((2, 5, n))
+        design = np.zeros((2, 6, n))
         design[0, 0], design[1, 1] = 1.0, 1.0
         design[0, 3], design[0, 4] = -np.sin(record.heading_rad), np.cos(record.heading_rad)
-        self["design"], self["selection"] = design, np.eye(5)
-        self.initialize_known(np.zeros(5), np.diag(np.array(INITIAL_STD)[_STATES] ** 2))
+        self["design"], self["selection"] = design, np.eye(6)
+        error = record.speed_error
+        self.error_gain = 0.5 * (error.gain_rad_s_m[1:] + error.gain_rad_s_m[:-1])
+        self.error_std, self.error_decay = error.std_m_s, np.exp(-error.rate_per_s * self.step_s)
+        std = np.append(np.array(INITIAL_STD)[_STATES], error.std_m_s)
+        self.initialize_known(np.zeros(6), np.diag(std**2))
         self.arrays: dict[Any, tuple[Any, Any, Any]] = {}
 
     @property
@@ -85,17 +89,19 @@ class ShipLikelihood(MLEModel):  # type: ignore[misc, unused-ignore]
         hull, sigma = params[:6] * self.scale, np.exp(params[6:])
         n = self.speed.size + 1
         # the last of everything leads beyond the record
-        transition = np.zeros((5, 5, n), dtype=params.dtype)
-        intercept, noise = np.zeros((5, n), dtype=params.dtype), np.zeros((5, 5, n), dtype=params.dtype)
-        Phi, g, Q = self._steps(hull, sigma[0])
+        transition = np.zeros((6, 6, n), dtype=params.dtype)
+        intercept, noise = np.zeros((6, n), dtype=params.dtype), np.zeros((6, 6, n), dtype=params.dtype)
+        Phi, g, Q, held = self._steps(hull, sigma[0])
         transition[:3, :3, :-1], intercept[:3, :-1], noise[:3, :3, :-1] = Phi, g, Q
         transition[3, 3, :-1] = transition[4, 4, :-1] = self.decay
         noise[3, 3, :-1] = noise[4, 4, :-1] = sigma[1] ** 2 * (1.0 - self.decay**2)
+        transition[:3, 5, :-1], transition[5, 5, :-1] = held * self.error_gain, self.error_decay
+        noise[5, 5, :-1] = self.error_std**2 * (1.0 - self.error_decay**2)
         self["transition"], self["state_intercept"], self["state_cov"] = transition, intercept, noise
         self["obs_cov"] = np.diag(sigma[2:] ** 2)
 
-    def _steps(self, hull: Any, sigma_F: Any) -> tuple[Any, Any, Any]:
-        """Exact steps of (v, r, F): transition (3, 3, n), input (3, n), process noise (3, 3, n)."""
+    def _steps(self, hull: Any, sigma_F: Any) -> tuple[Any, Any, Any, Any]:
+        """Exact steps of (v, r, F): transition, input, process noise, and what a unit of rudder held does."""
         h, V, n = self.step_s, self.speed, self.speed.size
         A = np.zeros((n, 3, 3), dtype=hull.dtype)
         A[:, :2, :2] = hull[:4].reshape(2, 2) * (V * h)[:, None, None]
@@ -119,4 +125,4 @@ class ShipLikelihood(MLEModel):  # type: ignore[misc, unused-ignore]
         intensity = 2.0 * self.wind_rate * sigma_F**2 * h
         Q = intensity[:, None, None] * ((answer * weights) @ answer.transpose(0, 2, 1))
         Q += self.rudder_variance[:, None, None] * held[:, :, None] * held[:, None, :]
-        return Phi.transpose(1, 2, 0), g.T, Q.transpose(1, 2, 0)
+        return Phi.transpose(1, 2, 0), g.T, Q.transpose(1, 2, 0), held.T

@@ -85,8 +85,8 @@ def free_run(record: Record, hull: Hull, spec: ModelSpec) -> FreeRun:
     trace = (*no_trace()[:2], states, spread, no_trace()[4])
     nothing = np.full((n, 3), np.nan)
     likelihood(
-        *(theta, False, used.time_s, used.speed_m_s, used.rudder_rad, np.zeros(n), nothing),
-        *(np.zeros(n, dtype=np.bool_), np.zeros((n, 2)), 0.0, 1.0, 1.0, 1.0, x0, P0, trace),
+        *(theta, False, used.time_s, used.speed_m_s, used.rudder_rad, np.zeros(n), np.zeros(n), nothing),
+        *(np.zeros(n, dtype=np.bool_), np.zeros((n, 2)), 0.0, 1.0, 1.0, 1.0, 1.0, x0, P0, trace),
     )
     predicted = states[:, [0, 1, 4]]
     return FreeRun(record.time_s, predicted, record.measured - predicted)

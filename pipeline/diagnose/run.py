@@ -175,7 +175,7 @@ def make_run(
         start_utc_ns=record.start_utc_ns,
         step_s=step_s,
         inputs=inputs,
-        rudder_noise=np.interp(time, record.time_s, record.rudder_noise_rad_sqrt_s),
+        rudder_noise=np.interp(time, record.time_s, record.shake_rad_sqrt_s),
         measured=measured,
         offset_s=offset,
         current_row=_current_row(spec, coarse),

@@ -1,9 +1,10 @@
 """The compiled likelihood of eq. (16) over one segment, with its score and Fisher information.
 
-State x = (v, r, F, M, psi, c_1, c_2, b); measurements y_v = v + h_1 c_1 + h_2 c_2 (eq. (18)), y_r = r + b, y_psi = psi,
-each at its own instants. With h = (1, 0) the first current state is the paper's V_T; with h = (-sin K, cos K) the two
-are the current towards north and east, and eq. (19) holds without its small angle. b is the bias of the rate gyro; the
-heading tells it from a turn. A state without variance is left out of the arithmetic.
+State x = (v, r, F, M, psi, c_1, c_2, b, e); measurements y_v = v + h_1 c_1 + h_2 c_2 (eq. (18)), y_r = r + b, y_psi =
+psi, each at its own instants. With h = (1, 0) the first current state is the paper's V_T; with h = (-sin K, cos K) the
+two are the current towards north and east, and eq. (19) holds without its small angle. b is the bias of the rate gyro;
+the heading tells it from a turn. e is the error of the speed, which acts like one of the rudder
+(`pipeline.identify.speed_error`). A state without variance is left out of the arithmetic.
 Sensitivities are carried forward with the filter (Astrom 1980, "Maximum likelihood and prediction error methods",
 Automatica 16), scalar measurement by scalar measurement; they lie innermost in memory.
 """
@@ -19,8 +20,8 @@ from pipeline.normalise.series import Float
 #: theta = (a11, a12, a21, a22, b1, b2, log sigma_F, sigma_M, sigma_V, sigma_v, sigma_r, sigma_psi); the second half
 #: are logarithms, in the order of `schemas.model_spec.NOISE_PARAMETERS`
 N_THETA = 12
-N_STATE = 8
-C1, C2, BIAS = 5, 6, 7
+N_STATE = 9
+C1, C2, BIAS, ERROR = 5, 6, 7, 8
 LOG_F, LOG_M, LOG_V = 6, 7, 8
 #: the first of the measurements' noise levels
 LOG_MEASUREMENT = 9
@@ -31,12 +32,13 @@ _LOG_2PI = float(np.log(2.0 * np.pi))
 
 @njit(**STEP, fastmath={"contract"})
 def _advance(  # type: ignore[no-untyped-def]
-    x, P, dx, dP, F, g, Q, dF, dg, dQ, derivatives, chain, W, dW, dWt, moved, dmoved
+    x, P, dx, dP, F, g, Q, dF, dE, dg, dQ, derivatives, chain, error, W, dW, dWt, moved, dmoved
 ):
     """Let x <- F x + g, P <- F P F' + Q, and their derivatives.
 
     Derivatives of a matrix lie in rows (i, (c, j)), so that F acts on them row by row, on all columns and parameters
-    at once. ``chain`` is how many states belong to the chain; only its rows of F depend on the parameters.
+    at once. ``chain`` is how many states belong to the chain; only its rows of F depend on the parameters. ``error`` is
+    where the speed's error stands, n where there is none, and ``dE`` how its column of F depends on them.
     """
     n, width = x.size, x.size * N_THETA
     for i in range(n):
@@ -71,6 +73,12 @@ def _advance(  # type: ignore[no-untyped-def]
                             dmoved[i, j] += d * x[k]
                             for c in range(n):
                                 dW[i, c * N_THETA + j] += d * P[k, c]
+                if error < n:
+                    for j in range(6):
+                        d = dE[i, j]
+                        dmoved[i, j] += d * x[error]
+                        for c in range(n):
+                            dW[i, c * N_THETA + j] += d * P[error, c]
             for c in range(n):
                 for j in range(N_THETA):
                     dWt[c, i * N_THETA + j] = dW[i, c * N_THETA + j]
@@ -177,15 +185,22 @@ def _update(  # type: ignore[no-untyped-def]
 
 @njit(**STEP)
 def _gather(  # type: ignore[no-untyped-def]
-    states, chain, q_delta, Phi, g, held, Q, dPhi, dg, dheld, dQ, F, gs, Qs, dF, dgs, dQs, derivatives
+    states, chain, error, q_delta, gain, Phi, g, held, Q, dPhi, dg, dheld, dQ, F, gs, Qs, dF, dE, dgs, dQs, derivatives
 ):
     """Take the present states out of the chain's step; what lies outside the chain stays as it is.
 
-    The rudder's error, of variance ``q_delta`` over the step, joins the process noise here.
+    The rudder's error, of variance ``q_delta`` over the step, joins the process noise here; the speed's, state
+    ``error``, acts like ``gain`` of rudder.
     """
+    n = states.size
     for a in range(chain):
         i = states[a]
         gs[a] = g[i]
+        if error < n:
+            F[a, error] = gain * held[i]
+            if derivatives:
+                for j in range(6):
+                    dE[a, j] = gain * dheld[i, j]
         for b in range(chain):
             F[a, b] = Phi[i, states[b]]
         for b in range(a + 1):
@@ -217,6 +232,7 @@ def likelihood(  # type: ignore[no-untyped-def]
     speed,
     rudder,
     rudder_noise,
+    error_gain,
     measured,
     withheld,
     current_row,
@@ -224,6 +240,7 @@ def likelihood(  # type: ignore[no-untyped-def]
     mu_F,
     mu_M,
     mu_V,
+    mu_e,
     x0,
     P0,
     trace,
@@ -242,18 +259,20 @@ def likelihood(  # type: ignore[no-untyped-def]
         Speed through the water, m/s, and rudder angle, rad, at the instants.
     rudder_noise : ndarray, shape (n,)
         Intensity of the rudder's error before each instant, rad s^0.5; over a step the error is taken for constant.
+    error_gain : ndarray, shape (n,)
+        Rudder that a unit of the speed's error stands for, rad s/m.
     measured : ndarray, shape (n, 3)
         y_v, y_r, y_psi at the instants, NaN where not measured then.
     withheld : ndarray of bool, shape (n,)
         Instants whose measurements are predicted, innovation and variance told, and not taken in.
     current_row : ndarray, shape (n, 2)
         h_1 and h_2 at the instants; used where y_v is measured.
-    arm, mu_F, mu_M, mu_V : float
-        l, 1/m, and the correlation rates of the disturbances, 1/s.
-    x0 : ndarray, shape (8,); P0 : ndarray, shape (8, 8)
+    arm, mu_F, mu_M, mu_V, mu_e : float
+        l, 1/m, and the correlation rates of the disturbances and of the speed's error, 1/s.
+    x0 : ndarray, shape (9,); P0 : ndarray, shape (9, 9)
         Mean and covariance of the state at the first instant. States that have no variance are left out.
     trace : tuple of ndarray
-        Innovations (n, 3), their variances (n, 3), filtered states (n, 8), their variances (n, 8), and the scores of
+        Innovations (n, 3), their variances (n, 3), filtered states (n, 9), their variances (n, 9), and the scores of
         the single measurements (n, 3, 12), to be filled; any of them may have 0 rows.
 
     Returns
@@ -277,11 +296,12 @@ def likelihood(  # type: ignore[no-untyped-def]
     Q, dQ = np.zeros((N_CHAIN, N_CHAIN, 2)), np.zeros((N_CHAIN, N_CHAIN, 4))
     F, gs, Qs = np.zeros((n, n)), np.zeros(n), np.zeros((n, n))
     dF, dgs, dQs = np.zeros((chain, chain, 4)), np.zeros((n, N_THETA)), np.zeros((n, n * N_THETA))
+    dE = np.zeros((chain, 6))
     T, dT, answer, danswer = room_for_a_step()
     W, dW, dWt, moved, dmoved = np.zeros((n, n)), np.zeros_like(dP), np.zeros_like(dP), np.zeros(n), np.zeros_like(dx)
     gain, de, dS = np.zeros(n), np.zeros(N_THETA), np.zeros(N_THETA)
     dPh, gains, tile = np.zeros(n * N_THETA), np.zeros(n * N_THETA), np.zeros(n * N_THETA)
-    h, first_current = np.zeros((3, n)), n
+    h, first_current, error = np.zeros((3, n)), n, n
     for i in range(n):
         state = states[i]
         h[0, i] = 1.0 if state == V else 0.0
@@ -291,6 +311,8 @@ def likelihood(  # type: ignore[no-untyped-def]
             F[i, i] = 1.0
         if state == C1:
             first_current = i
+        if state == ERROR:
+            error = i
     currents = np.count_nonzero((states == C1) | (states == C2))
     q_F, q_M = 2.0 * mu_F * np.exp(2.0 * theta[LOG_F]), 2.0 * mu_M * np.exp(2.0 * theta[LOG_M])
     if P0[M, M] <= 0.0:
@@ -310,6 +332,9 @@ def likelihood(  # type: ignore[no-untyped-def]
             for i in range(first_current, first_current + currents):
                 F[i, i], Qs[i, i] = decay, noise_V
                 dQs[i, i * N_THETA + LOG_V] = 2.0 * noise_V
+            if error < n:
+                decay = np.exp(-mu_e * s)
+                F[error, error], Qs[error, error] = decay, P0[ERROR, ERROR] * (1.0 - decay * decay)
             slope = (rudder[k] - rudder[k - 1]) / n_sub
             for sub in range(n_sub):
                 u0 = rudder[k - 1] + slope * sub
@@ -318,10 +343,14 @@ def likelihood(  # type: ignore[no-untyped-def]
                     *(Phi, g, held, Q, dPhi, dg, dheld, dQ, T, dT, answer, danswer),
                 )
                 _gather(
-                    *(states, chain, rudder_noise[k] * rudder_noise[k] / s, Phi, g, held, Q, dPhi, dg, dheld, dQ),
-                    *(F, gs, Qs, dF, dgs, dQs, derivatives),
+                    *(states, chain, error, rudder_noise[k] * rudder_noise[k] / s),
+                    *(0.5 * (error_gain[k] + error_gain[k - 1]), Phi, g, held, Q, dPhi, dg, dheld, dQ),
+                    *(F, gs, Qs, dF, dE, dgs, dQs, derivatives),
                 )
-                _advance(x, P, dx, dP, F, gs, Qs, dF, dgs, dQs, derivatives, chain, W, dW, dWt, moved, dmoved)
+                _advance(
+                    *(x, P, dx, dP, F, gs, Qs, dF, dE, dgs, dQs, derivatives, chain, error),
+                    *(W, dW, dWt, moved, dmoved),
+                )
         for i in range(currents):
             h[0, first_current + i] = current_row[k, i]
         for channel in range(3):

@@ -26,7 +26,7 @@ class Trace:
     ----------
     innovation, variance : ndarray, shape (n, 3)
         One-step prediction errors and their variances, NaN where not measured.
-    states, spread : ndarray, shape (n, 8)
+    states, spread : ndarray, shape (n, 9)
         Filtered states and their variances.
     scores : ndarray, shape (n, 3, 12)
         Derivative of each measurement's own log-likelihood.
@@ -80,13 +80,15 @@ class Likelihood:
         else:
             row = np.tile([1.0, 0.0], (record.time_s.size, 1))
             present[6] = 0
-        P0 = np.diag((np.array(initial_std) * present) ** 2)
+        error = record.speed_error
+        P0 = np.diag(np.append(np.array(initial_std) * present, error.std_m_s) ** 2)
         rates = (
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
-            spec.current_correlation_rate_per_s,
+            *(spec.current_correlation_rate_per_s, error.rate_per_s),
         )
         taken = np.zeros(record.time_s.size, dtype=np.bool_)
-        inputs = (record.time_s, record.speed_m_s, record.rudder_rad, record.rudder_noise_rad_sqrt_s)
+        noise = (record.rudder_noise_rad_sqrt_s, error.gain_rad_s_m)
+        inputs = (record.time_s, record.speed_m_s, record.rudder_rad, *noise)
         self._fixed = (*inputs, record.measured, taken, row, arm_per_m, *rates, np.zeros(N_STATE), P0)
         self.low = np.concatenate([np.full(6, -np.inf), np.log(sigma_low)])
         self.high = np.concatenate([np.full(6, np.inf), np.log(sigma_high)])
@@ -128,7 +130,7 @@ class Likelihood:
             *(np.full((n, N_STATE), np.nan), np.full((n, N_STATE), np.nan)),
             np.zeros((0, 3, N_THETA)),
         )
-        before, after = self._fixed[:5], self._fixed[6:]
+        before, after = self._fixed[:6], self._fixed[7:]
         likelihood(theta, False, *before, withheld, *after, kept)  # noqa: FBT003 - the same
         return Trace(*kept)
 

@@ -9,7 +9,7 @@ import numpy as np
 from pipeline.identify.agreement import Channels, check_agreement
 from pipeline.identify.checks import check_manoeuvre, check_sway, check_way
 from pipeline.identify.jumps import find_jumps
-from pipeline.identify.speed_error import rudder_of_speed_error
+from pipeline.identify.speed_error import SpeedError, rudder_of_speed_error
 from pipeline.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from pipeline.normalise.corners import with_corners
 from pipeline.normalise.grid import gap_limit_s
@@ -25,6 +25,8 @@ _COMPARED = ("speed_through_water", "latitude", "longitude")
 #: a log slower than this changes little in between; longer gaps are refused
 _MAX_SPEED_GAP_S = 60.0
 _MIN_INSTANTS = 40
+#: a relative error of the speed is counted against no less than this
+_SLOWEST_M_S = 0.1
 _MIN_RUDDER_STD_RAD = np.deg2rad(0.2)
 
 
@@ -42,8 +44,9 @@ class Record:
         Inputs, interpolated linearly; the rudder between its readings and the corners that these show, the speed after
         its noise was taken out.
     rudder_noise_rad_sqrt_s : ndarray, shape (n,)
-        Intensity of the error of the rudder's force at the instants, as if the rudder made it, rad s^0.5: the noise of
-        its readings, and that of the speed (`pipeline.identify.speed_error`).
+        Intensity of the error of the rudder's readings at the instants, rad s^0.5.
+    speed_error : SpeedError
+        What is left of the noise of the speed, and which rudder acts like it.
     measured : ndarray, shape (n, 3)
         Columns `MEASUREMENTS` in m/s, rad/s, rad; NaN where not measured at that instant. The heading is counted from
         its first value.
@@ -69,6 +72,7 @@ class Record:
     heading_origin_rad: float
     rudder_period_s: float
     rudder_noise_rad_sqrt_s: Float
+    speed_error: SpeedError
     lateral: LateralSpeed
     noise_start: Float
     warnings: tuple[str, ...]
@@ -77,6 +81,12 @@ class Record:
     def mean_speed_m_s(self) -> float:
         """Mean speed through the water, m/s."""
         return float(np.mean(self.speed_m_s))
+
+    @property
+    def shake_rad_sqrt_s(self) -> Float:
+        """Intensity of the errors of rudder and speed together, as if the rudder made them, rad s^0.5, shape (n,)."""
+        result: Float = np.hypot(self.rudder_noise_rad_sqrt_s, self.speed_error.intensity_rad_sqrt_s)
+        return result
 
     @property
     def used(self) -> tuple[bool, bool, bool]:
@@ -133,7 +143,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
     instants = instants[inside]
-    speed, speed_noise = _speed(instruments, lateral, instants, start_utc_ns, end_utc_ns, warnings)
+    speed, error_std, error_time_s = _speed(instruments, lateral, instants, start_utc_ns, end_utc_ns, warnings)
     instants, speed = _trimmed(instants, speed, warnings)
     delta = moved.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
@@ -151,7 +161,8 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         heading_rad=heading.at(instants, gap_limit_s(heading)),
         heading_origin_rad=float(heading.value[0]),
         rudder_period_s=rudder.period_s,
-        rudder_noise_rad_sqrt_s=_rudder_noise(rudder, by_speed, speed, speed_noise),
+        rudder_noise_rad_sqrt_s=np.full(instants.size, _intensity(rudder)),
+        speed_error=SpeedError(by_speed / np.maximum(np.abs(speed), _SLOWEST_M_S), error_std, error_time_s),
         lateral=lateral,
         noise_start=noise,
         warnings=tuple(warnings),
@@ -211,8 +222,8 @@ def _speed(
     start_ns: int,
     end_ns: int,
     warnings: list[str],
-) -> tuple[Float, float]:
-    """Speed through the water at the instants and the intensity of its error, m s^-0.5.
+) -> tuple[Float, float, float]:
+    """Speed through the water at the instants, standard deviation of its error, m/s, and the error's time, s.
 
     The log, else the forward part of the GNSS velocity.
     """
@@ -224,16 +235,15 @@ def _speed(
     log, spikes = without_spikes(log)
     if spikes:
         warnings.append(f"{spikes} spikes of the speed left out")
-    noise = float(np.nan_to_num(noise_std(log)))
-    speed = smoothed(log, noise).at(instants, _MAX_SPEED_GAP_S)
+    slow = smoothed(log, float(np.nan_to_num(noise_std(log))))
+    speed = slow.series.at(instants, _MAX_SPEED_GAP_S)
     if np.nanmax(np.abs(speed), initial=0.0) < 0.05:
         raise DataRejected(
             "no_speed",
             "The ship does not move through the water in this segment: the model of eq. (16) needs V > 0.",
             "Check the speed channel and its unit, or choose a segment under way.",
         )
-    # smoothing takes away what is fast and leaves the intensity of what is slow
-    return speed, noise * float(np.sqrt(log.period_s))
+    return speed, slow.error_std, slow.error_time_s
 
 
 def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:
@@ -254,11 +264,9 @@ def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:
     return replace(lateral, **sound)
 
 
-def _rudder_noise(rudder: Series, by_speed: Float, speed: Float, speed_noise: float) -> Float:
-    """Intensity of the rudder's error: its own, and that of the speed, see `pipeline.identify.speed_error`."""
-    own = float(np.nan_to_num(noise_std(rudder))) * float(np.sqrt(rudder.period_s))
-    result: Float = np.hypot(own, by_speed / np.maximum(np.abs(speed), 0.1) * speed_noise)
-    return result
+def _intensity(rudder: Series) -> float:
+    """Intensity of the noise of the rudder's readings, rad s^0.5."""
+    return float(np.nan_to_num(noise_std(rudder))) * float(np.sqrt(rudder.period_s))
 
 
 def _trimmed(instants: Nanoseconds, speed: Float, warnings: list[str]) -> tuple[Nanoseconds, Float]:

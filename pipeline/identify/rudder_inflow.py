@@ -41,4 +41,5 @@ def with_rudder_inflow(record: Record, spec: ModelSpec) -> Record:
         record,
         rudder_rad=record.rudder_rad * factor,
         rudder_noise_rad_sqrt_s=record.rudder_noise_rad_sqrt_s * factor,
+        speed_error=record.speed_error.scaled(factor),
     )

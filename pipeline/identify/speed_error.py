@@ -7,6 +7,9 @@ In a steady turn that is delta dV / V; just after the rudder has gone from side 
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from typing import Any
+
 import numpy as np
 
 from pipeline.identify.checks import moves
@@ -15,6 +18,43 @@ from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds, Series
 #: the yaw rate is the heading's change over this share of a leg
 _SHARE = 0.1
 _FEWEST = 20
+
+
+@dataclass(frozen=True, eq=False)
+class SpeedError:
+    """The error of a record's speed, a first-order process.
+
+    Attributes
+    ----------
+    gain_rad_s_m : ndarray, shape (n,)
+        Rudder that a unit of it stands for at each instant.
+    std_m_s : float
+    time_s : float
+        Correlation time; 0 where the speed is no measured one.
+    """
+
+    gain_rad_s_m: Float
+    std_m_s: float
+    time_s: float
+
+    def at(self, rows: Any) -> SpeedError:
+        """Return it at some of the instants."""
+        return replace(self, gain_rad_s_m=self.gain_rad_s_m[rows])
+
+    def scaled(self, factor: Float) -> SpeedError:
+        """Return it where the rudder does ``factor`` times as much, shape (n,)."""
+        return replace(self, gain_rad_s_m=self.gain_rad_s_m * factor)
+
+    @property
+    def rate_per_s(self) -> float:
+        """Correlation rate, 1/s."""
+        return 1.0 / self.time_s if self.time_s > 0.0 else 0.0
+
+    @property
+    def intensity_rad_sqrt_s(self) -> Float:
+        """Intensity of the rudder that does the same, rad s^0.5, shape (n,), to one who is slow beside the error."""
+        result: Float = np.abs(self.gain_rad_s_m) * self.std_m_s * np.sqrt(2.0 * self.time_s)
+        return result
 
 
 def rudder_of_speed_error(heading: Series, rudder: Series, instants: Nanoseconds, delta: Float) -> Float:

@@ -87,6 +87,7 @@ def _kept(record: Record, rows: Any) -> Record:
         speed_m_s=record.speed_m_s[rows],
         rudder_rad=record.rudder_rad[rows],
         rudder_noise_rad_sqrt_s=record.rudder_noise_rad_sqrt_s[rows],
+        speed_error=record.speed_error.at(rows),
         measured=record.measured[rows],
         heading_rad=record.heading_rad[rows],
     )

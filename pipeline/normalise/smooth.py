@@ -1,4 +1,4 @@
-"""A slow channel without its noise: a cubic smoothing spline that leaves over what the instrument's noise is.
+"""A slow channel without its noise: a cubic smoothing spline as stiff as the channel and its noise allow.
 
 The speed of a ship changes over minutes, her log reads it with noise every second. The speed multiplies every term of
 the model, so that noise would shake the rudder's force as if the rudder itself shook.
@@ -6,24 +6,47 @@ the model, so that noise would shake the rudder's force as if the rudder itself 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cache
+
 import numpy as np
 from scipy.interpolate import make_smoothing_spline
 
 from pipeline.normalise.series import Series
 
-#: penalties on the curvature that are tried, s^3
-_PENALTIES = 10.0 ** np.arange(-1.0, 6.0)
-#: the spline may leave over so much of the noise: less than all of it, as it follows some, and as a ship whose speed is
-#: smoothed too far is worse off than one whose log still trembles a little
-_LEFT_OVER = 0.93
+#: each width that is tried is so many times the next one
+_STEP = 10.0**0.25
+#: weight of a reading in its own smoothed value, in periods by width
+_WEIGHT = 0.5**1.5
 _FEWEST = 12
 #: half width, in readings, and limit, in robust standard deviations, of the search for spikes
 _NEIGHBOURS = 5
 _SPIKE = 8.0
+#: integral of 1 / (1 + x^4)^2 over all x, divided by 2 pi
+_PASSED = 0.2652
 
 
-def smoothed(series: Series, noise_std: float) -> Series:
-    """Return the series without its noise, at its own instants.
+@dataclass(frozen=True, eq=False)
+class Smoothed:
+    """A series without its noise, and what of it is left.
+
+    Attributes
+    ----------
+    series : Series
+        At its own instants.
+    error_std : float
+        Standard deviation of the noise that is left, in the series' unit.
+    error_time_s : float
+        Its correlation time: that of the first-order process with as much variance and as much power at frequency 0.
+    """
+
+    series: Series
+    error_std: float
+    error_time_s: float
+
+
+def smoothed(series: Series, noise_std: float) -> Smoothed:
+    """Take the noise out of a series.
 
     Parameters
     ----------
@@ -33,32 +56,38 @@ def smoothed(series: Series, noise_std: float) -> Series:
 
     Returns
     -------
-    Series
-        The same where there is no noise to speak of, or fewer than 12 readings.
+    Smoothed
+        With the same series where there is no noise to speak of, or fewer than 12 readings.
 
     References
     ----------
-    Reinsch (1967), "Smoothing by spline functions", Numerische Mathematik 10: the residuals tell how far to smooth.
+    Craven and Wahba (1978), "Smoothing noisy data with spline functions", Numerische Mathematik 31: where the noise is
+    known, what is left over and the weight of a reading in its own value tell the error of each stiffness.
+    Silverman (1984), "Spline smoothing: the equivalent variable kernel method", Annals of Statistics 12: a spline of
+    penalty h^4 passes the share 1 / (1 + (h w)^4) of what swings at w.
     """
-    if len(series) < _FEWEST or not noise_std > 1e-6 * max(1e-12, float(np.max(np.abs(series.value)))):
-        return series
+    if len(series) < _FEWEST:
+        return Smoothed(series, noise_std, 0.0)
+    as_it_is = Smoothed(series, noise_std, 0.5 * series.period_s)
+    if not noise_std > 1e-6 * max(1e-12, float(np.max(np.abs(series.value)))):
+        return as_it_is
     time_s = series.seconds_since(int(series.time_utc_ns[0]))
 
-    def left_over(penalty: float) -> tuple[float, Series]:
+    @cache
+    def risk(power: int) -> tuple[float, Smoothed]:
+        width = series.period_s * float(_STEP**power)
         # the sum of squares grows with the readings: per second of them the penalty means one width for all rates
-        spline = make_smoothing_spline(time_s, series.value, lam=float(penalty) / series.period_s)
-        value = spline(time_s)
-        return float(np.sqrt(np.mean((series.value - value) ** 2))), Series(series.time_utc_ns, value)
+        value = make_smoothing_spline(time_s, series.value, lam=width**4 / series.period_s)(time_s)
+        left = noise_std * float(np.sqrt(_PASSED * series.period_s / width))
+        error = float(np.mean((series.value - value) ** 2)) + 2.0 * noise_std**2 * _WEIGHT * series.period_s / width
+        return error, Smoothed(Series(series.time_utc_ns, value), left, 0.5 / _PASSED * width)
 
-    low, high, best = 0, len(_PENALTIES) - 1, series
-    while low <= high:
-        middle = (low + high) // 2
-        residual, candidate = left_over(_PENALTIES[middle])
-        if residual <= _LEFT_OVER * noise_std:
-            best, low = candidate, middle + 1
-        else:
-            high = middle - 1
-    return best
+    # from the widest down and at last by single steps: a spline over all readings takes a while
+    widest = int(np.log(time_s[-1] / series.period_s) / np.log(_STEP))
+    best = min(range(0, widest + 1, 4), key=lambda power: risk(power)[0])
+    for step in (2, 1):
+        best = min((best - step, best, best + step), key=lambda power: risk(power)[0])
+    return risk(best)[1]
 
 
 def without_spikes(series: Series) -> tuple[Series, int]:

@@ -26,18 +26,20 @@ class Case:
     speed: Float
     rudder: Float
     rudder_noise: Float
+    error_gain: Float
     measured: Float
     current_row: Float
     arm: float
     wind_rate: float
     moment_rate: float
     current_rate: float
+    error_rate: float
     x0: Float
     P0: Float
 
     def arguments(self) -> tuple[Any, ...]:
         """In the order of the kernel, after theta and derivatives."""
-        inputs = (self.time_s, self.speed, self.rudder, self.rudder_noise, self.measured)
+        inputs = (self.time_s, self.speed, self.rudder, self.rudder_noise, self.error_gain, self.measured)
         taken = np.zeros(self.time_s.size, dtype=np.bool_)
         return (
             *inputs,
@@ -47,13 +49,14 @@ class Case:
             self.wind_rate,
             self.moment_rate,
             self.current_rate,
+            self.error_rate,
             self.x0,
             self.P0,
         )
 
 
 def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:
-    """Transition (8, 8), input (8,) and process noise (8, 8) from instant k - 1 to k."""
+    """Transition (9, 9), input (9,) and process noise (9, 9) from instant k - 1 to k."""
     a11, a12, a21, a22, b1, b2 = theta[:6]
     dt = case.time_s[k] - case.time_s[k - 1]
     V = 0.5 * (case.speed[k] + case.speed[k - 1])
@@ -68,7 +71,7 @@ def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:
     q_F, q_M, q_V = 2.0 * rates * np.exp(2.0 * theta[6:9])
     intensity = np.diag([0.0, 0.0, q_F, q_M, 0.0, q_V, q_V, 0.0])
     if dt == 0.0:
-        return np.eye(8), np.zeros(8), np.zeros((8, 8))
+        return np.eye(9), np.zeros(9), np.zeros((9, 9))
     block = np.zeros((16, 16))
     block[:8, :8], block[:8, 8:], block[8:, 8:] = -A, intensity, A.T
     exponential = expm(block * dt)
@@ -81,16 +84,25 @@ def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:
         return result
 
     g = quad_vec(integrand, 0.0, dt, epsabs=1e-14, epsrel=1e-12)[0]
-    # the rudder's error is constant over each of the steps that the kernel takes
+    # the errors of rudder and speed are constant over each of the steps that the kernel takes
     size = V * (abs(a11) + abs(a22) + np.sqrt(abs(a12 * a21))) + max(case.wind_rate, case.moment_rate)
     steps = max(1, int(np.ceil(size * dt / 0.5)))
     short = dt / steps
     held = quad_vec(lambda s: expm(A * s) @ B, 0.0, short, epsabs=1e-14, epsrel=1e-12)[0]
     through = expm(A * short)
-    rudder = np.zeros((8, 8))
+    decay = np.exp(-case.error_rate * short)
+    once, shaken = np.zeros((9, 9)), np.zeros((9, 9))
+    once[:8, :8], once[8, 8] = through, decay
+    once[:8, 8] = 0.5 * (case.error_gain[k] + case.error_gain[k - 1]) * held
+    shaken[:8, :8] = case.rudder_noise[k] ** 2 / short * np.outer(held, held)
+    shaken[8, 8] = case.P0[8, 8] * (1.0 - decay**2)
+    noise = np.zeros((9, 9))
     for _ in range(steps):
-        rudder = through @ rudder @ through.T + case.rudder_noise[k] ** 2 / short * np.outer(held, held)
-    return Phi, g, 0.5 * (Q + Q.T) + rudder
+        noise = once @ noise @ once.T + shaken
+    noise[:8, :8] += 0.5 * (Q + Q.T)
+    whole = np.linalg.matrix_power(once, steps)
+    whole[:8, :8] = Phi
+    return whole, np.append(g, 0.0), noise
 
 
 def moments(case: Case, theta: Float) -> tuple[Float, Float, Float, Float]:
@@ -100,12 +112,12 @@ def moments(case: Case, theta: Float) -> tuple[Float, Float, Float, Float]:
     -------
     mean : ndarray, shape (m,)
     covariance : ndarray, shape (m, m)
-    last_mean : ndarray, shape (8,)
-    cross : ndarray, shape (8, m)
+    last_mean : ndarray, shape (9,)
+    cross : ndarray, shape (9, m)
         Covariance of the last state with the measured values.
     """
     n = case.time_s.size
-    means, covariance = np.zeros((n, 8)), np.zeros((n, n, 8, 8))
+    means, covariance = np.zeros((n, 9)), np.zeros((n, n, 9, 9))
     means[0], covariance[0, 0] = case.x0, case.P0
     for k in range(1, n):
         Phi, g, Q = step(case, theta, k)
@@ -115,16 +127,16 @@ def moments(case: Case, theta: Float) -> tuple[Float, Float, Float, Float]:
             covariance[j, k] = covariance[k, j].T
         covariance[k, k] = Phi @ covariance[k - 1, k - 1] @ Phi.T + Q
     which = [(k, c) for k in range(n) for c in range(3) if np.isfinite(case.measured[k, c])]
-    H = np.zeros((len(which), n * 8))
+    H = np.zeros((len(which), n * 9))
     for row, (k, c) in enumerate(which):
-        H[row, 8 * k + (0, 1, 4)[c]] = 1.0
+        H[row, 9 * k + (0, 1, 4)[c]] = 1.0
         if c == 0:
-            H[row, 8 * k + 5 : 8 * k + 7] = case.current_row[k]
+            H[row, 9 * k + 5 : 9 * k + 7] = case.current_row[k]
         if c == 1:
-            H[row, 8 * k + 7] = 1.0
+            H[row, 9 * k + 7] = 1.0
     noise = np.exp(2.0 * theta[9:])[[c for _, c in which]]
-    stacked = covariance.transpose(0, 2, 1, 3).reshape(8 * n, 8 * n)
-    return H @ means.ravel(), H @ stacked @ H.T + np.diag(noise), means[-1], stacked[-8:] @ H.T
+    stacked = covariance.transpose(0, 2, 1, 3).reshape(9 * n, 9 * n)
+    return H @ means.ravel(), H @ stacked @ H.T + np.diag(noise), means[-1], stacked[-9:] @ H.T
 
 
 def values(case: Case) -> Float:
@@ -177,6 +189,7 @@ def make_case(
     arm: float = 0.01,
     same_instant: bool = True,
     rudder_noise: float = 0.02,
+    error_gain: float = 0.1,
 ) -> Case:
     """Draw a record from the model: irregular instants, two shared, values missing at random, varying speed and rudder.
 
@@ -195,22 +208,24 @@ def make_case(
     measured = np.zeros((n, 3))
     measured[random.random((n, 3)) < 0.35] = np.nan
     measured[n // 2] = np.nan
-    spread = random.standard_normal((8, 8))
-    scale = np.array([0.5, 0.02, 0.01, 1e-4, 0.1, 0.3, 0.3, 2e-3])
-    P0 = np.outer(scale, scale) * (0.2 * spread @ spread.T + np.eye(8))
+    spread = random.standard_normal((9, 9))
+    scale = np.array([0.5, 0.02, 0.01, 1e-4, 0.1, 0.3, 0.3, 2e-3, 0.1])
+    P0 = np.outer(scale, scale) * (0.2 * spread @ spread.T + np.eye(9))
     case = Case(
         theta,
         time,
         speed_m_s * (1.0 + 0.1 * np.sin(0.11 * time)),
         0.35 * np.sign(np.sin(0.13 * time)) + 0.02 * random.standard_normal(n),
         rudder_noise * (1.0 + 0.5 * np.sin(time)),
+        error_gain * np.cos(0.2 * time),
         measured,
         row,
         arm,
         1 / 300.0,
         1 / 90.0,
         1 / 1800.0,
-        scale * random.standard_normal(8),
+        1 / 15.0,
+        scale * random.standard_normal(9),
         P0,
     )
     mean, covariance, _, _ = moments(case, theta)

@@ -119,12 +119,14 @@ def test_a_long_interval_is_several_short_ones() -> None:
     once = replace(
         case,
         rudder_noise=np.zeros(whole.size),
+        error_gain=np.zeros(whole.size),
         **{name: getattr(case, name)[whole] for name in ("time_s", "speed", "rudder", "measured", "current_row")},
     )
     fine = replace(
         once,
         time_s=time,
         rudder_noise=np.zeros(time.size),
+        error_gain=np.zeros(time.size),
         speed=np.full(time.size, 7.0),
         rudder=np.interp(time, once.time_s, once.rudder),
         measured=measured,
@@ -172,7 +174,7 @@ def test_states_without_variance_are_left_out_and_their_noise_levels_say_nothing
 
 @pytest.mark.parametrize("count", [1, 2, 7])
 def test_nothing_jumps_where_the_number_of_substeps_changes(count: int) -> None:
-    case = make_case(seed=12, n=8, same_instant=False, rudder_noise=0.0)
+    case = make_case(seed=12, n=8, same_instant=False, rudder_noise=0.0, error_gain=0.0)
     V = 7.0
     hull = case.theta[:6]
     size = V * (abs(hull[0]) + abs(hull[3]) + np.sqrt(abs(hull[1] * hull[2]))) + case.moment_rate

@@ -65,7 +65,9 @@ def test_a_direction_that_is_hardly_determined_says_what_would_help() -> None:
     record = record_of(trial)
     short = record.time_s < 60.0
     rows = ("time_s", "speed_m_s", "rudder_rad", "rudder_noise_rad_sqrt_s", "measured", "heading_rad")
-    cut = replace(record, **{name: getattr(record, name)[short] for name in rows})
+    cut = replace(
+        record, speed_error=record.speed_error.at(short), **{name: getattr(record, name)[short] for name in rows}
+    )
     found = identify(cut, ModelSpec(moment="gauss-markov"), 0.0, SETTINGS)
     assert found.report["weak_directions"]
     said = [warning for warning in found.warnings if "hardly determine a direction" in warning]

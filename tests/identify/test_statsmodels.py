@@ -26,7 +26,10 @@ def kept(record: Record) -> Record:
     measured[100:130, 0] = np.nan
     measured[120:140, 1] = np.nan
     names = ("time_s", "speed_m_s", "rudder_rad", "heading_rad", "rudder_noise_rad_sqrt_s")
-    return replace(record, measured=measured, **{name: getattr(record, name)[rows] for name in names})
+    error = record.speed_error.at(rows)
+    return replace(
+        record, measured=measured, speed_error=error, **{name: getattr(record, name)[rows] for name in names}
+    )
 
 
 def test_log_likelihood_is_that_of_statsmodels() -> None:

@@ -66,12 +66,12 @@ def test_without_effects_it_is_the_kernel():
     stationary = LEVELS[:3] / np.sqrt(2.0 * np.array(rates))
     theta = np.concatenate([HULL, np.log(stationary), np.log(LEVELS[3:])])
     # there the order of states is v, r, F, M, psi, c_1, c_2, b
-    P0 = np.diag(INITIAL_STD[[0, 1, 3, 4, 2, 5, 6, 7]] ** 2)
+    P0 = np.diag(np.append(INITIAL_STD[[0, 1, 3, 4, 2, 5, 6, 7]], 0.0) ** 2)
     innovation, variance = np.full((N, 3), np.nan), np.full((N, 3), np.nan)
     trace = (innovation, variance, *no_trace()[2:])
     value, _, _ = likelihood(
-        *(theta, False, run.time_s, run.speed_m_s, run.rudder_rad, run.rudder_noise, run.measured),
-        *(np.zeros(N, dtype=np.bool_), run.current_row, run.ship.arm_per_m, *rates, np.zeros(N_STATE), P0, trace),
+        *(theta, False, run.time_s, run.speed_m_s, run.rudder_rad, run.rudder_noise, np.zeros(N), run.measured),
+        *(np.zeros(N, dtype=np.bool_), run.current_row, run.ship.arm_per_m, *rates, 1.0, np.zeros(N_STATE), P0, trace),
     )
     # the kernel holds the speed over a step at its mean and takes the noise of the current for stationary
     assert passed.log_likelihood == pytest.approx(value, abs=2e-2)
