@@ -11,7 +11,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+
+from pipeline.compiled import njit
 
 #: how what runs at every instant is compiled: put into its caller, and without counting references to arrays, which
 #: takes longer than the arithmetic; such a function may fill arrays but not make them

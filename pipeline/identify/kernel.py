@@ -12,8 +12,8 @@ Automatica 16), scalar measurement by scalar measurement; they lie innermost in 
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pipeline.compiled import njit
 from pipeline.identify.chain import LONGEST, N_CHAIN, PSI, STEP, M, R, V, discretise, rates, room_for_a_step
 from pipeline.normalise.series import Float
 

@@ -10,9 +10,9 @@ MCAP specification, https://mcap.dev/spec, "Records".
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.compiled import njit
 from pipeline.ingest.spans import Bytes, Index
 
 #: Bytes of opcode and length in front of the content.

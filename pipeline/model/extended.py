@@ -14,8 +14,8 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from pipeline.compiled import njit
 from pipeline.model.moments import add_noise, carry_covariance, exponential, take_in
 from pipeline.model.terms.program import DEPTH, evaluate
 from pipeline.model.terms.symbols import SYMBOLS

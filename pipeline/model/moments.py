@@ -6,7 +6,7 @@ fourth order, as in `pipeline.model.extended` (Van Loan 1978, IEEE Trans. Automa
 
 from __future__ import annotations
 
-from numba import njit
+from pipeline.compiled import njit
 
 
 @njit(cache=True, nogil=True, error_model="numpy")

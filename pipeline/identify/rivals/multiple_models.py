@@ -13,8 +13,8 @@ from itertools import product
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from pipeline.compiled import njit
 from pipeline.identify.estimate import Estimate, Value
 from pipeline.identify.record import Record
 from pipeline.identify.rivals.even import even, step_of

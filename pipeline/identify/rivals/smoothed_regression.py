@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 
+from pipeline.compiled import njit
 from pipeline.identify.estimate import Estimate
 from pipeline.identify.least_squares import regress
 from pipeline.identify.record import Record

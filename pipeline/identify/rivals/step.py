@@ -7,7 +7,8 @@ part in the kernel's changes.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
+
+from pipeline.compiled import njit
 
 _ORDER = 14
 _LONGEST = 0.5

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pipeline.compiled import njit
 from pipeline.model.terms.effect import Effect, Parameter
 from pipeline.normalise.series import Float
 

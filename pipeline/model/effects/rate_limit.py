@@ -8,8 +8,8 @@ is too steep.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pipeline.compiled import njit
 from pipeline.model.terms.effect import Effect, Parameter
 from pipeline.normalise.series import Float
 

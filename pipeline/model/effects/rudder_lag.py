@@ -7,8 +7,8 @@ there is no error of integration that could pass for a lag of its own.
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
+from pipeline.compiled import njit
 from pipeline.model.terms.effect import Effect, Parameter
 from pipeline.normalise.series import Float
 

@@ -11,9 +11,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
+from pipeline.compiled import njit
 from pipeline.model.terms.symbols import COMPUTED_SYMBOLS, STATE_SYMBOLS
 from pipeline.normalise.series import Float
 

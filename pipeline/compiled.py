@@ -1,0 +1,75 @@
+"""The decorator of the compiled kernels, which are compiled anew whenever anything that went into them has changed.
+
+numba keeps compiled functions on disk and compares the date of their own source file. What they call from other files
+is compiled into them: changed there only, the old code would go on running under the new version's name.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import inspect
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+from numba import njit
+from numba.core import caching, config
+from numba.core.dispatcher import Dispatcher
+
+__all__ = ["njit"]
+
+
+def went_in(function: Any) -> str:
+    """Return a digest of the functions that a function calls and of the constants that it and they use.
+
+    Parameters
+    ----------
+    function : callable
+        Its own source counts only by the constants in it.
+    """
+    digest = hashlib.sha256()
+    for part in _parts(function, {function}):
+        digest.update(part)
+    return digest.hexdigest()
+
+
+def _parts(function: Any, seen: set[Any]) -> Iterator[bytes]:
+    for name in sorted(set(function.__code__.co_names)):
+        value = function.__globals__.get(name)
+        called = value.py_func if isinstance(value, Dispatcher) else None
+        if called is not None and called not in seen:
+            seen.add(called)
+            yield inspect.getsource(called).encode()
+            yield from _parts(called, seen)
+        elif isinstance(value, np.ndarray):
+            yield name.encode() + value.tobytes()
+        elif isinstance(value, bool | int | float | str | tuple):
+            yield f"{name}={value!r}".encode()
+
+
+class _Whole:
+    """The stamp of a compiled function: that of its source file, and what went in from elsewhere."""
+
+    def __init__(self, py_func: Any, py_file: str) -> None:
+        super().__init__(py_func, py_file)  # type: ignore[call-arg]
+        self._py_func = py_func
+
+    def get_source_stamp(self) -> Any:
+        return super().get_source_stamp(), went_in(self._py_func)  # type: ignore[misc]
+
+
+class Given(_Whole, caching.UserProvidedCacheLocator):  # type: ignore[misc, unused-ignore]
+    """In the folder of NUMBA_CACHE_DIR."""
+
+
+class Beside(_Whole, caching.InTreeCacheLocator):  # type: ignore[misc, unused-ignore]
+    """Beside the source."""
+
+
+class OfTheUser(_Whole, caching.UserWideCacheLocator):  # type: ignore[misc, unused-ignore]
+    """In the user's own folder, where the source's may not be written to."""
+
+
+config.CACHE_LOCATOR_CLASSES = ",".join(  # type: ignore[attr-defined, unused-ignore]
+    [f"{__name__}.{one.__name__}" for one in (Given, Beside, OfTheUser)] + ["IPythonCacheLocator", "ZipCacheLocator"]
+)

@@ -1,0 +1,52 @@
+"""Compiled functions are compiled anew when something that went into them has changed in another file."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+INNER = """
+from pipeline.compiled import njit
+
+HELD = {held}
+
+@njit(cache=True)
+def inner(x):
+    return {factor} * x
+"""
+OUTER = """
+from pipeline.compiled import njit
+from inner import HELD, inner
+
+@njit(cache=True)
+def outer(x):
+    return inner(x) + HELD
+
+print(outer(1.0), sum(outer.stats.cache_hits.values()))
+"""
+
+
+def said(folder: Path, held: float, factor: float) -> tuple[float, int]:
+    """Run `outer` in a process of its own: its value, and whether it was found compiled."""
+    text = INNER.format(held=held, factor=factor)
+    if not (folder / "inner.py").exists() or (folder / "inner.py").read_text() != text:
+        (folder / "inner.py").write_text(text)
+    root = Path(__file__).parents[1]
+    command = f"import sys; sys.path[:0] = [{str(root)!r}, {str(folder)!r}]; sys.argv = ['outer']; import outer"
+    run = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
+    value, hits = run.stdout.split()
+    return float(value), int(hits)
+
+
+@pytest.mark.parametrize("changed", ["constant", "function"])
+def test_a_change_in_another_file_is_compiled_in(tmp_path: Path, changed: str) -> None:
+    (tmp_path / "outer.py").write_text(OUTER)
+    assert said(tmp_path, 10.0, 2.0) == (12.0, 0)
+    assert said(tmp_path, 10.0, 2.0) == (12.0, 1)
+    if changed == "constant":
+        assert said(tmp_path, 20.0, 2.0) == (22.0, 0)
+    else:
+        assert said(tmp_path, 10.0, 3.0) == (13.0, 0)
