@@ -5,6 +5,7 @@ BIN := $(VENV)/bin
 # A stamp a lock file: set-up is redone when, and only when, what it depends on has changed.
 RUNTIME := $(VENV)/.runtime
 DEVELOP := $(VENV)/.develop
+RIVALS := $(VENV)/.rivals
 
 .PHONY: demo test check bench bench-long lock clean setup
 
@@ -21,9 +22,9 @@ check: $(DEVELOP)
 	$(BIN)/mypy
 
 # Every figure anew, each on its own page in benchmarks/results; needs the measured logs in ../shared. Minutes.
-bench: $(DEVELOP)
+bench: $(RIVALS)
 	for name in hsva hsva_held_out usv trials rerun_demo speed monte_carlo current_frame draw_paper course_keeping \
-		estimator_speed rivals trials_diagnosis hsva_ladder diagnosis_speed; do $(BIN)/python -m benchmarks.$$name || exit 1; done
+		estimator_speed rivals vessel_models trials_diagnosis hsva_ladder diagnosis_speed; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 # The long ones, half an hour and more each on two cores.
 bench-long: $(DEVELOP)
@@ -47,6 +48,11 @@ $(DEVELOP): $(RUNTIME) requirements/develop.txt
 	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/uv pip install --quiet --require-hashes -r requirements/develop.txt
 	touch $@
 
+# Only the benchmarks want these.
+$(RIVALS): $(DEVELOP) requirements/rivals.txt
+	VIRTUAL_ENV=$(abspath $(VENV)) $(BIN)/uv pip install --quiet --require-hashes -r requirements/rivals.txt
+	touch $@
+
 # The lock files hold for every Python from 3.11 on and for Linux, macOS and Windows.
 lock: $(VENV)/.uv
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
@@ -54,6 +60,9 @@ lock: $(VENV)/.uv
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 		--no-emit-find-links --no-header --group build --group dev pyproject.toml -c requirements/runtime.txt \
 		-o requirements/develop.txt
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+		--no-emit-find-links --no-header --group build --group rivals pyproject.toml -c requirements/develop.txt \
+		-o requirements/rivals.txt
 
 clean:
 	rm -rf $(VENV) kempf-demo *.egg-info

@@ -13,7 +13,7 @@ import pytest
 
 from tests.conftest import Ship
 from tests.flows.content import fresh, versions
-from warehouse import logs, parameter_sets, runs, segments, vessels
+from warehouse import aliases, logs, parameter_sets, runs, segments, vessels
 from warehouse.store import Warehouse
 
 FLEET = ("ferry", "mariner", "tramp")
@@ -179,3 +179,19 @@ def test_the_command_runs_the_flow_and_prints_one_document(own: Warehouse):
     assert failed.code == 3
     assert "ferry, ps-" in failed.err and "damaged" in failed.err
     assert "\x1b" not in failed.out
+
+
+def test_the_fleet_is_diagnosed_as_a_flow(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    from flows.fleet import diagnose
+    from pipeline.model import effects
+
+    few = {name: effects.catalogue()[name] for name in ("rudder_lag", "cross_flow_drag")}
+    monkeypatch.setattr(effects, "catalogue", lambda: few)
+    rows = diagnose(own.uri)
+    # one manoeuvre each: nothing can be held against another
+    assert [(row["vessel"], row["verdict"], row["effects"]) for row in rows] == [
+        (name, "insufficient_data", "") for name in FLEET
+    ]
+    assert [row["vessel"] for row in tables_of("kempf-diagnose")[0]] == list(FLEET)
+    standing = [name for name in FLEET if "model" in aliases.of_vessel(own, name)]
+    assert standing == [], "a diagnosis recommends, it moves no vessel to another model"
