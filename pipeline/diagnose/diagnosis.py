@@ -20,7 +20,7 @@ from pipeline.diagnose.run import Run
 from pipeline.diagnose.screen import Candidate, score, screen
 from pipeline.diagnose.sets import WINDOW, shortlist, undecided
 from pipeline.diagnose.split import split
-from pipeline.diagnose.staged import staged
+from pipeline.diagnose.staged import is_ship, staged
 from pipeline.diagnose.start import Start
 from pipeline.model.terms.effect import Effect
 from pipeline.normalise.series import Float
@@ -168,8 +168,11 @@ def diagnose(
         last = steps[-1]
         tried: list[tuple[Candidate, Confirmation]] = []
         for candidate in shortlist(last.screened, settings.level, settings.refits):
-            # the score foretells the likelihood ratio; what is far behind the best refit cannot come near it
-            if any(candidate.score * _FORETOLD < k.likelihood_ratio - WINDOW for _, k in tried if k.holds):
+            # the score foretells the likelihood ratio, but beside what is no ship; what is far behind the best refit
+            # cannot come near it
+            if is_ship(last.fit.hull) and any(
+                candidate.score * _FORETOLD < k.likelihood_ratio - WINDOW for _, k in tried if k.holds
+            ):
                 continue
             told(f"step {len(steps)}: refitting with {candidate.effect.title}")
             tried.append((candidate, confirm(last.fit, candidate, held, workers)))

@@ -17,7 +17,7 @@ from pipeline.diagnose.gate import without_gross_errors
 from pipeline.diagnose.pooled_fit import Fit
 from pipeline.diagnose.run import Run
 from pipeline.diagnose.screen import Candidate, score
-from pipeline.diagnose.start import Start
+from pipeline.diagnose.start import INTENSITIES, Start
 from pipeline.model.augmented import Augmented
 from pipeline.model.ship import mariner_like
 from pipeline.model.terms.effect import Effect
@@ -27,6 +27,8 @@ from schemas.model_spec import ModelSpec
 
 #: iterations of an entry of the race, and of the climb to the end
 _RACE, _TO_THE_END = 6, 60
+#: multiples of its typical size with which a lag begins beside an ordinary hull
+_LONGER = (1.0, 10.0, 30.0)
 #: runs that the race goes over
 _RUNS_OF_RACE = 3
 
@@ -50,7 +52,8 @@ def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
     """Fit a model with one effect more.
 
     A hull fitted without a lag of the rudder has bent itself to stand in for it, and from there the way to the true
-    hull leads through worse ones. So an effect with a threshold races from several sizes and two hulls.
+    hull leads through worse ones. So an effect with a threshold races from several sizes and two hulls, and where the
+    hull has bent so far that it is no ship, every effect climbs from an ordinary one too.
 
     Parameters
     ----------
@@ -63,8 +66,8 @@ def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
     begin = _begin(candidate)
     first = candidate.effect.parameters[0]
     entries = [(base.hull, begin)]
+    ordinary = mariner_like(base.runs[0].run.ship.length_m).array()
     if len(first.steps) > 1:
-        ordinary = mariner_like(base.runs[0].run.ship.length_m).array()
         sizes = [np.concatenate([[size], begin[1:]]) for size in first.steps]
         entries += [(hull, size) for hull in (base.hull, ordinary) for size in sizes]
     if len(entries) > 1:
@@ -74,7 +77,38 @@ def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
         hull, begin = best.hull, best.values[base.values.size :]
     else:
         hull = base.hull
-    return _climbed(base, model, hull, begin, workers, _TO_THE_END)
+    found = _climbed(base, model, hull, begin, workers, _TO_THE_END)
+    if is_ship(base.hull):
+        return found
+    # what the score foretells beside such a hull says little, and the disturbances beside it have eaten the effect
+    levels = base.levels.copy()
+    levels[:, : len(INTENSITIES)] = np.log(INTENSITIES)
+    calm = replace(base, levels=np.clip(levels, pooled_fit.LOWEST, pooled_fit.HIGHEST))
+    others = [_climbed(calm, model, ordinary, size, workers, _TO_THE_END) for size in _sizes(candidate.effect)]
+    return max([found, *others], key=lambda one: one.log_likelihood)
+
+
+def _sizes(effect: Effect) -> list[Float]:
+    """Sizes to begin with where the score foretells none: of what delays the rudder several, it has several tops."""
+    first, *rest = (p.steps for p in effect.parameters)
+    if effect.rudder_course is None:
+        chosen = first[:1]
+    else:
+        chosen = first if len(first) > 1 else tuple(k * first[0] for k in _LONGER)
+    return [np.array([size, *(steps[0] for steps in rest)]) for size in chosen]
+
+
+def is_ship(hull: Float) -> bool:
+    """Tell whether sway and yaw are damped and the rudder turns her the way it should.
+
+    A ship that does not keep a straight course by herself is one too.
+
+    Parameters
+    ----------
+    hull : ndarray, shape (6,)
+    """
+    a11, _, _, a22, _, b2 = (float(x) for x in hull)
+    return a11 < 0.0 and a22 < 0.0 and b2 > 0.0
 
 
 def _climbed(

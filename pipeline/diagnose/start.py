@@ -23,7 +23,7 @@ from schemas.errors import DataRejected, KempfError
 from schemas.model_spec import ModelSpec
 
 #: intensities to start from, SI: of what drives the wind force, the moment and the current
-_INTENSITIES = (1e-4, 1e-6, 1e-3)
+INTENSITIES = (1e-4, 1e-6, 1e-3)
 _SHORT_CLIMB, _ENTRIES = 5, 4
 #: instants that a record is thinned to
 _INSTANTS = 400
@@ -102,5 +102,5 @@ def _levels(record: Record, run: Run) -> Float:
     noise = np.nan_to_num(record.noise_start, nan=1e-3)
     readings = np.isfinite(record.measured).sum(axis=0) / np.maximum(np.isfinite(run.measured).sum(axis=0), 1)
     level = np.maximum(noise / np.sqrt(np.maximum(readings, 1.0)), 0.02 * spread(run.measured))
-    found: Float = np.log(np.concatenate([_INTENSITIES, np.maximum(level, 1e-5)]))
+    found: Float = np.log(np.concatenate([INTENSITIES, np.maximum(level, 1e-5)]))
     return found

@@ -8,7 +8,9 @@ import numpy as np
 import pytest
 
 from pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from pipeline.diagnose.screen import score
 from pipeline.diagnose.split import split
+from pipeline.diagnose.staged import added, is_ship, plain, staged
 from pipeline.diagnose.verdict import as_json, finding, sentences, verdict
 from pipeline.model import effects
 from tests.diagnose.sailing import SOME, WORKERS, Sailed, sailed
@@ -67,6 +69,18 @@ def test_a_lag_is_found_with_its_size_and_the_held_out_error_falls(late: tuple[S
     assert found.after.gain < 0.2 * found.before.gain
     said = sentences(found)
     assert f"tau = {tau:.3f} +- {std:.3f} s" in said[0] and "held-out" in said[1]
+
+
+def test_a_lag_that_leaves_no_ship_without_it_is_found_with_its_size() -> None:
+    """Five seconds: fitted without it, sway feeds itself and the rudder turns her the wrong way."""
+    ship = sailed("rudder_lag", seed=5)
+    chosen, _ = split(ship.runs)
+    bent, _ = plain([ship.runs[i] for i in chosen], ship.spec, ship.start.of(chosen), WORKERS)
+    assert not is_ship(bent.hull)
+    found = added(bent, score(bent, effects.get("rudder_lag")), WORKERS)
+    assert is_ship(found.hull)
+    assert found.log_likelihood > bent.log_likelihood + 300.0
+    assert abs(found.values[0] - ship.c) < 3.0 * found.std[6]
 
 
 def test_a_drag_is_in_the_named_set(dragged: tuple[Sailed, Diagnosis]) -> None:
@@ -143,6 +157,21 @@ def test_one_manoeuvre_is_not_enough() -> None:
     assert verdict(found) == "insufficient_data"
     assert not found.held and found.steps[0].held_out_error is None
     assert "sail at least three zigzags" in sentences(found)[-1]
+
+
+def test_the_speed_lost_in_a_turn_is_looked_for_only_where_no_log_shows_it() -> None:
+    ship, effect = sailed("none"), effects.get("speed_loss")
+    none = DiagnosisSettings(most_steps=0)
+    (one,) = as_json(ship.diagnosis(("speed_loss",), settings=none))["candidates"]
+    assert one["verdict"] == "not_testable" and np.isnan(one["score"])
+    assert one["why"] == "the logs have speed_through_water, which tells it already"
+    with pytest.raises(DataRejected, match="speed_through_water") as caught:
+        staged(ship.runs[:1], ship.spec, ship.start.of([0]), [effect], WORKERS)
+    assert caught.value.code == "effect_not_testable"
+    # one run without a log is enough to ask
+    runs = (*ship.runs[:1], *(replace(run, channels=run.channels - {"speed_through_water"}) for run in ship.runs[1:]))
+    (one,) = as_json(replace(ship, runs=runs).diagnosis(("speed_loss",), settings=none))["candidates"]
+    assert np.isfinite(one["score"])
 
 
 def test_a_channel_that_the_runs_lack_is_named() -> None:
