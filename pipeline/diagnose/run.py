@@ -8,7 +8,7 @@ import numpy as np
 
 from pipeline.identify.record import Record
 from pipeline.model.extended import N_INPUT, ROWS
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS
+from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TELLING
 from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.instruments import Instruments
 from pipeline.normalise.series import SECOND_NS, Float, Series
@@ -162,6 +162,9 @@ def make_run(
         column = _channel(instruments.get(channel), record.start_utc_ns, fine)
         if column is not None:
             inputs[:, 2 + k] = column
+            have.add(channel)
+    for channel in TELLING:
+        if channel not in have and _channel(instruments.get(channel), record.start_utc_ns, fine) is not None:
             have.add(channel)
     heading: Float = 0.0 * fine
     if known.any():

@@ -46,6 +46,8 @@ class Candidate:
         Share of the effect's whitened trace that the fitted parameters imitate.
     missing : tuple of str
         Channels it needs that the runs lack.
+    told_by : tuple of str
+        Channels of the runs that show it already; then it is not scored.
     direction : ndarray, shape (N,)
         S' times the change: what the effect would explain of the whitened innovations.
     steps : tuple of float
@@ -62,6 +64,7 @@ class Candidate:
     missing: tuple[str, ...]
     direction: Float
     steps: tuple[float, ...]
+    told_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,6 +149,11 @@ def missing_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
     return tuple(c for c in effect.needs if any(c not in one.run.channels for one in base.runs))
 
 
+def telling_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
+    """Return the channels that show an effect already in every run."""
+    return tuple(c for c in effect.told_by if all(c in one.run.channels for one in base.runs))
+
+
 def score(base: Fit, effect: Effect) -> Candidate:
     """Score one effect beside a fitted model; its p-value is adjusted for its own grid alone."""
     one = _scored(base, nuisance(base.linearised, N_HULL + len(base.model.names)), effect)
@@ -153,13 +161,14 @@ def score(base: Fit, effect: Effect) -> Candidate:
 
 
 def _scored(base: Fit, known: Nuisance, effect: Effect) -> Candidate:
-    missing = missing_channels(base, effect)
+    missing, told_by = missing_channels(base, effect), telling_channels(base, effect)
     size = len(effect.parameters)
     nothing = Candidate(
         *(effect, np.nan, 1.0, 1.0, np.full(size, np.nan), np.full(size, np.nan), np.nan, missing),
-        *(np.zeros(0), ()),
+        *(np.zeros(0), (), told_by),
     )
-    if missing:
+    # what a channel shows already is in the inputs: scored beside them it would stand in for something else
+    if missing or told_by:
         return nothing
     best, tries = nothing, 0
     for steps in _grid(effect):

@@ -158,7 +158,8 @@ def staged(
     Raises
     ------
     DataRejected
-        ``effect_not_testable``: nothing can be told of an effect from these runs; the message says why.
+        ``effect_not_testable``: nothing can be told of an effect from these runs, or a channel tells it already; the
+        message says which.
     """
     first, gross = plain(runs, spec, start, workers)
     fits = [first]
@@ -170,6 +171,13 @@ def staged(
                 f"{effect.title} needs the channel {', '.join(candidate.missing)}, which the logs lack.",
                 "Log it, or map it in the vessel profile if the log has it under another name.",
                 {"effect": effect.name, "missing": list(candidate.missing)},
+            )
+        if candidate.told_by:
+            raise DataRejected(
+                "effect_not_testable",
+                f"The logs have {', '.join(candidate.told_by)}, which tells {effect.title} already.",
+                "The model runs on that channel; nothing need be added.",
+                {"effect": effect.name, "told_by": list(candidate.told_by)},
             )
         if np.isnan(candidate.score):
             raise DataRejected(

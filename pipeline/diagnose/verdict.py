@@ -99,6 +99,8 @@ def _untestable(candidate: Candidate) -> str:
     """Say why nothing can be told of an effect from these data; empty where something can."""
     if candidate.missing:
         return f"the logs lack {_listed(list(candidate.missing))}"
+    if candidate.told_by:
+        return f"the logs have {_listed(list(candidate.told_by))}, which tells it already"
     if np.isnan(candidate.score):
         share = _percent(candidate.absorption)
         return f"what the model has already imitates {share} of it. {candidate.effect.separated_by}"

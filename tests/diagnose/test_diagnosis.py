@@ -13,6 +13,7 @@ from pipeline.diagnose.split import split
 from pipeline.diagnose.staged import added, is_ship, plain, staged
 from pipeline.diagnose.verdict import as_json, finding, sentences, verdict
 from pipeline.model import effects
+from schemas.errors import DataRejected
 from tests.diagnose.sailing import SOME, WORKERS, Sailed, sailed
 
 LAG = ("rudder_lag", "cross_flow_drag")

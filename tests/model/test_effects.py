@@ -134,6 +134,14 @@ def test_its_content_is_json_and_its_digest_pins_it(effect: Effect) -> None:
     assert digest(wider) != digest(effect)
 
 
+def test_a_channel_that_tells_an_effect_already_is_one_that_runs_list() -> None:
+    told = {name: effect.told_by for name, effect in ALL.items() if effect.told_by}
+    assert told == {"speed_loss": ("speed_through_water",)}
+    with pytest.raises(KempfError, match="'yaw_rate'"):
+        replace(ALL["yaw_cubic"], told_by=("yaw_rate",))
+    assert digest(replace(ALL["speed_loss"], told_by=())) != digest(ALL["speed_loss"])
+
+
 def test_digests_differ() -> None:
     assert len({digest(effect) for effect in ALL.values()}) == len(ALL)
 

@@ -26,6 +26,7 @@ EFFECT = Effect(
         Parameter("k", "1", -0.05, 0.6, (0.03,), "drag of the rudder without dimension, over the mass with added mass"),
     ),
     terms={"speed": "-m1"},
+    told_by=("speed_through_water",),
     states=(ExtraState("m1", "-c*v*r + k*V**2*delta**2/L - 0.2*V*m1/L"),),
     confounded_with=(
         "speed_exponent, the quadratic and cubic hull terms: all weaken what a long turn does; with a log of the "

@@ -36,6 +36,7 @@ def as_json(effect: Effect) -> dict[str, Any]:
             for s in effect.states
         ],
         "needs": list(effect.needs),
+        "told_by": list(effect.told_by),
         "confounded_with": effect.confounded_with,
         "separated_by": effect.separated_by,
         "sha256": digest(effect),
@@ -63,4 +64,6 @@ def digest(effect: Effect) -> str:
         "needs": list(effect.needs),
         "rudder_course": source,
     }
+    if effect.told_by:
+        content["told_by"] = list(effect.told_by)
     return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()

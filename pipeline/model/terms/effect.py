@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS
+from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS, TELLING
 from pipeline.normalise.series import Float
 from schemas.errors import UsageError
 
@@ -92,6 +92,8 @@ class Effect:
     states : tuple of ExtraState
     needs : tuple of str
         Canonical channels without which it cannot be tested.
+    told_by : tuple of str
+        Canonical channels that show it already: where every run has one of them there is nothing left to look for.
     confounded_with, separated_by : str
         What looks alike, and the manoeuvre or channel that tells them apart.
     """
@@ -107,6 +109,7 @@ class Effect:
     rudder_course: RudderCourse | None = None
     states: tuple[ExtraState, ...] = ()
     needs: tuple[str, ...] = ()
+    told_by: tuple[str, ...] = ()
     confounded_with: str = ""
     separated_by: str = ""
 
@@ -128,4 +131,11 @@ class Effect:
                 "effect_channel",
                 f"The effect {self.name!r} needs the channel {lost[0]!r}, which no symbol stands for.",
                 f"Use one of {', '.join(CHANNEL_SYMBOLS.values())}.",
+            )
+        strange = [channel for channel in self.told_by if channel not in TELLING]
+        if strange:
+            raise UsageError(
+                "effect_channel",
+                f"The effect {self.name!r} is told by the channel {strange[0]!r}, which runs do not list.",
+                f"Use one of {', '.join(TELLING)}.",
             )

@@ -52,6 +52,8 @@ CHANNEL_SYMBOLS: dict[str, str] = {
     "h": "water_depth",
     "phi": "roll",
 }
+#: channels by which an effect may be told already: those above, and the log, without which V is that over ground
+TELLING: tuple[str, ...] = (*CHANNEL_SYMBOLS.values(), "speed_through_water")
 RUN_SYMBOLS: dict[str, str] = {
     "K": "true heading, rad",
     "t": "time from the beginning of the run, s",
