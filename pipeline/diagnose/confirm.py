@@ -22,6 +22,35 @@ BIC_SAVING = 6.0
 
 
 @dataclass(frozen=True, eq=False)
+class Unseen:
+    """How well a model predicts runs that its parameters did not see.
+
+    Attributes
+    ----------
+    folds : ndarray, shape (runs,)
+        Log-likelihood of each fitted run under what the others say, to first order.
+    held : ndarray, shape (held,)
+        Log-likelihood of the held-out runs.
+    """
+
+    folds: Float
+    held: Float
+
+
+def unseen(fit: Fit, held: Sequence[Run], workers: Executor) -> Unseen:
+    """Return the log-likelihoods of runs that the parameters did not see.
+
+    Parameters
+    ----------
+    fit : Fit
+    held : sequence of Run
+        Held out.
+    workers : Executor
+    """
+    return Unseen(_left_out(fit, workers), np.array(list(workers.map(lambda run: predictive(fit, run), held))))
+
+
+@dataclass(frozen=True, eq=False)
 class Confirmation:
     """A model with one effect more, refitted.
 
@@ -60,12 +89,14 @@ class Confirmation:
         )
 
 
-def confirm(base: Fit, candidate: Candidate, held: Sequence[Run], workers: Executor) -> Confirmation:
+def confirm(base: Fit, before: Unseen, candidate: Candidate, held: Sequence[Run], workers: Executor) -> Confirmation:
     """Refit a model with one effect more.
 
     Parameters
     ----------
     base : Fit
+    before : Unseen
+        Of ``base``, the same for all its candidates.
     candidate : Candidate
         Of the screen beside ``base``.
     held : sequence of Run
@@ -81,12 +112,13 @@ def confirm(base: Fit, candidate: Candidate, held: Sequence[Run], workers: Execu
     low, high, at = model.low[last], model.high[last], fit.values[last]
     # at a lower bound of 0 the effect is absent, which the criterion tells; any other bound is implausible
     bound = (at >= high - reach) | ((at <= low + reach) & (low != 0.0))
+    after = unseen(fit, held, workers)
     return Confirmation(
         fit=fit,
         likelihood_ratio=ratio,
         bic_change=len(new) * float(np.log(fit.count)) - ratio,
-        fold_gains=_left_out(fit, workers) - _left_out(base, workers),
-        held_out_gains=np.array([predictive(fit, run) - predictive(base, run) for run in held]),
+        fold_gains=after.folds - before.folds,
+        held_out_gains=after.held - before.held,
         at_bound=bool(np.any(bound)),
     )
 

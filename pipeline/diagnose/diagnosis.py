@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnose.confirm import Confirmation, confirm
+from pipeline.diagnose.confirm import Confirmation, confirm, unseen
 from pipeline.diagnose.flexible import Flexible, flexible
 from pipeline.diagnose.held_out import FreeRun, free_run
 from pipeline.diagnose.pooled_fit import Fit
@@ -162,12 +162,16 @@ def diagnose(
     base = fits[-1]
     held = [runs[i] for i in left]
     told(f"screening {len(effects)} effects")
-    steps = [_step(base, None, (), (), held, screen(base, effects, workers))]
+    steps = [_step(base, None, (), (), held, screen(base, effects, workers), workers)]
     before = flexible(base, workers) if len(chosen) > 1 else None
     while len(steps) <= settings.most_steps:
         last = steps[-1]
         tried: list[tuple[Candidate, Confirmation]] = []
-        for candidate in shortlist(last.screened, settings.level, settings.refits):
+        worth = shortlist(last.screened, settings.level, settings.refits)
+        if not worth:
+            break
+        alone = unseen(last.fit, held, workers)
+        for candidate in worth:
             # the score foretells the likelihood ratio, but beside what is no ship; what is far behind the best refit
             # cannot come near it
             if is_ship(last.fit.hull) and any(
@@ -175,7 +179,7 @@ def diagnose(
             ):
                 continue
             told(f"step {len(steps)}: refitting with {candidate.effect.title}")
-            tried.append((candidate, confirm(last.fit, candidate, held, workers)))
+            tried.append((candidate, confirm(last.fit, alone, candidate, held, workers)))
         best = undecided([pair for pair in tried if pair[1].holds])
         if not best:
             steps[-1] = replace(last, refused=(*last.refused, *tried))
@@ -184,7 +188,8 @@ def diagnose(
         worse = tuple(pair for pair in tried if pair[0].effect.name not in names)
         found = best[0][1].fit
         told(f"step {len(steps)}: screening beside {best[0][0].effect.title}")
-        steps.append(_step(found, best[0][0].effect, tuple(best), worse, held, screen(found, effects, workers)))
+        screened = screen(found, effects, workers)
+        steps.append(_step(found, best[0][0].effect, tuple(best), worse, held, screened, workers))
         idle = _idle(steps)
         if idle is not None:
             told(f"step {len(steps) - 1}: {idle.title} no longer earns its place")
@@ -219,10 +224,10 @@ def _without(
             continue
         base = made[-1].fit
         candidate = score(base, step.added)
-        one = confirm(base, candidate, held, workers)
+        one = confirm(base, unseen(base, held, workers), candidate, held, workers)
         others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
         screened = screen(one.fit, effects, workers)
-        made.append(_step(one.fit, step.added, ((candidate, one),), others, held, screened))
+        made.append(_step(one.fit, step.added, ((candidate, one),), others, held, screened, workers))
     return made
 
 
@@ -238,6 +243,10 @@ def _step(
     refused: tuple[tuple[Candidate, Confirmation], ...],
     held: Sequence[Run],
     screened: Sequence[Candidate],
+    workers: Executor | None = None,
 ) -> Step:
-    fitted = tuple(free_run(fit, one.run) for one in fit.runs)
-    return Step(fit, added, chosen_from, refused, tuple(screened), fitted, tuple(free_run(fit, run) for run in held))
+    runs = [*(one.run for one in fit.runs), *held]
+    each = map if workers is None else workers.map
+    free = tuple(each(lambda run: free_run(fit, run), runs))
+    many = len(fit.runs)
+    return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:])

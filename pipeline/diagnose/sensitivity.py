@@ -99,4 +99,9 @@ def columns(filtered: Filtered, point: Point, base: Passed) -> Iterator[tuple[in
     """Give the columns of J of every parameter that the run has, with their places in `Point.vector`."""
     by = steps(filtered, point)
     for index in active(filtered):
-        yield index, difference(base, passed(filtered, point.moved(index, by[index])), by[index])
+        yield index, column(filtered, point, base, index, by[index])
+
+
+def column(filtered: Filtered, point: Point, base: Passed, index: int, by: float) -> Float:
+    """Return one column of J, shape (2 m,), by one pass of the filter."""
+    return difference(base, passed(filtered, point.moved(index, by)), by)

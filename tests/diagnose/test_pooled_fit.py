@@ -1,0 +1,84 @@
+"""The climb over several runs asks the filter for no more than it needs, and every way gives the same bits."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.diagnose import pooled_fit, sensitivity
+from pipeline.diagnose.confirm import confirm, unseen
+from pipeline.diagnose.diagnosis import step_of
+from pipeline.diagnose.filtered import Filtered, Passed
+from pipeline.diagnose.pooled_fit import Fit, linearise
+from pipeline.diagnose.screen import score
+from pipeline.diagnose.sensitivity import Point
+from pipeline.model.augmented import Augmented
+from pipeline.model.effects import get
+from tests.diagnose.sailing import WORKERS, Sailed, sailed
+
+
+class Counted:
+    """The filter, and how often it was asked."""
+
+    def __init__(self) -> None:
+        self.passes, self.ask = 0, sensitivity.passed
+
+    def __call__(self, filtered: Filtered, point: Point) -> Passed:
+        self.passes += 1
+        return self.ask(filtered, point)
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> Counted:
+    found = Counted()
+    monkeypatch.setattr(sensitivity, "passed", found)
+    return found
+
+
+def plain_of(ship: Sailed, iterations: int) -> Fit:
+    runs, start = ship.runs[:2], ship.start.of([0, 1])
+    return pooled_fit.fit(
+        *(Augmented(), runs, ship.spec, start.hull, start.levels, np.zeros(0), WORKERS), max_iterations=iterations
+    )
+
+
+def test_derivatives_are_asked_for_only_where_the_search_goes_on(counted: Counted) -> None:
+    ship = sailed("none")
+    two, each = 2, sum(len(sensitivity.active(one)) for one in plain_of(ship, 0).runs)
+    counted.passes = 0
+    beginning = plain_of(ship, 0)
+    # the start and its derivatives, and none of it again for the linearisation that a fit keeps
+    assert counted.passes == two + each
+    layout = pooled_fit._Layout(beginning.runs, WORKERS)
+    theta = np.concatenate([beginning.hull, beginning.values, beginning.levels.ravel()])
+    value, gradient, _ = layout.full(theta)
+    lower = theta + 0.1 * np.concatenate([np.zeros(6), np.sign(-gradient[6:])])
+    counted.passes = 0
+    there, slope, _ = layout.full(lower)
+    assert there < value and not slope.any()
+    assert counted.passes == two
+
+
+def test_a_run_by_itself_and_runs_together_are_linearised_to_the_same_bits() -> None:
+    fit = plain_of(sailed("none"), 3)
+    for number, line in enumerate(fit.linearised):
+        alone = linearise(fit.runs[number], fit.point(number))
+        assert alone.index == line.index
+        assert np.array_equal(alone.J, line.J) and np.array_equal(alone.u, line.u)
+
+
+def test_the_gains_of_a_candidate_are_those_over_what_was_asked_of_the_base_before() -> None:
+    ship = sailed("none")
+    base, held = plain_of(ship, 40), ship.runs[2:3]
+    before = unseen(base, held, WORKERS)
+    one = confirm(base, before, score(base, get("sway_quadratic")), held, WORKERS)
+    after = unseen(one.fit, held, WORKERS)
+    assert np.array_equal(one.fold_gains, after.folds - before.folds)
+    assert np.array_equal(one.held_out_gains, after.held - before.held)
+
+
+def test_a_rung_by_itself_has_the_free_runs_of_its_manoeuvres_in_their_order() -> None:
+    ship = sailed("none")
+    found = step_of(plain_of(ship, 3), ship.runs[2:])
+    assert [one.name for one in found.fitted] == ["run 0", "run 1"]
+    assert [one.name for one in found.held] == [run.name for run in ship.runs[2:]]
