@@ -53,8 +53,8 @@ def _named(case: Case) -> str:
 
 def _setting(runs: int) -> list[str]:
     return [
-        f"Simulated 20-minute 20/20 zigzags, {runs} a cell of the grid, half as many by y_v and y_r only and with "
-        "disturbances that forget, a quarter where one other source is changed. GNSS velocity 0.05 m/s, yaw rate "
+        f"Simulated 20-minute 20/20 zigzags, {runs} a cell of the grid, a quarter by y_v and y_r only and with "
+        "disturbances that forget, an eighth where one other source is changed. GNSS velocity 0.05 m/s, yaw rate "
         "0.03 deg/s, heading 0.05 deg and log 0.05 m/s at 1 Hz, rudder 0.1 deg at 4 Hz, all on one clock; times 0.3, "
         "1 and 3. Wind force 5e-3 m/s2 with a slow part of 1e-3, stream 0.3 m/s, base headings all round. The boat of "
         "3 m (usv) lives twelve times faster: 12 Hz, 48 Hz and 100 s, but with the same noise. Every cell of the grid "

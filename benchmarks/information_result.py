@@ -35,7 +35,7 @@ class Case:
         """How many times fewer runs it gets than a cell of the grid."""
         if self.on_grid:
             return 1
-        return 2 if not self.with_heading or self.control == "forgetting" else 4
+        return 4 if not self.with_heading or self.control == "forgetting" else 8
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,4 +1,4 @@
-"""A slow channel without its noise: a cubic smoothing spline as stiff as the channel and its noise allow.
+"""A slow channel without its noise: a cubic smoothing spline, softer than the one with the least error.
 
 The speed of a ship changes over minutes, her log reads it with noise every second. The speed multiplies every term of
 the model, so that noise would shake the rudder's force as if the rudder itself shook.
@@ -18,6 +18,9 @@ from pipeline.normalise.series import Series
 _STEP = 10.0**0.25
 #: weight of a reading in its own smoothed value, in periods by width
 _WEIGHT = 0.5**1.5
+#: the width that is taken, by the one with the least error: what is left of the noise is known in size and time, what
+#: smoothing takes away of the channel itself is not, and sinks much faster with the width than the noise grows
+_SOFTER = 0.25
 _FEWEST = 12
 #: half width, in readings, and limit, in robust standard deviations, of the search for spikes
 _NEIGHBOURS = 5
@@ -73,21 +76,28 @@ def smoothed(series: Series, noise_std: float) -> Smoothed:
         return as_it_is
     time_s = series.seconds_since(int(series.time_utc_ns[0]))
 
-    @cache
-    def risk(power: int) -> tuple[float, Smoothed]:
-        width = series.period_s * float(_STEP**power)
+    def width(power: int) -> float:
+        return series.period_s * float(_STEP**power)
+
+    def spline(over_s: float) -> Smoothed:
         # the sum of squares grows with the readings: per second of them the penalty means one width for all rates
-        value = make_smoothing_spline(time_s, series.value, lam=width**4 / series.period_s)(time_s)
-        left = noise_std * float(np.sqrt(_PASSED * series.period_s / width))
-        error = float(np.mean((series.value - value) ** 2)) + 2.0 * noise_std**2 * _WEIGHT * series.period_s / width
-        return error, Smoothed(Series(series.time_utc_ns, value), left, 0.5 / _PASSED * width)
+        value = make_smoothing_spline(time_s, series.value, lam=over_s**4 / series.period_s)(time_s)
+        left = noise_std * float(np.sqrt(_PASSED * series.period_s / over_s))
+        # narrower than its readings lie apart no spline is: then it is the readings themselves
+        slowness = max(0.5 / _PASSED * over_s, 0.5 * series.period_s)
+        return Smoothed(Series(series.time_utc_ns, value), min(left, noise_std), slowness)
+
+    @cache
+    def risk(power: int) -> float:
+        left_over = series.value - spline(width(power)).series.value
+        return float(np.mean(left_over**2)) + 2.0 * noise_std**2 * _WEIGHT * series.period_s / width(power)
 
     # from the widest down and at last by single steps: a spline over all readings takes a while
     widest = int(np.log(time_s[-1] / series.period_s) / np.log(_STEP))
-    best = min(range(0, widest + 1, 4), key=lambda power: risk(power)[0])
+    best = min(range(0, widest + 1, 4), key=risk)
     for step in (2, 1):
-        best = min((best - step, best, best + step), key=lambda power: risk(power)[0])
-    return risk(best)[1]
+        best = min((best - step, best, best + step), key=risk)
+    return spline(_SOFTER * width(best))
 
 
 def without_spikes(series: Series) -> tuple[Series, int]:

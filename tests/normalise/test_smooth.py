@@ -18,12 +18,13 @@ def slow(period_s: float = 1.0, noise: float = 0.05, seed: int = 0) -> tuple[Ser
 
 
 def test_most_of_the_noise_goes_and_the_speed_stays() -> None:
-    for period_s in (0.2, 1.0, 2.0):
+    # fewer readings leave more
+    for period_s, share in ((0.2, 0.35), (1.0, 0.5), (2.0, 0.65)):
         read, truth = slow(period_s)
         told = smoothed(read, noise_std(read))
         found = told.series
         np.testing.assert_array_equal(found.time_utc_ns, read.time_utc_ns)
-        assert np.std(found.value - truth) < 0.4 * 0.05
+        assert np.std(found.value - truth) < share * 0.05
         assert abs(np.mean(found.value - truth)) < 0.2 * 0.05
 
 
