@@ -16,6 +16,9 @@ from pipeline.normalise.series import Float
 Verdict = Literal["adequate", "explained", "ambiguous", "unexplained", "insufficient_data"]
 #: log-likelihood that the flexible reference must still gain, in runs that did not fit it: something is left
 LEFT_OVER = 12.0
+#: and the share that this must be of what it gained beside the plain model: of an effect that was rightly named a
+#: little stays unexplained, and the stronger the effect, the more log-likelihood that little is worth
+LEFT_SHARE = 0.07
 #: so many effects are a string, which stands in for something else where the first has less than this share of the gain
 STRING, FIRST_SHARE = 3, 0.8
 #: said of an effect that improves the prediction while something that repeats itself is left
@@ -59,11 +62,18 @@ def something_left(diagnosis: Diagnosis) -> bool:
     Either the flexible reference still finds what repeats itself, or it took a string of effects of which the first
     explains little: terms that together imitate what none of them is.
     """
-    after = diagnosis.after
-    if after is not None and after.gain > LEFT_OVER and after.repeats:
+    if _reference_gains(diagnosis):
         return True
     ratios = [step.chosen_from[0][1].likelihood_ratio for step in diagnosis.steps[1:]]
     return len(ratios) >= STRING and ratios[0] < FIRST_SHARE * sum(ratios)
+
+
+def _reference_gains(diagnosis: Diagnosis) -> bool:
+    """Tell whether the flexible reference still finds what repeats itself, beyond a rest of what was found."""
+    before, after = diagnosis.before, diagnosis.after
+    if before is None or after is None:
+        return False
+    return after.repeats and after.gain > max(LEFT_OVER, LEFT_SHARE * before.gain)
 
 
 def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
@@ -194,7 +204,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     if what == "adequate":
         said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
     if what == "unexplained" and diagnosis.after is not None:
-        if diagnosis.after.gain > LEFT_OVER:
+        if _reference_gains(diagnosis):
             said.append(
                 "None of the known effects explains it: a smooth force without a name still gains "
                 f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."

@@ -106,6 +106,22 @@ def test_an_effect_that_no_catalogue_names_is_not_given_a_wrong_name() -> None:
     assert "{" not in "".join(told["sentences"])
 
 
+def test_a_small_rest_of_a_strong_effect_is_no_sign_of_another(late: tuple[Sailed, Diagnosis]) -> None:
+    _, found = late
+    assert found.before is not None and found.after is not None
+    gains = np.full_like(found.after.gains, 1.0)
+
+    def left(before: float, after: float, gains: np.ndarray = gains) -> str:
+        assert found.before is not None and found.after is not None
+        first, last = replace(found.before, gain=before), replace(found.after, gain=after, gains=gains)
+        return verdict(replace(found, before=first, after=last))
+
+    # a hundredth of what it was, twelve and more as that is; a tenth; little of little; in one run of three alone
+    assert left(1300.0, 13.0) == left(20.0, 11.0) == "explained"
+    assert left(1300.0, 130.0) == left(20.0, 13.0) == "unexplained"
+    assert left(1300.0, 130.0, np.array([131.0, -0.5, -0.5])) == "explained"
+
+
 def test_what_the_logs_lack_or_zigzags_cannot_tell_is_not_testable(calm: tuple[Sailed, Diagnosis]) -> None:
     _, found = calm
     told = {one.effect.name: finding(found, one) for one in found.steps[0].screened}
