@@ -1,7 +1,8 @@
 """The package vessel-manoeuvring-models itself on our records: its filter, its smoother, its regression.
 
-Alexandersson, Mao & Ringsberg (2022), Ocean Engineering 266, 112940. The package is no dependency of Kempf and declares
-none of its own: `make bench` installs it with all that it imports (requirements/rivals.txt); without it the page says so.
+Alexandersson, Mao & Ringsberg (2022), Ocean Engineering 266, 112940. The package is no dependency of Kempf and
+declares none of its own: `make bench` installs it with all that it imports (requirements/rivals.txt); without it the
+page says so.
 """
 
 from __future__ import annotations
