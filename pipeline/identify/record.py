@@ -10,12 +10,13 @@ from pipeline.identify.agreement import Channels, check_agreement
 from pipeline.identify.checks import check_manoeuvre, check_sway, check_way
 from pipeline.identify.jumps import find_jumps
 from pipeline.identify.speed_error import SpeedError, rudder_of_speed_error
+from pipeline.identify.water_speed import water_speed
 from pipeline.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from pipeline.normalise.corners import with_corners
 from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.instruments import Instruments
 from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds, Series
-from pipeline.normalise.smooth import smoothed, without_spikes
+from pipeline.normalise.smooth import without_spikes
 from schemas.errors import DataRejected
 
 #: columns of `Record.measured`
@@ -143,7 +144,9 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
     instants = instants[inside]
-    speed, error_std, error_time_s = _speed(instruments, lateral, instants, start_utc_ns, end_utc_ns, warnings)
+    speed, error_std, error_time_s = _speed(
+        *(instruments, lateral, heading, rudder, instants, start_utc_ns, end_utc_ns, warnings)
+    )
     instants, speed = _trimmed(instants, speed, warnings)
     delta = moved.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
@@ -218,6 +221,8 @@ def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) ->
 def _speed(
     instruments: Instruments,
     lateral: LateralSpeed,
+    heading: Series,
+    rudder: Series,
     instants: Nanoseconds,
     start_ns: int,
     end_ns: int,
@@ -235,7 +240,7 @@ def _speed(
     log, spikes = without_spikes(log)
     if spikes:
         warnings.append(f"{spikes} spikes of the speed left out")
-    slow = smoothed(log, float(np.nan_to_num(noise_std(log))))
+    slow = water_speed(log, heading, rudder)
     speed = slow.series.at(instants, _MAX_SPEED_GAP_S)
     if np.nanmax(np.abs(speed), initial=0.0) < 0.05:
         raise DataRejected(

@@ -72,7 +72,7 @@ def test_cells_take_turns_and_the_grid_gets_most_runs() -> None:
     grid = [case for case in counts if case.on_grid]
     assert len(grid) == 15
     assert all(counts[case] == 8 for case in grid)
-    assert all(counts[case] in (2, 4) for case in counts if not case.on_grid)
+    assert all(counts[case] in (1, 2) for case in counts if not case.on_grid)
     assert [number for _, number in tasks] == sorted(number for _, number in tasks)
 
 
