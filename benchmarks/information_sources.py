@@ -128,10 +128,8 @@ def _corners(as_is: Cell, slow: Cell) -> str:
 def _boat(as_is: Cell, exact: Cell, sized: Cell) -> str:
     return (
         f"- **The boat.** Her log's 0.05 m/s is 3 % of her speed while her b2 could be known to "
-        f"{100 * exact.bound[5]:.1g} %. With an exact rudder and log the bias is {_biases(exact)} in the "
-        f"{len(exact.z)} of {exact.runs} runs that converge; as it is {_biases(as_is)}, and sigma_r comes out at "
-        f"{np.rad2deg(as_is.levels['sigma_r']):.3f} deg/s where it is 0.030. The likely reason: what smoothing leaves "
-        "of the log's noise is slow beside her, and the estimator takes it for a shake of the rudder from reading to "
-        "reading. Too much process noise makes the filter follow the measured yaw rate, a regression on noisy values. "
-        f"With noise as small beside her motion as a ship's is the bias is {_biases(sized)}."
+        f"{100 * exact.bound[5]:.1g} %. What smoothing leaves of the log's noise is slow beside her, and a state of the "
+        f"likelihood (decision 0022). With an exact rudder and log the bias is {_biases(exact)} in the {len(exact.z)} "
+        f"of {exact.runs} runs that converge; as it is {_biases(as_is)}; with noise as small beside her motion as a "
+        f"ship's is {_biases(sized)}."
     )
