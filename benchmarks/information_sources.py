@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 
-import numpy as np
-
 from benchmarks.information_result import Case, Cell, Run, gather
 from benchmarks.result_page import table
 from pipeline.normalise.series import Float
