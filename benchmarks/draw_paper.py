@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 from shutil import copyfile
 
-from benchmarks.refresh_readme import refreshed
+from benchmarks.refresh_documents import refreshed
 
 PAGE = Path(__file__).parents[1] / "docs" / "paper.md"
 

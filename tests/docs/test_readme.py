@@ -21,7 +21,7 @@ def test_readme_shows_what_its_commands_print(tmp_path: Path) -> None:
             found, code = shell.run(names.resolved(step.line))
             assert code == 0, (step.line, found)
             told = difference(step.shown, found, names)
-            assert told is None, f"$ {step.line}\n{told}\nmend it by hand or with python -m benchmarks.refresh_readme"
+            assert told is None, f"$ {step.line}\n{told}\nmend it by python -m benchmarks.refresh_documents"
     finally:
         shell.close()
     assert commands >= 10

@@ -1,10 +1,12 @@
-"""Write the outputs in the README anew from real runs: ``python -m benchmarks.refresh_readme``.
+"""Write the outputs in documents anew from real runs: ``python -m benchmarks.refresh_documents [docs/compare.md ...]``.
 
-Every console block is run in an empty folder, in its order. Commands and the places of ``...`` stay as they are.
+Without a name the README. Every console block of a document is run in an empty folder, in its order. Commands and the
+places of ``...`` stay as they are.
 """
 
 from __future__ import annotations
 
+import sys
 import tempfile
 from pathlib import Path
 
@@ -35,8 +37,9 @@ def refreshed(text: str, folder: Path) -> str:
 
 
 def main() -> None:
-    with tempfile.TemporaryDirectory() as folder:
-        README.write_text(refreshed(README.read_text(encoding="utf-8"), Path(folder)), encoding="utf-8")
+    for path in [Path(name) for name in sys.argv[1:]] or [README]:
+        with tempfile.TemporaryDirectory() as folder:
+            path.write_text(refreshed(path.read_text(encoding="utf-8"), Path(folder)), encoding="utf-8")
 
 
 if __name__ == "__main__":
