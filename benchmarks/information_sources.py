@@ -128,6 +128,6 @@ def _boat(as_is: Cell, exact: Cell, sized: Cell) -> str:
         f"- **The boat.** Her log's 0.05 m/s is 3 % of her speed while her b2 could be known to "
         f"{100 * exact.bound[5]:.1g} %. What smoothing leaves of the log's noise is slow beside her, and a state of "
         f"the likelihood (decision 0022). With an exact rudder and log the bias is {_biases(exact)} in the "
-        f"{len(exact.z)} of {exact.runs} runs that converge; as it is {_biases(as_is)}; with noise as small beside her motion as a "
-        f"ship's is {_biases(sized)}."
+        f"{len(exact.z)} of {exact.runs} runs that converge; as it is {_biases(as_is)}; with noise as "
+        f"small beside her motion as a ship's is {_biases(sized)}."
     )
