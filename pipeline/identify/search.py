@@ -180,6 +180,8 @@ def _bounded(step: Float, theta: Float, scale: Float) -> Float:
     Far from the maximum the quadratic model sends the ship into regions where she answers absurdly fast.
     """
     reach = np.maximum(np.abs(theta[:_HULL]), scale)
-    bounded = step * min(1.0, 1.0 / float(np.max(np.abs(step[:_HULL]) / reach) + 1e-300))
+    # a parameter that began at nothing and is still there has no scale to leave
+    large = np.max(np.abs(step[:_HULL]) / np.where(reach > 0.0, reach, np.inf))
+    bounded = step * min(1.0, 1.0 / float(large + 1e-300))
     bounded[_HULL:] = np.clip(step[_HULL:], -1.0, 1.0)
     return bounded
