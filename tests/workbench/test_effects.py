@@ -37,6 +37,8 @@ def test_show() -> None:
     for words in ("first-order rudder lag", "told apart by:", "dead_time", "tau", "time constant of the lag"):
         assert words in told.out
     assert kempf("effects", "show", "rudder_lag", "--json").json["parameters"][0]["unit"] == "s"
+    assert "not looked for" not in told.out
+    assert "not looked for where the logs have: speed_through_water" in kempf("effects", "show", "speed_loss").out
 
 
 def test_show_symbols() -> None:

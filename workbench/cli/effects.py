@@ -71,6 +71,8 @@ def _tell(effect: Effect) -> None:
     click.echo(f"  {effect.plain}")
     click.echo(f"  equation: {effect.equation}")
     click.echo(f"  needs: {', '.join(effect.needs) or 'no channel beyond those of every trial'}")
+    if effect.told_by:
+        click.echo(f"  not looked for where the logs have: {', '.join(effect.told_by)}")
     click.echo(f"  looks like: {effect.confounded_with}")
     click.echo(f"  told apart by: {effect.separated_by}")
     click.echo(f"  reference: {effect.reference}")
