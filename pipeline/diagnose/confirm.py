@@ -67,6 +67,8 @@ class Confirmation:
         The same in the held-out runs.
     at_bound : bool
         Whether a parameter of the effect ended at a bound.
+    unseen : Unseen
+        Of ``fit``.
     """
 
     fit: Fit
@@ -75,6 +77,7 @@ class Confirmation:
     fold_gains: Float
     held_out_gains: Float
     at_bound: bool
+    unseen: Unseen
 
     @property
     def holds(self) -> bool:
@@ -120,6 +123,7 @@ def confirm(base: Fit, before: Unseen, candidate: Candidate, held: Sequence[Run]
         fold_gains=after.folds - before.folds,
         held_out_gains=after.held - before.held,
         at_bound=bool(np.any(bound)),
+        unseen=after,
     )
 
 

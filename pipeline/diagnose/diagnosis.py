@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnose.confirm import Confirmation, confirm, unseen
+from pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unseen
 from pipeline.diagnose.flexible import Flexible, flexible
 from pipeline.diagnose.held_out import FreeRun, free_run
 from pipeline.diagnose.pooled_fit import Fit
@@ -170,7 +170,7 @@ def diagnose(
         worth = shortlist(last.screened, settings.level, settings.refits)
         if not worth:
             break
-        alone = unseen(last.fit, held, workers)
+        alone = _unseen(last, held, workers)
         for candidate in worth:
             # the score foretells the likelihood ratio, but beside what is no ship; what is far behind the best refit
             # cannot come near it
@@ -200,6 +200,11 @@ def diagnose(
     return Diagnosis(tuple(fits), tuple(steps), before, after, fitted, tuple(held), gross, settings)
 
 
+def _unseen(step: Step, held: Sequence[Run], workers: Executor) -> Unseen:
+    """Return how a rung predicts what it did not see; its confirmation has asked that already."""
+    return step.chosen_from[0][1].unseen if step.chosen_from else unseen(step.fit, held, workers)
+
+
 def _idle(steps: Sequence[Step]) -> Effect | None:
     """Return an effect added before the last one that is absent in the last fit, None where all earn their place."""
     fit, at = steps[-1].fit, 0
@@ -224,7 +229,7 @@ def _without(
             continue
         base = made[-1].fit
         candidate = score(base, step.added)
-        one = confirm(base, unseen(base, held, workers), candidate, held, workers)
+        one = confirm(base, _unseen(made[-1], held, workers), candidate, held, workers)
         others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
         screened = screen(one.fit, effects, workers)
         made.append(_step(one.fit, step.added, ((candidate, one),), others, held, screened, workers))

@@ -196,20 +196,7 @@ class _Layout:
         return list(self.workers.map(lambda i: sensitivity.passed(self.filtered[i], self.point(theta, i)), numbers))
 
     def _linearised(self, theta: Float, bases: Sequence[Passed]) -> tuple[Linearised, ...]:
-        points = [self.point(theta, i) for i in range(len(bases))]
-        # a pass of one run is the smallest piece of work: so three runs keep two cores busy
-        jobs = []
-        for i, (filtered, point, base) in enumerate(zip(self.filtered, points, bases, strict=True)):
-            if np.isfinite(base.log_likelihood):
-                by = sensitivity.steps(filtered, point)
-                jobs += [(i, index, float(by[index])) for index in sensitivity.active(filtered)]
-        made = self.workers.map(
-            lambda job: sensitivity.column(self.filtered[job[0]], points[job[0]], bases[job[0]], job[1], job[2]), jobs
-        )
-        columns: list[list[tuple[int, Float]]] = [[] for _ in bases]
-        for (i, index, _), column in zip(jobs, made, strict=True):
-            columns[i].append((index, column))
-        return tuple(_line(base, own) for base, own in zip(bases, columns, strict=True))
+        return linearise(self.filtered, [self.point(theta, i) for i in range(len(bases))], bases, self.workers)
 
     def full(self, theta: Float) -> tuple[float, Float, Float]:
         """Log-likelihood, score and expected information, summed in the order of the runs.
@@ -235,12 +222,23 @@ class _Layout:
         return value, score, information
 
 
-def linearise(filtered: Filtered, point: Point) -> Linearised:
-    """Return u and J of one run at a point."""
-    base = sensitivity.passed(filtered, point)
-    if not np.isfinite(base.log_likelihood):
-        return _line(base, [])
-    return _line(base, list(sensitivity.columns(filtered, point, base)))
+def linearise(
+    filtered: Sequence[Filtered], points: Sequence[Point], bases: Sequence[Passed], workers: Executor
+) -> tuple[Linearised, ...]:
+    """Return u and J of every run at its point, ``bases`` being the passes there."""
+    # a pass of one run is the smallest piece of work: so three runs keep two cores busy
+    jobs = []
+    for i, (one, point, base) in enumerate(zip(filtered, points, bases, strict=True)):
+        if np.isfinite(base.log_likelihood):
+            by = sensitivity.steps(one, point)
+            jobs += [(i, index, float(by[index])) for index in sensitivity.active(one)]
+    made = workers.map(
+        lambda job: sensitivity.column(filtered[job[0]], points[job[0]], bases[job[0]], job[1], job[2]), jobs
+    )
+    columns: list[list[tuple[int, Float]]] = [[] for _ in bases]
+    for (i, index, _), column in zip(jobs, made, strict=True):
+        columns[i].append((index, column))
+    return tuple(_line(base, own) for base, own in zip(bases, columns, strict=True))
 
 
 def _line(base: Passed, columns: Sequence[tuple[int, Float]]) -> Linearised:

@@ -9,7 +9,6 @@ from predicted states, with the filter's own way of swallowing it, by no formula
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,13 +92,6 @@ def _typical(filtered: Filtered, point: Point) -> Float:
     L = filtered.run.ship.length_m
     typical: Float = np.maximum(np.abs(point.hull), 0.02 * np.array([1 / L, 1.0, 1 / L**2, 1 / L, 1 / L, 1 / L**2]))
     return typical
-
-
-def columns(filtered: Filtered, point: Point, base: Passed) -> Iterator[tuple[int, Float]]:
-    """Give the columns of J of every parameter that the run has, with their places in `Point.vector`."""
-    by = steps(filtered, point)
-    for index in active(filtered):
-        yield index, column(filtered, point, base, index, by[index])
 
 
 def column(filtered: Filtered, point: Point, base: Passed, index: int, by: float) -> Float:

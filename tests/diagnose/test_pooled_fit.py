@@ -62,7 +62,8 @@ def test_derivatives_are_asked_for_only_where_the_search_goes_on(counted: Counte
 def test_a_run_by_itself_and_runs_together_are_linearised_to_the_same_bits() -> None:
     fit = plain_of(sailed("none"), 3)
     for number, line in enumerate(fit.linearised):
-        alone = linearise(fit.runs[number], fit.point(number))
+        run, point = fit.runs[number], fit.point(number)
+        (alone,) = linearise((run,), (point,), (sensitivity.passed(run, point),), WORKERS)
         assert alone.index == line.index
         assert np.array_equal(alone.J, line.J) and np.array_equal(alone.u, line.u)
 

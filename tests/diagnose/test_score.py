@@ -13,7 +13,7 @@ from pipeline.diagnose.filtered import Filtered
 from pipeline.diagnose.pooled_fit import Fit, linearise
 from pipeline.diagnose.run import Run
 from pipeline.diagnose.screen import Candidate, score
-from pipeline.diagnose.sensitivity import Point
+from pipeline.diagnose.sensitivity import Point, passed
 from pipeline.model.augmented import Augmented
 from pipeline.model.effects import catalogue
 from pipeline.model.ship import mariner_like
@@ -39,7 +39,8 @@ def scored(run: Run, truth: np.ndarray, seed: int, name: str) -> Candidate:
     noise = np.random.default_rng(seed).normal(0.0, 1.0, truth.shape) * NOISE
     filtered = Filtered(replace(run, measured=truth + noise), Augmented(), STILL)
     hull = mariner_like(run.ship.length_m).array()
-    line = linearise(filtered, Point(hull, np.zeros(0), LEVELS))
+    point = Point(hull, np.zeros(0), LEVELS)
+    (line,) = linearise((filtered,), (point,), (passed(filtered, point),), WORKERS)
     base = Fit(
         *(Augmented(), (filtered,), hull, np.zeros(0), LEVELS[None, :], line.passed.log_likelihood),
         *(np.full((6, 6), np.nan), (line,), True, 0),
