@@ -133,6 +133,32 @@ class Names:
         return _PIECES.sub(lambda m: self.real.get(m[0], m[0]), line)
 
 
+def follow(text: str, folder: Path, *before: str) -> int:
+    """Run every command of a document in ``folder``, after those of ``before``; each must print what is shown.
+
+    Returns
+    -------
+    int
+        Commands of the document.
+    """
+    names, shell, commands = Names(), Shell(folder), 0
+    try:
+        for line in before:
+            shell.run(line)
+        for step in steps(text):
+            if isinstance(step, File):
+                (folder / step.name).write_text(step.content, encoding="utf-8")
+                continue
+            commands += 1
+            found, code = shell.run(names.resolved(step.line))
+            assert code == 0, (step.line, found)
+            told = difference(step.shown, found, names)
+            assert told is None, f"$ {step.line}\n{told}\nmend it with python -m benchmarks.refresh_documents"
+    finally:
+        shell.close()
+    return commands
+
+
 def difference(shown: tuple[str, ...], found: list[str], names: Names) -> str | None:
     """Say where the output differs from what the document shows; None where it does not.
 

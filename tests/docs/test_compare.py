@@ -5,25 +5,14 @@ from __future__ import annotations
 import re
 from pathlib import Path
 
-from tests.docs.console import File, Names, Shell, difference, steps
+from tests.docs.console import follow
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "compare.md").read_text(encoding="utf-8")
 
 
 def test_the_examples_run_to_their_output(tmp_path: Path) -> None:
-    shell, names = Shell(tmp_path), Names()
-    try:
-        shell.run(f"export PYTHONPATH='{ROOT}'")
-        for step in steps(TEXT):
-            if isinstance(step, File):
-                (tmp_path / step.name).write_text(step.content, encoding="utf-8")
-                continue
-            found, code = shell.run(names.resolved(step.line))
-            assert code == 0, found
-            assert difference(step.shown, found, names) is None
-    finally:
-        shell.close()
+    assert follow(TEXT, tmp_path, f"export PYTHONPATH='{ROOT}'")
 
 
 def test_the_keys_of_where_are_those_of_the_code() -> None:

@@ -7,24 +7,14 @@ from dataclasses import fields
 from pathlib import Path
 
 from pipeline.history.settings import ChangeSettings
-from tests.docs.console import File, Names, Shell, blocks, difference, steps
+from tests.docs.console import blocks, follow
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "history.md").read_text(encoding="utf-8")
 
 
 def test_the_example_runs_to_its_output(tmp_path: Path) -> None:
-    shell = Shell(tmp_path)
-    try:
-        for step in steps(TEXT):
-            if isinstance(step, File):
-                (tmp_path / step.name).write_text(step.content, encoding="utf-8")
-                continue
-            found, code = shell.run(f"PYTHONPATH='{ROOT}' {step.line}")
-            assert code == 0, found
-            assert difference(step.shown, found, Names()) is None
-    finally:
-        shell.close()
+    assert follow(TEXT, tmp_path, f"export PYTHONPATH='{ROOT}'")
     assert [kind for kind, _, _ in blocks(TEXT)] == ["python", "console"]
 
 

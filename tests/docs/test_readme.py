@@ -4,27 +4,13 @@ from pathlib import Path
 
 import pytest
 
-from tests.docs.console import Command, Names, Shell, difference, same_line, steps
+from tests.docs.console import Names, difference, follow, same_line
 
 README = Path(__file__).parents[2] / "README.md"
 
 
 def test_readme_shows_what_its_commands_print(tmp_path: Path) -> None:
-    names, shell = Names(), Shell(tmp_path)
-    commands = 0
-    try:
-        for step in steps(README.read_text(encoding="utf-8")):
-            if not isinstance(step, Command):
-                (tmp_path / step.name).write_text(step.content, encoding="utf-8")
-                continue
-            commands += 1
-            found, code = shell.run(names.resolved(step.line))
-            assert code == 0, (step.line, found)
-            told = difference(step.shown, found, names)
-            assert told is None, f"$ {step.line}\n{told}\nmend it by python -m benchmarks.refresh_documents"
-    finally:
-        shell.close()
-    assert commands >= 10
+    assert follow(README.read_text(encoding="utf-8"), tmp_path) >= 10
 
 
 @pytest.mark.parametrize(
