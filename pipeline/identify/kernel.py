@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.compiled import njit
-from pipeline.identify.chain import LONGEST, N_CHAIN, PSI, STEP, M, R, V, discretise, rates, room_for_a_step
+from pipeline.identify.chain import N_CHAIN, PSI, STEP, M, R, V, discretise, rates, room_for_a_step
 from pipeline.normalise.series import Float
 
 #: theta = (a11, a12, a21, a22, b1, b2, log sigma_F, sigma_M, sigma_V, sigma_v, sigma_r, sigma_psi); the second half
@@ -241,6 +241,7 @@ def likelihood(  # type: ignore[no-untyped-def]
     mu_M,
     mu_V,
     mu_e,
+    longest,
     x0,
     P0,
     trace,
@@ -269,6 +270,8 @@ def likelihood(  # type: ignore[no-untyped-def]
         h_1 and h_2 at the instants; used where y_v is measured.
     arm, mu_F, mu_M, mu_V, mu_e : float
         l, 1/m, and the correlation rates of the disturbances and of the speed's error, 1/s.
+    longest : float
+        Largest |A| h of one step; what lies farther apart is crossed in several.
     x0 : ndarray, shape (9,); P0 : ndarray, shape (9, 9)
         Mean and covariance of the state at the first instant. States that have no variance are left out.
     trace : tuple of ndarray
@@ -325,7 +328,7 @@ def likelihood(  # type: ignore[no-untyped-def]
             size = rates(theta, U, arm, mu_F, mu_M, A, b)
             if not (size <= FASTEST_PER_S):
                 return -np.inf, score, information
-            n_sub = max(1, int(np.ceil(size * span / LONGEST)))
+            n_sub = max(1, int(np.ceil(size * span / longest)))
             s = span / n_sub
             decay = np.exp(-mu_V * s)
             noise_V = square_V * (1.0 - decay * decay)
