@@ -8,15 +8,10 @@ to a11, a12, a21, a22 run along in the innermost axis, where the processor takes
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from pipeline.compiled import njit
+from pipeline.compiled import STEP, njit
 
-#: how what runs at every instant is compiled: put into its caller, and without counting references to arrays, which
-#: takes longer than the arithmetic; such a function may fill arrays but not make them
-STEP: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": True, "_nrt": False}
 #: rows and columns of the chain
 V, R, F, M, PSI = 0, 1, 2, 3, 4
 N_CHAIN = 5

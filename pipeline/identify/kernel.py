@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.compiled import njit
-from pipeline.identify.chain import N_CHAIN, PSI, STEP, M, R, V, discretise, rates, room_for_a_step
+from pipeline.compiled import STEP, njit
+from pipeline.identify.chain import N_CHAIN, PSI, M, R, V, discretise, rates, room_for_a_step
 from pipeline.normalise.series import Float
 
 #: theta = (a11, a12, a21, a22, b1, b2, log sigma_F, sigma_M, sigma_V, sigma_v, sigma_r, sigma_psi); the second half
