@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
-from os import cpu_count
 from typing import Any
 
+from flows.cores import usable
 from flows.progress import Progress, silent
 from flows.vessel_model import NONE_OF_ONES_OWN, Fitted, Own, inputs_of, known_effects, named, store_model
 from flows.vessel_runs import Chosen, VesselRuns, assembled, choose
@@ -127,7 +127,7 @@ def examine(
         # how many steps it takes is not known beforehand
         progress(count, count + 5, what)
 
-    with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+    with ThreadPoolExecutor(max_workers=usable()) as workers:
         made = diagnose(
             *(runs.runs, runs.spec, runs.start, screened, workers, settings),
             given=named(spec.effects, known),

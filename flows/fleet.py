@@ -5,40 +5,38 @@ The work is in the jobs beside this file; here it is only put into batches, retr
 
 from __future__ import annotations
 
-import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from uuid import UUID
 
-# Before prefect is imported: nothing leaves the machine.
-os.environ.setdefault("DO_NOT_TRACK", "1")
-os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
-# A busy machine needs longer than Prefect's 20 s to start the server of a run.
-os.environ.setdefault("PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS", "180")
+from flows.engine import task_runner, workers  # isort: skip - before Prefect, which reads its settings once
 
 from prefect import flow, get_run_logger, task
-from prefect.artifacts import create_table_artifact
+from prefect.artifacts import (
+    create_markdown_artifact,
+    create_progress_artifact,
+    create_table_artifact,
+    update_progress_artifact,
+)
+from prefect.client.schemas.objects import State
+from prefect.futures import as_completed
 from prefect.runtime import flow_run
-from prefect.task_runners import ThreadPoolTaskRunner
+from prefect.states import Failed
 
-from flows import ingest_logs
+from flows import fleet_plan, fleet_report, ingest_logs
 from flows.diagnose_vessel import diagnose_vessel
 from flows.files import read_profiles
 from flows.fleet_diagnosis import summary
 from flows.identify_vessel import Request, identify_vessel
 from flows.pool_vessel import pool_vessel
-from flows.reprocess_vessel import VesselReport, reprocess_vessel
 from flows.unforeseen import as_told
 from flows.vessel_model import PLAIN
 from schemas.model_spec import ModelSpec
 from warehouse import vessels as vessel_table
 from warehouse.instant import iso_utc
 from warehouse.store import Warehouse
-
-#: The compiled likelihood and the readers run outside the interpreter's lock: one thread a core.
-_WORKERS = os.cpu_count() or 1
-#: Batches a worker: more than one evens out vessels of different size, many would pay Prefect for each.
-_BATCHES_A_WORKER = 2
 
 
 @task(name="ingest-batch", retries=1, retry_delay_seconds=5)
@@ -130,30 +128,51 @@ def _names(warehouse: str, vessels: Sequence[str] | None) -> list[str]:
     return sorted(set(vessels)) if vessels else vessel_table.names(store)
 
 
-@task(name="reprocess-batch", retries=1, retry_delay_seconds=5)
+@task(name="reprocess-batch", retries=1, retry_delay_seconds=5, persist_result=False, result_serializer="json")
 def reprocess_batch(warehouse: str, vessels: list[str], changed_only: bool, run: str | None) -> list[dict[str, Any]]:
     """Bring a batch of vessels up to date; a vessel that fails is reported, the others are done."""
-    store, reports = Warehouse(warehouse), []
-    for vessel in vessels:
-        try:
-            report = reprocess_vessel(store, vessel, changed_only=changed_only, flow_run=run)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
-            report = VesselReport(vessel)
-            report.fail(vessel, as_told(error))
-        get_run_logger().info("%s: %s", vessel, report.status)
-        reports.append(report.show())
-    return reports
+    log = get_run_logger()
+    return fleet_plan.do_batch(
+        Warehouse(warehouse),
+        vessels,
+        changed_only=changed_only,
+        flow_run=run,
+        tell=lambda vessel, status: log.info("%s: %s", vessel, status),
+    )
 
 
-#: Typed here because the runner's own parameter cannot be told from its arguments.
-_THREADS: Any = ThreadPoolTaskRunner(max_workers=_WORKERS)
+@dataclass(frozen=True)
+class _Run:
+    """What is the same for every batch of one run."""
+
+    warehouse: str
+    changed_only: bool
+    run: str | None
+
+    def do(self, batches: Sequence[list[str]], tell: Callable[[int], None]) -> list[dict[str, Any]]:
+        """Run batches as tasks, tell how many vessels are done; those of a lost batch are reported as failed."""
+        futures: dict[Any, list[str]] = {
+            reprocess_batch.submit(self.warehouse, batch, self.changed_only, self.run): batch for batch in batches
+        }
+        reports: list[dict[str, Any]] = []
+        for future in as_completed(list(futures)):
+            try:
+                reports += future.result()
+            except Exception as error:  # noqa: BLE001 - a worker that died must not take the others' work with it
+                reports += fleet_plan.lost(futures[future], error)
+            tell(len(reports))
+        return reports
 
 
-@flow(name="reprocess", task_runner=_THREADS)
+@flow(name="reprocess", task_runner=task_runner(), persist_result=False, result_serializer="json")
 def reprocess(
     warehouse: str = "kempf-data", vessels: list[str] | None = None, changed_only: bool = True
-) -> list[dict[str, Any]]:
+) -> list[dict[str, Any]] | State[Any]:
     """Bring the fleet up to date with its profiles and the code.
+
+    Vessels whose inputs did not change since their last run are not looked at again. The run ends as Failed where a
+    vessel failed in a way that is new, or that another attempt may mend; all others are done all the same. Failures
+    that the run before told of already, of data that are refused, leave it Completed.
 
     Parameters
     ----------
@@ -166,24 +185,58 @@ def reprocess(
 
     Returns
     -------
-    list of dict
-        One report a vessel, sorted by name.
+    list of dict or State
+        One report a vessel, sorted by name; where the run ends as Failed a caller gets the error
+        `flows.fleet_report.VesselsFailed`, which has them too.
     """
-    names = _names(warehouse, vessels)
-    run = str(flow_run.get_id()) if flow_run.get_id() else None
-    n_batches = min(len(names), _WORKERS * _BATCHES_A_WORKER)
-    batches = [names[k::n_batches] for k in range(n_batches)]
-    futures = [reprocess_batch.submit(warehouse, batch, changed_only, run) for batch in batches]
-    reports: list[dict[str, Any]] = sorted((r for f in futures for r in f.result()), key=lambda r: str(r["vessel"]))
-    rows = [
-        {
-            **{k: v for k, v in report.items() if k not in ("failures", "verified")},
-            "failures": "; ".join(f"{f['what']}: {f['error']['message']}" for f in report["failures"]),
-        }
-        for report in reports
-    ]
-    create_table_artifact(key="kempf-reprocess", table=rows, description="The fleet")
+    told = flow_run.get_id()
+    one = _Run(warehouse, changed_only, str(told) if told else None)
+    todo = fleet_plan.plan(Warehouse(warehouse), vessels, changed_only=changed_only)
+    get_run_logger().info("%d vessels, %d with something to do", todo.vessels, len(todo.due))
+    shown = create_progress_artifact(_percent(len(todo.kept), todo.vessels), "kempf-progress", _PROGRESS)
+    assert isinstance(shown, UUID)  # it is a coroutine only where a loop runs
+
+    def tell(done: int) -> None:
+        update_progress_artifact(shown, _percent(len(todo.kept) + done, todo.vessels))
+
+    reports = {report["vessel"]: report for report in todo.kept}
+    reports |= {report["vessel"]: report for report in one.do(todo.batches(workers()), tell)}
+    # each alone: a vessel that takes her worker down takes no other with her
+    for report in one.do([[name] for name in fleet_plan.to_try_again(reports.values())], lambda done: None):
+        reports[report["vessel"]] = fleet_plan.together(reports[report["vessel"]], report)
+    ordered = [reports[name] for name in sorted(reports)]
+    sentence = fleet_report.sentence(ordered)
+    create_table_artifact(key="kempf-reprocess", table=fleet_report.table(ordered), description=sentence)
+    create_markdown_artifact(key="kempf-fleet", markdown=fleet_report.markdown(ordered), description=sentence)
+    if any(map(fleet_report.alarming, ordered)):
+        return Failed(message=sentence, data=fleet_report.VesselsFailed(ordered))
+    return ordered
+
+
+def reports_of(warehouse: str, vessels: list[str] | None, changed_only: bool) -> list[dict[str, Any]]:
+    """Run the flow `reprocess` and return its reports, whichever way it ended.
+
+    Parameters
+    ----------
+    warehouse : str
+    vessels : list of str or None
+    changed_only : bool
+    """
+    state = reprocess(warehouse, vessels, changed_only, return_state=True)
+    found: Any = state.result(raise_on_failure=False)
+    if isinstance(found, fleet_report.VesselsFailed):
+        found = found.details["reports"]
+    if isinstance(found, Exception):
+        raise found
+    reports: list[dict[str, Any]] = found
     return reports
+
+
+_PROGRESS = "Vessels that are up to date, percent"
+
+
+def _percent(done: int, total: int) -> float:
+    return 100.0 * done / total if total else 100.0
 
 
 @task(name="diagnose-batch", retries=1, retry_delay_seconds=5)

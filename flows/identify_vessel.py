@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from os import cpu_count
 from typing import Any
 
+from flows.cores import usable
 from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
 from flows.refresh_logs import Refreshed, refresh_logs
@@ -101,7 +101,7 @@ def identify_vessel(
     outcomes: list[IdentifyOutcome] = []
     readable = [segment for segment in found if segment.ingest_id not in refreshed.failed]
     ingests = list(dict.fromkeys(segment.ingest_id for segment in found))
-    with ThreadPoolExecutor(max_workers=cpu_count()) as pool:
+    with ThreadPoolExecutor(max_workers=usable()) as pool:
         for done, ingest in enumerate(ingests):
             hers = [segment for segment in found if segment.ingest_id == ingest]
             progress(done, len(ingests), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from os import cpu_count
 from typing import Any
 
+from flows.cores import usable
 from flows.identify_vessel import IdentifyOutcome, Request
 from flows.manoeuvres import once, overlap
 from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
@@ -146,6 +146,6 @@ def build_pooled(
     for name, bounds in zip(segment_ids, inputs.bounds, strict=True):
         record = make_record(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
         members.append(Member(name, with_rudder_inflow(record, spec), arm or 0.0))
-    with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+    with ThreadPoolExecutor(max_workers=usable()) as workers:
         result = pooling.identify(members, spec.with_arm(arm), MaximumLikelihoodSettings(**settings), workers)
     return as_parameter_set(result, inputs, vessel, segment_ids, told, without_arm(spec, arm))

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import Any
-
+from flows.fleet_state import VesselState, fleet_state
 from flows.identify_vessel import IdentifyOutcome, Request, identify_vessel
 from flows.pool_vessel import POOLED, pool_vessel
 from flows.progress import Progress, silent
@@ -12,54 +10,12 @@ from flows.refresh_logs import refresh_logs
 from flows.rerun_set import rerun
 from flows.unforeseen import as_told
 from flows.vessel_model import ALIAS, ESTIMATOR, model_of, point, standing, store_model
+from flows.vessel_report import VesselReport, remember
 from flows.vessel_runs import choose
 from schemas.errors import KempfError
 from schemas.model_spec import ModelSpec
-from warehouse import aliases, code_version, logs, parameter_sets, runs, segments
+from warehouse import aliases, code_version, logs, parameter_sets, segments
 from warehouse.store import Warehouse
-
-
-@dataclass
-class VesselReport:
-    """What reprocessing did for one vessel.
-
-    Attributes
-    ----------
-    vessel : str
-    logs, reread, segments, new_sets, kept_sets : int
-        Logs in all, logs read anew, zigzags found, parameter sets made and kept.
-    verified : dict of str to int
-        Verdicts on the kept sets, where everything was asked for.
-    withdrawn : str or None
-        Parameter set that ``current`` pointed to, where it no longer stands and nothing took its place.
-    failures : list of dict
-        What failed, each with the error's JSON; the rest was done all the same.
-    """
-
-    vessel: str
-    logs: int = 0
-    reread: int = 0
-    segments: int = 0
-    new_sets: int = 0
-    kept_sets: int = 0
-    verified: dict[str, int] = field(default_factory=dict)
-    withdrawn: str | None = None
-    failures: list[dict[str, Any]] = field(default_factory=list)
-
-    @property
-    def status(self) -> str:
-        """``failed`` where something did, else ``changed`` or ``unchanged``."""
-        if self.failures:
-            return "failed"
-        return "changed" if self.reread or self.new_sets else "unchanged"
-
-    def show(self) -> dict[str, Any]:
-        """Return the report as JSON content."""
-        return {"vessel": self.vessel, "status": self.status, **{k: v for k, v in vars(self).items() if k != "vessel"}}
-
-    def fail(self, what: str, error: KempfError) -> None:
-        """Write down a failure and go on."""
-        self.failures.append({"what": what, **error.to_json()})
 
 
 def reprocess_vessel(
@@ -68,6 +24,7 @@ def reprocess_vessel(
     request: Request | None = None,
     *,
     changed_only: bool = True,
+    before: VesselState | None = None,
     flow_run: str | None = None,
     progress: Progress = silent,
 ) -> VesselReport:
@@ -83,6 +40,8 @@ def reprocess_vessel(
         Only this model and estimator; by default every one that she was identified with before.
     changed_only : bool, optional
         False also builds every kept set again from the raw bytes and counts the verdicts.
+    before : VesselState, optional
+        Her state where the caller has just read it; else it is read here.
     flow_run : str, optional
     progress : Progress, optional
 
@@ -91,41 +50,61 @@ def reprocess_vessel(
     VesselReport
         Failures are in it; one bad log stops nothing.
     """
-    report = VesselReport(vessel)
+    report, left = VesselReport(vessel), None
     try:
-        requests = _requests(warehouse, vessel, request)
-        names = {row.ingest_id: row.file_name for row in logs.current(warehouse, vessel)}
-        refreshed = refresh_logs(warehouse, vessel, progress)
-        report.logs, report.reread = refreshed.logs, refreshed.reread
-        for ingest, error in refreshed.failed.items():
-            report.fail(names[ingest], error)
-        report.segments = len(segments.current(warehouse, vessel))
-        for one in requests if report.segments else ():
-            outcomes = identify_vessel(
-                warehouse, vessel, one, refreshed=refreshed, adopt=False, flow_run=flow_run, progress=progress
-            )
-            for outcome in outcomes:
-                if outcome.error is not None and outcome.segment.ingest_id not in refreshed.failed:
-                    report.fail(outcome.segment.segment_id, outcome.error)
-                report.new_sets += outcome.new
-                report.kept_sets += outcome.parameter_set is not None and not outcome.new
-            _pool(warehouse, vessel, one, outcomes, report, flow_run, progress)
-        if report.segments and request is None:
-            _model(warehouse, vessel, report, flow_run, progress)
-        _withdraw(warehouse, vessel, report)
+        before = before or fleet_state(warehouse, [vessel])[vessel]
+        _bring_up_to_date(warehouse, vessel, request, report, flow_run, progress)
         if not changed_only:
             _verify(warehouse, vessel, report)
+        if request is None:
+            left = _left(warehouse, before, report)
     except Exception as error:  # noqa: BLE001 - whatever it is, it is reported and the fleet goes on
         report.fail(vessel, as_told(error))
-    counts = {k: v for k, v in vars(report).items() if isinstance(v, int)}
-    inputs = {"vessel": vessel, "changed_only": changed_only, "estimator": request.estimator if request else None}
-    runs.record(
-        warehouse,
-        runs.Run(
-            runs.run_id("reprocess", inputs), "reprocess", vessel, report.status, counts, {"failures": report.failures}
-        ),
-    )
+    estimator = request.estimator if request else None
+    remember(warehouse, report, report.as_run(left, changed_only=changed_only, estimator=estimator))
     return report
+
+
+def _bring_up_to_date(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request | None,
+    report: VesselReport,
+    flow_run: str | None,
+    progress: Progress,
+) -> None:
+    requests = _requests(warehouse, vessel, request)
+    names = {row.ingest_id: row.file_name for row in logs.current(warehouse, vessel)}
+    refreshed = refresh_logs(warehouse, vessel, progress)
+    report.logs, report.reread = refreshed.logs, refreshed.reread
+    for ingest, error in refreshed.failed.items():
+        report.fail(names[ingest], error)
+    report.segments = len(segments.current(warehouse, vessel))
+    for one in requests if report.segments else ():
+        outcomes = identify_vessel(
+            warehouse, vessel, one, refreshed=refreshed, adopt=False, flow_run=flow_run, progress=progress
+        )
+        for outcome in outcomes:
+            if outcome.error is not None and outcome.segment.ingest_id not in refreshed.failed:
+                report.fail(outcome.segment.segment_id, outcome.error)
+            report.new_sets += outcome.new
+            report.kept_sets += outcome.parameter_set is not None and not outcome.new
+        _pool(warehouse, vessel, one, outcomes, report, flow_run, progress)
+    if report.segments and request is None:
+        _model(warehouse, vessel, report, flow_run, progress)
+    _withdraw(warehouse, vessel, report)
+
+
+def _left(warehouse: Warehouse, before: VesselState, report: VesselReport) -> str | None:
+    """Return the digest of the state in which nothing is left to do, None where that is not sure.
+
+    Not sure: a failure that another attempt may mend; a log, a profile or a set that somebody else added meanwhile.
+    """
+    if not all(failure["lasting"] for failure in report.failures):
+        return None
+    after = fleet_state(warehouse, [report.vessel])[report.vessel]
+    made = len(set(after.set_ids) - set(before.set_ids))
+    return after.digest if after.inputs == before.inputs and made == report.new_sets else None
 
 
 def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> list[Request]:

@@ -8,11 +8,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
-from os import cpu_count
 from typing import Any
 
 import numpy as np
 
+from flows.cores import usable
 from flows.parameter_set_of import arm_of, stored, without_arm
 from flows.progress import Progress, silent
 from flows.vessel_runs import Chosen, VesselRuns, assemble, assembled
@@ -145,7 +145,7 @@ def fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own) -> Fitted:
     """Fit a model and every model on the way to it."""
     used = named(spec.effects, known_effects(own))
     chosen, _ = split(runs.runs)
-    with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+    with ThreadPoolExecutor(max_workers=usable()) as workers:
         fits, gross = staged([runs.runs[i] for i in chosen], runs.spec, runs.start.of(chosen), used, workers)
     return Fitted(runs, tuple(fits), gross)
 

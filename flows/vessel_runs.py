@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
-from os import cpu_count
 
+from flows.cores import usable
 from flows.manoeuvres import once, same
 from flows.parameter_set_of import arm_of
 from flows.progress import Progress, silent
@@ -53,7 +53,7 @@ class VesselRuns:
     @cached_property
     def start(self) -> Start:
         """Hull and noise levels to start a fit from; the held-out runs have no part in the hull."""
-        with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+        with ThreadPoolExecutor(max_workers=usable()) as workers:
             return start_of(self.records, self.runs, self.spec, split(self.runs)[0], workers)
 
 

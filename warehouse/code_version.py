@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
+from types import ModuleType
 
 import pipeline
 import schemas
@@ -40,7 +41,17 @@ def fingerprint() -> str:
 
     The simulator is left out: it makes logs, and a log counts by its own bytes.
     """
-    roots = [_folder(package.__file__) for package in (pipeline, schemas)]
+    return fingerprint_of_packages(pipeline, schemas)
+
+
+def fingerprint_of_packages(*packages: ModuleType) -> str:
+    """Return the fingerprint of some installed packages, the simulator left out.
+
+    Parameters
+    ----------
+    packages : module
+    """
+    roots = [_folder(package.__file__) for package in packages]
     return fingerprint_of(
         {
             f"{root.name}/{path.relative_to(root).as_posix()}": path.read_bytes()

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from json import loads
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from warehouse import delta
 from warehouse.canonical import canonical_json, plain, sha256
-from warehouse.keys import quoted
+from warehouse.keys import one_of
 from warehouse.retry import with_retry
 from warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    import polars as pl
 
 
 def run_id(flow: str, inputs: Any) -> str:
@@ -43,7 +46,42 @@ def record(warehouse: Warehouse, run: Run) -> bool:
     bool
         Whether anything changed.
     """
-    row = {
+    return bool(record_all(warehouse, [run]))
+
+
+def record_all(warehouse: Warehouse, found: Sequence[Run]) -> tuple[str, ...]:
+    """Store how runs stand, in place of how they stood, in at most one commit.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    found : sequence of Run
+        Each run once.
+
+    Returns
+    -------
+    tuple of str
+        Ids of those that stood otherwise before, in the order given.
+    """
+    if not found:
+        return ()
+    rows = {run.run_id: _as_columns(run) for run in found}
+
+    def attempt() -> tuple[str, ...]:
+        table = delta.ensure_table(warehouse, "runs")
+        stored = delta.rows(table, "runs", {"run_id": sorted(rows)}).rows(named=True)
+        known = {row["run_id"]: row for row in stored}
+        changed = tuple(name for name, row in rows.items() if known.get(name) != row)
+        if changed:
+            delta.replace(table, "runs", [rows[name] for name in changed], one_of("run_id", changed))
+        return changed
+
+    return with_retry(attempt)
+
+
+def _as_columns(run: Run) -> dict[str, Any]:
+    return {
         "run_id": run.run_id,
         "flow": run.flow,
         "vessel": run.vessel,
@@ -52,21 +90,19 @@ def record(warehouse: Warehouse, run: Run) -> bool:
         "message_json": canonical_json(run.message),
     }
 
-    def attempt() -> bool:
-        table = delta.ensure_table(warehouse, "runs")
-        stored = delta.rows(table, "runs", {"run_id": run.run_id})
-        if stored.rows(named=True) == [row]:
-            return False
-        delta.replace(table, "runs", [row], f"run_id = {quoted(run.run_id)}")
-        return True
 
-    return with_retry(attempt)
+def some(warehouse: Warehouse, run_ids: Sequence[str]) -> list[Run]:
+    """Return those of some runs that are stored, sorted by flow then id."""
+    return _runs(delta.read(warehouse, "runs", {"run_id": sorted(set(run_ids))}))
 
 
 def all_runs(warehouse: Warehouse, flow: str | None = None) -> list[Run]:
     """Return every run, of one flow or of all, sorted by flow then id."""
-    frame = delta.read(warehouse, "runs", {} if flow is None else {"flow": flow}).sort("flow", "run_id")
+    return _runs(delta.read(warehouse, "runs", {} if flow is None else {"flow": flow}))
+
+
+def _runs(frame: pl.DataFrame) -> list[Run]:
     return [
         Run(r["run_id"], r["flow"], r["vessel"], r["status"], loads(r["counts_json"]), loads(r["message_json"]))
-        for r in frame.rows(named=True)
+        for r in frame.sort("flow", "run_id").rows(named=True)
     ]

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from schemas.errors import KempfError, NotFound, UsageError
+from warehouse import object_store
 
 #: Name and content of the file that marks a warehouse.
 MARKER = "kempf-warehouse.json"
@@ -23,15 +24,6 @@ LAYOUT = 1
 
 #: Characters that the readers of the tables give another meaning: escapes, patterns, and = as a partition's folder.
 _UNADDRESSABLE = "%=[]*?^|{}" if os.sep == "\\" else "%=[]*?^|{}\\"
-
-#: What pyarrow calls the options that object stores know by these names.
-_S3_OPTIONS = {
-    "AWS_ACCESS_KEY_ID": "access_key",
-    "AWS_SECRET_ACCESS_KEY": "secret_key",
-    "AWS_SESSION_TOKEN": "session_token",
-    "AWS_REGION": "region",
-    "AWS_ENDPOINT_URL": "endpoint_override",
-}
 
 
 @dataclass(frozen=True)
@@ -43,7 +35,8 @@ class Warehouse:
     uri : str
         A folder, ``file://...`` or ``s3://bucket/prefix``.
     storage_options : mapping of str, optional
-        Options of the object store, such as ``AWS_ENDPOINT_URL``; never stored.
+        Options of the object store, such as ``AWS_ENDPOINT_URL``; they go before those of the environment, and are
+        never stored.
 
     Raises
     ------
@@ -74,9 +67,16 @@ class Warehouse:
             return None
         return Path(self.uri.removeprefix("file://")).expanduser().resolve()
 
-    @property
+    @cached_property
+    def scheme(self) -> str:
+        """How it is reached: ``file``, ``s3``, ..."""
+        return "file" if self.folder is not None else self.uri.partition("://")[0]
+
+    @cached_property
     def options(self) -> dict[str, str] | None:
-        """Storage options as the table format wants them."""
+        """Storage options as the table format wants them; None for a folder."""
+        if self.scheme in object_store.SCHEMES:
+            return object_store.options_of(self.storage_options) or None
         return dict(self.storage_options) if self.storage_options else None
 
     def address(self, *parts: str) -> str:
@@ -91,12 +91,9 @@ class Warehouse:
 
         if self.folder is not None:
             return fs.LocalFileSystem(), self.folder.as_posix()
-        scheme, _, root = self.uri.rstrip("/").partition("://")
-        if scheme in ("s3", "s3a") and self.storage_options:
-            given = {_S3_OPTIONS[k.upper()]: v for k, v in self.storage_options.items() if k.upper() in _S3_OPTIONS}
-            given["scheme"] = "http" if given.get("endpoint_override", "").startswith("http://") else "https"
-            return fs.S3FileSystem(**given), root
         try:
+            if self.scheme in object_store.SCHEMES and self.options:
+                return object_store.file_system(self.options), self.uri.rstrip("/").partition("://")[2]
             files, inside = fs.FileSystem.from_uri(self.uri.rstrip("/"))
         except (ValueError, OSError) as error:  # pyarrow's own errors are subclasses
             raise UsageError(

@@ -67,6 +67,18 @@ def tables_of(key: str) -> list[list[dict[str, Any]]]:
     return [json.loads(one.data) if isinstance(one.data, str) else one.data for one in found]
 
 
+def summary_of_last_run() -> str:
+    """The text of the latest summary."""
+    from prefect.client.orchestration import get_client
+    from prefect.client.schemas.filters import ArtifactFilter, ArtifactFilterKey
+    from prefect.client.schemas.sorting import ArtifactSort
+
+    with get_client(sync_client=True) as client:
+        wanted = ArtifactFilter(key=ArtifactFilterKey(any_=["kempf-fleet"]))
+        found = client.read_artifacts(artifact_filter=wanted, sort=ArtifactSort.CREATED_DESC, limit=1)
+    return str(found[0].data)
+
+
 def test_every_flow_leaves_a_table(fleet: Warehouse):
     rows = [row for table in tables_of("kempf-ingest") for row in table]
     assert {(row["log"], row["outcome"]) for row in rows} >= {("tramp.nmea", "new"), ("none", "failed")}
@@ -113,13 +125,14 @@ def test_a_changed_profile_concerns_her_alone(own: Warehouse):
 
 
 def test_a_damaged_raw_copy_is_reported_and_the_others_are_done(own: Warehouse):
-    from flows.fleet import reprocess
+    from flows.fleet import reports_of, reprocess
+    from flows.fleet_report import VesselsFailed
 
     damage(own, "mariner")
     for name in FLEET:
         profile = vessels.current(own, name).model_copy(update={"wind_arm_per_m": 0.002})
         vessels.register(own, name, profile)
-    reports = {r["vessel"]: r for r in reprocess(own.uri, changed_only=False)}
+    reports = {r["vessel"]: r for r in reports_of(own.uri, None, False)}
     assert {n: r["status"] for n, r in reports.items()} == {"ferry": "changed", "mariner": "failed", "tramp": "changed"}
     told = {row["vessel"]: row["failures"] for row in tables_of("kempf-reprocess")[0]}
     assert (told["ferry"], told["tramp"]) == ("", "") and "is damaged" in told["mariner"]
@@ -133,6 +146,11 @@ def test_a_damaged_raw_copy_is_reported_and_the_others_are_done(own: Warehouse):
         "tramp": {"bit-identical": 2},
     }
     assert [run.vessel for run in runs.all_runs(own, "reprocess") if run.status == "failed"] == ["mariner"]
+    # the run itself ends as Failed and says whom to look at, every night until she is mended
+    for _ in range(2):
+        with pytest.raises(VesselsFailed, match="3 vessels: 1 failed, 2 unchanged; look at mariner"):
+            reprocess(own.uri)
+    assert "Ingest the original file again" in summary_of_last_run()
 
 
 def damage(warehouse: Warehouse, vessel: str) -> None:
@@ -143,16 +161,18 @@ def damage(warehouse: Warehouse, vessel: str) -> None:
 
 
 def test_the_batch_goes_on_behind_a_fault_of_our_own(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
-    from flows import fleet as flows_fleet
+    from flows import fleet_plan
+    from flows.fleet import reports_of
 
     def one(warehouse: Warehouse, vessel: str, **named: Any) -> Any:
         if vessel == "ferry":
             raise ZeroDivisionError("division by zero")
         return real(warehouse, vessel, **named)
 
-    real = flows_fleet.reprocess_vessel
-    monkeypatch.setattr(flows_fleet, "reprocess_vessel", one)
-    reports = flows_fleet.reprocess(own.uri, ["tramp", "ferry", "ferry"])
+    real = fleet_plan.reprocess_vessel
+    monkeypatch.setattr(fleet_plan, "reprocess_vessel", one)
+    vessels.register(own, "ferry", vessels.current(own, "ferry").model_copy(update={"wind_arm_per_m": 0.003}))
+    reports = reports_of(own.uri, ["tramp", "ferry", "ferry"], True)
     assert [(r["vessel"], r["status"]) for r in reports] == [("ferry", "failed"), ("tramp", "unchanged")]
     assert "ZeroDivisionError" in reports[0]["failures"][0]["error"]["message"]
 

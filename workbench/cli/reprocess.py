@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 from typing import Any
 
@@ -25,8 +26,9 @@ from workbench.terminal import print_json, print_table, progress
 def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool) -> None:
     """Bring the whole fleet, or some vessels, up to date with their profiles and the code.
 
-    Several vessels run as the Prefect flow `reprocess`, on the server that PREFECT_API_URL names or on one of its own;
-    a single one runs at once.
+    Where PREFECT_API_URL names a server this is a run of the Prefect flow `reprocess` there; else it is done in this
+    process, and no server is started. Vessels of which nothing changed since their last run are not looked at again;
+    a single one that is named is.
     """
     from warehouse import vessels
     from warehouse.store import Warehouse
@@ -42,10 +44,15 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
 
         with progress() as tell:
             reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=tell).show()]
-    else:
-        from flows.fleet import reprocess
+    elif os.environ.get("PREFECT_API_URL"):
+        from flows.fleet import reports_of
 
-        reports = reprocess(uri, names or None, changed_only)
+        reports = reports_of(uri, names or None, changed_only)
+    else:
+        from flows.fleet_plan import do_fleet
+
+        with progress() as tell:
+            reports = do_fleet(warehouse, names or None, changed_only=changed_only, progress=tell)
     if as_json:
         print_json(reports)
     else:

@@ -1,0 +1,223 @@
+"""Which vessels of a fleet have something to do, and how the work is cut into batches. Knows no engine."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from dataclasses import dataclass
+from typing import Any
+
+from flows.cores import usable
+from flows.fleet_state import VesselState, fleet_state
+from flows.progress import Progress, silent
+from flows.reprocess_vessel import reprocess_vessel
+from flows.unforeseen import as_told
+from flows.vessel_report import FLOW, PASSING, VesselReport, from_run, run_id_of
+from schemas.errors import KempfError
+from warehouse import runs, vessels
+from warehouse.runs import Run
+from warehouse.store import Warehouse
+
+#: A batch holds about so many logs: a minute of work, beside which what an engine asks for a task is small, and little
+#: enough that a lost worker costs a minute and progress is seen.
+LOGS_A_BATCH = 20
+#: Batches a worker where the fleet is small: more than one evens out vessels of different size.
+BATCHES_A_WORKER = 2
+
+Report = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """What a run over the fleet has to do.
+
+    Attributes
+    ----------
+    due : tuple of (str, int)
+        Vessels that have something to do with the number of their logs, the heavier ones first.
+    kept : tuple of dict
+        Reports of the others.
+    """
+
+    due: tuple[tuple[str, int], ...]
+    kept: tuple[Report, ...]
+
+    @property
+    def vessels(self) -> int:
+        """How many vessels there are in all."""
+        return len(self.due) + len(self.kept)
+
+    def batches(self, workers: int) -> list[list[str]]:
+        """Return the vessels that are due in batches of about equal work, the heavier vessels begun first.
+
+        Parameters
+        ----------
+        workers : int
+            That will share them.
+        """
+        n_logs = sum(logs for _, logs in self.due)
+        wanted = max(-(-n_logs // LOGS_A_BATCH), workers * BATCHES_A_WORKER)
+        n_batches = min(len(self.due), wanted)
+        names = [name for name, _ in self.due]
+        return [names[k::n_batches] for k in range(n_batches)]
+
+
+def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_only: bool = True) -> Plan:
+    """Say which vessels have something to do, and write down that the others have not.
+
+    A vessel has nothing to do where her state is the one that her last run left, and nothing failed in it that another
+    attempt may mend.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    names : sequence of str, optional
+        Only these; the whole fleet by default.
+    changed_only : bool, optional
+        False: all of them have.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    warehouse.require()
+    asked = sorted(set(names)) if names else vessels.names(warehouse)
+    states = fleet_state(warehouse, asked if names else None)
+    settled = _settled(warehouse, states) if changed_only else {}
+    due = sorted((len(state.log_ids), name) for name, state in states.items() if name not in settled)
+    reports = [from_run(run) for run in settled.values()]
+    again = [report.as_run(states[report.vessel].digest, changed_only=True, estimator=None) for report in reports]
+    runs.record_all(warehouse, again)
+    return Plan(tuple((name, logs) for logs, name in reversed(due)), tuple(report.show() for report in reports))
+
+
+def _settled(warehouse: Warehouse, states: Mapping[str, VesselState]) -> dict[str, Run]:
+    """Return the run that left each vessel in the state that she is in."""
+    found = {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
+    settled = {}
+    for name, state in states.items():
+        for changed_only in (True, False):
+            run = found.get(run_id_of(name, changed_only=changed_only))
+            if run is not None and run.message.get("state") == state.digest:
+                settled[name] = run
+                break
+    return settled
+
+
+def do_batch(
+    warehouse: Warehouse,
+    batch: Sequence[str],
+    *,
+    changed_only: bool,
+    flow_run: str | None = None,
+    tell: Callable[[str, str], None] = lambda vessel, status: None,
+) -> list[Report]:
+    """Bring a batch of vessels up to date; one that fails is reported, the others are done.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    batch : sequence of str
+    changed_only : bool
+    flow_run : str, optional
+    tell : callable, optional
+        Called with name and status after every vessel.
+
+    Returns
+    -------
+    list of dict
+        One report a vessel.
+    """
+    reports = []
+    for vessel in batch:
+        try:
+            report = reprocess_vessel(warehouse, vessel, changed_only=changed_only, flow_run=flow_run)
+        except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
+            report = VesselReport(vessel)
+            report.fail(vessel, as_told(error))
+        tell(vessel, report.status)
+        reports.append(report.show())
+    return reports
+
+
+def lost(batch: Sequence[str], error: BaseException) -> list[Report]:
+    """Return the reports of a batch whose worker did not come back.
+
+    Parameters
+    ----------
+    batch : sequence of str
+    error : BaseException
+        What the engine says.
+    """
+    reports = []
+    for vessel in batch:
+        report = VesselReport(vessel)
+        told = KempfError(
+            "batch_lost",
+            f"The worker that had {vessel!r} in a batch of {len(batch)} did not come back: {error}.",
+            "Run it again; look at the worker's log, and at its memory.",
+        )
+        report.fail(vessel, told)
+        reports.append(report.show())
+    return reports
+
+
+def to_try_again(reports: Iterable[Report]) -> list[str]:
+    """Return the vessels that failed in a way that may be gone at the next attempt, sorted."""
+    return sorted(
+        report["vessel"]
+        for report in reports
+        if any(failure["error"]["code"] in PASSING for failure in report["failures"])
+    )
+
+
+def together(first: Report, second: Report) -> Report:
+    """Return the report of two attempts on one vessel: what both did, and what the second left."""
+    new, reread = (first[key] + second[key] for key in ("new_sets", "reread"))
+    kept = max(second["kept_sets"] - first["new_sets"], 0)
+    changed = "changed" if second["status"] == "unchanged" and (new or reread) else second["status"]
+    return {**second, "status": changed, "new_sets": new, "kept_sets": kept, "reread": reread}
+
+
+def do_fleet(
+    warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_only: bool = True, progress: Progress = silent
+) -> list[Report]:
+    """Bring the fleet up to date in this process, a vessel a thread and a thread a core; no engine, no server.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    names : sequence of str, optional
+        Only these; the whole fleet by default.
+    changed_only : bool, optional
+        False also verifies every kept parameter set from the raw bytes.
+    progress : Progress, optional
+        Told after every vessel.
+
+    Returns
+    -------
+    list of dict
+        One report a vessel, sorted by name.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    todo = plan(warehouse, names, changed_only=changed_only)
+    reports = {report["vessel"]: report for report in todo.kept}
+    progress(len(reports), todo.vessels, "reprocessing")
+    with ThreadPoolExecutor(max_workers=usable()) as pool:
+        futures = [pool.submit(do_batch, warehouse, [name], changed_only=changed_only) for name, _ in todo.due]
+        try:
+            for future in as_completed(futures):
+                (report,) = future.result()
+                reports[report["vessel"]] = report
+                progress(len(reports), todo.vessels, f"{report['vessel']}: {report['status']}")
+        except BaseException:  # interrupted: what has begun is finished, the rest is left for the next run
+            pool.shutdown(wait=False, cancel_futures=True)
+            raise
+    for report in do_batch(warehouse, to_try_again(reports.values()), changed_only=changed_only):
+        reports[report["vessel"]] = together(reports[report["vessel"]], report)
+    return [reports[name] for name in sorted(reports)]

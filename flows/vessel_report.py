@@ -1,0 +1,128 @@
+"""What reprocessing did for one vessel, as it is told and as it is remembered for the next time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from schemas.errors import DataRejected, KempfError
+from warehouse import runs
+from warehouse.runs import Run
+from warehouse.store import Warehouse
+
+#: Codes of errors that come of the storage and may be gone at the next attempt.
+PASSING = ("warehouse_unreachable", "warehouse_busy", "warehouse_not_writable", "batch_lost")
+FLOW = "reprocess"
+
+
+@dataclass
+class VesselReport:
+    """What reprocessing did for one vessel.
+
+    Attributes
+    ----------
+    vessel : str
+    logs, reread, segments, new_sets, kept_sets : int
+        Logs in all, logs read anew, zigzags found, parameter sets made and kept.
+    verified : dict of str to int
+        Verdicts on the kept sets, where everything was asked for.
+    withdrawn : str or None
+        Parameter set that ``current`` pointed to, where it no longer stands and nothing took its place.
+    failures : list of dict
+        What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
+        refused, so that the same data are refused again; ``known`` that the run before told of it already.
+    """
+
+    vessel: str
+    logs: int = 0
+    reread: int = 0
+    segments: int = 0
+    new_sets: int = 0
+    kept_sets: int = 0
+    verified: dict[str, int] = field(default_factory=dict)
+    withdrawn: str | None = None
+    failures: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def status(self) -> str:
+        """``failed`` where something did, else ``changed`` or ``unchanged``."""
+        if self.failures:
+            return "failed"
+        return "changed" if self.reread or self.new_sets else "unchanged"
+
+    def show(self) -> dict[str, Any]:
+        """Return the report as JSON content."""
+        return {"vessel": self.vessel, "status": self.status, **{k: v for k, v in vars(self).items() if k != "vessel"}}
+
+    def fail(self, what: str, error: KempfError) -> None:
+        """Write down a failure and go on."""
+        lasting = isinstance(error, DataRejected)
+        self.failures.append({"what": what, "lasting": lasting, "known": False, **error.to_json()})
+
+    def as_run(self, state: str | None, *, changed_only: bool, estimator: str | None) -> Run:
+        """Return the line of the table ``runs``.
+
+        Parameters
+        ----------
+        state : str or None
+            Digest of the state that the vessel was left in, where nothing is left to do in it.
+        changed_only : bool
+        estimator : str or None
+            What was asked for; both are part of the run's id.
+        """
+        counts = {k: v for k, v in vars(self).items() if isinstance(v, int)}
+        message = {"failures": self.failures, **({"state": state} if state else {})}
+        return Run(
+            run_id_of(self.vessel, changed_only=changed_only, estimator=estimator),
+            FLOW,
+            self.vessel,
+            self.status,
+            counts,
+            message,
+        )
+
+
+def run_id_of(vessel: str, *, changed_only: bool, estimator: str | None = None) -> str:
+    """Return the id under which the reprocessing of a vessel is remembered."""
+    return runs.run_id(FLOW, {"vessel": vessel, "changed_only": changed_only, "estimator": estimator})
+
+
+def remember(warehouse: Warehouse, report: VesselReport, run: Run) -> None:
+    """Store a run; failures that stood there before are marked as known in the report and in what is stored.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    report : VesselReport
+    run : Run
+        Of `VesselReport.as_run`.
+    """
+    if report.failures:
+        before = {_what(f) for earlier in runs.some(warehouse, [run.run_id]) for f in earlier.message["failures"]}
+        for failure in report.failures:
+            failure["known"] = _what(failure) in before
+    told = {**run.message, "failures": report.failures}
+    runs.record(warehouse, Run(run.run_id, run.flow, run.vessel, run.status, run.counts, told))
+
+
+def from_run(run: Run) -> VesselReport:
+    """Return the report of a vessel that has nothing to do, from what her last run left.
+
+    Parameters
+    ----------
+    run : Run
+        Its failures are all lasting.
+    """
+    told = run.counts
+    return VesselReport(
+        str(run.vessel),
+        logs=told["logs"],
+        segments=told["segments"],
+        kept_sets=told["new_sets"] + told["kept_sets"],
+        failures=[{**failure, "known": True} for failure in run.message["failures"]],
+    )
+
+
+def _what(failure: Mapping[str, Any]) -> tuple[str, str]:
+    return str(failure["what"]), str(failure["error"]["code"])
