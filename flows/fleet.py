@@ -29,6 +29,7 @@ from flows import fleet_plan, fleet_report, ingest_logs
 from flows.diagnose_vessel import diagnose_vessel
 from flows.files import read_profiles
 from flows.fleet_diagnosis import summary
+from flows.fleet_state import responsible_code
 from flows.identify_vessel import Request, identify_vessel
 from flows.pool_vessel import pool_vessel
 from flows.unforeseen import as_told
@@ -129,7 +130,9 @@ def _names(warehouse: str, vessels: Sequence[str] | None) -> list[str]:
 
 
 @task(name="reprocess-batch", retries=1, retry_delay_seconds=5, persist_result=False, result_serializer="json")
-def reprocess_batch(warehouse: str, vessels: list[str], changed_only: bool, run: str | None) -> list[dict[str, Any]]:
+def reprocess_batch(
+    warehouse: str, vessels: list[str], changed_only: bool, run: str | None, code: list[str] | None = None
+) -> list[dict[str, Any]]:
     """Bring a batch of vessels up to date; a vessel that fails is reported, the others are done."""
     log = get_run_logger()
     return fleet_plan.do_batch(
@@ -137,6 +140,7 @@ def reprocess_batch(warehouse: str, vessels: list[str], changed_only: bool, run:
         vessels,
         changed_only=changed_only,
         flow_run=run,
+        code=code,
         tell=lambda vessel, status: log.info("%s: %s", vessel, status),
     )
 
@@ -151,8 +155,9 @@ class _Run:
 
     def do(self, batches: Sequence[list[str]], tell: Callable[[int], None]) -> list[dict[str, Any]]:
         """Run batches as tasks, tell how many vessels are done; those of a lost batch are reported as failed."""
+        code = responsible_code()
         futures: dict[Any, list[str]] = {
-            reprocess_batch.submit(self.warehouse, batch, self.changed_only, self.run): batch for batch in batches
+            reprocess_batch.submit(self.warehouse, batch, self.changed_only, self.run, code): batch for batch in batches
         }
         reports: list[dict[str, Any]] = []
         for future in as_completed(list(futures)):
@@ -200,7 +205,8 @@ def reprocess(
         update_progress_artifact(shown, _percent(len(todo.kept) + done, todo.vessels))
 
     reports = {report["vessel"]: report for report in todo.kept}
-    reports |= {report["vessel"]: report for report in one.do(todo.batches(workers()), tell)}
+    if todo.due:
+        reports |= {report["vessel"]: report for report in one.do(todo.batches(workers()), tell)}
     # each alone: a vessel that takes her worker down takes no other with her
     for report in one.do([[name] for name in fleet_plan.to_try_again(reports.values())], lambda done: None):
         reports[report["vessel"]] = fleet_plan.together(reports[report["vessel"]], report)
@@ -213,7 +219,7 @@ def reprocess(
     return ordered
 
 
-def reports_of(warehouse: str, vessels: list[str] | None, changed_only: bool) -> list[dict[str, Any]]:
+def reports_of(warehouse: str, vessels: list[str] | None = None, *, changed_only: bool = True) -> list[dict[str, Any]]:
     """Run the flow `reprocess` and return its reports, whichever way it ended.
 
     Parameters

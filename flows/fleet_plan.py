@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from flows.cores import usable
-from flows.fleet_state import VesselState, fleet_state
+from flows.fleet_state import VesselState, fleet_state, responsible_code
 from flows.progress import Progress, silent
 from flows.reprocess_vessel import reprocess_vessel
 from flows.unforeseen import as_told
@@ -111,6 +111,7 @@ def do_batch(
     *,
     changed_only: bool,
     flow_run: str | None = None,
+    code: Sequence[str] | None = None,
     tell: Callable[[str, str], None] = lambda vessel, status: None,
 ) -> list[Report]:
     """Bring a batch of vessels up to date; one that fails is reported, the others are done.
@@ -121,6 +122,8 @@ def do_batch(
     batch : sequence of str
     changed_only : bool
     flow_run : str, optional
+    code : sequence of str, optional
+        `responsible_code` of the machine that asks; where it is not that of this one, nothing is done.
     tell : callable, optional
         Called with name and status after every vessel.
 
@@ -132,6 +135,7 @@ def do_batch(
     reports = []
     for vessel in batch:
         try:
+            _refuse_other_code(code)
             report = reprocess_vessel(warehouse, vessel, changed_only=changed_only, flow_run=flow_run)
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
             report = VesselReport(vessel)
@@ -139,6 +143,18 @@ def do_batch(
         tell(vessel, report.status)
         reports.append(report.show())
     return reports
+
+
+def _refuse_other_code(code: Sequence[str] | None) -> None:
+    """Do nothing unless another machine asks that runs other code: two versions would undo each other's work."""
+    own = responsible_code()
+    if code is not None and list(code) != own:
+        raise KempfError(
+            "other_code",
+            f"This worker runs code {' '.join(own)}; the flow that asks runs {' '.join(code)}.",
+            "Install the same version of kempf on every machine, and start the workers again.",
+            {"worker": own, "flow": list(code)},
+        )
 
 
 def lost(batch: Sequence[str], error: BaseException) -> list[Report]:

@@ -56,12 +56,12 @@ class VesselState:
     def digest(self) -> str:
         """SHA-256 of the state and of the code that is responsible for it, 64 hex digits."""
         told = [self.vessel, *self.inputs, self.ingest_ids, self.set_ids, self.aliases]
-        return sha256(canonical_json([_code(), *told]))
+        return sha256(canonical_json([responsible_code(), *told]))
 
 
 @cache
-def _code() -> list[str]:
-    """Fingerprints of the code that makes results, and of the code that decides which are made."""
+def responsible_code() -> list[str]:
+    """Return the fingerprints of the code that makes results, and of the code that decides which are made."""
     return [code_version.fingerprint(), code_version.fingerprint_of_packages(flows, storage)]
 
 

@@ -132,7 +132,7 @@ def test_a_damaged_raw_copy_is_reported_and_the_others_are_done(own: Warehouse):
     for name in FLEET:
         profile = vessels.current(own, name).model_copy(update={"wind_arm_per_m": 0.002})
         vessels.register(own, name, profile)
-    reports = {r["vessel"]: r for r in reports_of(own.uri, None, False)}
+    reports = {r["vessel"]: r for r in reports_of(own.uri, changed_only=False)}
     assert {n: r["status"] for n, r in reports.items()} == {"ferry": "changed", "mariner": "failed", "tramp": "changed"}
     told = {row["vessel"]: row["failures"] for row in tables_of("kempf-reprocess")[0]}
     assert (told["ferry"], told["tramp"]) == ("", "") and "is damaged" in told["mariner"]
@@ -172,7 +172,7 @@ def test_the_batch_goes_on_behind_a_fault_of_our_own(own: Warehouse, monkeypatch
     real = fleet_plan.reprocess_vessel
     monkeypatch.setattr(fleet_plan, "reprocess_vessel", one)
     vessels.register(own, "ferry", vessels.current(own, "ferry").model_copy(update={"wind_arm_per_m": 0.003}))
-    reports = reports_of(own.uri, ["tramp", "ferry", "ferry"], True)
+    reports = reports_of(own.uri, ["tramp", "ferry", "ferry"])
     assert [(r["vessel"], r["status"]) for r in reports] == [("ferry", "failed"), ("tramp", "unchanged")]
     assert "ZeroDivisionError" in reports[0]["failures"][0]["error"]["message"]
 

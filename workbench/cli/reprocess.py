@@ -47,7 +47,7 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
     elif os.environ.get("PREFECT_API_URL"):
         from flows.fleet import reports_of
 
-        reports = reports_of(uri, names or None, changed_only)
+        reports = reports_of(uri, names or None, changed_only=changed_only)
     else:
         from flows.fleet_plan import do_fleet
 
