@@ -12,7 +12,7 @@ from warehouse.runs import Run
 from warehouse.store import Warehouse
 
 #: Codes of errors that come of the storage and may be gone at the next attempt.
-PASSING = ("warehouse_unreachable", "warehouse_busy", "warehouse_not_writable", "batch_lost")
+PASSING = ("warehouse_unreachable", "warehouse_busy", "warehouse_not_writable", "table_unreadable", "batch_lost")
 FLOW = "reprocess"
 
 

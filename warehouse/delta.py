@@ -67,12 +67,14 @@ def open_table(warehouse: Warehouse, name: str, version: int | None = None) -> D
     try:
         return _Table(address, version=version, storage_options=warehouse.options)
     except TableNotFoundError:
-        newest = _newest(warehouse, name)
+        # no version asked for: where another writer makes it at this moment, the caller comes again
+        newest = None if version is None else _newest(warehouse, name)
         if newest is None:
             return None
         raise _no_version(name, version, newest) from None
     except (DeltaError, OSError, ValueError) as error:
-        newest = _newest(warehouse, name)
+        warehouse.reach()
+        newest = None if version is None else _newest(warehouse, name)
         if version is not None and newest is not None and not 0 <= version <= newest:
             raise _no_version(name, version, newest) from error
         raise KempfError(
@@ -122,6 +124,7 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
         )
     except DeltaError:  # another writer made it at the same moment
         if open_table(warehouse, name) is None:
+            warehouse.reach()
             raise
     made = open_table(warehouse, name)
     assert made is not None
@@ -159,7 +162,12 @@ def read(
         ``table_unreadable``.
     """
     warehouse.require()
-    return rows(open_table(warehouse, name, version), name, where, columns)
+    table = open_table(warehouse, name, version)
+    try:
+        return rows(table, name, where, columns)
+    except KempfError:
+        warehouse.reach()
+        raise
 
 
 def rows(table: DeltaTable | None, name: str, where: Where | None = None, columns: Sequence[str] = ()) -> pl.DataFrame:
@@ -210,6 +218,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
     import polars as pl
     import pyarrow as pa
     from deltalake import WriterProperties, write_deltalake
+    from deltalake.exceptions import CommitFailedError, DeltaError
 
     schema = arrow_schema(TABLES[name])
     if isinstance(new, pl.DataFrame):
@@ -224,7 +233,11 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
             predicate=predicate,
             writer_properties=WriterProperties(compression="ZSTD"),
         )
-    except OSError as error:
+    except CommitFailedError:
+        raise
+    except (OSError, DeltaError) as error:
+        if isinstance(error, DeltaError) and "://" not in table.table_uri.removeprefix("file://"):
+            raise  # on a disk it is no matter of the connection
         raise not_writable(table.table_uri, error) from error
 
 

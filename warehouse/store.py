@@ -119,11 +119,14 @@ class Warehouse:
         except (FileNotFoundError, NotADirectoryError):
             return None
         except OSError as error:
-            raise KempfError(
-                "warehouse_unreachable",
-                f"Reading {'/'.join(parts)} of the warehouse {self.uri} failed: {error}.",
-                "Look at the permissions of the folder, or at the address and the credentials of the object store.",
-            ) from error
+            raise self._unreachable("/".join(parts), error) from error
+
+    def _unreachable(self, what: str, why: object) -> KempfError:
+        return KempfError(
+            "warehouse_unreachable",
+            f"Reading {what} of the warehouse {self.uri} failed: {why}.",
+            "Look at the permissions of the folder, or at the address and the credentials of the object store.",
+        )
 
     def write_bytes(self, data: bytes, *parts: str) -> None:
         """Write a file inside, all of it or nothing: a reader never sees a part.
@@ -177,6 +180,25 @@ class Warehouse:
             )
         return True
 
+    def reach(self) -> None:
+        """Do nothing where the bucket answers, or for a folder; asked after an error that does not tell the difference.
+
+        Raises
+        ------
+        KempfError
+            ``warehouse_unreachable``.
+        """
+        if self.folder is not None:
+            return
+        files, root = self._files
+        bucket = root.partition("/")[0]
+        try:
+            there = files.get_file_info(bucket).type.name != "NotFound"
+        except OSError as error:
+            raise self._unreachable(MARKER, error) from error
+        if not there:
+            raise self._unreachable(MARKER, f"there is no bucket {bucket!r}")
+
     def require(self) -> None:
         """Do nothing where a warehouse is there.
 
@@ -221,10 +243,11 @@ class Warehouse:
         self.write_bytes(json.dumps({"layout": LAYOUT}).encode() + b"\n", MARKER)
 
 
-def not_writable(where: str, error: OSError) -> KempfError:
+def not_writable(where: str, error: Exception) -> KempfError:
     """Return the error of a write that failed."""
     return KempfError(
         "warehouse_not_writable",
         f"Writing to {where} failed: {error}.",
-        "Look at the free space and the permissions of the folder, then run the command again.",
+        "Look at the free space and the permissions of the folder, or at the bucket and its credentials; then run the "
+        "command again.",
     )

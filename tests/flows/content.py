@@ -6,6 +6,8 @@ import json
 from pathlib import Path
 from typing import Any
 
+from pyarrow import fs
+
 from schemas.tables import TABLES
 from warehouse import delta
 from warehouse.store import Warehouse
@@ -23,9 +25,9 @@ def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
     for row in content["parameter_sets"]:
         told = json.loads(row["provenance_json"])
         row["provenance_json"] = json.dumps({k: v for k, v in told.items() if k != "table_versions"}, sort_keys=True)
-    assert warehouse.folder is not None
-    kept = [p for p in warehouse.folder.glob("raw/*/*") if not p.name.startswith(".")]
-    content["raw"] = [{"name": p.name, "size": p.stat().st_size} for p in kept]
+    files, root = warehouse._files
+    kept = [f for f in files.get_file_info(fs.FileSelector(f"{root}/raw", recursive=True)) if f.is_file]
+    content["raw"] = [{"name": f.base_name, "size": f.size} for f in kept if not f.base_name.startswith(".")]
     return {name: sorted(rows, key=lambda row: json.dumps(row, sort_keys=True)) for name, rows in content.items()}
 
 

@@ -1,0 +1,70 @@
+"""Real processes for the tests: each in a group of its own, its port waited for, killed with all its children."""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+ROOT = Path(__file__).parents[2]
+
+
+def free_port() -> int:
+    with socket.socket() as one:
+        one.bind(("127.0.0.1", 0))
+        return int(one.getsockname()[1])
+
+
+def environment(**more: str) -> dict[str, str]:
+    """The environment of a process: the one of the tests without anybody's settings, and what is told."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("KEMPF_", "PREFECT_", "AWS_", "DASK_"))}
+    path = os.pathsep.join((str(Path(sys.executable).parent), kept.get("PATH", "")))
+    beside = os.pathsep.join((str(ROOT), *filter(None, (kept.get("PYTHONPATH"),))))
+    return {**kept, "PATH": path, "PYTHONPATH": beside, "NO_COLOR": "1", **more}
+
+
+@contextmanager
+def running(
+    command: list[str], env: Mapping[str, str], log: Path, *, port: int | None = None, within_s: float = 120.0
+) -> Iterator[subprocess.Popen[bytes]]:
+    """Start a process, wait until it listens, and end it with its whole group."""
+    with log.open("wb") as out:
+        process = subprocess.Popen(
+            command, env=dict(env), cwd=ROOT, stdout=out, stderr=subprocess.STDOUT, start_new_session=True
+        )
+        try:
+            if port is not None:
+                wait_for(lambda: listens(port) or ended(process, log), within_s)
+            yield process
+        finally:
+            kill(process)
+
+
+def listens(port: int) -> bool:
+    with socket.socket() as one:
+        return one.connect_ex(("127.0.0.1", port)) == 0
+
+
+def ended(process: subprocess.Popen[bytes], log: Path) -> bool:
+    if process.poll() is not None:
+        raise RuntimeError(f"{process.args} ended: {log.read_text(errors='replace')[-2000:]}")
+    return False
+
+
+def kill(process: subprocess.Popen[bytes]) -> None:
+    with suppress(ProcessLookupError):
+        os.killpg(process.pid, signal.SIGKILL)
+    process.wait(timeout=30)
+
+
+def wait_for(reached, within_s: float = 60.0, every_s: float = 0.1) -> None:
+    until = time.monotonic() + within_s
+    while not reached():
+        assert time.monotonic() < until, f"not reached within {within_s} s"
+        time.sleep(every_s)

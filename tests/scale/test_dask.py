@@ -1,0 +1,121 @@
+"""The fleet on two Dask workers with its warehouse in a bucket: real scheduler, real workers, real S3 server."""
+
+from __future__ import annotations
+
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+from shutil import copytree
+from threading import Thread
+from typing import Any
+
+import pytest
+
+from flows.fleet_plan import do_fleet
+from tests.flows.content import seen
+from tests.scale.conftest import FLEET, Bucket, Server, touch
+from tests.scale.servers import environment, free_port, running, wait_for
+from warehouse import runs
+from warehouse.store import Warehouse
+
+pytest.importorskip("prefect_dask", reason="kempf[dask] is not installed")
+
+
+@dataclass(frozen=True)
+class Cluster:
+    address: str
+    workers: list[subprocess.Popen[bytes]]
+    logs: list[Path]
+
+
+@pytest.fixture(scope="module")
+def cluster(bucket: Bucket, server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
+    folder, port = tmp_path_factory.mktemp("dask"), free_port()
+    address, env = f"tcp://127.0.0.1:{port}", environment(**bucket.settings, **server.settings)
+    scheduler = ["dask", "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
+    worker = ["dask", "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+    with ExitStack() as stack:
+        stack.enter_context(running([sys.executable, "-m", *scheduler], env, folder / "scheduler", port=port))
+        logs = [folder / f"worker{k}" for k in range(2)]
+        started = [
+            stack.enter_context(running([sys.executable, "-m", *worker, "--local-directory", f"{log}.d"], env, log))
+            for log in logs
+        ]
+        wait_for(lambda: all("Registered to" in log.read_text() for log in logs))
+        yield Cluster(address, started, logs)
+
+
+@pytest.fixture
+def fleet(bucket: Bucket, stocked: Path, tmp_path: Path) -> Warehouse:
+    """The stocked warehouse, copied into the bucket as it stands."""
+    from pyarrow import fs
+
+    warehouse = Warehouse(f"{bucket.uri}/{tmp_path.name}", bucket.settings)
+    files, root = warehouse._files
+    fs.copy_files(str(stocked), root, source_filesystem=fs.LocalFileSystem(), destination_filesystem=files)
+    return warehouse
+
+
+def run(cluster: Cluster, warehouse: Warehouse, bucket: Bucket, **options: Any) -> list[dict[str, Any]]:
+    """Run the flow in this process on the cluster's workers."""
+    from flows.engine import task_runner
+    from flows.fleet import reprocess
+
+    with pytest.MonkeyPatch.context() as patched:
+        for name, value in bucket.settings.items():
+            patched.setenv(name, value)
+        found = reprocess.with_options(task_runner=task_runner(cluster.address))(warehouse.uri, **options)
+    assert isinstance(found, list)
+    return found
+
+
+def test_two_workers_do_what_one_process_does(
+    cluster: Cluster, fleet: Warehouse, bucket: Bucket, stocked: Path, tmp_path: Path, on_server: None
+) -> None:
+    alone = Warehouse(str(copytree(stocked, tmp_path / "alone")))
+    for warehouse in (fleet, alone):
+        touch(warehouse, *FLEET)
+    reports = run(cluster, fleet, bucket)
+    assert [(r["vessel"], r["status"], r["reread"], r["new_sets"]) for r in reports] == [
+        (name, "changed", 1, 1) for name in FLEET
+    ]
+    did = [log.read_text() for log in cluster.logs]
+    assert all(any(f"{name}: changed" in text for name in FLEET) for text in did), "each of the two had a share"
+    do_fleet(alone)
+    there, here = seen(fleet), seen(alone)
+    for told in (there, here):  # which run made a set differs, what it says does not
+        for row in told["parameter_sets"]:
+            row["provenance_json"] = without_run(row["provenance_json"])
+    assert there == here
+    assert [r["status"] for r in run(cluster, fleet, bucket)] == ["unchanged"] * len(FLEET)
+
+
+def without_run(text: str) -> str:
+    return json.dumps({k: v for k, v in json.loads(text).items() if k != "flow_run"}, sort_keys=True)
+
+
+def test_a_worker_that_dies_takes_nothing_with_it(
+    cluster: Cluster, fleet: Warehouse, bucket: Bucket, on_server: None
+) -> None:
+    touch(fleet, *FLEET)
+    victim, log = cluster.workers[1], cluster.logs[1]
+    before = len(log.read_text())
+
+    def kill_at_work() -> None:
+        wait_for(lambda: len(log.read_text()) > before, every_s=0.02)
+        victim.kill()
+
+    killer = Thread(target=kill_at_work)
+    killer.start()
+    reports = run(cluster, fleet, bucket)
+    killer.join()
+    victim.wait(timeout=30)
+    assert victim.returncode == -signal.SIGKILL
+    assert [(r["vessel"], bool(r["failures"])) for r in reports] == [(name, False) for name in FLEET]
+    assert len(seen(fleet)["parameter_sets"]) == 2 * len(FLEET)
+    assert {one.status for one in runs.all_runs(fleet, "reprocess")} <= {"changed", "unchanged"}

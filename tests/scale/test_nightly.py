@@ -1,0 +1,126 @@
+"""docs/fleet.md followed word for word: server, pool, deployment, worker, a run that fails, one cancelled and resumed."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from collections.abc import Iterator
+from datetime import timedelta
+from pathlib import Path
+from shutil import copytree
+from typing import Any
+
+import pytest
+
+from flows.fleet_plan import do_fleet
+from tests.flows.content import seen
+from tests.scale.conftest import FLEET, Server, touch
+from tests.scale.servers import ROOT, environment, running, wait_for
+from warehouse import logs, runs
+from warehouse.store import Warehouse
+
+TEXT = (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")
+
+
+def documented(beginning: str) -> list[str]:
+    """Return the one command of the page that begins so."""
+    found = re.findall(rf"^{re.escape(beginning)}.*$", TEXT, re.MULTILINE)
+    assert len(set(found)) == 1, (beginning, found)
+    return [part.strip("\"'") for part in found[0].split()]
+
+
+@pytest.fixture(scope="module")
+def place(stocked: Path, tmp_path_factory: pytest.TempPathFactory) -> Warehouse:
+    return Warehouse(str(copytree(stocked, tmp_path_factory.mktemp("nightly") / "w")))
+
+
+@pytest.fixture(scope="module")
+def deployed(place: Warehouse, server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[dict[str, str]]:
+    """The pool and the deployments are made and a worker runs, each by the page's own command."""
+    assert documented("prefect server start") == ["prefect", "server", "start", "--host", "127.0.0.1"]
+    exported = re.findall(r"^export (\w+)=", TEXT, re.MULTILINE)
+    assert {"PREFECT_API_URL", "KEMPF_WAREHOUSE", "DO_NOT_TRACK"} <= set(exported)
+    env = environment(**server.settings, KEMPF_WAREHOUSE=place.uri)
+    for beginning in ("prefect work-pool create", "prefect --no-prompt deploy --"):
+        done = tell(documented(beginning), env)
+        assert done.returncode == 0, done
+    log = tmp_path_factory.mktemp("worker") / "log"
+    with running(documented("prefect worker start"), env, log):
+        yield env
+
+
+def tell(command: list[str], env: dict[str, str]) -> subprocess.CompletedProcess[str]:
+    return subprocess.run(command, env=env, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+
+
+def flow_runs(*states: str) -> list[Any]:
+    from prefect.client.orchestration import get_client
+    from prefect.client.schemas.sorting import FlowRunSort
+
+    with get_client(sync_client=True) as client:
+        found = client.read_flow_runs(sort=FlowRunSort.START_TIME_DESC)
+        return [one for one in found if not states or (one.state and one.state.type.value in states)]
+
+
+def test_a_run_as_documented_reports_the_failed_and_does_the_rest(
+    deployed: dict[str, str], place: Warehouse, on_server: None
+) -> None:
+    planned = flow_runs("SCHEDULED")
+    assert {one.expected_start_time.strftime("%H:%M") for one in planned if one.auto_scheduled} >= {"02:00"}
+    sound, damaged = FLEET[:2], FLEET[2]
+    touch(place, *FLEET)
+    assert place.folder is not None
+    (row,) = logs.current(place, damaged)
+    kept = place.folder / "raw" / row.log_id[:2] / row.log_id
+    whole = kept.read_bytes()
+    kept.write_bytes(whole[:-10])
+    done = tell(documented("prefect --no-prompt deployment run reprocess/nightly --watch"), deployed)
+    assert done.returncode == 1, done
+    assert f"look at {damaged}" in done.stdout + done.stderr
+    stood = {run.vessel: run.status for run in runs.all_runs(place, "reprocess")}
+    assert stood == {**dict.fromkeys(sound, "changed"), damaged: "failed"}
+    told = tell(documented("prefect artifact inspect kempf-fleet"), deployed)
+    assert "3 vessels: 2 changed, 1 failed" in told.stdout and "Ingest the original file again" in told.stdout
+    kept.write_bytes(whole)
+
+
+def test_a_cancelled_run_goes_on_where_it_stopped(deployed: dict[str, str], place: Warehouse, on_server: None) -> None:
+    touch(place, *FLEET)
+    alone = Warehouse(str(copytree(str(place.folder), f"{place.uri}-alone")))
+    started = tell(["prefect", "--no-prompt", "deployment", "run", "reprocess/nightly"], deployed)
+    assert started.returncode == 0, started
+    wait_for(lambda: flow_runs("RUNNING"), 120.0)
+    (one,) = flow_runs("RUNNING")
+    command = documented("prefect flow-run cancel")
+    assert tell([*command[:-1], str(one.id)], deployed).returncode == 0
+    wait_for(lambda: not flow_runs("RUNNING", "CANCELLING"), 120.0, every_s=0.5)
+    assert flow_runs()[0].state.type.value in ("CANCELLED", "COMPLETED")  # it may have been faster
+    for warehouse in (place, alone):
+        assert not any(report["failures"] for report in do_fleet(warehouse))
+    assert ids(place) == ids(alone)
+    assert {report["status"] for report in do_fleet(place)} == {"unchanged"}
+
+
+def ids(warehouse: Warehouse) -> dict[str, list[Any]]:
+    """What results are called, which is what they say: an id is the hash of all that made them."""
+    content = seen(warehouse)
+    keys = {"logs": "ingest_id", "segments": "segment_id", "parameter_sets": "parameter_set_id", "raw": "name"}
+    return {name: sorted(row[key] for row in content[name]) for name, key in keys.items()}
+
+
+@pytest.mark.usefixtures("on_server")
+def test_the_schedule_starts_runs_by_itself(deployed: dict[str, str], place: Warehouse) -> None:
+    from prefect.client.orchestration import get_client
+    from prefect.client.schemas.schedules import IntervalSchedule
+
+    before = {one.id for one in flow_runs()}
+    with get_client(sync_client=True) as client:
+        deployment = client.read_deployment_by_name("reprocess/nightly")
+        soon = IntervalSchedule(interval=timedelta(seconds=5))
+        (made,) = client.create_deployment_schedules(deployment.id, [(soon, True)])
+
+        def fired() -> list[Any]:
+            return [r for r in flow_runs("COMPLETED") if r.id not in before and r.auto_scheduled]
+
+        wait_for(fired, 120.0, every_s=0.5)
+        client.delete_deployment_schedule(deployment.id, made.id)

@@ -1,0 +1,115 @@
+"""A warehouse in a bucket, on a real S3 server: the same content as in a folder, by the same commands."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from flows.identify_vessel import Request, identify_vessel
+from flows.ingest_logs import ingest
+from flows.reprocess_vessel import reprocess_vessel
+from flows.rerun_set import rerun
+from schemas.errors import KempfError, NotFound
+from schemas.profile import VesselProfile
+from tests.conftest import Ship
+from tests.flows.content import seen
+from tests.scale.conftest import Bucket
+from tests.workbench.driving import kempf
+from warehouse import aliases, delta, logs, parameter_sets, raw, runs, segments, vessels
+from warehouse.store import Warehouse
+
+QUICK = Request(estimator="least-squares")
+
+
+def taken_in(warehouse: Warehouse, ferry: Ship, folder: Path) -> Warehouse:
+    profile = VesselProfile.model_validate(ferry.profile)
+    (folder / "ferry.csv.gz").write_bytes(ferry.csv)
+    (outcome,) = ingest(warehouse, [folder / "ferry.csv.gz"], given=profile)
+    assert (outcome.outcome, outcome.error) == ("new", None)
+    assert all(o.parameter_set for o in identify_vessel(warehouse, "ferry", QUICK))
+    return warehouse
+
+
+@pytest.fixture(scope="module")
+def stored(bucket: Bucket, ferry: Ship, tmp_path_factory: pytest.TempPathFactory) -> Warehouse:
+    folder = tmp_path_factory.mktemp("logs")
+    return taken_in(Warehouse(f"{bucket.uri}/stored", bucket.settings), ferry, folder)
+
+
+def test_a_bucket_says_what_a_folder_says(stored: Warehouse, ferry: Ship, tmp_path: Path) -> None:
+    local = taken_in(Warehouse(str(tmp_path / "w")), ferry, tmp_path)
+    there, here = seen(stored), seen(local)
+    assert {name: len(rows) for name, rows in there.items()} == {name: len(rows) for name, rows in here.items()}
+    assert there == here and len(there["readings"]) > 1000
+    (row,) = logs.current(stored)
+    assert raw.get(stored, row.log_id) == ferry.csv
+    fields = {f.name: f.metadata.get("unit") for f in delta.ensure_table(stored, "readings").schema().fields}
+    assert fields["heading_rad"] == "rad"
+
+
+def test_a_set_is_built_again_from_the_bytes_in_the_bucket(stored: Warehouse) -> None:
+    (name,) = parameter_sets.summaries(stored, "ferry")["parameter_set_id"].to_list()
+    assert rerun(stored, name).verdict == "bit-identical"
+
+
+def test_the_command_line_reaches_it_by_the_environment(
+    stored: Warehouse, bucket: Bucket, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    for name, value in bucket.settings.items():
+        monkeypatch.setenv(name, value)
+    told = kempf("segments", "--warehouse", stored.uri, "--json")
+    assert told.code == 0, told
+    assert [one["segment_id"] for one in told.json] == [one.segment_id for one in segments.current(stored)]
+    assert kempf("params", "list", "--warehouse", stored.uri).code == 0
+    assert kempf("vessels", "list", "--warehouse", f"{bucket.uri}/nothing-here", "--json").code == 4
+
+
+def test_several_writers_lose_nothing(bucket: Bucket) -> None:
+    warehouse = Warehouse(f"{bucket.uri}/many", bucket.settings)
+
+    def write(k: int) -> None:
+        mine = Warehouse(warehouse.uri, bucket.settings)
+        vessels.register(mine, f"ship{k}", VesselProfile(vessel=f"ship{k}", length_m=50.0 + k))
+        runs.record(mine, runs.Run(runs.run_id("test", k), "test", f"ship{k}", "done"))
+        runs.record(mine, runs.Run(runs.run_id("test", "all"), "test", None, f"last was {k}"))
+
+    with ThreadPoolExecutor(3) as pool:
+        list(pool.map(write, range(6)))
+    assert vessels.names(warehouse) == sorted(f"ship{k}" for k in range(6))
+    assert len(runs.all_runs(warehouse, "test")) == 7
+
+
+def test_reprocessing_moves_the_alias_and_history_stays(stored: Warehouse) -> None:
+    before = {row.ingest_id for row in logs.current(stored)}
+    changed = vessels.current(stored, "ferry").model_copy(update={"wind_arm_per_m": 0.004})
+    vessels.register(stored, "ferry", changed)
+    report = reprocess_vessel(stored, "ferry", QUICK)
+    assert (report.status, report.reread, report.new_sets, report.failures) == ("changed", 1, 1, [])
+    assert {row.ingest_id for row in logs.current(stored)}.isdisjoint(before)
+    assert len(parameter_sets.summaries(stored, "ferry")) == 2
+    name = parameter_sets.summaries(stored, "ferry")["parameter_set_id"].to_list()[0]
+    assert aliases.point(stored, "ferry", name) and aliases.of_vessel(stored, "ferry") == {"current": name}
+
+
+def test_a_damaged_object_is_told_and_mended(stored: Warehouse, ferry: Ship) -> None:
+    (row,) = logs.current(stored)
+    stored.write_bytes(ferry.csv[:-1], "raw", row.log_id[:2], row.log_id)
+    with pytest.raises(KempfError, match="is damaged"):
+        raw.get(stored, row.log_id)
+    raw.put(stored, ferry.csv)
+    assert raw.get(stored, row.log_id) == ferry.csv
+
+
+def test_what_cannot_be_reached_is_one_clear_error_that_may_pass(bucket: Bucket) -> None:
+    off = {**bucket.settings, "AWS_ENDPOINT_URL": "http://127.0.0.1:1"}
+    for address, options in (("s3://fleet/stored", off), ("s3://no-such-bucket/x", bucket.settings)):
+        warehouse = Warehouse(address, options)
+        with pytest.raises(KempfError) as caught:
+            vessels.register(warehouse, "ferry", VesselProfile(vessel="ferry"))
+        assert caught.value.code in ("warehouse_unreachable", "warehouse_not_writable"), caught.value
+        assert "testing" not in json.dumps(caught.value.to_json())
+    with pytest.raises(NotFound, match="no warehouse"):
+        vessels.names(Warehouse(f"{bucket.uri}/empty", bucket.settings))
