@@ -1,4 +1,4 @@
-"""docs/fleet.md followed word for word: server, pool, deployment, worker, a run that fails, one cancelled and resumed."""
+"""docs/fleet.md followed word for word: server, pool, worker, a run with a failure, one cancelled, the schedule."""
 
 from __future__ import annotations
 

@@ -1,0 +1,173 @@
+"""A fleet of simulated vessels reprocessed: the cost, Prefect's share, nothing changed, one log changed, Dask.
+
+A real Prefect server on this machine; Dask with a real scheduler and workers that have one core each. Times are of one
+run on one machine: look at their ratios. ``--draw`` makes the pages anew from the figures of the last run.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from benchmarks import fleet_logs, fleet_page, fleet_run
+from flows.cores import usable
+from tests.scale.servers import environment, free_port, running, wait_for
+from warehouse.store import Warehouse
+
+#: The fleet grows in these steps: what a vessel costs is measured at each.
+STEPS = (0.125, 0.25, 0.5, 1.0)
+#: Vessels of the comparisons that have to do everything twice.
+SUBSET = 24
+
+_PINNED = (
+    "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); "
+    "sys.argv = ['dask', *sys.argv[2:]]; from dask.cli import run_cli; run_cli()"
+)
+
+
+@contextmanager
+def prefect_server(folder: Path) -> Iterator[dict[str, str]]:
+    """Start a server as docs/fleet.md says, and let this process report to it."""
+    port = free_port()
+    settings = {
+        "PREFECT_HOME": str(folder / "prefect"),
+        "PREFECT_API_URL": f"http://127.0.0.1:{port}/api",
+        "PREFECT_SERVER_API_PORT": str(port),
+        "DO_NOT_TRACK": "1",
+        "PREFECT_SERVER_ANALYTICS_ENABLED": "false",
+    }
+    command = [sys.executable, "-m", "prefect", "server", "start", "--host", "127.0.0.1"]
+    os.environ.update(settings)
+    with running(command, environment(**settings), folder / "server.log", port=port, within_s=300.0):
+        yield settings
+
+
+@contextmanager
+def dask_cluster(folder: Path, n_workers: int, settings: dict[str, str]) -> Iterator[str]:
+    """Start a scheduler and workers, the k-th on the k-th core alone, as if each were a machine."""
+    port = free_port()
+    address, env = f"tcp://127.0.0.1:{port}", environment(**settings, PREFECT_LOGGING_LEVEL="WARNING")
+    scheduler = [
+        sys.executable,
+        "-m",
+        "dask",
+        "scheduler",
+        "--host",
+        "127.0.0.1",
+        "--port",
+        str(port),
+        "--no-dashboard",
+    ]
+    cores = sorted(os.sched_getaffinity(0))
+    with ExitStack() as stack:
+        stack.enter_context(running(scheduler, env, folder / f"scheduler{port}", port=port))
+        logs = [folder / f"worker{port}-{k}" for k in range(n_workers)]
+        for k, log in enumerate(logs):
+            worker = ["worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory"]
+            command = [sys.executable, "-c", _PINNED, str(cores[k % len(cores)]), *worker, f"{log}.d"]
+            stack.enter_context(running(command, env, log))
+        wait_for(lambda: all("Registered to" in log.read_text() for log in logs), 300.0)
+        yield address
+
+
+def grow(warehouse: Warehouse, voyages: fleet_logs.Voyages, n_vessels: int) -> list[dict[str, Any]]:
+    """Let the fleet grow step by step; at each reprocess the new vessels, and then nothing."""
+    found, there = [], 0
+    for step in STEPS:
+        wanted = max(round(step * n_vessels), there + 1)
+        begun = time.perf_counter()
+        fleet_logs.take_in(warehouse, voyages, range(there, wanted))
+        took = time.perf_counter() - begun
+        first, again = fleet_run.with_prefect(warehouse), fleet_run.with_prefect(warehouse)
+        assert (first.changed, again.changed) == (wanted - there, 0), (first, again)
+        found.append(
+            {
+                "vessels": wanted,
+                "new": wanted - there,
+                "take_in_s": took,
+                "first": asdict(first),
+                "again": asdict(again),
+            }
+        )
+        print(
+            f"{wanted} vessels: {first.wall_s:.1f} s for {wanted - there}, {again.wall_s:.1f} s for nothing", flush=True
+        )
+        there = wanted
+    return found
+
+
+def measure(folder: Path, n_vessels: int, n_logs: int) -> dict[str, Any]:
+    """Measure everything on a fleet of some size."""
+    voyages = fleet_logs.simulate(n_logs)
+    warehouse = Warehouse(str(folder / "w"))
+    names = [fleet_logs.name_of(k) for k in range(n_vessels)]
+    subset = names[: min(SUBSET, n_vessels)]
+    with prefect_server(folder) as settings:
+        warm = Warehouse(str(folder / "warm"))
+        fleet_logs.take_in(warm, voyages, range(1))
+        fleet_run.with_prefect(warm)  # what is compiled once is no part of the figures
+        steps = grow(warehouse, voyages, n_vessels)
+        fleet_logs.touch(warehouse, names)
+        whole = fleet_run.with_prefect(warehouse)
+        print(f"whole fleet: {whole.wall_s:.1f} s", flush=True)
+        again = fleet_run.with_prefect(warehouse)
+        fleet_logs.one_more(warehouse, voyages, n_vessels // 2)
+        one = fleet_run.with_prefect(warehouse)
+        pairs = []
+        for _ in range(2):
+            fleet_logs.touch(warehouse, subset)
+            engine = fleet_run.with_prefect(warehouse, subset)
+            fleet_logs.touch(warehouse, subset)
+            pairs.append((engine.wall_s, fleet_run.without_prefect(warehouse, subset).wall_s))
+        dask = {}
+        for n_workers in (1, 2):
+            with dask_cluster(folder, n_workers, settings) as address:
+                fleet_logs.touch(warehouse, names[:n_workers])  # each worker loads its compiled code
+                fleet_run.with_prefect(warehouse, names[:n_workers], address)
+                fleet_logs.touch(warehouse, subset)
+                dask[n_workers] = fleet_run.with_prefect(warehouse, subset, address).wall_s
+            print(f"{n_workers} Dask workers: {dask[n_workers]:.1f} s", flush=True)
+        rates = {str(n): fleet_run.commits_a_second(warehouse, n) for n in (1, 2, 4)}
+    return {
+        "vessels": n_vessels,
+        "logs": n_logs,
+        "cores": usable(),
+        "steps": steps,
+        "whole": {**asdict(whole), "engine_share": whole.engine_share},
+        "again": asdict(again),
+        "one": asdict(one),
+        "subset": len(subset),
+        "prefect_pairs_s": pairs,
+        "dask_s": {str(n): wall for n, wall in dask.items()},
+        "commits_a_second": rates,
+        "bytes": fleet_run.size_bytes(warehouse),
+        "log_bytes": len(voyages.rows[fleet_logs.HULLS[0]][0]),
+    }
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--vessels", type=int, default=200)
+    parser.add_argument("--logs", type=int, default=5)
+    parser.add_argument("--draw", action="store_true", help="only the pages, from the figures of the last run")
+    options = parser.parse_args()
+    fleet_run.quiet()
+    if not options.draw:
+        with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+            figures = measure(Path(folder), options.vessels, options.logs)
+        fleet_page.FIGURES.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
+    path = fleet_page.write(json.loads(fleet_page.FIGURES.read_text(encoding="utf-8")))
+    print(path.read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    main()
