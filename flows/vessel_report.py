@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from schemas.errors import DataRejected, KempfError
@@ -102,8 +102,17 @@ def remember(warehouse: Warehouse, report: VesselReport, run: Run) -> None:
         before = {_what(f) for earlier in runs.some(warehouse, [run.run_id]) for f in earlier.message["failures"]}
         for failure in report.failures:
             failure["known"] = _what(failure) in before
-    told = {**run.message, "failures": report.failures}
-    runs.record(warehouse, Run(run.run_id, run.flow, run.vessel, run.status, run.counts, told))
+    told = replace(run, message={**run.message, "failures": report.failures})
+    runs.record_all(warehouse, [told, *_forgotten(warehouse, run)])
+
+
+def _forgotten(warehouse: Warehouse, run: Run) -> list[Run]:
+    """Return the runs of the same vessel whose state no longer tells that nothing is left to do."""
+    if "state" in run.message:
+        return []
+    names = [run_id_of(str(run.vessel), changed_only=changed_only) for changed_only in (True, False)]
+    stale = [one for one in runs.some(warehouse, names) if "state" in one.message and one.run_id != run.run_id]
+    return [replace(one, message={k: v for k, v in one.message.items() if k != "state"}) for one in stale]
 
 
 def from_run(run: Run) -> VesselReport:
