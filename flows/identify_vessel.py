@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,6 +24,9 @@ from warehouse import aliases, code_version, delta, logs, parameter_sets, proven
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
+
+#: New sets that wait for one commit: less than a minute of work, which is what a crash may cost.
+_SETS_A_COMMIT = 8
 
 
 @dataclass(frozen=True)
@@ -101,7 +105,7 @@ def identify_vessel(
     outcomes: list[IdentifyOutcome] = []
     readable = [segment for segment in found if segment.ingest_id not in refreshed.failed]
     ingests = list(dict.fromkeys(segment.ingest_id for segment in found))
-    with ThreadPoolExecutor(max_workers=usable()) as pool:
+    with ThreadPoolExecutor(max_workers=usable()) as pool, _stored_together(warehouse) as keep:
         for done, ingest in enumerate(ingests):
             hers = [segment for segment in found if segment.ingest_id == ingest]
             progress(done, len(ingests), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
@@ -111,10 +115,31 @@ def identify_vessel(
                 beside = {s.segment_id: companions_of(s, readable, by_ingest) for s in hers if without_log(s)}
                 job = _Job(warehouse, request, pool, flow_run, table_versions, by_ingest)
                 outcomes += _identify_log(job, by_ingest[ingest], hers, beside)
+                keep([o.parameter_set for o in outcomes[-len(hers) :] if o.new and o.parameter_set])
     progress(len(ingests), len(ingests), "done")
     outcomes.sort(key=lambda o: (o.segment.start_utc_ns, o.segment.segment_id))
     _point_to_current(warehouse, vessel, outcomes, request.spec, adopt=adopt)
     return outcomes
+
+
+@contextmanager
+def _stored_together(warehouse: Warehouse) -> Iterator[Callable[[Sequence[ParameterSet]], None]]:
+    """Give a function that stores new sets, some in one commit; what waits is stored also when the block is left."""
+    waiting: list[ParameterSet] = []
+
+    def store() -> None:
+        made, waiting[:] = list(waiting), []  # what could not be stored is not tried again on the way out
+        parameter_sets.insert(warehouse, made)
+
+    def keep(made: Sequence[ParameterSet]) -> None:
+        waiting.extend(made)
+        if len(waiting) >= _SETS_A_COMMIT:
+            store()
+
+    try:
+        yield keep
+    finally:
+        store()
 
 
 @dataclass(frozen=True)
@@ -132,7 +157,7 @@ class _Job:
 def _identify_log(
     job: _Job, row: logs.LogRow, found: Sequence[Segment], beside: Mapping[str, tuple[Segment, ...]]
 ) -> list[IdentifyOutcome]:
-    """Identify the segments of one log, one a thread, and store the new sets in one commit.
+    """Identify the segments of one log, one a thread; the new sets are stored by the caller.
 
     ``beside`` are the companions by segment, of those without a log.
     """
@@ -157,9 +182,7 @@ def _identify_log(
             return IdentifyOutcome(segment, None, error=as_told(error))
         return IdentifyOutcome(segment, made, new=True)
 
-    outcomes = list(pool.map(one, found, wanted, companions))
-    parameter_sets.insert(warehouse, [o.parameter_set for o in outcomes if o.new and o.parameter_set])
-    return outcomes
+    return list(pool.map(one, found, wanted, companions))
 
 
 def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:

@@ -16,7 +16,7 @@ from pipeline.ingest.readings import Tally
 from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
 from warehouse import code_version, logs, raw, segments, vessels
-from warehouse.deposit import Delivery, deposit, held
+from warehouse.deposit import Delivery, Deposit, deposit, held
 from warehouse.keys import ingest_id, vessel_key
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
@@ -165,13 +165,48 @@ def ingest_bytes(
         row = logs.of_ingest(warehouse, there.ingest_id)
         found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
         return IngestOutcome(path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found)
+    read = read_one(vessel, file_name, data, profile)
+    (stored,) = store(warehouse, [read])
+    row = logs.of_ingest(warehouse, stored.ingest_id)
+    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, read.segments)
+
+
+@dataclass(frozen=True, eq=False)
+class ReadLog:
+    """A log that was read and looked through; nothing of it is stored yet."""
+
+    delivery: Delivery
+    ingest_id: str
+    segments: tuple[Segment, ...]
+
+
+def read_one(vessel: str, file_name: str, data: bytes, profile: VesselProfile) -> ReadLog:
+    """Read a log and find its zigzags.
+
+    Raises
+    ------
+    KempfError
+        It cannot be read.
+    """
+    code = code_version.fingerprint()
     readings = read_log(file_name, data, profile)
     log = raw.log_id(data)
     one = Ingest(vessel, log, ingest_id(log, profile.sha256, code))
     zigzags, notes = find_segments(one, profile, readings.frame)
-    # the zigzags before the row that makes the log count: what a crash leaves in between is not seen, and is not missed
-    segments.replace(warehouse, vessel, {one.ingest_id: zigzags})
     noted = replace(readings, notes=(*readings.notes, *notes))
-    stored = deposit(warehouse, [Delivery(vessel, file_name, data, profile, noted, code)])[0]
-    row = logs.of_ingest(warehouse, stored.ingest_id)
-    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, tuple(zigzags))
+    return ReadLog(Delivery(vessel, file_name, data, profile, noted, code), one.ingest_id, tuple(zigzags))
+
+
+def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
+    """Store logs of one vessel that were read, all of them in one commit a table.
+
+    Raises
+    ------
+    KempfError
+        One is another vessel's, or the warehouse cannot be written; then none of them counts.
+    """
+    # the zigzags before the rows that make the logs count: what a crash leaves in between is not seen, and not missed
+    for vessel in sorted({one.delivery.vessel for one in read}):
+        hers = {one.ingest_id: one.segments for one in read if one.delivery.vessel == vessel}
+        segments.replace(warehouse, vessel, hers)
+    return deposit(warehouse, [one.delivery for one in read])

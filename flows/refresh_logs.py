@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from flows.ingest_logs import ingest_bytes
+from flows.ingest_logs import ReadLog, read_one, store
 from flows.progress import Progress, silent
 from flows.unforeseen import as_told
 from schemas.errors import KempfError
 from warehouse import code_version, logs, raw, vessels
+from warehouse.logs import LogRow
 from warehouse.store import Warehouse
+
+#: Logs that are stored together, at most; and their bytes as delivered, which compression may hide twentyfold.
+_MOST_LOGS, _MOST_BYTES = 20, 8 << 20
 
 
 @dataclass(frozen=True)
@@ -43,11 +48,41 @@ def refresh_logs(warehouse: Warehouse, vessel: str, progress: Progress = silent)
     hers, code = logs.current(warehouse, vessel), code_version.fingerprint()
     stale = [row for row in hers if (row.profile_sha256, row.code_version) != (profile.sha256, code)]
     failed: dict[str, KempfError] = {}
-    for done, row in enumerate(stale):
-        progress(done, len(stale), f"reading {row.file_name}")
-        try:
-            data = raw.get(warehouse, row.log_id)
-            ingest_bytes(warehouse, vessel, row.file_name, data, profile, row.file_name)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
-            failed[row.ingest_id] = as_told(error)
+    done = 0
+    for chunk in _chunks(stale):
+        read: dict[str, ReadLog] = {}
+        for row in chunk:
+            progress(done, len(stale), f"reading {row.file_name}")
+            done += 1
+            try:
+                read[row.ingest_id] = read_one(vessel, row.file_name, raw.get(warehouse, row.log_id), profile)
+            except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
+                failed[row.ingest_id] = as_told(error)
+        failed |= _stored(warehouse, read)
     return Refreshed(len(hers), len(stale) - len(failed), failed)
+
+
+def _chunks(stale: Sequence[LogRow]) -> list[list[LogRow]]:
+    """Return logs in groups that are stored by one commit a table and held in memory together; a long one alone."""
+    chunks: list[list[LogRow]] = []
+    for row in stale:
+        last = chunks[-1] if chunks else []
+        if last and len(last) < _MOST_LOGS and sum(r.size_bytes for r in last) + row.size_bytes <= _MOST_BYTES:
+            last.append(row)
+        else:
+            chunks.append([row])
+    return chunks
+
+
+def _stored(warehouse: Warehouse, read: Mapping[str, ReadLog]) -> dict[str, KempfError]:
+    """Store logs together; where that fails each alone, so that one does not take the others with it."""
+    try:
+        store(warehouse, list(read.values()))
+    except Exception as error:  # noqa: BLE001 - told below, for the logs that it concerns
+        if len(read) == 1:
+            return dict.fromkeys(read, as_told(error))
+        failed = {}
+        for name, one in read.items():
+            failed |= _stored(warehouse, {name: one})
+        return failed
+    return {}

@@ -112,14 +112,13 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
     if default is not None:
         return [default]
     asked: dict[str, Request] = {}
-    names = parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list()
-    for name in names:
-        one = parameter_sets.get(warehouse, name)
-        request = Request(ModelSpec.model_validate(dict(one.model_spec)), one.estimator)
-        if request.estimator in (POOLED, ESTIMATOR):
+    known = parameter_sets.models(warehouse, vessel)
+    for spec, estimator in known:
+        if estimator in (POOLED, ESTIMATOR):
             continue  # the one comes of the separate ones, the other is a model of all runs at once
+        request = Request(ModelSpec.model_validate(spec), estimator)
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
-    return [asked[key] for key in sorted(asked)] if names else [Request()]
+    return [asked[key] for key in sorted(asked)] if known else [Request()]
 
 
 def _pool(

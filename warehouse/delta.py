@@ -7,14 +7,17 @@ under `warehouse.retry.with_retry`. (Merges lose the units in the field metadata
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
+from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
 from schemas.errors import KempfError, NotFound
 from schemas.tables import TABLES, arrow_schema
+from warehouse import handles
 from warehouse.store import Warehouse, not_writable
 
 if TYPE_CHECKING:
@@ -131,6 +134,26 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
     return made
 
 
+@contextmanager
+def writing(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
+    """Lend a table for reading, deciding and writing in one step; make it where it is not there.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    name : str
+        Key of `schemas.tables.TABLES`.
+
+    Yields
+    ------
+    DeltaTable
+        At the newest version, for this thread alone.
+    """
+    with handles.borrowed(warehouse, name, partial(ensure_table, warehouse, name)) as table:
+        assert table is not None
+        yield table
+
+
 def read(
     warehouse: Warehouse, name: str, where: Where | None = None, columns: Sequence[str] = (), version: int | None = None
 ) -> pl.DataFrame:
@@ -162,9 +185,11 @@ def read(
         ``table_unreadable``.
     """
     warehouse.require()
-    table = open_table(warehouse, name, version)
     try:
-        return rows(table, name, where, columns)
+        if version is not None:
+            return rows(open_table(warehouse, name, version), name, where, columns)
+        with handles.borrowed(warehouse, name, partial(open_table, warehouse, name)) as table:
+            return rows(table, name, where, columns)
     except KempfError:
         warehouse.reach()
         raise
@@ -243,8 +268,12 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
 
 def versions(warehouse: Warehouse) -> dict[str, int]:
     """Return the newest version of every table that was written, for the provenance of what is made from them."""
-    opened = {name: open_table(warehouse, name) for name in TABLES}
-    return {name: table.version() for name, table in opened.items() if table is not None}
+    found = {}
+    for name in TABLES:
+        with handles.borrowed(warehouse, name, partial(open_table, warehouse, name)) as table:
+            if table is not None:
+                found[name] = table.version()
+    return found
 
 
 def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | None:

@@ -50,17 +50,17 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
     keys = {vessel_key(one.vessel) for one in given.values()}
 
     def attempt() -> tuple[str, ...]:
-        table = delta.ensure_table(warehouse, "parameter_sets")
-        known = delta.rows(table, "parameter_sets", {"parameter_set_id": sorted(given)})
-        stored = [_set(r) for r in known.rows(named=True)]
-        for one in stored:
-            _refuse_other(one, given[one.parameter_set_id])
-        fresh = [name for name in given if name not in {one.parameter_set_id for one in stored}]
-        if fresh:
-            rows = [_as_columns(given[name]) for name in fresh]
-            predicate = f"{one_of('vessel_key', keys)} AND {one_of('parameter_set_id', fresh)}"
-            delta.replace(table, "parameter_sets", rows, predicate)
-        return tuple(fresh)
+        with delta.writing(warehouse, "parameter_sets") as table:
+            known = delta.rows(table, "parameter_sets", {"parameter_set_id": sorted(given)})
+            stored = [_set(r) for r in known.rows(named=True)]
+            for one in stored:
+                _refuse_other(one, given[one.parameter_set_id])
+            fresh = [name for name in given if name not in {one.parameter_set_id for one in stored}]
+            if fresh:
+                rows = [_as_columns(given[name]) for name in fresh]
+                predicate = f"{one_of('vessel_key', keys)} AND {one_of('parameter_set_id', fresh)}"
+                delta.replace(table, "parameter_sets", rows, predicate)
+            return tuple(fresh)
 
     return with_retry(attempt)
 
@@ -108,6 +108,17 @@ def summaries(warehouse: Warehouse, vessel: str | None = None) -> pl.DataFrame:
     where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
     columns = ("vessel", "parameter_set_id", "start_utc_ns", "model_name", "estimator", "parent")
     return delta.read(warehouse, "parameter_sets", where, columns).sort("vessel", "start_utc_ns", "parameter_set_id")
+
+
+def models(warehouse: Warehouse, vessel: str) -> list[tuple[dict[str, Any], str]]:
+    """Return every model specification and estimator that a vessel has sets of, in the order of their text."""
+    where = {"vessel_key": vessel_key(vessel)}
+    frame = (
+        delta.read(warehouse, "parameter_sets", where, ("model_json", "estimator"))
+        .unique()
+        .sort("model_json", "estimator")
+    )
+    return [(loads(text), estimator) for text, estimator in frame.rows()]
 
 
 def _refuse_other(stored: ParameterSet, given: ParameterSet) -> None:

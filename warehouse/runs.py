@@ -69,13 +69,13 @@ def record_all(warehouse: Warehouse, found: Sequence[Run]) -> tuple[str, ...]:
     rows = {run.run_id: _as_columns(run) for run in found}
 
     def attempt() -> tuple[str, ...]:
-        table = delta.ensure_table(warehouse, "runs")
-        stored = delta.rows(table, "runs", {"run_id": sorted(rows)}).rows(named=True)
-        known = {row["run_id"]: row for row in stored}
-        changed = tuple(name for name, row in rows.items() if known.get(name) != row)
-        if changed:
-            delta.replace(table, "runs", [rows[name] for name in changed], one_of("run_id", changed))
-        return changed
+        with delta.writing(warehouse, "runs") as table:
+            stored = delta.rows(table, "runs", {"run_id": sorted(rows)}).rows(named=True)
+            known = {row["run_id"]: row for row in stored}
+            changed = tuple(name for name, row in rows.items() if known.get(name) != row)
+            if changed:
+                delta.replace(table, "runs", [rows[name] for name in changed], one_of("run_id", changed))
+            return changed
 
     return with_retry(attempt)
 

@@ -164,6 +164,8 @@ class Warehouse:
         KempfError
             ``warehouse_layout``: it is there, but was made by a newer version, or its marker is damaged.
         """
+        if self.folder is None and vars(self).get("_stood"):
+            return True  # a bucket is asked once; a folder may be moved away while we look
         marker = self.read_bytes(MARKER)
         if marker is None:
             return False
@@ -178,6 +180,7 @@ class Warehouse:
                 "Update kempf, or give another folder with --warehouse.",
                 {"found": layout, "expected": LAYOUT},
             )
+        vars(self)["_stood"] = True
         return True
 
     def reach(self) -> None:
