@@ -129,8 +129,8 @@ def scale(figures: Figures) -> list[str]:
     ]
     verdict = (
         f"**First full: {'the commits to one table' if first_full < cores_a_night else 'the cores'}.** A vessel takes "
-        f"{core_s:.1f} core seconds and {commits / n:.1f} commits to the table {busiest}. Commits to one table come one "
-        f"after another, {rate:.0f} a second here: beyond {first_full:.0f} cores more machines do not help. "
+        f"{core_s:.1f} core seconds and {commits / n:.1f} commits to the table {busiest}. Commits to one table come "
+        f"one after another, {rate:.0f} a second here: beyond {first_full:.0f} cores more machines do not help. "
         f"{LARGE} vessels in {NIGHT_H:.0f} hours want {np.ceil(cores_a_night):.0f}. "
         f"A run that finds nothing to do was {again['wall_s']:.1f} s for {n} vessels and grows by "
         f"{1000.0 * slope:.1f} ms a vessel."

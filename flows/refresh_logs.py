@@ -81,7 +81,7 @@ def _stored(warehouse: Warehouse, read: Mapping[str, ReadLog]) -> dict[str, Kemp
     except Exception as error:  # noqa: BLE001 - told below, for the logs that it concerns
         if len(read) == 1:
             return dict.fromkeys(read, as_told(error))
-        failed = {}
+        failed: dict[str, KempfError] = {}
         for name, one in read.items():
             failed |= _stored(warehouse, {name: one})
         return failed

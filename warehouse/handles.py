@@ -29,7 +29,7 @@ _lock = threading.Lock()
 
 @contextmanager
 def borrowed(warehouse: Warehouse, name: str, opened: Callable[[], DeltaTable | None]) -> Iterator[DeltaTable | None]:
-    """Lend a handle at the newest version of a table; after an error other than a lost race it is thrown away.
+    """Lend a handle at the newest version of a table; after an error other than a lost race all are opened anew.
 
     Parameters
     ----------
@@ -57,9 +57,13 @@ def borrowed(warehouse: Warehouse, name: str, opened: Callable[[], DeltaTable | 
     try:
         yield table
     except CommitFailedError:
-        _give_back(key, table)
+        _give_back(_key(warehouse, name), table)
         raise
-    _give_back(key, table)
+    except BaseException:
+        with _lock:  # the others may be as wrong: of a table that was deleted and made anew in a bucket
+            _idle.pop(key, None)
+        raise
+    _give_back(_key(warehouse, name), table)  # it may have been made meanwhile
 
 
 def _key(warehouse: Warehouse, name: str) -> _Key:

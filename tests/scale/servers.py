@@ -31,7 +31,7 @@ def environment(**more: str) -> dict[str, str]:
 
 @contextmanager
 def running(
-    command: list[str], env: Mapping[str, str], log: Path, *, port: int | None = None, within_s: float = 120.0
+    command: list[str], env: Mapping[str, str], log: Path, *, port: int | None = None, within_s: float = 300.0
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Start a process, wait until it listens, and end it with its whole group."""
     with log.open("wb") as out:
