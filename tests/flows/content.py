@@ -26,7 +26,11 @@ def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
         told = json.loads(row["provenance_json"])
         row["provenance_json"] = json.dumps({k: v for k, v in told.items() if k != "table_versions"}, sort_keys=True)
     files, root = warehouse._files
-    kept = [f for f in files.get_file_info(fs.FileSelector(f"{root}/raw", recursive=True)) if f.is_file]
+    kept = [
+        f
+        for f in files.get_file_info(fs.FileSelector(f"{root}/raw", recursive=True, allow_not_found=True))
+        if f.is_file
+    ]
     content["raw"] = [{"name": f.base_name, "size": f.size} for f in kept if not f.base_name.startswith(".")]
     return {name: sorted(rows, key=lambda row: json.dumps(row, sort_keys=True)) for name, rows in content.items()}
 
