@@ -149,6 +149,8 @@ def refusal(one: Confirmation) -> str:
     gains = np.concatenate([one.fold_gains, one.held_out_gains])
     if not np.isfinite(one.fit.log_likelihood):
         return "the fit runs away"
+    if one.outdone:
+        return "another one is so much better that it was not fitted to the end"
     if one.at_bound:
         return "its size ends at the bound of what is physical"
     if one.bic_change > -6.0:
