@@ -6,7 +6,7 @@ added to what their kind says: to the speed and the rudder that the hull feels, 
 
 from __future__ import annotations
 
-from pipeline.compiled import STEP, njit
+from pipeline.compiled import FILLING, njit
 from pipeline.model.lanes import each
 from pipeline.model.terms.program import evaluate
 from pipeline.model.terms.symbols import SYMBOLS
@@ -24,7 +24,7 @@ ON_SPEED, ON_RUDDER, ON_SWAY, ON_YAW, ON_EXTRA, ON_LATERAL, ON_YAW_RATE, ON_HEAD
 ON_NOISE, ON_INITIAL = 8, 9
 
 
-@njit(**STEP)
+@njit(**FILLING)
 def add_programs(  # type: ignore[no-untyped-def]
     kind, place, table, values, slopes, stack, by, width, total, lanes
 ):
@@ -47,7 +47,7 @@ def add_programs(  # type: ignore[no-untyped-def]
     return found
 
 
-@njit(**STEP)
+@njit(**FILLING)
 def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
     x, row, rudder, ship, width, carried, table, values, slopes, stack, by, total, f, J, lanes
 ):

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.compiled import STEP, njit
+from pipeline.compiled import FILLING, njit
 from pipeline.model.dynamics import (
     N_AFTER,
     N_BEFORE,
@@ -45,7 +45,7 @@ ROWS, SUBSTEPS = 4, 2
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
-@njit(**STEP)
+@njit(**FILLING)
 def _begin(P, table, values, slopes, stack, by, total, drive, lanes):  # type: ignore[no-untyped-def]
     """Add the initial variance of the effects' own states to P, and fill the intensities of what drives them."""
     width = P.shape[0] - N_AFTER
@@ -73,7 +73,7 @@ def _live_states(P0, width):  # type: ignore[no-untyped-def]
     return before[:m], after[:k]
 
 
-@njit(**STEP)
+@njit(**FILLING)
 def _substep(  # type: ignore[no-untyped-def]
     x, P, rows, rudders, h, drive, decay, ship, live, after, table, values, slopes, stack, by, total, room, lanes
 ):
@@ -130,7 +130,7 @@ def _substep(  # type: ignore[no-untyped-def]
             w[i, b] = 0.0
 
 
-@njit(**STEP)
+@njit(**FILLING)
 def _measurements(  # type: ignore[no-untyped-def]
     k,
     x,
