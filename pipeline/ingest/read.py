@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from pipeline.ingest import sniff
 from pipeline.ingest.decoded import Decoded
+from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.readings import Readings
 from pipeline.ingest.screen import screen
 from pipeline.ingest.unpack import unpack
@@ -54,9 +57,7 @@ def read_log(name: str, data: bytes, profile: VesselProfile) -> Readings:
     if readings.frame.height == 0:
         raise _nothing(name, readings)
     if notes:
-        readings = Readings(
-            readings.frame, readings.rejected, readings.tally, (*notes, *readings.notes), readings.format
-        )
+        readings = replace(readings, notes=(*notes, *readings.notes))
     return readings
 
 
@@ -69,7 +70,7 @@ def _decode(log_format: str, name: str, data: bytes, profile: VesselProfile, sou
     if log_format == "mcap":
         from pipeline.ingest import mcap_log
 
-        return mcap_log.decode(name, data, source, [s.match for s in profile.sources])
+        return mcap_log.decode(name, LogFile(data), source, [s.match for s in profile.sources])
     from pipeline.ingest import delimited
 
     if source is None or source.time is None or not source.channels:
