@@ -79,7 +79,7 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
     """
     job = _Job(name, log, source, set())
     found = job.run()
-    if set(job.owners.values()) != set(job.whole_owners().values()):
+    if job.misled():
         # a topic that came late owns a key of one that came before it: /a.b behind /a
         job = _Job(name, log, source, {channel.topic for channel in job.stream.channels.values()})
         found = job.run()
@@ -99,6 +99,7 @@ class _Job:
         time = source.time if source else None
         self.clock = time.column if time and time.column in _TIMES else _TIMES[0]
         self.time_field = time if time and time.column not in _TIMES else None
+        self.asked: dict[str, tuple[str, str]] = {}
         self.routes: dict[int, Route | None] = {}
         self.refused: dict[str, str] = {}
         self.seen: dict[str, set[str]] = {}
@@ -107,10 +108,11 @@ class _Job:
         self.taken: list[str] = []
         self.offered: dict[str, str] = {}
 
-    def whole_owners(self) -> dict[str, tuple[str, str]]:
-        """Return whose each key is, now that all topics are known."""
+    def misled(self) -> bool:
+        """Whether a topic that came late owns a key that was asked of another one."""
         self.topics |= {channel.topic for channel in self.stream.channels.values()}
-        return self._owners()
+        last = self._owners()
+        return any(last[key] != owner for key, owner in self.asked.items())
 
     def _owners(self) -> dict[str, tuple[str, str]]:
         """Split the profile's keys into topic and field: the longest topic that fits."""
@@ -196,7 +198,8 @@ class _Job:
         if channel.topic not in self.topics:
             self.topics.add(channel.topic)
             self.owners = self._owners()
-        mapped = {field: self.keys[key] for key, (topic, field) in self.owners.items() if topic == channel.topic}
+        own = {key: owner for key, owner in self.owners.items() if owner[0] == channel.topic}
+        mapped = {field: self.keys[key] for key, (_, field) in own.items()}
         kind = plain_name(schema.name) if schema else ""
         if not self.keys and kind in TAKEN:
             mapped = TAKEN[kind]
@@ -205,6 +208,8 @@ class _Job:
             self.offered[channel.topic] = _lines(channel.topic, OFFERED[kind])
         if not mapped:
             return None
+        for key, owner in own.items():
+            self.asked.setdefault(key, owner)
         try:
             return Route(channel, schema, mapped, self.time_field)
         except NoReaderError as why:

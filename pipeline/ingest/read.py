@@ -13,6 +13,9 @@ from pipeline.ingest.unpack import unpack
 from schemas.errors import DataRejected, UsageError
 from schemas.profile import Source, VesselProfile
 
+#: Notes that a refusal repeats, at most.
+_NOTES = 3
+
 _TOLD = "See docs/profile.md for how to describe a log."
 
 
@@ -105,9 +108,14 @@ def _nothing(name: str, readings: Readings) -> DataRejected:
     return DataRejected(
         "no_valid_reading",
         f"{name} holds no valid reading: {readings.tally.records_read} records, "
-        f"of them {listed or 'none usable'}.{years}",
+        f"of them {listed or 'none usable'}.{years}{''.join(f' {note}' for note in readings.notes[:_NOTES])}",
         step.get(most, "Look at the reasons; most often the profile does not fit the log."),
-        {"name": name, "records_read": readings.tally.records_read, "by_reason": counts},
+        {
+            "name": name,
+            "records_read": readings.tally.records_read,
+            "by_reason": counts,
+            "notes": list(readings.notes),
+        },
     )
 
 
