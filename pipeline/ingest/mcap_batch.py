@@ -104,6 +104,9 @@ def joined(batches: list[Batch]) -> Batch:
     """Return batches of messages that follow each other as one."""
     if len(batches) == 1:
         return batches[0]
+    if not batches:
+        nothing = np.empty(0, dtype=np.int64)
+        return Batch(np.empty(0, dtype=np.uint8), nothing, nothing, nothing, nothing, nothing)
     base = np.concatenate(([0], np.cumsum([b.content.size for b in batches])))[:-1]
     return Batch(
         np.concatenate([b.content for b in batches]),

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from typing import TypeVar
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap_batch import Batch
+from pipeline.ingest.mcap_batch import Batch, joined
 from pipeline.ingest.mcap_payloads import PayloadsBuilder
 from pipeline.ingest.mcap_records import Channel
 from pipeline.ingest.mcap_stream import McapStream
@@ -30,22 +31,55 @@ _TIMES = ("log_time", "publish_time")
 _NAMED = 20
 
 
-@dataclass(eq=False)
-class _Sparse:
-    """Values of one canonical channel: the records that carry it."""
-
-    record: list[NDArray[np.int64]] = field(default_factory=list)
-    value: list[NDArray[np.float64]] = field(default_factory=list)
-
-
 @dataclass(frozen=True, eq=False)
-class _Part:
-    """The records of one batch: time, place of the topic, reason of refusal, whether the payload is text."""
+class Part:
+    """The records of some megabytes of the file, decoded and not yet checked.
 
-    time: NDArray[np.int64]
+    Attributes
+    ----------
+    batch : Batch
+        Where they stand.
+    time_ns : ndarray of int64, shape (m,)
+    topic : ndarray of int64, shape (m,)
+        Place of the topic in the order in which topics come, -1 where it cannot be told.
+    reason : ndarray of int8, shape (m,)
+        Code of the reason for which a record is refused, 0 for none.
+    text : ndarray of bool, shape (m,)
+        Whether the payload is text.
+    values : dict of str to list of (record, value)
+        By canonical channel, in SI: numbers of records within the part, shape (k,), and what they carry, shape (k,).
+    """
+
+    batch: Batch
+    time_ns: NDArray[np.int64]
     topic: NDArray[np.int64]
     reason: NDArray[np.int8]
     text: NDArray[np.bool_]
+    values: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]]
+
+
+_NO_BATCH = joined([])
+
+
+def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
+    """Decode an MCAP log a few megabytes at a time, for those who keep less of it than `decode` does.
+
+    Parameters
+    ----------
+    name, log, source
+        See `decode`; the source has channels.
+
+    Yields
+    ------
+    Part
+        In the order of the file.
+
+    Raises
+    ------
+    UsageError, DataRejected
+        See `decode`, but for what can be told only at the end of the file.
+    """
+    return _Job(name, log, source, set()).parts()
 
 
 def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) -> Decoded:
@@ -127,65 +161,68 @@ class _Job:
     def run(self) -> Decoded:
         """Read the file through."""
         places = PayloadsBuilder()
-        parts: list[_Part] = []
-        channels: dict[str, _Sparse] = {}
-        base = 0
-        for batch in self.stream.batches():
-            places.add(batch)
-            parts.append(self._batch(batch, base, channels))
-            base += batch.first.size
+        parts: list[Part] = []
+        for part in self.parts():
+            places.add(part.batch)
+            parts.append(replace(part, batch=_NO_BATCH))
         topics = tuple(sorted(self.places))
         order = np.array([topics.index(name) for name in self.places] + [-1], dtype=np.int64)
         payloads = places.build(self.log, _joined([part.text for part in parts], np.empty(0, np.bool_)))
         return Decoded(
             payloads,
             payloads,
-            _joined([part.time for part in parts], np.empty(0, np.int64)),
+            _joined([part.time_ns for part in parts], np.empty(0, np.int64)),
             order[_joined([part.topic for part in parts], np.empty(0, np.int64))],
             topics,
             _joined([part.reason for part in parts], np.empty(0, np.int8)),
-            {name: _dense(sparse, base) for name, sparse in channels.items()},
+            _dense(parts),
             [*self.stream.notes, *self._notes()],
             tuple(self.stream.lost),
         )
 
-    def _batch(self, batch: Batch, base: int, channels: dict[str, _Sparse]) -> _Part:
-        """Decode a batch."""
+    def parts(self) -> Iterator[Part]:
+        """Read the file a few megabytes at a time; no more than that is held."""
+        for batch in self.stream.batches():
+            yield self._part(batch)
+
+    def _part(self, batch: Batch) -> Part:
         n = batch.first.size
         time = (batch.log_time if self.clock == _TIMES[0] else batch.publish_time).copy()
-        topic, reason, text = np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.int8), np.ones(n, dtype=np.bool_)
+        topic, text = np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+        part = Part(batch, time, topic, np.zeros(n, dtype=np.int8), text, {})
         for number in np.unique(batch.channel).tolist():
             record = np.flatnonzero(batch.channel == number)
             channel = self.stream.channels.get(number)
             if channel is None:
-                reason[record], time[record] = CODE[Reason.MALFORMED], NO_TIME
-                text[record] = False
+                part.reason[record], time[record] = CODE[Reason.MALFORMED], NO_TIME
                 continue
             topic[record] = self.places.setdefault(channel.topic, len(self.places))
             text[record] = channel.encoding == "json"
             if batch.lost:
-                reason[record] = CODE[Reason.MALFORMED]
-                continue
-            route = self._route(number, channel)
-            if route is None:
-                reason[record] = CODE[Reason.NO_CHANNEL]
-                continue
-            done = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
-            reason[record[~done.good]] = CODE[Reason.MALFORMED]
-            if done.time_ns is not None:
-                told = done.time_ns >= 0
-                self.timed |= bool(told.any())
-                time[record[told]] = done.time_ns[told]
-                if not told[done.good].all():
-                    self.untimed.add(channel.topic)
-            for key, (value, present) in done.values.items():
-                mapped = route.mapped[key]
-                if present.any():
-                    self.seen.setdefault(channel.topic, set()).add(key)
-                    sparse = channels.setdefault(mapped.channel, _Sparse())
-                    sparse.record.append(base + record[present])
-                    sparse.value.append(value[present] * mapped.factor + mapped.offset_si)
-        return _Part(time, topic, reason, text)
+                part.reason[record] = CODE[Reason.MALFORMED]
+            elif (route := self._route(number, channel)) is None:
+                part.reason[record] = CODE[Reason.NO_CHANNEL]
+            else:
+                self._read(part, record, channel.topic, route)
+        return part
+
+    def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
+        """Decode the messages of one channel."""
+        batch = part.batch
+        done = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
+        part.reason[record[~done.good]] = CODE[Reason.MALFORMED]
+        if done.time_ns is not None:
+            told = done.time_ns >= 0
+            self.timed |= bool(told.any())
+            part.time_ns[record[told]] = done.time_ns[told]
+            if not told[done.good].all():
+                self.untimed.add(topic)
+        for key, (value, present) in done.values.items():
+            mapped = route.mapped[key]
+            if present.any():
+                self.seen.setdefault(topic, set()).add(key)
+                found = record[present], value[present] * mapped.factor + mapped.offset_si
+                part.values.setdefault(mapped.channel, []).append(found)
 
     def _route(self, number: int, channel: Channel) -> Route | None:
         """Return the reader of a channel, None where nothing is asked of it or it cannot be read."""
@@ -293,8 +330,14 @@ def _joined(parts: list[NDArray[T]], empty: NDArray[T]) -> NDArray[T]:
     return np.concatenate([empty, *parts])
 
 
-def _dense(sparse: _Sparse, n: int) -> Values:
-    values = Values.empty(n)
-    for record, value in zip(sparse.record, sparse.value, strict=True):
-        values.put(record, value)
-    return values
+def _dense(parts: list[Part]) -> dict[str, Values]:
+    """Lay the values of all parts out over all records."""
+    n = sum(part.time_ns.size for part in parts)
+    channels: dict[str, Values] = {}
+    base = 0
+    for part in parts:
+        for name, found in part.values.items():
+            for record, value in found:
+                channels.setdefault(name, Values.empty(n)).put(base + record, value)
+        base += part.time_ns.size
+    return channels

@@ -132,9 +132,7 @@ class McapStream:
 
     def _lose(self, lost: LostStretch, told: str = "") -> None:
         self.lost.append(lost)
-        span = f"log times {lost.since_ns} to {lost.until_ns} ns" if lost.since_ns is not None else "log times unknown"
-        if lost.since_ns is not None and lost.until_ns is None:
-            span = f"log times from {lost.since_ns} ns on"
+        span = _span(lost) or "at a time unknown"
         count = f"{lost.messages} messages" if lost.messages is not None else "an unknown number of messages"
         self.notes.append(told or f"Lost: {count}, {span}: {lost.why}.")
 
@@ -237,8 +235,8 @@ class McapStream:
 
     def _note_chunk(self, place: int, lost: LostStretch) -> None:
         count = f"{lost.messages} messages by its index" if lost.messages else "an unknown number of messages"
-        span = f", log times {lost.since_ns} to {lost.until_ns} ns" if lost.since_ns is not None else ""
-        self._lose(lost, f"The chunk at byte {place} is lost, {count}{span}: {lost.why}.")
+        span = _span(lost)
+        self._lose(lost, f"The chunk at byte {place} is lost, {count}{f', {span}' if span else ''}: {lost.why}.")
 
     def _describe(self, opcode: int, content: bytes) -> None:
         """Take note of a channel or schema; a damaged one is left out and its messages with it."""
@@ -316,3 +314,15 @@ class McapStream:
         if not self._summary.ended:
             self.notes.append("The end of the file is missing; its data section is whole.")
             self._summary.ended = True
+
+
+def _span(lost: LostStretch) -> str:
+    """Return log times as a person reads them, nothing where they are not known."""
+    since, until = (None if ns is None else _utc(ns) for ns in (lost.since_ns, lost.until_ns))
+    if since is None:
+        return f"log times until {until}" if until else ""
+    return f"log times {since} to {until}" if until else f"log times from {since} on"
+
+
+def _utc(time_ns: int) -> str:
+    return f"{np.datetime64(time_ns, 'ns').astype('datetime64[ms]')}Z"
