@@ -35,7 +35,7 @@ def _bits(buffer, at, size, little):
 
 
 @njit(cache=True)
-def _counted(buffer, begin, at, end, little, steps, step, out, present):
+def _counted(buffer, begin, at, end, little, steps, step, i, out, present):
     """Step over text or a sequence of numbers, or read one element of it; return the place behind it, -1 for a cut."""
     place = at + ((begin - at) & 3)
     if place + 4 > end:
@@ -50,13 +50,13 @@ def _counted(buffer, begin, at, end, little, steps, step, out, present):
     if steps[step, 0] != PICK:
         return place + count * size
     if steps[step, 4] < count:
-        out[steps[step, 3]] = _bits(buffer, place + steps[step, 4] * size, size, little)
-        present[steps[step, 3]] = True
+        out[i, steps[step, 3]] = _bits(buffer, place + steps[step, 4] * size, size, little)
+        present[i, steps[step, 3]] = True
     return at
 
 
 @njit(cache=True)
-def _one(buffer, begin, end, little, steps, left, back, out, present):
+def _one(buffer, begin, end, little, steps, left, back, i, out, present):
     """Run the walk over one message; return the place behind its last step, -1 where the message is cut."""
     at, step, level = begin, 0, -1
     while step < steps.shape[0]:
@@ -67,8 +67,8 @@ def _one(buffer, begin, end, little, steps, left, back, out, present):
             if size > end - at:
                 return -1
             if kind == READ:
-                out[steps[step, 3]] = _bits(buffer, at, size, little)
-                present[steps[step, 3]] = True
+                out[i, steps[step, 3]] = _bits(buffer, at, size, little)
+                present[i, steps[step, 3]] = True
             at += size
         elif kind == LOOP:
             count = steps[step, 1]
@@ -93,7 +93,7 @@ def _one(buffer, begin, end, little, steps, left, back, out, present):
                 continue
             level -= 1
         else:
-            at = _counted(buffer, begin, at, end, little, steps, step, out, present)
+            at = _counted(buffer, begin, at, end, little, steps, step, i, out, present)
             if at < 0:
                 return -1
         step += 1
@@ -110,5 +110,5 @@ def walk(buffer, start, stop, steps, closed, out, present, good):
         if begin > end or buffer[start[i]] != 0 or buffer[start[i] + 1] > 1:
             continue
         little = buffer[start[i] + 1] == 1
-        at = _one(buffer, begin, end, little, steps, left, back, out[i], present[i])
+        at = _one(buffer, begin, end, little, steps, left, back, i, out, present)
         good[i] = at >= 0 and (not closed or end - at <= _PADDING)

@@ -59,8 +59,9 @@ class JsonReader:
         value[kind != NUMBER] = np.nan
         for slot in range(k):
             text = np.flatnonzero((kind[:, slot] == TEXT) & found.good)
-            # ascending, as stretches of one buffer are
-            value[text, slot] = number(Spans(payloads.buffer, first[text, slot], last[text, slot]).text())
+            if text.size:
+                # ascending, as stretches of one buffer are
+                value[text, slot] = number(Spans(payloads.buffer, first[text, slot], last[text, slot]).text())
         found.value[:] = value.T
         found.present[:] = (kind != ABSENT).T & found.good
         return found

@@ -22,6 +22,9 @@ ABSENT, OTHER, NUMBER, TEXT = range(4)
 #: Deepest nesting that is walked.
 _DEEPEST = 64
 _EXACT = np.array([10.0**k for k in range(23)])
+#: Powers of ten that a whole number holds, and by how many bits each may be shifted without passing 62.
+_DIVISOR = np.array([10**k for k in range(19)], dtype=np.uint64)
+_SHIFT = np.array([62 - (10**k).bit_length() for k in range(19)])
 
 
 @njit(cache=True)
@@ -38,22 +41,16 @@ def _quotient(mantissa, exponent):
     The quotient of the two whole numbers is made bit by bit until 55 of them and a last one that stands for all behind
     it tell how to round.
     """
-    divisor = np.uint64(1)
-    for _ in range(-exponent):
-        divisor *= np.uint64(10)
+    divisor, step = _DIVISOR[-exponent], _SHIFT[-exponent]
     quotient, rest = mantissa // divisor, mantissa % divisor
-    step = 1
-    while (divisor << np.uint64(step)) < np.uint64(1 << 62):
-        step += 1
     shifted = 0
     while quotient < np.uint64(1 << 54):
-        need = 1
-        while need < step and (quotient << np.uint64(need)) < np.uint64(1 << 54):
-            need += 1
-        rest <<= np.uint64(need)
-        quotient = (quotient << np.uint64(need)) | (rest // divisor)
+        while quotient >> np.uint64(63 - step) > np.uint64(0):
+            step -= 1
+        rest <<= np.uint64(step)
+        quotient = (quotient << np.uint64(step)) | (rest // divisor)
         rest %= divisor
-        shifted += need
+        shifted += step
     if rest > 0:
         quotient |= np.uint64(1)
     value = np.float64(quotient)
@@ -104,8 +101,8 @@ def _string_end(buffer, at, end):
 
 
 @njit(cache=True)
-def _number(buffer, at, end):
-    """Return where a number ends (-1: it is none), its value, and whether that is exact."""
+def _number(buffer, at, end, wanted):
+    """Return where a number ends (-1: it is none), its value where it is wanted, and whether that is exact."""
     negative = buffer[at] == 45
     if negative:
         at += 1
@@ -143,7 +140,7 @@ def _number(buffer, at, end):
         if at == first:
             return -1, 0.0, False
         exponent += -power if down else power
-    exact = digits <= 18 and -22 <= exponent <= 22
+    exact = wanted and digits <= 18 and -22 <= exponent <= 22
     value = 0.0
     if exact and mantissa <= np.uint64(1 << 53):
         value = np.float64(mantissa)
@@ -187,7 +184,7 @@ def _child(buffer, at, end, node, children, keys, key_at):
 
 
 @njit(cache=True)
-def _scalar(buffer, at, end, slot, kind, value, first, last):
+def _scalar(buffer, at, end, row, slot, kind, value, first, last):
     """Read text, a number or a literal; return the place behind it, -1 where it is odd."""
     byte = buffer[at]
     if byte == 34:
@@ -195,17 +192,17 @@ def _scalar(buffer, at, end, slot, kind, value, first, last):
         if close < 0 or (escaped and slot >= 0):
             return -1
         if slot >= 0:
-            kind[slot], first[slot], last[slot] = TEXT, at + 1, close
+            kind[row, slot], first[row, slot], last[row, slot] = TEXT, at + 1, close
         return close + 1
     if byte == 45 or 48 <= byte <= 57:
-        close, number, exact = _number(buffer, at, end)
+        close, number, exact = _number(buffer, at, end, slot >= 0)
         if close >= 0 and slot >= 0:
-            kind[slot], value[slot] = NUMBER if exact else TEXT, number
-            first[slot], last[slot] = at, close
+            kind[row, slot], value[row, slot] = NUMBER if exact else TEXT, number
+            first[row, slot], last[row, slot] = at, close
         return close
     length = _literal(buffer, at, end)
     if slot >= 0 and byte != 110:
-        kind[slot] = OTHER
+        kind[row, slot] = OTHER
     return at + length if length > 0 else -1
 
 
@@ -226,9 +223,11 @@ def _key(buffer, at, end, parent, children, keys, key_at):
 
 
 @njit(cache=True)
-def _one(buffer, at, end, children, keys, key_at, slots, seen, stamp, kind, value, first, last):
-    """Walk through one message; tell whether it is a whole object without anything odd."""
-    inside = np.empty(_DEEPEST, dtype=np.int64)  # node of an object, -1 of one nobody wants, -2 of a list
+def _one(buffer, at, end, children, keys, key_at, slots, seen, inside, row, kind, value, first, last):
+    """Walk through one message; tell whether it is a whole object without anything odd.
+
+    What is open around a value stands in ``inside``: the node of an object, -1 of one nobody wants, -2 of a list.
+    """
     depth, node = 0, 0
     at = _blank_until(buffer, at, end)
     if at >= end or buffer[at] != 123:
@@ -243,11 +242,11 @@ def _one(buffer, at, end, children, keys, key_at, slots, seen, stamp, kind, valu
             inside[depth] = node if byte == 123 else -2
             depth += 1
             if slot >= 0:
-                kind[slot] = OTHER
+                kind[row, slot] = OTHER
             at = _blank_until(buffer, at + 1, end)
             opened = at < end and buffer[at] != (125 if byte == 123 else 93)
         else:
-            at = _scalar(buffer, at, end, slot, kind, value, first, last)
+            at = _scalar(buffer, at, end, row, slot, kind, value, first, last)
             if at < 0:
                 return False
         if not opened:
@@ -266,10 +265,10 @@ def _one(buffer, at, end, children, keys, key_at, slots, seen, stamp, kind, valu
         node = -1
         if inside[depth - 1] != -2:
             at, node = _key(buffer, at, end, inside[depth - 1], children, keys, key_at)
-            if at < 0 or (node >= 0 and seen[node] == stamp):
+            if at < 0 or (node >= 0 and seen[node] == row):
                 return False
             if node >= 0:
-                seen[node] = stamp
+                seen[node] = row
 
 
 @njit(cache=True)
@@ -280,7 +279,8 @@ def walk(buffer, start, stop, children, keys, key_at, slots, kind, value, first,
     node or -1.
     """
     seen = np.full(slots.size, -1, dtype=np.int64)
+    inside = np.empty(_DEEPEST, dtype=np.int64)
     for i in range(start.size):
         good[i] = _one(
-            buffer, start[i], stop[i], children, keys, key_at, slots, seen, i, kind[i], value[i], first[i], last[i]
+            buffer, start[i], stop[i], children, keys, key_at, slots, seen, inside, i, kind, value, first, last
         )

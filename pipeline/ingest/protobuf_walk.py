@@ -34,12 +34,10 @@ def _varint(buffer, at, end):
 
 
 @njit(cache=True)
-def _one(buffer, at, end, rows, row_of, out, present, entered):
+def _one(buffer, at, end, rows, row_of, ends, nodes, i, out, present, entered):
     """Walk through one message; tell whether it is whole."""
-    ends = np.empty(DEEPEST + 1, dtype=np.int64)
-    nodes = np.empty(DEEPEST + 1, dtype=np.int64)
     ends[0], nodes[0], level = end, 0, 0
-    entered[0] = True
+    entered[i, 0] = True
     while True:
         while at == ends[level]:
             if level == 0:
@@ -71,12 +69,12 @@ def _one(buffer, at, end, rows, row_of, out, present, entered):
         for row in range(row_of[node], row_of[node + 1]):
             if rows[row, 0] == number and rows[row, 1] == wire:
                 if rows[row, 2] >= 0:
-                    out[rows[row, 2]] = value
-                    present[rows[row, 2]] = True
+                    out[i, rows[row, 2]] = value
+                    present[i, rows[row, 2]] = True
                 else:
                     level += 1
                     ends[level], nodes[level] = at + size, rows[row, 3]
-                    entered[rows[row, 3]] = True
+                    entered[i, rows[row, 3]] = True
                     entered_child = True
                 break
         if not entered_child:
@@ -86,5 +84,7 @@ def _one(buffer, at, end, rows, row_of, out, present, entered):
 @njit(cache=True)
 def walk(buffer, start, stop, rows, row_of, out, present, entered, good):
     """Walk through all messages and fill what was read, by message and slot, and which messages were entered."""
+    ends = np.empty(DEEPEST + 1, dtype=np.int64)
+    nodes = np.empty(DEEPEST + 1, dtype=np.int64)
     for i in range(start.size):
-        good[i] = _one(buffer, start[i], stop[i], rows, row_of, out[i], present[i], entered[i])
+        good[i] = _one(buffer, start[i], stop[i], rows, row_of, ends, nodes, i, out, present, entered)
