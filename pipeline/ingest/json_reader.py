@@ -33,7 +33,7 @@ class JsonReader:
             node = tree
             for part in path:
                 node = node.setdefault(part, {})
-        self._children, self._keys, self._key_at, self._slots = _flat(tree, self._paths)
+        self._nodes, self._keys = _flat(tree, self._paths)
         #: a JSON schema need not name every field: what is missing shows in the messages
         self.missing: dict[str, str] = {}
 
@@ -46,27 +46,24 @@ class JsonReader:
             Shape (m,).
         """
         m, k = len(payloads), len(self._paths)
-        found = Columns.empty(k, m)
-        kind = np.zeros((m, k), dtype=np.int8)
-        value = np.zeros((m, k))
-        first, last = np.zeros((m, k), dtype=np.int64), np.zeros((m, k), dtype=np.int64)
-        tree = (self._children, self._keys, self._key_at, self._slots)
-        walk(payloads.buffer, payloads.start, payloads.stop, *tree, kind, value, first, last, found.good)
-        for i in np.flatnonzero(~found.good):
-            found.good[i] = self._slow(
-                payloads.buffer[payloads.start[i] : payloads.stop[i]].tobytes(), kind[i], value[i]
-            )
+        columns = Columns.empty(k, m)
+        found, value = np.zeros((m, k, 3), dtype=np.int64), np.zeros((m, k))
+        walk(payloads.buffer, payloads.start, payloads.stop, self._nodes.copy(), self._keys, found, value, columns.good)
+        kind, first, last = found[..., 0], found[..., 1], found[..., 2]
+        for i in np.flatnonzero(~columns.good):
+            payload = payloads.buffer[payloads.start[i] : payloads.stop[i]].tobytes()
+            columns.good[i] = self._slow(payload, kind[i], value[i])
         value[kind != NUMBER] = np.nan
         for slot in range(k):
-            text = np.flatnonzero((kind[:, slot] == TEXT) & found.good)
+            text = np.flatnonzero((kind[:, slot] == TEXT) & columns.good)
             if text.size:
                 # ascending, as stretches of one buffer are
                 value[text, slot] = number(Spans(payloads.buffer, first[text, slot], last[text, slot]).text())
-        found.value[:] = value.T
-        found.present[:] = (kind != ABSENT).T & found.good
-        return found
+        columns.value[:] = value.T
+        columns.present[:] = (kind != ABSENT).T & columns.good
+        return columns
 
-    def _slow(self, payload: bytes, kind: NDArray[np.int8], value: NDArray[np.float64]) -> bool:
+    def _slow(self, payload: bytes, kind: NDArray[np.int64], value: NDArray[np.float64]) -> bool:
         """Read one message by Python's own reader."""
         kind[:] = ABSENT
         try:
@@ -94,22 +91,14 @@ def _leaf(value: Any, path: list[str]) -> tuple[int, float]:
     return NUMBER, read if np.isfinite(read) else np.nan
 
 
-def _flat(
-    tree: Tree, paths: list[list[str]]
-) -> tuple[NDArray[np.int64], NDArray[np.uint8], NDArray[np.int64], NDArray[np.int64]]:
-    """Lay a tree out in arrays: the children of a node stand behind each other, the root is node 0."""
+def _flat(tree: Tree, paths: list[list[str]]) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Lay a tree out as `pipeline.ingest.json_walk.walk` wants it: the children of a node stand behind each other."""
     nodes: list[tuple[Tree, bytes, tuple[str, ...]]] = [(tree, b"", ())]
-    children = []
-    for own, _, path in nodes:
-        children.append((len(nodes), len(nodes) + len(own)))
+    slots = {tuple(path): slot for slot, path in enumerate(paths)}
+    rows, at = [], 0
+    for own, key, path in nodes:
+        rows.append((len(nodes), len(nodes) + len(own), at, at + len(key), slots.get(path, -1) if path else -1, -1))
         nodes += [(below, name.encode(), (*path, name)) for name, below in own.items()]
-    slot_of = {tuple(path): slot for slot, path in enumerate(paths)}
+        at += len(key)
     keys = b"".join(key for _, key, _ in nodes)
-    at = np.cumsum([0] + [len(key) for _, key, _ in nodes])
-    slots = [slot_of.get(path, -1) if path else -1 for _, _, path in nodes]
-    return (
-        np.array(children, dtype=np.int64),
-        np.frombuffer(keys or b"\0", dtype=np.uint8),
-        at.astype(np.int64),
-        np.array(slots, dtype=np.int64),
-    )
+    return np.array(rows, dtype=np.int64), np.frombuffer(keys or b"\0", dtype=np.uint8)

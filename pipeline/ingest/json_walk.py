@@ -19,6 +19,9 @@ from pipeline.compiled import njit
 #: What was found of a field: nothing, something that is no number, a number, text that may be one.
 ABSENT, OTHER, NUMBER, TEXT = range(4)
 
+#: Columns of the tree of wanted keys.
+FIRST, BEHIND, KEY, KEY_END, SLOT, SEEN = range(6)
+
 #: Deepest nesting that is walked.
 _DEEPEST = 64
 _EXACT = np.array([10.0**k for k in range(23)])
@@ -166,16 +169,16 @@ def _literal(buffer, at, end):
     return 0
 
 
-@njit(cache=True)
-def _child(buffer, at, end, node, children, keys, key_at):
+@njit(cache=True, inline="always")
+def _child(buffer, at, end, node, nodes, keys):
     """Return the node below ``node`` whose key stands in the buffer, -1 for none."""
     if node < 0:
         return -1
-    for child in range(children[node, 0], children[node, 1]):
-        if key_at[child + 1] - key_at[child] == end - at:
+    for child in range(nodes[node, FIRST], nodes[node, BEHIND]):
+        if nodes[child, KEY_END] - nodes[child, KEY] == end - at:
             same = True
             for k in range(end - at):
-                if keys[key_at[child] + k] != buffer[at + k]:
+                if keys[nodes[child, KEY] + k] != buffer[at + k]:
                     same = False
                     break
             if same:
@@ -183,8 +186,8 @@ def _child(buffer, at, end, node, children, keys, key_at):
     return -1
 
 
-@njit(cache=True)
-def _scalar(buffer, at, end, row, slot, kind, value, first, last):
+@njit(cache=True, inline="always")
+def _scalar(buffer, at, end, row, slot, found, value):
     """Read text, a number or a literal; return the place behind it, -1 where it is odd."""
     byte = buffer[at]
     if byte == 34:
@@ -192,29 +195,29 @@ def _scalar(buffer, at, end, row, slot, kind, value, first, last):
         if close < 0 or (escaped and slot >= 0):
             return -1
         if slot >= 0:
-            kind[row, slot], first[row, slot], last[row, slot] = TEXT, at + 1, close
+            found[row, slot, 0], found[row, slot, 1], found[row, slot, 2] = TEXT, at + 1, close
         return close + 1
     if byte == 45 or 48 <= byte <= 57:
         close, number, exact = _number(buffer, at, end, slot >= 0)
         if close >= 0 and slot >= 0:
-            kind[row, slot], value[row, slot] = NUMBER if exact else TEXT, number
-            first[row, slot], last[row, slot] = at, close
+            value[row, slot] = number
+            found[row, slot, 0], found[row, slot, 1], found[row, slot, 2] = NUMBER if exact else TEXT, at, close
         return close
     length = _literal(buffer, at, end)
     if slot >= 0 and byte != 110:
-        kind[row, slot] = OTHER
+        found[row, slot, 0] = OTHER
     return at + length if length > 0 else -1
 
 
-@njit(cache=True)
-def _key(buffer, at, end, parent, children, keys, key_at):
+@njit(cache=True, inline="always")
+def _key(buffer, at, end, parent, nodes, keys):
     """Read a key and its colon; return the place of the value (-1: odd) and the node that it names (-1: none)."""
     if buffer[at] != 34:
         return -1, -1
     close, escaped = _string_end(buffer, at + 1, end)
     if close < 0 or escaped:
         return -1, -1
-    node = _child(buffer, at + 1, close, parent, children, keys, key_at)
+    node = _child(buffer, at + 1, close, parent, nodes, keys)
     at = _blank_until(buffer, close + 1, end)
     if at >= end or buffer[at] != 58:
         return -1, -1
@@ -223,7 +226,7 @@ def _key(buffer, at, end, parent, children, keys, key_at):
 
 
 @njit(cache=True)
-def _one(buffer, at, end, children, keys, key_at, slots, seen, inside, row, kind, value, first, last):
+def _one(buffer, at, end, nodes, keys, inside, row, found, value):
     """Walk through one message; tell whether it is a whole object without anything odd.
 
     What is open around a value stands in ``inside``: the node of an object, -1 of one nobody wants, -2 of a list.
@@ -234,7 +237,7 @@ def _one(buffer, at, end, children, keys, key_at, slots, seen, inside, row, kind
         return False
     while True:
         # a value is expected here, of the node or of nobody (-1)
-        slot = slots[node] if node >= 0 else -1
+        slot = nodes[node, SLOT] if node >= 0 else -1
         byte, opened = buffer[at], False
         if byte == 123 or byte == 91:
             if depth >= _DEEPEST:
@@ -242,11 +245,11 @@ def _one(buffer, at, end, children, keys, key_at, slots, seen, inside, row, kind
             inside[depth] = node if byte == 123 else -2
             depth += 1
             if slot >= 0:
-                kind[row, slot] = OTHER
+                found[row, slot, 0] = OTHER
             at = _blank_until(buffer, at + 1, end)
             opened = at < end and buffer[at] != (125 if byte == 123 else 93)
         else:
-            at = _scalar(buffer, at, end, row, slot, kind, value, first, last)
+            at = _scalar(buffer, at, end, row, slot, found, value)
             if at < 0:
                 return False
         if not opened:
@@ -264,23 +267,30 @@ def _one(buffer, at, end, children, keys, key_at, slots, seen, inside, row, kind
             return False
         node = -1
         if inside[depth - 1] != -2:
-            at, node = _key(buffer, at, end, inside[depth - 1], children, keys, key_at)
-            if at < 0 or (node >= 0 and seen[node] == row):
+            at, node = _key(buffer, at, end, inside[depth - 1], nodes, keys)
+            if at < 0:
                 return False
             if node >= 0:
-                seen[node] = row
+                if nodes[node, SEEN] == row:
+                    return False
+                nodes[node, SEEN] = row
 
 
 @njit(cache=True)
-def walk(buffer, start, stop, children, keys, key_at, slots, kind, value, first, last, good):
+def walk(buffer, start, stop, nodes, keys, found, value, good):
     """Walk through all messages and fill what was found, by message and slot.
 
-    The tree of wanted keys is the children of each node, the bytes of the keys, where these begin, and the slot of each
-    node or -1.
+    Parameters
+    ----------
+    nodes : ndarray of int64, shape (n, 6)
+        The tree of wanted keys, its columns numbered `FIRST` to `SEEN`: children, place of the key's bytes, slot or -1,
+        and the last message that had the key, -1 at first. Node 0 is the message itself.
+    keys : ndarray of uint8
+    found : ndarray of int64, shape (m, k, 3)
+        `ABSENT` at first; what was found, and its first byte and the one behind its last, of numbers and text.
+    value : ndarray of float64, shape (m, k)
+    good : ndarray of bool, shape (m,)
     """
-    seen = np.full(slots.size, -1, dtype=np.int64)
     inside = np.empty(_DEEPEST, dtype=np.int64)
     for i in range(start.size):
-        good[i] = _one(
-            buffer, start[i], stop[i], children, keys, key_at, slots, seen, inside, i, kind, value, first, last
-        )
+        good[i] = _one(buffer, start[i], stop[i], nodes, keys, inside, i, found, value)
