@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -69,33 +70,34 @@ class Payloads:
 
     def binary(self) -> pl.Series:
         """Return the payloads as a column of bytes."""
-        parts = [spans.binary() for spans, _ in self._spans()]
+        parts = [spans.binary() for spans, _ in self._blocks_chosen()]
         return pl.concat(parts) if parts else pl.Series("content", [], dtype=pl.Binary)
 
     def text(self, limit: int = RAW_LIMIT) -> pl.Series:
         """Return the payloads as text of at most ``limit`` characters, what is no text as its first bytes."""
-        parts = []
-        for spans, record in self._spans():
-            shown = spans.text(limit)
-            for i in np.flatnonzero(~self._is_text[record]):
-                own = spans.buffer[spans.start[i] : spans.stop[i]]
-                more = f"... {own.size} bytes" if own.size > _SHOWN else ""
-                shown[int(i)] = own[:_SHOWN].tobytes().hex() + more
-            parts.append(shown)
+        parts = [_shown(spans, self._is_text[record], limit) for spans, record in self._blocks_chosen()]
         return pl.concat(parts) if parts else pl.Series("raw", [], dtype=pl.String)
 
-    def _spans(self) -> list[tuple[Spans, Index]]:
-        """Read the blocks that are asked for again; return the payloads and the numbers of the messages."""
+    def _blocks_chosen(self) -> Iterator[tuple[Spans, Index]]:
+        """Read the blocks that are asked for again, one at a time: their payloads and the numbers of the messages."""
         bounds = np.searchsorted(self._chosen, self._begins)
-        found = []
         for block, begin, low, high in zip(self._blocks, self._begins[:-1], bounds[:-1], bounds[1:], strict=True):
             if low == high:
                 continue
             record = self._chosen[low:high]
             own = record - begin
             content: Bytes = np.concatenate([np.empty(0, np.uint8), *(piece.read(self._log) for piece in block.pieces)])
-            whole = Spans(content, block.first[own].astype(np.int64), block.end[own].astype(np.int64))
-            # only what is chosen is kept of the content
-            offset = np.concatenate(([0], np.cumsum(whole.stop - whole.start)))
-            found.append((Spans(whole.joined().copy(), offset[:-1], offset[1:]), record))
-        return found
+            yield Spans(content, block.first[own].astype(np.int64), block.end[own].astype(np.int64)), record
+
+
+def _shown(spans: Spans, is_text: NDArray[np.bool_], limit: int) -> pl.Series:
+    """Return payloads as they are shown."""
+    if is_text.all():
+        return spans.text(limit)
+    shown = np.empty(len(spans), dtype=object)
+    shown[is_text] = spans.take(is_text).text(limit).to_list()
+    for i in np.flatnonzero(~is_text):
+        own = spans.buffer[spans.start[i] : spans.stop[i]]
+        more = f"... {own.size} bytes" if own.size > _SHOWN else ""
+        shown[i] = own[:_SHOWN].tobytes().hex() + more
+    return pl.Series("raw", shown.tolist(), dtype=pl.String)

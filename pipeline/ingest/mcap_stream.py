@@ -43,6 +43,15 @@ from pipeline.ingest.unpack import allowance, too_large, too_many
 #: Bytes that are read from the file at once, and messages that are handed on together, unpacked.
 WINDOW = 4 << 20
 
+#: The same right behind damage, where there may be more of it.
+_FIRST_WINDOW = 1 << 14
+
+#: Bytes of a chunk's head that tell it for one.
+_CHUNK_HEAD = 64
+
+#: Lost stretches that are told apart; what more there are is one.
+_MOST_STRETCHES = 1_000
+
 #: Largest record that is read for what it says; a larger one, such as an attachment, is stepped over.
 _RECORD_LIMIT = CHUNK_LIMIT + (1 << 20)
 
@@ -76,6 +85,7 @@ class McapStream:
         self.notes: list[str] = list(self._summary.notes)
         self._length = dict(self._summary.chunks)
         self._expected = np.array(sorted(self._length), dtype=np.int64)
+        self._lengths = np.array([self._length[at] for at in sorted(self._length)], dtype=np.int64)
         self._room, self._records_left = allowance(log.size)
         self._crc: int | None = 0 if self._summary.data_end < 0 or self._summary.data_crc else None
         self._crc_to = 0
@@ -101,16 +111,18 @@ class McapStream:
             ``log_too_large``, ``too_many_records``: it unpacks to far more than a log of its size holds.
         """
         waiting: list[Batch] = []
+        size = 0
         for batch in self._pieces():
             self._count(batch)
-            if batch.lost or sum(b.content.size for b in waiting) + batch.content.size > WINDOW:
+            if batch.lost or size + batch.content.size > WINDOW:
                 if waiting:
                     yield joined(waiting)
-                waiting = []
+                waiting, size = [], 0
             if batch.lost:
                 yield batch
             else:
                 waiting.append(batch)
+                size += batch.content.size
         if waiting:
             yield joined(waiting)
         expected = self._summary.messages
@@ -131,6 +143,10 @@ class McapStream:
             self._last_ns = int(batch.log_time.max())
 
     def _lose(self, lost: LostStretch, told: str = "") -> None:
+        if len(self.lost) >= _MOST_STRETCHES:
+            since = self.lost[-1].since_ns
+            self.lost[-1] = LostStretch(since, lost.until_ns, None, "the file is damaged in very many places")
+            return
         self.lost.append(lost)
         span = _span(lost) or "at a time unknown"
         count = f"{lost.messages} messages" if lost.messages is not None else "an unknown number of messages"
@@ -138,15 +154,17 @@ class McapStream:
 
     def _pieces(self) -> Iterator[Batch]:
         at, stop = len(MCAP_MAGIC), self._summary.stop
+        window = WINDOW
         while at < stop:
-            data = self._log.read(at, min(WINDOW, stop - at))
+            data = self._log.read(at, min(window, stop - at))
+            window = min(2 * window, WINDOW)
             buffer = as_bytes(data)
             opcode, first, end, reached = walk(buffer, 0, len(data))
             if reached == 0:
                 length = int.from_bytes(data[1:HEAD], "little") if len(data) >= HEAD else stop
-                if HEAD + length > stop - at:
+                if HEAD + length > stop - at or self._sound(at, *_alone(data[0], length)) == 0:
                     yield from self._mended(at)
-                    at = self._resume(at, stop)
+                    at, window = self._resume(at, stop), _FIRST_WINDOW
                     continue
                 if HEAD + length > _RECORD_LIMIT or data[0] not in (CHUNK, MESSAGE, SCHEMA, CHANNEL):
                     if data[0] in (CHUNK, MESSAGE):
@@ -168,7 +186,7 @@ class McapStream:
                     return
                 self._check_window(at, data, place - at)
                 yield from self._mended(place)
-                at = self._resume(place, stop)
+                at, window = self._resume(place, stop), _FIRST_WINDOW
                 continue
             self._check_window(at, data, reached)
             at += reached
@@ -184,10 +202,10 @@ class McapStream:
         # the walk is off where it steps over the beginning of a chunk that the summary knows
         beyond = np.searchsorted(self._expected, at + first - HEAD, side="right")
         strange |= np.searchsorted(self._expected, at + end, side="left") > beyond
-        for place in self._expected[
-            np.searchsorted(self._expected, at) : np.searchsorted(self._expected, at + end[-1])
-        ]:
-            strange |= (at + first - HEAD == place) & (end - first + HEAD != self._length[int(place)])
+        if self._expected.size:
+            own = np.minimum(np.searchsorted(self._expected, at + first - HEAD), self._expected.size - 1)
+            is_chunk = self._expected[own] == at + first - HEAD
+            strange |= is_chunk & (end - first + HEAD != self._lengths[own])
         found = np.flatnonzero(strange)
         return int(found[0]) if found.size else int(opcode.size)
 
@@ -258,15 +276,15 @@ class McapStream:
             return at + self._length[at]
         later = self._expected[self._expected > at]
         place = int(later[0]) if later.size else -1
-        look = at + 1
+        look, window = at + 1, _FIRST_WINDOW
         while place < 0 and look < stop and not self._summary.chunks:
-            data = self._log.read(look, min(WINDOW, stop - look))
+            data = self._log.read(look, min(window, stop - look))
             hit = chunk_after(as_bytes(data), stop - look)
-            if hit >= 0:
-                place = look + hit
-            elif len(data) < WINDOW:
+            place = look + hit if hit >= 0 else -1
+            if look + len(data) >= stop:
                 break
-            look += max(len(data) - 64, 1)
+            look += len(data) - _CHUNK_HEAD
+            window = min(2 * window, WINDOW)
         if place < 0:
             if self._summary.ended and self._summary.data_end > at:
                 return self._summary.data_end
@@ -314,6 +332,11 @@ class McapStream:
         if not self._summary.ended:
             self.notes.append("The end of the file is missing; its data section is whole.")
             self._summary.ended = True
+
+
+def _alone(opcode: int, length: int) -> tuple[NDArray[np.uint8], Index, Index]:
+    """Return one record as a walk tells it."""
+    return np.array([opcode], dtype=np.uint8), np.array([HEAD]), np.array([HEAD + length])
 
 
 def _span(lost: LostStretch) -> str:

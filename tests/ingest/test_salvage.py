@@ -200,10 +200,10 @@ def test_a_chunk_that_is_a_bomb_is_refused_and_the_rest_is_read(compression, cla
     monkeypatch.setattr(mcap_chunk, "CHUNK_LIMIT", 1 << 22)
     pack = {b"zstd": zstandard.ZstdCompressor().compress, b"lz4": lz4.frame.compress}[compression]
     evil = bomb(1 << 24, compression, lambda size: pack(bytes(size)), claim)
-    begin = time.perf_counter()
+    begin = time.process_time()
     readings, chunks, _ = kept(log(mend=lambda out, places: bytes(out) + evil)[0])
     assert chunks == set(range(CHUNKS)) and readings.partial
-    assert time.perf_counter() - begin < 1.0
+    assert time.process_time() - begin < 1.0
 
 
 def test_many_chunks_that_unpack_to_too_much_are_refused(monkeypatch):
@@ -223,3 +223,24 @@ def test_a_chunk_of_too_many_messages_is_refused(monkeypatch):
     with pytest.raises(DataRejected) as refused:
         read_log("a.mcap", data, PROFILE)
     assert refused.value.code == "too_many_records"
+
+
+def test_a_file_of_nothing_but_beginnings_of_chunks_takes_no_time_and_no_space():
+    head = struct.pack("<BQQQQI", 6, 40, START, START, 0, 1) + text(b"") + struct.pack("<Q", 0)
+    data = MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json"))
+    data += record(*message(START, START, 0, b'{"heading": 1}')) + (head + b"\xff" * 12) * 3_000
+    begin = time.process_time()
+    readings, _, numbers = kept(data)
+    assert numbers == [0] and len(readings.lost) <= 1_000 and len(readings.notes) <= 1_001
+    assert time.process_time() - begin < 3.0
+
+
+def test_a_large_record_of_another_kind_is_stepped_over_and_a_garbled_one_is_not():
+    data, places = log()
+    at = places[6][0]
+    attachment = record(9, bytes(9 << 20))
+    readings, _, numbers = kept(log(mend=lambda out, _: bytes(out) + attachment)[0])
+    assert numbers == whole(range(CHUNKS)) and not readings.partial
+    garbled = data[:at] + b"\x00" + struct.pack("<Q", len(data) - at - 100) + data[at + 9 :]
+    readings, chunks, _ = kept(garbled)
+    assert chunks == set(range(CHUNKS))
