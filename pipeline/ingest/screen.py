@@ -160,7 +160,7 @@ def _readings(decoded: Decoded, reason: Code, refused: dict[str, Code], log_form
         values_rejected=rejected.height - records_rejected,
         by_reason=dict(counts.iter_rows()),
     )
-    return Readings(frame, rejected, tally, tuple(decoded.notes), log_format)
+    return Readings(frame, rejected, tally, tuple(decoded.notes), log_format, decoded.lost)
 
 
 def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.DataFrame:
