@@ -124,8 +124,10 @@ class Cells:
         there = stop > start
         if buffer.size:
             last = buffer.size - 1
-            blank = is_blank(buffer[np.minimum(start, last)]) | is_blank(buffer[np.maximum(stop - 1, 0)])
-            at = np.flatnonzero(blank & there)
+            first, final = buffer[np.minimum(start, last)], buffer[np.maximum(stop - 1, 0)]
+            # every blank is a space or below it
+            at = np.flatnonzero((np.minimum(first, final) <= ord(" ")) & there)
+            at = at[is_blank(first[at]) | is_blank(final[at])]
             if at.size:
                 slim = trimmed(Spans(buffer, start[at], stop[at]))
                 start, stop = start.copy(), stop.copy()
@@ -137,6 +139,16 @@ class Cells:
         filled: Flag = self.stop > self.start
         return filled
 
+    def letter(self) -> Bytes:
+        """Return the one character of each text; 0 for an empty text, 255 for a longer one."""
+        length = self.stop - self.start
+        if self.buffer.size == 0:
+            return np.zeros(length.shape, dtype=np.uint8)
+        letter = self.buffer[np.minimum(self.start, self.buffer.size - 1)]
+        letter[length != 1] = 255
+        letter[length == 0] = 0
+        return letter
+
     def word(self) -> Word:
         """Return each text as a word, see `as_word`; `LONG` for one of more than eight characters."""
         length = self.stop - self.start
@@ -147,6 +159,10 @@ class Cells:
 
     def is_one_of(self, texts: tuple[str, ...] | frozenset[str]) -> Flag:
         """Tell which texts are one of some short ones."""
+        if max(map(len, texts), default=0) <= 1:
+            among = np.zeros(256, dtype=np.bool_)
+            among[[ord(text) if text else 0 for text in texts]] = True
+            return among[self.letter()]
         word = self.word()
         found = np.zeros(word.shape, dtype=np.bool_)
         for text in sorted(texts):

@@ -70,21 +70,18 @@ def parse(text: Spans) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np
     good = text.stop - text.start >= 19
     # a shorter text is none already: whatever stands behind it may be read
     first, second, third = (words(text.buffer, np.minimum(text.start + k, text.buffer.size)) for k in (0, 8, 16))
-    date, dashes = _between_signs(first, "0000-00-")
-    clock, signs = _between_signs(second & ~_BETWEEN, "00 00:00")
+    # neighbours mostly share their minute: each is read once
+    same = (first[1:] == first[:-1]) & (second[1:] == second[:-1])
+    heads = np.flatnonzero(np.append([True], ~same))
+    minutes, sound = _minutes(first[heads], second[heads])
+    often = np.diff(heads, append=n)
     seconds, colon = _between_signs(third & _SECONDS, ":00")
-    good &= dashes & signs & colon & np.isin(second & _BETWEEN, _MAY_STAND_BETWEEN)
-    year, month = date // 10_000, date // 10 % 1_000
-    day, hour, minute = clock // 1_000_000, clock // 1_000 % 1_000, clock % 1_000
-    days, exists = days_since_1970(year, month, day)
     # 60 is a leap second; it becomes the first of the next minute
-    good &= exists & (hour < 24) & (minute < 60) & (seconds <= 60)
-    # int64 nanoseconds hold the years 1678 to 2261
-    good &= (year > 1678) & (year < 2261)
+    good &= np.repeat(sound, often) & colon & (seconds <= 60)
     fraction, behind, whole = _fraction(text)
     shift, zoned, fits = _zone(text, behind)
     good &= whole & fits
-    seconds = days * 86_400 + hour * 3_600 + minute * 60 + seconds - shift
+    seconds += np.repeat(minutes * 60, often) - shift
     return np.where(good, np.where(good, seconds, 0) * SECOND_NS + fraction, 0), good, good & zoned
 
 
@@ -93,6 +90,19 @@ _BETWEEN = np.uint64(0xFF << 16)
 _MAY_STAND_BETWEEN = np.array([ord(sign) << 16 for sign in "Tt "], dtype=np.uint64)
 #: The sign and two digits at the beginning of the third word.
 _SECONDS = np.uint64(0xFFFFFF)
+
+
+def _minutes(first: Word, second: Word) -> tuple[_Int, _Flag]:
+    """Read YYYY-MM-DDThh:mm, cut in two words, as minutes since 1970."""
+    date, dashes = _between_signs(first, "0000-00-")
+    clock, signs = _between_signs(second & ~_BETWEEN, "00 00:00")
+    year, month = date // 10_000, date // 10 % 1_000
+    day, hour, minute = clock // 1_000_000, clock // 1_000 % 1_000, clock % 1_000
+    days, good = days_since_1970(year, month, day)
+    good &= dashes & signs & np.isin(second & _BETWEEN, _MAY_STAND_BETWEEN) & (hour < 24) & (minute < 60)
+    # int64 nanoseconds hold the years 1678 to 2261
+    good &= (year > 1678) & (year < 2261)
+    return days * 1_440 + hour * 60 + minute, good
 
 
 def _between_signs(word: Word, form: str) -> tuple[_Int, _Flag]:
@@ -115,13 +125,17 @@ def _fraction(text: Spans) -> tuple[_Int, _Int, _Flag]:
     sign = text.buffer[np.minimum(place, end - 1)]
     point = ((sign == ord(".")) | (sign == ord(","))) & (place < text.stop)
     place = place + point
-    early, late = (words(text.buffer, np.minimum(place + k, end)) for k in (0, 8))
-    count = leading_digits(early)
-    count += np.where(count == 8, leading_digits(late), 0)
-    count = np.where(point, np.clip(np.minimum(count, text.stop - place), 0, None), 0)
-    value = eight_digits(first_digits(early, np.minimum(count, 8))) * _POWER[9 - np.minimum(count, 8)]
-    ninth = (late & np.uint64(0xFF)).astype(np.int64) - ord("0")
-    return value + np.where(count >= 9, ninth, 0), place + count, ~point | (count > 0)
+    early = words(text.buffer, np.minimum(place, end))
+    count = np.where(point, np.clip(np.minimum(leading_digits(early), text.stop - place), 0, None), 0)
+    value = eight_digits(first_digits(early, count)) * _POWER[9 - count]
+    long = np.flatnonzero(count == 8)
+    if long.size:
+        late = words(text.buffer, np.minimum(place[long] + 8, end))
+        more = np.clip(np.minimum(leading_digits(late), text.stop[long] - place[long] - 8), 0, None)
+        ninth = (late & np.uint64(0xFF)).astype(np.int64) - ord("0")
+        value[long] += np.where(more > 0, ninth, 0)
+        count[long] += more
+    return value, place + count, ~point | (count > 0)
 
 
 def _zone(text: Spans, place: _Int) -> tuple[_Int, _Flag, _Flag]:

@@ -36,15 +36,17 @@ def time_of_day(cells: Cells) -> Nanoseconds:
     point = length > 6
     if point.any():
         good &= ~point | (cells.buffer[np.minimum(cells.start + 6, size)] == ord("."))
-    early, late = (words(cells.buffer, np.minimum(cells.start + k, size + 1)) for k in (7, 15))
+    early = words(cells.buffer, np.minimum(cells.start + 7, size + 1))
     told = np.clip(length - 7, 0, None)
     count = leading_digits(early)
-    count += np.where(count == 8, leading_digits(late), 0)
-    good &= (told <= count) | ~point
     first = np.minimum(np.where(point, told, 0), 8)
-    fraction = eight_digits(first_digits(early, first)) * _POWER[9 - first]
-    ninth = (late & np.uint64(0xFF)).astype(np.int64) - ord("0")
-    fraction += np.where(told >= 9, ninth, 0)
+    fraction = eight_digits(first_digits(early, np.minimum(first, count))) * _POWER[9 - first]
+    long = np.flatnonzero(told > 8)
+    if long.size:
+        late = words(cells.buffer, np.minimum(cells.start[long] + 15, size + 1))
+        count[long] += np.where(count[long] == 8, leading_digits(late), 0)
+        fraction[long] += (late & np.uint64(0xFF)).astype(np.int64) - ord("0")
+    good &= (told <= count) | ~point
     hours, minutes, seconds = value // 10_000, value // 100 % 100, value % 100
     # 60 is a leap second; it becomes the first of the next minute
     good &= (hours < 24) & (minutes < 60) & (seconds <= 60)
@@ -55,9 +57,13 @@ def date(cells: Cells) -> Nanoseconds:
     """Read ddmmyy as nanoseconds of its midnight since 1970; `NO_TIME` where it is none."""
     value, good = _digits(cells, 6)
     good &= cells.stop - cells.start == 6
+    # neighbours mostly share their day: each is read once
+    heads = np.flatnonzero(np.diff(value, prepend=-1))
+    often = np.diff(heads, append=value.size)
+    value = value[heads]
     day, month, year = value // 10_000, value // 100 % 100, value % 100
     days, exists = days_since_1970(year + np.where(year >= _CENTURY, 1900, 2000), month, day)
-    return np.where(good & exists, days * DAY_NS, NO_TIME)
+    return np.where(good & np.repeat(exists, often), np.repeat(days * DAY_NS, often), NO_TIME)
 
 
 def year_month_day(year: Cells, month: Cells, day: Cells) -> Nanoseconds:

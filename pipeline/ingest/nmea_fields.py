@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -41,22 +42,35 @@ class Fields:
     frames: Frames
     record: Index
 
-    @property
+    @cached_property
     def count(self) -> Index:
         """Number of fields behind the address, shape (m,)."""
         return self.frames.commas[self.record]
 
     def at(self, place: int) -> Cells:
         """Return the fields at a place, counted from 1; empty where a sentence ends before it."""
-        comma = self.frames.comma
-        buffer, stop = self.frames.body.buffer, self.frames.body.stop[self.record]
+        comma, stop = self.frames.comma, self._stop
         if comma.size == 0:
-            return Cells(buffer, stop, stop)
-        here = self.frames.first_comma[self.record] + place - 1
+            return Cells(self.frames.body.buffer, stop, stop)
+        here = self._first + (place - 1)
         start = comma[np.minimum(here, comma.size - 1)] + 1
         end = np.where(self.count > place, comma[np.minimum(here + 1, comma.size - 1)], stop)
-        there = self.count >= place
-        return Cells.of(buffer, np.where(there, start, stop), np.where(there, end, stop))
+        if self._fewest < place:
+            there = self.count >= place
+            start, end = np.where(there, start, stop), np.where(there, end, stop)
+        return Cells.of(self.frames.body.buffer, start, end)
+
+    @cached_property
+    def _stop(self) -> Index:
+        return self.frames.body.stop[self.record]
+
+    @cached_property
+    def _first(self) -> Index:
+        return self.frames.first_comma[self.record]
+
+    @cached_property
+    def _fewest(self) -> int:
+        return int(self.count.min(initial=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,17 +154,17 @@ def _read_field(fields: Fields, item: NmeaField) -> tuple[Float, Flag]:
         minutes = value - 100.0 * degrees
         value = np.where(minutes < 60.0, degrees + minutes / 60.0, np.nan)
     if item.letter is not None and item.factors is not None:
-        letter = fields.at(item.letter)
-        factor = np.full(value.shape, np.nan)
+        factor = np.full(256, np.nan)
         for name, times in item.factors.items():
-            factor[letter.is_one_of((name,))] = times
-        value = value * factor
+            factor[ord(name)] = times
+        value = value * factor[fields.at(item.letter).letter()]
     return value * factor_to_si(item.unit, CHANNELS[item.channel].unit, item.channel), cells.there()
 
 
 def east(letter: Cells) -> Float:
     """Return 1 for E, -1 for W, NaN for any other letter."""
-    return np.where(letter.is_one_of(("E",)), 1.0, np.where(letter.is_one_of(("W",)), -1.0, np.nan))
+    side = letter.letter()
+    return np.where(side == ord("E"), 1.0, np.where(side == ord("W"), -1.0, np.nan))
 
 
 def _read_magnetic(said: Said) -> None:

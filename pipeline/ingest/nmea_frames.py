@@ -151,10 +151,10 @@ def _cuts(buffer: Bytes) -> list[tuple[int, int]]:
     cuts = [0]
     look = _BLOCK
     while cuts[-1] + look < buffer.size:
-        part = buffer[cuts[-1] + look - _BLOCK : cuts[-1] + look]
-        ends = np.flatnonzero((part == _FEED) | (part == _RETURN))
-        if ends.size:
-            cuts.append(cuts[-1] + look - _BLOCK + int(ends[-1]) + 1)
+        part = buffer[cuts[-1] + look - _BLOCK : cuts[-1] + look].tobytes()
+        end = max(part.rfind(b"\n"), part.rfind(b"\r"))
+        if end >= 0:
+            cuts.append(cuts[-1] + look - _BLOCK + end + 1)
             look = _BLOCK
         else:
             look += _BLOCK

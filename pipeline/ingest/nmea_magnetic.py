@@ -35,6 +35,8 @@ def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
         A note where a variation was carried from one sentence to another.
     """
     notes: list[str] = []
+    if not {"HDG", "HDM"} & set(said):
+        return notes
     carried = _told(frames, said)
     for name in ("HDG", "HDM"):
         if name not in said:
