@@ -120,8 +120,8 @@ def page(found: list[Measured], lines: int) -> list[str]:
         *table(head, rows),
         "",
         "*decoded*: bytes to channels in SI with their times. *read*: unpacked, decoded, screened for clock, "
-        "repetition and range, and every refusal listed with its reason and its line. pynmea2 parses every line, checks its "
-        "checksum and reads every field; it gives no units, no times and no ledger, and starts from unpacked bytes.",
+        "repetition and range, and every refusal listed with its reason and its line. pynmea2 parses every line, "
+        "checks its checksum and reads every field; it gives no units, no times and no ledger.",
         "",
         "The generated logs mix every sentence that is read with AIS, proprietary and satellite ones, ten a second "
         "over midnight: with a stamp, without, and with a TAG block in front of each. The real logs are short: the "

@@ -169,6 +169,17 @@ class Cells:
             found |= word == as_word(text)
         return found
 
+    def integer(self) -> tuple[NDArray[np.int64], Flag]:
+        """Return each text of one to sixteen digits as an integer, zero for any other, and which are such."""
+        length = self.stop - self.start
+        good = (length >= 1) & (length <= 16)
+        length = np.where(good, length, 0)
+        stop = np.where(good, self.stop, 0)
+        late = last_digits(words(self.buffer, stop - 8), np.minimum(length, 8))
+        early = last_digits(words(self.buffer, np.maximum(stop - 16, -8)), np.maximum(length - 8, 0))
+        good &= all_digits(late) & all_digits(early)
+        return np.where(good, eight_digits(early) * 100_000_000 + eight_digits(late), 0), good
+
     def number(self) -> Float:
         """Return each text as a number; NaN where it is none.
 

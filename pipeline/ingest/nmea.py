@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 
 from pipeline.ingest.decoded import CODE, NO_TIME, Code, Decoded, Values
@@ -24,7 +26,8 @@ def decode(data: bytes, name: str = "log", source: Source | None = None) -> Deco
 
     A record is a line that is not blank. RMC, ZDA, GGA and GLL tell their own time; any other sentence has that of its
     stamp, or in a log without stamps the time of the latest of those four before it - of the next one behind
-    it, where VTG shows that the receiver sends its fix last.
+    it, where VTG shows that the receiver sends its fix last. What comes several times between two fixes is spread
+    evenly over the time between them.
 
     Parameters
     ----------
@@ -51,17 +54,20 @@ def decode(data: bytes, name: str = "log", source: Source | None = None) -> Deco
     reason = frames.reason.copy()
     kind = _kinds(frames)
     said: dict[str, Said] = {}
-    for code, letters in enumerate(SENTENCES):
-        record = np.flatnonzero((kind == code) & (reason == 0))
-        if record.size:
-            said[letters] = read_type(frames, record, letters)
+    read = np.flatnonzero((kind >= 0) & (reason == 0))
+    # numbers of one byte are sorted by counting them
+    read = read[np.argsort(kind[read].astype(np.int8), kind="stable")]
+    bounds = np.searchsorted(kind[read], np.arange(len(SENTENCES) + 1))
+    for letters, (first, last) in zip(SENTENCES, pairwise(bounds.tolist()), strict=True):
+        if last > first:
+            said[letters] = read_type(frames, read[first:last], letters)
     reason[(kind < 0) & (reason == 0)] = CODE[Reason.NO_CHANNEL]
     notes = [*both_rudders(frames, said), *make_true(frames, said)]
     channels: dict[str, Values] = {}
     for what in said.values():
         reason[what.record] = what.reason
-        for channel, (read, there) in what.values.items():
-            value = read
+        for channel, (read_value, there) in what.values.items():
+            value = read_value
             put = there & (what.reason == 0)
             for code, (factor, offset) in mended.get(channel, {}).items():
                 mine = frames.address[what.record] == code

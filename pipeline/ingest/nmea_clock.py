@@ -11,6 +11,7 @@ from pipeline.ingest.iso_time import DAY_NS, SECOND_NS
 from pipeline.ingest.nmea_calendar import date, mend_rollover, time_of_day, year_month_day
 from pipeline.ingest.nmea_fields import Said
 from pipeline.ingest.nmea_frames import Frames
+from pipeline.ingest.nmea_spread import spread
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.spans import Index
 from schemas.nmea import SATELLITES, SENTENCES
@@ -100,7 +101,38 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> Clock:
     n = own.size
     carrier = _next(fix) if follows else _latest(fix)
     carried = np.where((carrier >= 0) & (carrier < n), own[np.clip(carrier, 0, max(n - 1, 0))], NO_TIME)
-    return Clock(np.where(own != NO_TIME, own, carried), notes)
+    return Clock(
+        np.where(own != NO_TIME, own, carried + _delays(frames, said, own, fix, carried, follows, notes)), notes
+    )
+
+
+def _delays(
+    frames: Frames,
+    said: dict[str, Said],
+    own: Nanoseconds,
+    fix: Flag,
+    carried: Nanoseconds,
+    follows: bool,
+    notes: list[str],
+) -> Nanoseconds:
+    """Return what is added to the time of the fix for the sentences that share it with others of their source."""
+    source = np.full(own.size, -1, dtype=np.int64)
+    for name, what in said.items():
+        good = (what.reason == 0) & (own[what.record] == NO_TIME) & (carried[what.record] != NO_TIME)
+        # an instrument may tell roll and pitch in two sentences of one address: these are one measurement
+        kinds = (
+            [there.astype(np.int64) << k for k, (_, there) in enumerate(what.values.values())] if name == "XDR" else []
+        )
+        source[what.record] = np.where(good, frames.address[what.record] * 4 + sum(kinds), -1)
+    record, at = np.flatnonzero(source >= 0), np.flatnonzero(fix)
+    delay, shared = spread(own[at], at, record, source[record], follows=follows)
+    delays = np.zeros(own.size, dtype=np.int64)
+    delays[record] = delay
+    several = np.flatnonzero(np.bincount(frames.address[record[shared > 1]]))
+    if several.size:
+        names = ", ".join(sorted(frames.names[code] for code in several))
+        notes.append(f"Sentences that come several times between two fixes were spread evenly over it: {names}.")
+    return delays
 
 
 def _told(frames: Frames, said: dict[str, Said]) -> tuple[_Told, int]:
@@ -131,7 +163,7 @@ def _of_a_dated_talker(frames: Frames, dated: Flag) -> Flag:
     their time, but carries none to others.
     """
     talker = ["GN" if name[:2] in SATELLITES else name[:2] for name in frames.names]
-    talkers = {talker[code] for code in np.unique(frames.address[dated]) if code >= 0}
+    talkers = {talker[code] for code in np.flatnonzero(np.bincount(frames.address[dated]))}
     of_name = [one in talkers for one in talker]
     return np.array([*of_name, False], dtype=np.bool_)[frames.address]
 

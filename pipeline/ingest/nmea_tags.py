@@ -97,8 +97,7 @@ def _times(buffer: Bytes, opening: Index, star: Index) -> tuple[Nanoseconds, Fla
     told = first_within(colon, opening, star)
     stop = first_within(ends, np.where(told >= 0, told, star), star + 1)
     timed = (told >= 0) & (stop >= 0)
-    value = Cells.of(buffer, np.where(timed, told + 1, 0), np.where(timed, stop, 0)).number()
-    timed &= np.isfinite(value) & (value > 0) & (value < 1000.0 * _SECONDS_END)
-    value = np.where(timed, value, 0.0)
-    milliseconds = np.round(np.where(value > _SECONDS_END, value, value * 1e3)).astype(np.int64)
-    return milliseconds * (SECOND_NS // 1000), timed
+    value, whole = Cells(buffer, np.where(timed, told + 1, 0), np.where(timed, stop, 0)).integer()
+    timed &= whole & (value < 1000 * _SECONDS_END)
+    milliseconds = np.where(value > _SECONDS_END, value, value * 1000)
+    return np.where(timed, milliseconds * (SECOND_NS // 1000), 0), timed

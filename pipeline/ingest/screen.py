@@ -78,6 +78,9 @@ def _by_source(decoded: Decoded, reason: Code) -> list[Index]:
     """Return the good records of each source, in the order of the file."""
     good = np.flatnonzero(reason == 0)
     source = decoded.source[good]
+    if len(decoded.source_names) <= np.iinfo(np.int16).max:
+        # numbers of two bytes are sorted by counting them
+        source = source.astype(np.int16)
     order = np.argsort(source, kind="stable")
     cuts = np.flatnonzero(np.diff(source[order])) + 1
     return [part for part in np.split(good[order], cuts) if part.size]
@@ -172,8 +175,8 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
     distinct = np.unique(record)
     text = decoded.raw.take(distinct).text()
     time = decoded.time_utc_ns[record]
-    names = np.array([None, *(str(r) for r in REASONS)], dtype=object)
-    words = np.concatenate([names[code[where]] for where, _, code in parts])
+    words = pl.Series([None, *(str(r) for r in REASONS)], dtype=pl.String)
+    codes = np.concatenate([code[where] for where, _, code in parts])
     table = pl.DataFrame(
         {
             "record": record,
@@ -182,7 +185,7 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
             "channel": pl.concat(
                 [pl.repeat(name, where.size, dtype=pl.String, eager=True) for where, name, _ in parts]
             ),
-            "reason": pl.Series(words.tolist(), dtype=pl.String),
+            "reason": words.gather(codes.astype(np.int64)),
             "raw": text.gather(np.searchsorted(distinct, record)),
         },
         schema=REJECTED_SCHEMA,

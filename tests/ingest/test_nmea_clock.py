@@ -148,3 +148,32 @@ def test_a_receiver_without_a_fix_tells_no_date_where_another_does():
     readings = read(*lines)
     assert times(readings) == [START, START]
     assert readings.tally.by_reason == {"void": 1}
+
+
+def test_sentences_faster_than_the_fix_are_spread_over_the_time_between_two():
+    lines = []
+    for k in range(4):
+        lines += [rmc(START + timedelta(seconds=k)), *(sentence(f"HEHDT,{k}.{j},T") for j in range(5))]
+    readings = read(*lines)
+    heading = readings.frame.filter(readings.frame["source"] == "HEHDT")["time_utc_ns"].to_numpy()
+    assert (heading - int(START.timestamp()) * 10**9).tolist() == [k * 200_000_000 for k in range(20)]
+    assert readings.notes[0].endswith("spread evenly over it: HEHDT.")
+
+
+def test_a_pause_of_the_log_is_not_filled():
+    when = [START + timedelta(seconds=s) for s in (0, 1, 2, 3, 600, 601)]
+    lines = [
+        line for w in when for line in (rmc(w), sentence(f"HEHDT,{w.second}.0,T"), sentence(f"HEHDT,{w.second}.5,T"))
+    ]
+    readings = read(*lines)
+    heading = [t for t, s in zip(times(readings), readings.frame["source"], strict=True) if s == "HEHDT"]
+    assert heading[7] - heading[6] == timedelta(seconds=1.5)
+    assert heading[9] - heading[8] == timedelta(seconds=0.5)
+
+
+def test_two_transducer_sentences_of_one_instant_stay_together():
+    lines = []
+    for k in range(4):
+        roll, pitch = sentence(f"YXXDR,A,{k}.0,D,ROLL"), sentence(f"YXXDR,A,{k}.5,D,PTCH")
+        lines += [rmc(START + timedelta(seconds=k)), roll, pitch]
+    assert set(times(read(*lines))) == {START + timedelta(seconds=k) for k in range(4)}
