@@ -15,6 +15,9 @@ Dress = Literal["plain", "stamped", "tagged"]
 #: Start of the log, UTC seconds since 1970: 2025-05-03 22:00, so that an hour and a half in the day ends.
 START_S = 1_746_309_600
 
+#: Every dress.
+DRESSES: tuple[Dress, ...] = ("stamped", "plain", "tagged")
+
 Body = Callable[[str, str, np.random.Generator], str]
 
 
