@@ -94,8 +94,13 @@ def as_bytes(data: bytes) -> Bytes:
 
 
 def lines_of(buffer: Bytes) -> Spans:
-    """Cut a buffer at its line feeds; the line feeds and carriage returns before them are left out."""
+    """Cut a buffer at its line feeds, without them and the carriage returns before them.
+
+    A buffer without any line feed is cut at its carriage returns.
+    """
     feeds = np.flatnonzero(buffer == 10).astype(np.int64)
+    if feeds.size == 0:
+        feeds = np.flatnonzero(buffer == 13).astype(np.int64)
     start = np.concatenate((np.zeros(1, dtype=np.int64), feeds + 1))
     stop = np.concatenate((feeds, np.full(1, buffer.size, dtype=np.int64)))
     if buffer.size:

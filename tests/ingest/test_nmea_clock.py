@@ -177,3 +177,7 @@ def test_two_transducer_sentences_of_one_instant_stay_together():
         roll, pitch = sentence(f"YXXDR,A,{k}.0,D,ROLL"), sentence(f"YXXDR,A,{k}.5,D,PTCH")
         lines += [rmc(START + timedelta(seconds=k)), roll, pitch]
     assert set(times(read(*lines))) == {START + timedelta(seconds=k) for k in range(4)}
+
+
+def test_a_log_of_carriage_returns_that_begins_in_the_middle_of_a_line_is_told_by_its_content():
+    assert sniff(b"54.0,N,0\r" + b"\r".join(sentence(f"HEHDT,{k}.0,T").encode() for k in range(9))) == "nmea"
