@@ -68,6 +68,7 @@ def run(
     seed : int
         Of every choice; the same iterations of the same code give the same inputs.
     seconds : float
+        Of the processor, so that a busy machine gets as much done.
     iterations : int, optional
         Whichever ends first.
     before : callable, optional
@@ -83,8 +84,8 @@ def run(
         pool = inputs(reader)
         for name, data in [*pool, *([] if reader == "profile" else packed(*pool[0]))]:
             assert judge(name, data)[0] != "refused", f"{name} is no valid input"
-        begin, floor = perf_counter(), _peak()
-        while perf_counter() - begin < seconds and (iterations is None or found.iterations < iterations):
+        begin, floor = process_time(), _peak()
+        while process_time() - begin < seconds and (iterations is None or found.iterations < iterations):
             name, data = mutator.next(pool)
             if before is not None:
                 before(name, data)
@@ -97,7 +98,7 @@ def run(
             if outcome not in found.outcomes and len(pool) < _POOL and outcome[0] not in ("refused", "wrong"):
                 pool.append((name, data))
             found.outcomes[outcome] = found.outcomes.get(outcome, 0) + 1
-        found.seconds = perf_counter() - begin
+        found.seconds = process_time() - begin
     return found
 
 
