@@ -138,8 +138,19 @@ _ALL = (
             NmeaField(7, _THROUGH_WATER, "kn", letter=8, factors=_KILOMETRES),
         ),
     ),
-    Sentence("VBW", "dual ground and water speed", 3, (NmeaField(1, _THROUGH_WATER, "kn"),), {3: "A"}),
-    Sentence("VLW", "distance travelled through the water and over ground", 2),
+    Sentence(
+        "VBW",
+        "dual ground and water speed",
+        3,
+        (NmeaField(1, _THROUGH_WATER, "kn"), NmeaField(2, "lateral_speed_through_water", "kn")),
+        valid={3: "A"},
+    ),
+    Sentence(
+        "VLW",
+        "distance travelled through the water, in all and since a reset",
+        2,
+        (NmeaField(1, "distance_through_water", "nmi", letter=2, factors={"N": 1.0}),),
+    ),
     Sentence(
         "MWV",
         "wind speed and angle",
@@ -151,7 +162,16 @@ _ALL = (
         valid={5: "A"},
         carries={2: ("R",)},
     ),
-    Sentence("MWD", "true wind speed and direction", 8),
+    Sentence(
+        "MWD",
+        "true wind speed and direction",
+        8,
+        (
+            NmeaField(1, "true_wind_direction", "deg", letter=2, factors=_TRUE),
+            NmeaField(5, "true_wind_speed", "kn", letter=6, factors=_KNOTS),
+            NmeaField(7, "true_wind_speed", "kn", letter=8, factors={"M": 1.0 / _KNOT}),
+        ),
+    ),
     Sentence(
         "RPM",
         "shaft revolutions of the single or first shaft",
@@ -185,8 +205,8 @@ SPECIAL: dict[str, dict[str, str]] = {
     "XDR": {"roll": "deg", "pitch": "deg"},
 }
 
-#: Sentences that are read for their time alone, or say nothing of a canonical channel.
-SILENT: frozenset[str] = frozenset({"ZDA", "VLW", "MWD"})
+#: Sentences that are read for their time alone.
+SILENT: frozenset[str] = frozenset({"ZDA"})
 
 #: Names under which XDR transducers of type A (angle), unit D (degrees) report roll and pitch.
 XDR_ANGLES: dict[str, str] = {"ROLL": "roll", "PTCH": "pitch", "PITCH": "pitch"}

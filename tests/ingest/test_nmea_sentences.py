@@ -66,6 +66,14 @@ def rpm(m):
     return {"shaft_speed": number(m.speed, 1 / 60)} if shaft else None
 
 
+def vbw(m):
+    said = {
+        "speed_through_water": number(m.lon_water_spd, KN),
+        "lateral_speed_through_water": number(m.trans_water_spd, KN),
+    }
+    return said if m.data_validity_water_spd == "A" else None
+
+
 #: What a sentence says by the independent decoder, channel -> SI; None where it is void or silent.
 EXPECTED = {
     "RMC": rmc,
@@ -80,7 +88,13 @@ EXPECTED = {
     "ROT": lambda m: {"yaw_rate": number(m.rate_of_turn, DEG / 60)} if m.status == "A" else None,
     "RSA": lambda m: {"rudder_angle": number(m.rsa_starboard, DEG)} if m.rsa_starboard_status == "A" else None,
     "VHW": lambda m: {"speed_through_water": number(m.water_speed_knots, KN)},
-    "VBW": lambda m: {"speed_through_water": number(m.lon_water_spd, KN)} if m.data_validity_water_spd == "A" else None,
+    "VBW": vbw,
+    # a logger wrote sentences into each other whose checksum holds all the same
+    "VLW": lambda m: {"distance_through_water": number(m.data[0], 1852.0)} if "$" not in "".join(m.data) else None,
+    "MWD": lambda m: {
+        "true_wind_direction": number(m.direction_true, DEG),
+        "true_wind_speed": number(m.wind_speed_knots, KN),
+    },
     "MWV": mwv,
     "RPM": rpm,
     "DPT": lambda m: {"water_depth": number(m.depth)},
@@ -171,6 +185,8 @@ generated = st.one_of(
     of("RSA", decimal(-40, 40), status, "", ""),
     of("VHW", "", "T", "", "M", decimal(0, 40), "N", "", "K"),
     of("VBW", decimal(-5, 40), decimal(-3, 3), status, "", "", "V"),
+    of("VLW", decimal(0, 9000), "N", decimal(0, 90), "N"),
+    of("MWD", maybe(angle), "T", "", "M", decimal(0, 60), "N", "", "M"),
     of("MWV", angle, st.sampled_from("RT"), decimal(0, 60), st.sampled_from("MNK"), status),
     of("RPM", st.sampled_from("SE"), st.sampled_from("012"), decimal(-200, 200), "", status),
     of("DPT", decimal(0, 900), "0.0"),
@@ -236,6 +252,8 @@ def test_a_port_rudder_alone_is_the_rudder():
         ("SDDBT,100.0,f,,M,,F", "water_depth_m", 30.48),
         ("SDDBT,,f,,M,10.0,F", "water_depth_m", 18.288),
         ("HETHS,90.0,A", "heading_rad", math.pi / 2),
+        ("WIMWD,,T,240.3,M,,N,1.2,M", "true_wind_speed_m_s", 1.2),
+        ("VDVLW,10.0,N,2.5,N", "distance_through_water_m", 18520.0),
     ],
 )
 def test_an_empty_field_is_read_from_its_neighbour_in_another_unit(body, name, value):
@@ -250,8 +268,7 @@ def test_an_empty_field_is_read_from_its_neighbour_in_another_unit(body, name, v
         ("GPGGA,074701.15,5954.0,N,02436.0,E,6,08,1.0,1,M,,M,,", "void"),
         ("GPGLL,5954.0,N,02436.0,E,074701.15,A,S", "void"),
         ("GPVTG,1.0,T,,M,5.0,N,,K,N", "void"),
-        ("VDVLW,2354.9,N,2338.5,N", "no_channel"),
-        ("WIMWD,242.5,T,240.3,M,2.4,N,1.2,M", "no_channel"),
+        ("WIMWV,23.3,T,13.1,M,A", "no_channel"),
     ],
 )
 def test_what_an_instrument_does_not_measure_is_refused(body, reason):
