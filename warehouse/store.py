@@ -19,7 +19,7 @@ from schemas.errors import KempfError, NotFound, UsageError
 
 #: Name and content of the file that marks a warehouse.
 MARKER = "kempf-warehouse.json"
-LAYOUT = 1
+LAYOUT = 2
 
 #: Characters that the readers of the tables give another meaning: escapes, patterns, and = as a partition's folder.
 _UNADDRESSABLE = "%=[]*?^|{}" if os.sep == "\\" else "%=[]*?^|{}\\"

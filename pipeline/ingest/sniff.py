@@ -30,7 +30,7 @@ def sniff(data: bytes) -> Format | None:
     """
     if data.startswith(MCAP_MAGIC):
         return "mcap"
-    lines = [line for line in data[:SAMPLE].split(b"\n") if line.strip()]
+    lines = [line for line in re.split(rb"[\r\n]", data[:SAMPLE]) if line.strip()]
     if lines and sum(bool(_SENTENCE.match(line.lstrip(b"\0"))) for line in lines) >= _SHARE * len(lines):
         return "nmea"
     sample = data[:SAMPLE].replace(b"\xef\xbb\xbf", b"", 1)
