@@ -7,7 +7,8 @@ under `warehouse.retry.with_retry`. (Merges lose the units in the field metadata
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
@@ -112,14 +113,15 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
         return table
     warehouse.create()
     try:
-        DeltaTable.create(
-            warehouse.address(name),
-            schema=arrow_schema(TABLES[name]),
-            mode="ignore",
-            partition_by=list(TABLES[name].partition_by) or None,
-            configuration=_CONFIGURATION,
-            storage_options=warehouse.options,
-        )
+        with writing(warehouse.address(name)):
+            DeltaTable.create(
+                warehouse.address(name),
+                schema=arrow_schema(TABLES[name]),
+                mode="ignore",
+                partition_by=list(TABLES[name].partition_by) or None,
+                configuration=_CONFIGURATION,
+                storage_options=warehouse.options,
+            )
     except DeltaError:  # another writer made it at the same moment
         if open_table(warehouse, name) is None:
             raise
@@ -205,7 +207,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
     deltalake.exceptions.CommitFailedError
         Another writer changed what the predicate names: read again, see `warehouse.retry.with_retry`.
     KempfError
-        ``warehouse_not_writable``.
+        ``disk_full``, ``warehouse_not_writable``.
     """
     import polars as pl
     import pyarrow as pa
@@ -216,7 +218,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
         data = new.select(schema.names).to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema)
     else:
         data = pa.Table.from_pylist(list(new), schema=schema)
-    try:
+    with writing(table.table_uri):
         write_deltalake(
             table,
             data,
@@ -224,8 +226,29 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
             predicate=predicate,
             writer_properties=WriterProperties(compression="ZSTD"),
         )
+
+
+@contextmanager
+def writing(address: str) -> Iterator[None]:
+    """Tell what the storage refuses while something is written to an address as one clear error.
+
+    Raises
+    ------
+    KempfError
+        ``disk_full``, ``warehouse_not_writable``.
+    """
+    from deltalake.exceptions import DeltaError
+
+    try:
+        yield
     except OSError as error:
-        raise not_writable(table.table_uri, error) from error
+        raise not_writable(address, error) from error
+    except DeltaError as error:
+        # a commit that the disk has no room for is no lost race: trying it again would not help
+        told = not_writable(address, OSError(str(error)))
+        if told.code == "disk_full":
+            raise told from error
+        raise
 
 
 def versions(warehouse: Warehouse) -> dict[str, int]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from json import loads
 from typing import TYPE_CHECKING, Any
 
@@ -95,6 +95,35 @@ def get(warehouse: Warehouse, name: str) -> ParameterSet:
             {"beginning": name, "found": found},
         )
     return get(warehouse, found[0])
+
+
+def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
+    """Return the parameter sets of a vessel, all or some of them by their whole ids, in one reading of the table.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    names : collection of str, optional
+        Ids; one that she does not have is left out.
+
+    Returns
+    -------
+    list of ParameterSet
+        Sorted by start, then id.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    if names is not None and not names:
+        warehouse.require()
+        return []
+    hers: dict[str, str | list[str]] = {"vessel_key": vessel_key(vessel)}
+    chosen = hers if names is None else {**hers, "parameter_set_id": sorted(names)}
+    frame = delta.read(warehouse, "parameter_sets", chosen).sort("start_utc_ns", "parameter_set_id")
+    return [_set(row) for row in frame.rows(named=True)]
 
 
 def summaries(warehouse: Warehouse, vessel: str | None = None) -> pl.DataFrame:
