@@ -24,6 +24,8 @@ if TYPE_CHECKING:
 
 #: Tables that grow by single rows; readings come in whole files and are left alone.
 _SMALL = ("vessels", "logs", "segments", "parameter_sets", "diagnoses", "aliases", "runs")
+#: Rows that are read or skipped together.
+_ROW_GROUP = 8192
 #: Tables that ``history --as-of`` reads at any time there ever was: every version of them is kept.
 ALWAYS = ("logs", "parameter_sets")
 #: A writer that has not committed yet is at most so old, hours; its files must not be taken from under it.
@@ -56,6 +58,9 @@ class Cleared:
 def compact(warehouse: Warehouse, more_files_than: int = 50) -> tuple[str, ...]:
     """Compact the tables that have many files. Earlier versions stay readable: nothing is deleted.
 
+    A table that is not kept a folder a vessel is sorted by vessel, in small groups of rows, so that reading one vessel
+    skips the others. A table of many files is given a checkpoint, which opens several times as fast as its commits.
+
     Parameters
     ----------
     warehouse : Warehouse
@@ -73,10 +78,10 @@ def compact(warehouse: Warehouse, more_files_than: int = 50) -> tuple[str, ...]:
     NotFound
         ``no_warehouse``.
     KempfError
-        ``warehouse_not_writable``.
+        ``disk_full``, ``warehouse_not_writable``.
     """
     warehouse.require()
-    return tuple(name for name in _SMALL if with_retry(partial(_one, warehouse, name, more_files_than)))
+    return tuple(name for name in TABLES if with_retry(partial(_one, warehouse, name, more_files_than)))
 
 
 def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
@@ -85,9 +90,17 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
     table = delta.open_table(warehouse, name)
     if table is None or len(table.file_uris()) <= more_files_than:
         return False
+    written = WriterProperties(compression="ZSTD", max_row_group_size=_ROW_GROUP)
+    sortable = "vessel_key" in {c.name for c in TABLES[name].columns} - set(table.metadata().partition_columns)
     with delta.writing(warehouse.address(name)):
-        metrics = table.optimize.compact(writer_properties=WriterProperties(compression="ZSTD"))
-    return int(metrics["numFilesRemoved"]) > 0
+        removed = 0
+        if name in _SMALL and sortable:
+            removed = table.optimize.z_order(["vessel_key"], writer_properties=written)["numFilesRemoved"]
+        elif name in _SMALL:
+            removed = table.optimize.compact(writer_properties=written)["numFilesRemoved"]
+        if warehouse.size_of(name, "_delta_log", f"{table.version():020d}.checkpoint.parquet") is None:
+            table.create_checkpoint()
+    return int(removed) > 0
 
 
 def pinned(warehouse: Warehouse) -> dict[str, tuple[int, ...]]:

@@ -16,6 +16,7 @@ from urllib.parse import unquote
 
 from schemas.errors import KempfError, NotFound
 from schemas.tables import TABLES, arrow_schema
+from warehouse import handles
 from warehouse.store import Warehouse, not_writable
 
 if TYPE_CHECKING:
@@ -130,6 +131,17 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
     return made
 
 
+@contextmanager
+def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
+    """Lend a table for reading, deciding and writing; it is made, and the warehouse too, where it is not there.
+
+    What was lent is not to be used after. One over which a commit failed is opened anew the next time.
+    """
+    with handles.borrowed(warehouse, name, ensure_table) as table:
+        assert table is not None
+        yield table
+
+
 def read(
     warehouse: Warehouse, name: str, where: Where | None = None, columns: Sequence[str] = (), version: int | None = None
 ) -> pl.DataFrame:
@@ -161,7 +173,26 @@ def read(
         ``table_unreadable``.
     """
     warehouse.require()
-    return rows(open_table(warehouse, name, version), name, where, columns)
+    with reading(warehouse, name, version) as table:
+        return rows(table, name, where, columns)
+
+
+@contextmanager
+def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iterator[DeltaTable | None]:
+    """Lend a table for reading, as `open_table` opens it; what was lent is not to be used after, and not to be written.
+
+    Raises
+    ------
+    NotFound
+        ``no_table_version``.
+    KempfError
+        ``table_unreadable``.
+    """
+    if version is not None:
+        yield open_table(warehouse, name, version)
+        return
+    with handles.borrowed(warehouse, name, open_table) as table:
+        yield table
 
 
 def rows(table: DeltaTable | None, name: str, where: Where | None = None, columns: Sequence[str] = ()) -> pl.DataFrame:
@@ -176,7 +207,8 @@ def rows(table: DeltaTable | None, name: str, where: Where | None = None, column
         lazy = pl.scan_delta(table)
     for column, value in (where or {}).items():
         # one value prunes files by their statistics
-        lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))
+        one = value if isinstance(value, str) else value[0] if len(value) == 1 else None
+        lazy = lazy.filter(pl.col(column) == one if one is not None else pl.col(column).is_in(value))
     try:
         return (lazy.select(columns) if columns else lazy).collect()
     except (OSError, pl.exceptions.ComputeError, pl.exceptions.PanicException) as error:
@@ -194,7 +226,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
     Parameters
     ----------
     table : DeltaTable
-        Opened by `ensure_table`; what was read from it is what the commit rests on.
+        Lent by `ensured`; what was read from it is what the commit rests on.
     name : str
         Its name.
     new : sequence of dict, or polars.DataFrame
@@ -253,8 +285,12 @@ def writing(address: str) -> Iterator[None]:
 
 def versions(warehouse: Warehouse) -> dict[str, int]:
     """Return the newest version of every table that was written, for the provenance of what is made from them."""
-    opened = {name: open_table(warehouse, name) for name in TABLES}
-    return {name: table.version() for name, table in opened.items() if table is not None}
+    found = {}
+    for name in TABLES:
+        with reading(warehouse, name) as table:
+            if table is not None:
+                found[name] = table.version()
+    return found
 
 
 def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | None:
@@ -263,10 +299,10 @@ def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | N
     Commit times are those written into the commits, which copying a warehouse keeps; where clocks of two writers
     disagree a version counts as no older than the one before it.
     """
-    table = open_table(warehouse, name)
-    if table is None:
-        return None
-    commits = sorted((entry["version"], entry["timestamp"]) for entry in table.history())
+    with reading(warehouse, name) as table:
+        if table is None:
+            return None
+        commits = sorted((entry["version"], entry["timestamp"]) for entry in table.history())
     limit_ms = instant.astimezone(UTC).timestamp() * 1000.0
     known = list(accumulate((stamp for _, stamp in commits), max))
     held = [version for (version, _), stamp in zip(commits, known, strict=True) if stamp <= limit_ms]

@@ -50,17 +50,18 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
     keys = {vessel_key(one.vessel) for one in given.values()}
 
     def attempt() -> tuple[str, ...]:
-        table = delta.ensure_table(warehouse, "parameter_sets")
-        known = delta.rows(table, "parameter_sets", {"parameter_set_id": sorted(given)})
-        stored = [_set(r) for r in known.rows(named=True)]
-        for one in stored:
-            _refuse_other(one, given[one.parameter_set_id])
-        fresh = [name for name in given if name not in {one.parameter_set_id for one in stored}]
-        if fresh:
-            rows = [_as_columns(given[name]) for name in fresh]
-            predicate = f"{one_of('vessel_key', keys)} AND {one_of('parameter_set_id', fresh)}"
-            delta.replace(table, "parameter_sets", rows, predicate)
-        return tuple(fresh)
+        with delta.ensured(warehouse, "parameter_sets") as table:
+            # an id is made of logs, and a log is of one vessel: no other vessel's files need be looked into
+            known = delta.rows(table, "parameter_sets", {"vessel_key": sorted(keys), "parameter_set_id": sorted(given)})
+            stored = [_set(r) for r in known.rows(named=True)]
+            for one in stored:
+                _refuse_other(one, given[one.parameter_set_id])
+            fresh = [name for name in given if name not in {one.parameter_set_id for one in stored}]
+            if fresh:
+                rows = [_as_columns(given[name]) for name in fresh]
+                predicate = f"{one_of('vessel_key', keys)} AND {one_of('parameter_set_id', fresh)}"
+                delta.replace(table, "parameter_sets", rows, predicate)
+            return tuple(fresh)
 
     return with_retry(attempt)
 

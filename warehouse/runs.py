@@ -76,12 +76,14 @@ def record_all(warehouse: Warehouse, runs: Sequence[Run]) -> tuple[str, ...]:
         return ()
 
     def attempt() -> tuple[str, ...]:
-        table = delta.ensure_table(warehouse, "runs")
-        stored = {row["run_id"]: row for row in delta.rows(table, "runs", {"run_id": sorted(rows)}).rows(named=True)}
-        changed = tuple(name for name in sorted(rows) if stored.get(name) != rows[name])
-        if changed:
-            delta.replace(table, "runs", [rows[name] for name in changed], one_of("run_id", changed))
-        return changed
+        with delta.ensured(warehouse, "runs") as table:
+            stored = {
+                row["run_id"]: row for row in delta.rows(table, "runs", {"run_id": sorted(rows)}).rows(named=True)
+            }
+            changed = tuple(name for name in sorted(rows) if stored.get(name) != rows[name])
+            if changed:
+                delta.replace(table, "runs", [rows[name] for name in changed], one_of("run_id", changed))
+            return changed
 
     return with_retry(attempt)
 

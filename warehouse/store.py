@@ -139,6 +139,18 @@ class Warehouse:
         size: int | None = files.get_file_info("/".join((root, *parts))).size
         return size
 
+    def mark_of(self, *parts: str) -> tuple[int, ...] | None:
+        """Return numbers that change where a file inside is replaced by another; None where there is none."""
+        if self.folder is not None:
+            try:
+                found = self.folder.joinpath(*parts).stat()
+            except OSError:
+                return None
+            return found.st_ino, found.st_mtime_ns, found.st_size
+        files, root = self._files
+        told = files.get_file_info("/".join((root, *parts)))
+        return None if told.mtime_ns is None else (told.mtime_ns, told.size or 0)
+
     def write_bytes(self, data: bytes, *parts: str) -> None:
         """Write a file inside, all of it or nothing: a reader never sees a part.
 
