@@ -188,11 +188,11 @@ def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iter
     KempfError
         ``table_unreadable``.
     """
-    if version is not None:
-        yield open_table(warehouse, name, version)
-        return
     with handles.borrowed(warehouse, name, open_table) as table:
-        yield table
+        if version is None or (table is not None and table.version() == version):
+            yield table
+            return
+    yield open_table(warehouse, name, version)
 
 
 def rows(table: DeltaTable | None, name: str, where: Where | None = None, columns: Sequence[str] = ()) -> pl.DataFrame:
@@ -293,6 +293,15 @@ def versions(warehouse: Warehouse) -> dict[str, int]:
     return found
 
 
+def _commit_times(table: DeltaTable) -> list[tuple[int, int]]:
+    """Return version and time of every commit, ms; those that an open table knows are not read again."""
+    known: dict[int, int] = vars(table).setdefault("kempf_commit_times", {})
+    missing = table.version() + 1 - len(known)
+    if missing > 0:
+        known.update((entry["version"], entry["timestamp"]) for entry in table.history(missing))
+    return sorted(known.items())
+
+
 def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | None:
     """Return the newest version of a table that was committed by ``instant``; None before the first.
 
@@ -302,7 +311,7 @@ def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | N
     with reading(warehouse, name) as table:
         if table is None:
             return None
-        commits = sorted((entry["version"], entry["timestamp"]) for entry in table.history())
+        commits = _commit_times(table)
     limit_ms = instant.astimezone(UTC).timestamp() * 1000.0
     known = list(accumulate((stamp for _, stamp in commits), max))
     held = [version for (version, _), stamp in zip(commits, known, strict=True) if stamp <= limit_ms]

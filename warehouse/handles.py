@@ -63,6 +63,8 @@ def _taken(warehouse: Warehouse, name: str, key: tuple[object, ...]) -> DeltaTab
         _, mark, table = _kept.pop(at)
     if warehouse.mark_of(name, *_commit(table.version())) != mark:
         return None
+    if warehouse.mark_of(name, *_commit(table.version() + 1)) is None:
+        return table
     with suppress(DeltaError, OSError, ValueError):
         table.update_incremental()
         return table

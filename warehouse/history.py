@@ -223,7 +223,11 @@ def _sets_as_of(warehouse: Warehouse, as_of: datetime | None) -> Iterator[DeltaT
             "Write it with one, such as 2025-05-03T12:00:00Z.",
         )
     version = delta.version_as_of(warehouse, "parameter_sets", as_of)
-    yield None if version is None else delta.open_table(warehouse, "parameter_sets", version)
+    if version is None:
+        yield None
+        return
+    with delta.reading(warehouse, "parameter_sets", version) as table:
+        yield table
 
 
 def _past_ingests(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> list[str]:
