@@ -1,7 +1,7 @@
 """``kill -9`` at random moments of ingest and of reprocessing: after one more run the tables say what they should.
 
-Each job runs in a process of its own that is killed at a moment drawn with a fixed seed. What is seen then must be whole;
-the same job is run once more, and every table is held against those of a run that nobody disturbed.
+Each job runs in a process of its own that is killed at a moment drawn with a fixed seed. What is seen then must be
+whole; the same job is run once more, and every table is held against those of a run that nobody disturbed.
 """
 
 from __future__ import annotations
@@ -216,18 +216,18 @@ def page(found: Mapping[str, tuple[float, list[Killed]]], seed: int) -> list[str
     kills = sum(len(killed) for _, killed in found.values())
     good = sum(k.equal and k.rows and not k.halves for _, killed in found.values() for k in killed)
     return [
-        f"After **{good} of {kills}** kills nothing was half in, and one more run made of every table what an undisturbed "
-        "run makes of it.",
+        f"After **{good} of {kills}** kills nothing was half in, and one more run made of every table what an "
+        "undisturbed run makes of it.",
         "",
         *table(head, rows),
         "",
         "`ingest` takes in three logs of one ship (NMEA, delimited text, MCAP) and identifies her; `reprocess` then "
-        "changes her profile, so that every log is read anew (six readings in all) and every set made anew. Moments are "
-        f"drawn evenly over the time that the undisturbed job takes, seed {seed}; one that is faster than that is done "
-        "before it is killed. *Half in*: a log that counts without all its readings, refusals, raw bytes or its zigzag, "
-        "or an alias of nothing. *Equal*: the rows of every table that a recorded log leads to, and the raw bytes; "
-        "versions of tables in a set's provenance tell how the work went and are left out. *No row too many*: rows of "
-        "every table, also those that nothing leads to.",
+        "changes her profile, so that every log is read anew (six readings in all) and every set made anew. Moments "
+        f"are drawn evenly over the time that the undisturbed job takes, seed {seed}; one that is faster than that is "
+        "done before it is killed. *Half in*: a log that counts without all its readings, refusals, raw bytes or its "
+        "zigzag, or an alias of nothing. *Equal*: the rows of every table that a recorded log leads to, and the raw "
+        "bytes; versions of tables in a set's provenance tell how the work went and are left out. *No row too many*: "
+        "rows of every table, also those that nothing leads to.",
     ]
 
 

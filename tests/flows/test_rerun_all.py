@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,18 +10,17 @@ import pytest
 import yaml
 
 from flows import preview_code, rerun_all
-from flows.identify_vessel import Request, identify_vessel
+from flows.identify_vessel import Request, build, identify_vessel
 from flows.ingest_logs import ingest
 from flows.moves import Move
-from flows.pool_vessel import pool_vessel
 from flows.preview_code import VesselPreview, preview_all
 from flows.rerun_all import verify_all
-from pipeline.identify.estimators import default_settings
 from schemas.errors import NotFound
 from schemas.profile import VesselProfile
 from tests.flows.content import fresh, seen
 from tests.workbench.driving import kempf, refused, tree
 from warehouse import code_version, compaction, delta, logs, parameter_sets, runs
+from warehouse.parameter_set import ParameterSet
 from warehouse.store import Warehouse
 
 LEAST_SQUARES = Request(estimator="least-squares")
@@ -34,7 +34,6 @@ def _identified(harbour: Path, tmp_path_factory: pytest.TempPathFactory) -> Path
     profile = VesselProfile.model_validate(yaml.safe_load((harbour / "profile.yaml").read_text()))
     ingest(warehouse, [harbour / f"mariner.{end}" for end in ("nmea.gz", "csv.gz")], given=profile)
     identify_vessel(warehouse, "mariner", LEAST_SQUARES)
-    identify_vessel(warehouse, "mariner")
     return folder
 
 
@@ -54,14 +53,14 @@ def other_code(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
     before = seen(own)
     found = verify_all(own)
-    assert found.counts() == {**NONE, "bit-identical": 4}
+    assert found.counts() == {**NONE, "bit-identical": 2}
     assert found.counts(code_changed=True) == NONE
     assert seen(own) == before, "verdicts are runs, and nothing else is stored"
-    assert [run.status for run in runs.all_runs(own, "rerun")] == ["bit-identical"] * 4
+    assert [run.status for run in runs.all_runs(own, "rerun")] == ["bit-identical"] * 2
     monkeypatch.setattr(rerun_all, "rebuilt", lambda *_: pytest.fail("built again"))
     version = delta.versions(own)["runs"]
     again = verify_all(own)
-    assert (again.counts(), again.show()["known_before"]) == (found.counts(), 4)
+    assert (again.counts(), again.show()["known_before"]) == (found.counts(), 2)
     assert delta.versions(own)["runs"] == version
     assert verify_all(own, ["mariner"], afresh=False).counts() == found.counts()
 
@@ -75,19 +74,19 @@ def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: py
         return real(stored, *rest)
 
     def stop(done: int, total: int, what: str) -> None:
-        if done >= 2:
+        if done >= 1:
             raise KeyboardInterrupt
 
     monkeypatch.setattr(rerun_all, "rebuilt", noted)
     with pytest.raises(KeyboardInterrupt):
         verify_all(own, progress=stop)
     first = set(built)
-    assert len(first) == 2
+    assert len(first) == 1
     built.clear()
     found = verify_all(own)
-    assert first.isdisjoint(built) and len(built) == 2
-    assert found.counts() == {**NONE, "bit-identical": 4}
-    assert found.show()["known_before"] == 2
+    assert first.isdisjoint(built) and len(built) == 1
+    assert found.counts() == {**NONE, "bit-identical": 2}
+    assert found.show()["known_before"] == 1
 
 
 def test_what_differs_and_what_cannot_be_built_is_told(own: Warehouse):
@@ -95,23 +94,20 @@ def test_what_differs_and_what_cannot_be_built_is_told(own: Warehouse):
     assert own.folder is not None
     (own.folder / "raw" / csv.log_id[:2] / csv.log_id).unlink()
     told = kempf("rerun", "--all", "--warehouse", own.uri, "--json")
-    assert told.code == 3 and told.json["verdicts"] == {**NONE, "bit-identical": 2, "failed": 2}
+    assert told.code == 3 and told.json["verdicts"] == {**NONE, "bit-identical": 1, "failed": 1}
     assert {f["error"]["code"] for f in told.json["not_identical"]} == {"no_raw_log"}
-    assert len(runs.all_runs(own, "rerun")) == 2, "what failed is tried again"
+    assert len(runs.all_runs(own, "rerun")) == 1, "what failed is tried again"
 
 
 def test_a_set_that_was_tampered_with_is_different(own: Warehouse):
-    import polars as pl
-
-    table = delta.ensure_table(own, "parameter_sets")
-    rows = delta.rows(table, "parameter_sets")
-    bent = pl.col("fit_json").str.replace(r"(\d\.\d{3})\d", "${1}7").alias("fit_json")
-    (name,) = rows.filter(pl.col("estimator") == "ml").sort("parameter_set_id")["parameter_set_id"].to_list()[:1]
-    changed = rows.filter(pl.col("parameter_set_id") == name).with_columns(bent)
-    delta.replace(table, "parameter_sets", changed, f"parameter_set_id = '{name}'")
+    row = delta.read(own, "parameter_sets").rows(named=True)[0]
+    name = row["parameter_set_id"]
+    row["parameters"][0]["value"] *= 1.001
+    with delta.ensured(own, "parameter_sets") as table:
+        delta.replace(table, "parameter_sets", [row], f"parameter_set_id = '{name}'")
     told = kempf("rerun", "--all", "--verify", "--warehouse", own.uri)
     assert told.code == 5, told
-    assert f"mariner, {name}: different in fit." in told.out
+    assert f"mariner, {name}: different in parameters.a11.value" in told.out
 
 
 def test_an_old_set_is_built_again_after_compaction_and_vacuum(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -126,51 +122,56 @@ def test_an_old_set_is_built_again_after_compaction_and_vacuum(own: Warehouse, m
         os.utime(path, (1, 1))
     compaction.vacuum(own, 0.0)
     assert kempf("rerun", names[0], "--warehouse", own.uri).code == 0
-    assert verify_all(own).counts() == {**NONE, "bit-identical": 4}
+    assert verify_all(own).counts() == {**NONE, "bit-identical": 2}
     pins = parameter_sets.get(own, names[-1]).provenance["table_versions"]
     assert all(delta.read(own, name, version=v).height or name in ("aliases",) for name, v in pins.items())
 
 
 def test_code_that_changes_nothing_moves_nothing(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
-    pool_vessel(own, "mariner", Request(), identify_vessel(own, "mariner"))
     assert own.folder is not None
     before = tree(own.folder)
     (same,) = preview_all(own)
-    assert (same.sets, same.up_to_date, same.moves) == (4, 4, ())
+    assert (same.sets, same.up_to_date, same.moves) == (2, 2, ())
     other_code(monkeypatch)
     (found,) = preview_all(own)
-    assert (found.sets, found.up_to_date, found.identical) == (4, 0, 4)
+    assert (found.sets, found.up_to_date, found.identical) == (2, 0, 2)
     assert (found.moves, found.new, found.gone, found.failures) == ((), (), (), ())
     assert tree(own.folder) == before, "nothing is stored"
 
 
 def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
     other_code(monkeypatch)
-    real = default_settings
+    (bent, other) = (row.log_id for row in logs.current(own))
+    steps = {"a11": 0.3, "a12": -1.5, "b2": 0.01}
 
-    def wider(estimator: str) -> dict[str, Any]:
-        return {**real(estimator), **({"gate_width": 2.5} if estimator == "ml" else {})}
+    def moved(*arguments: Any) -> ParameterSet:
+        """What the present code makes, of one log so many standard errors beside it."""
+        made = build(*arguments)
+        if made.log_ids != (bent,):
+            return made
+        beside = [replace(e, value=e.value + steps.get(e.name, 0.0) * (e.std or 0.0)) for e in made.parameters]
+        return replace(made, parameters=tuple(beside))
 
-    monkeypatch.setattr("flows.identify_vessel.default_settings", wider)
+    monkeypatch.setattr("flows.identify_vessel.build", moved)
     assert own.folder is not None
     before = tree(own.folder)
-    told = kempf("rerun", "--all", "--preview", "--fail-above", 1e-9, "--warehouse", own.uri, "--json")
+    told = kempf("rerun", "--all", "--preview", "--fail-above", 1.4, "--warehouse", own.uri, "--json")
     assert tree(own.folder) == before
     assert told.code == 5
-    assert (told.json["identical"], told.json["moved"], len(told.json["moves"])) == (2, 2, 12)
-    found = VesselPreview("mariner", 4, 0, 2, tuple(Move(**move) for move in told.json["moves"]))
-    sizes = [m.size for m in found.moves]
-    assert sizes == sorted(sizes, reverse=True) and 0.0 < sizes[0] < 10.0
-    assert len(found.moves) == 12
-    for move in found.moves:
+    assert [told.json[k] for k in ("sets", "identical", "moved", "new", "gone")] == [2, 1, 1, 0, 0]
+    found = tuple(Move(**move) for move in told.json["moves"])
+    assert [m.parameter for m in found][:3] == ["a12", "a11", "b2"], "the largest first"
+    for move in found:
         stored = {e.name: e for e in parameter_sets.get(own, move.parameter_set_id).parameters}[move.parameter]
-        assert (move.before, move.std, move.estimator) == (stored.value, stored.std, "ml")
-        assert move.in_std == pytest.approx((move.after - stored.value) / stored.std)
+        assert (move.before, move.std, move.std_ratio) == (stored.value, stored.std, 1.0)
+        assert move.in_std == pytest.approx(steps.get(move.parameter, 0.0), rel=1e-9)
     first = told.json["parameters"][0]
-    assert (first["largest_in_std"], first["sets"]) == (found.moves[0].in_std, 2)
-    monkeypatch.setattr(preview_code, "preview_all", lambda *_: [found])
-    shown = kempf("rerun", "--all", "--preview", "--fail-above", 2 * sizes[0], "--warehouse", own.uri)
-    assert shown.code == 0 and "2 would say the same bit for bit, 2 would move" in shown.out
+    assert (first["vessel"], first["parameter"], first["sets"]) == ("mariner", "a12", 1)
+    assert other not in {move.parameter_set_id for move in found}
+    monkeypatch.setattr(preview_code, "preview_all", lambda *_: [VesselPreview("mariner", 2, 0, 1, found)])
+    shown = kempf("rerun", "--all", "--preview", "--fail-above", 1.6, "--warehouse", own.uri)
+    assert shown.code == 0 and "1 would say the same bit for bit, 1 would move" in shown.out
+    assert shown.out.splitlines()[2].split()[:3] == ["mariner", "a12", "-1.5"]
 
 
 def test_a_vessel_that_cannot_be_previewed_stops_no_other(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -181,7 +182,7 @@ def test_a_vessel_that_cannot_be_previewed_stops_no_other(own: Warehouse, monkey
     kept.write_bytes(kept.read_bytes()[:-10])
     (found,) = preview_all(own)
     assert [f["error"]["code"] for f in found.failures] == ["raw_bytes_damaged"]
-    assert (found.identical, len(found.gone)) == (2, 2)
+    assert (found.identical, len(found.gone)) == (1, 1)
 
     def broken(*_: Any) -> Any:
         raise ZeroDivisionError("division by zero")
