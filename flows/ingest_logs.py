@@ -9,13 +9,14 @@ from typing import Any
 
 from flows.files import read_bytes
 from flows.find_segments import Ingest, find_segments
+from flows.lost import as_json
 from flows.progress import Progress, silent
 from flows.unforeseen import as_told
 from pipeline.ingest.read import read_log
-from pipeline.ingest.readings import Tally
+from pipeline.ingest.readings import LostStretch, Tally
 from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
-from warehouse import code_version, logs, raw, segments, vessels
+from warehouse import code_version, logs, lost, raw, segments, vessels
 from warehouse.deposit import Delivery, Deposit, deposit, held
 from warehouse.keys import ingest_id, vessel_key
 from warehouse.segments import Segment
@@ -39,6 +40,8 @@ class IngestOutcome:
         How it was read, and why zigzags could not be looked for, where that is so.
     segments : tuple of Segment
         Found in this log.
+    lost : tuple of LostStretch
+        What of a damaged log could not be read.
     error : KempfError or None
         Why it failed; then nothing of the log was stored.
     """
@@ -50,6 +53,7 @@ class IngestOutcome:
     tally: Tally | None = None
     notes: tuple[str, ...] = ()
     segments: tuple[Segment, ...] = ()
+    lost: tuple[LostStretch, ...] = ()
     error: KempfError | None = None
 
     def show(self) -> dict[str, Any]:
@@ -63,6 +67,8 @@ class IngestOutcome:
             "values": _ledger(self.tally, "values"),
             "rejected_by_reason": dict(self.tally.by_reason) if self.tally else {},
             "notes": list(self.notes),
+            "partial": bool(self.lost),
+            "lost": as_json(self.lost),
             "segments": [segment.segment_id for segment in self.segments],
             **(self.error.to_json() if self.error else {}),
         }
@@ -164,11 +170,18 @@ def ingest_bytes(
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
         found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
-        return IngestOutcome(path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found)
+        return IngestOutcome(
+            path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, _lost(warehouse, row)
+        )
     read = read_one(vessel, file_name, data, profile)
     (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
-    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, read.segments)
+    gone = _lost(warehouse, row)
+    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, read.segments, gone)
+
+
+def _lost(warehouse: Warehouse, row: logs.LogRow) -> tuple[LostStretch, ...]:
+    return lost.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id, ())
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,7 +10,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
-from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
@@ -117,14 +116,15 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
         return table
     warehouse.create()
     try:
-        DeltaTable.create(
-            warehouse.address(name),
-            schema=arrow_schema(TABLES[name]),
-            mode="ignore",
-            partition_by=list(TABLES[name].partition_by) or None,
-            configuration=_CONFIGURATION,
-            storage_options=warehouse.options,
-        )
+        with writing(warehouse.address(name)):
+            DeltaTable.create(
+                warehouse.address(name),
+                schema=arrow_schema(TABLES[name]),
+                mode="ignore",
+                partition_by=list(TABLES[name].partition_by) or None,
+                configuration=_CONFIGURATION,
+                storage_options=warehouse.options,
+            )
     except DeltaError:  # another writer made it at the same moment
         if open_table(warehouse, name) is None:
             warehouse.reach()
@@ -135,21 +135,12 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
 
 
 @contextmanager
-def writing(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
-    """Lend a table for reading, deciding and writing in one step; make it where it is not there.
+def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
+    """Lend a table for reading, deciding and writing; it is made, and the warehouse too, where it is not there.
 
-    Parameters
-    ----------
-    warehouse : Warehouse
-    name : str
-        Key of `schemas.tables.TABLES`.
-
-    Yields
-    ------
-    DeltaTable
-        At the newest version, for this thread alone.
+    What was lent is not to be used after. One over which a commit failed is opened anew the next time.
     """
-    with handles.borrowed(warehouse, name, partial(ensure_table, warehouse, name)) as table:
+    with handles.borrowed(warehouse, name, ensure_table) as table:
         assert table is not None
         yield table
 
@@ -186,13 +177,29 @@ def read(
     """
     warehouse.require()
     try:
-        if version is not None:
-            return rows(open_table(warehouse, name, version), name, where, columns)
-        with handles.borrowed(warehouse, name, partial(open_table, warehouse, name)) as table:
+        with reading(warehouse, name, version) as table:
             return rows(table, name, where, columns)
     except KempfError:
         warehouse.reach()
         raise
+
+
+@contextmanager
+def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iterator[DeltaTable | None]:
+    """Lend a table for reading, as `open_table` opens it; what was lent is not to be used after, and not to be written.
+
+    Raises
+    ------
+    NotFound
+        ``no_table_version``.
+    KempfError
+        ``table_unreadable``.
+    """
+    with handles.borrowed(warehouse, name, open_table) as table:
+        if version is None or (table is not None and table.version() == version):
+            yield table
+            return
+    yield open_table(warehouse, name, version)
 
 
 def rows(table: DeltaTable | None, name: str, where: Where | None = None, columns: Sequence[str] = ()) -> pl.DataFrame:
@@ -207,7 +214,8 @@ def rows(table: DeltaTable | None, name: str, where: Where | None = None, column
         lazy = pl.scan_delta(table)
     for column, value in (where or {}).items():
         # one value prunes files by their statistics
-        lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))
+        one = value if isinstance(value, str) else value[0] if len(value) == 1 else None
+        lazy = lazy.filter(pl.col(column) == one if one is not None else pl.col(column).is_in(value))
     try:
         return (lazy.select(columns) if columns else lazy).collect()
     except (OSError, pl.exceptions.ComputeError, pl.exceptions.PanicException) as error:
@@ -225,7 +233,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
     Parameters
     ----------
     table : DeltaTable
-        Opened by `ensure_table`; what was read from it is what the commit rests on.
+        Lent by `ensured`; what was read from it is what the commit rests on.
     name : str
         Its name.
     new : sequence of dict, or polars.DataFrame
@@ -238,19 +246,18 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
     deltalake.exceptions.CommitFailedError
         Another writer changed what the predicate names: read again, see `warehouse.retry.with_retry`.
     KempfError
-        ``warehouse_not_writable``.
+        ``disk_full``, ``warehouse_not_writable``.
     """
     import polars as pl
     import pyarrow as pa
     from deltalake import WriterProperties, write_deltalake
-    from deltalake.exceptions import CommitFailedError, DeltaError
 
     schema = arrow_schema(TABLES[name])
     if isinstance(new, pl.DataFrame):
         data = new.select(schema.names).to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema)
     else:
         data = pa.Table.from_pylist(list(new), schema=schema)
-    try:
+    with writing(table.table_uri):
         write_deltalake(
             table,
             data,
@@ -258,22 +265,49 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
             predicate=predicate,
             writer_properties=WriterProperties(compression="ZSTD"),
         )
-    except CommitFailedError:
+
+
+@contextmanager
+def writing(address: str) -> Iterator[None]:
+    """Tell what the storage refuses while something is written to an address as one clear error.
+
+    Raises
+    ------
+    KempfError
+        ``disk_full``, ``warehouse_not_writable``.
+    """
+    from deltalake.exceptions import CommitFailedError, DeltaError
+
+    try:
+        yield
+    except OSError as error:
+        raise not_writable(address, error) from error
+    except DeltaError as error:
+        # a commit that the disk has no room for is no lost race: trying it again would not help
+        told = not_writable(address, OSError(str(error)))
+        away = "://" in address.removeprefix("file://") and not isinstance(error, CommitFailedError)
+        if told.code == "disk_full" or away:
+            raise told from error
         raise
-    except (OSError, DeltaError) as error:
-        if isinstance(error, DeltaError) and "://" not in table.table_uri.removeprefix("file://"):
-            raise  # on a disk it is no matter of the connection
-        raise not_writable(table.table_uri, error) from error
 
 
 def versions(warehouse: Warehouse) -> dict[str, int]:
     """Return the newest version of every table that was written, for the provenance of what is made from them."""
     found = {}
     for name in TABLES:
-        with handles.borrowed(warehouse, name, partial(open_table, warehouse, name)) as table:
+        with reading(warehouse, name) as table:
             if table is not None:
                 found[name] = table.version()
     return found
+
+
+def _commit_times(table: DeltaTable) -> list[tuple[int, int]]:
+    """Return version and time of every commit, ms; those that an open table knows are not read again."""
+    known: dict[int, int] = vars(table).setdefault("kempf_commit_times", {})
+    missing = table.version() + 1 - len(known)
+    if missing > 0:
+        known.update((entry["version"], entry["timestamp"]) for entry in table.history(missing))
+    return sorted(known.items())
 
 
 def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | None:
@@ -282,10 +316,10 @@ def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | N
     Commit times are those written into the commits, which copying a warehouse keeps; where clocks of two writers
     disagree a version counts as no older than the one before it.
     """
-    table = open_table(warehouse, name)
-    if table is None:
-        return None
-    commits = sorted((entry["version"], entry["timestamp"]) for entry in table.history())
+    with reading(warehouse, name) as table:
+        if table is None:
+            return None
+        commits = _commit_times(table)
     limit_ms = instant.astimezone(UTC).timestamp() * 1000.0
     known = list(accumulate((stamp for _, stamp in commits), max))
     held = [version for (version, _), stamp in zip(commits, known, strict=True) if stamp <= limit_ms]

@@ -82,7 +82,7 @@ def insert(warehouse: Warehouse, one: StoredDiagnosis) -> bool:
     }
 
     def attempt() -> bool:
-        with delta.writing(warehouse, "diagnoses") as table:
+        with delta.ensured(warehouse, "diagnoses") as table:
             if delta.rows(table, "diagnoses", {"diagnosis_id": one.diagnosis_id}).height:
                 return False
             predicate = f"vessel_key = {quoted(row['vessel_key'])} AND diagnosis_id = {quoted(one.diagnosis_id)}"

@@ -1,8 +1,7 @@
-"""Tables that this process has open already: brought up to date by what was committed since, not opened anew.
+"""Open tables kept between readings: one of many files takes long to open anew and next to nothing to bring up to date.
 
-Opening a table reads its last checkpoint and every commit behind it; bringing an open one up to date reads the new
-commits alone, a tenth of the time and less. A handle is used by one thread at a time, and by nobody else until it is
-given back: what was read from it is what a commit rests on.
+A handle is lent to one borrower at a time and brought to the newest version first, so that whoever holds it reads one
+version all the while. One whose newest commit is not the file it was (the folder was replaced) is thrown away.
 """
 
 from __future__ import annotations
@@ -10,7 +9,7 @@ from __future__ import annotations
 import os
 import threading
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 from warehouse.store import Warehouse
@@ -18,18 +17,18 @@ from warehouse.store import Warehouse
 if TYPE_CHECKING:
     from deltalake import DeltaTable
 
-_Key = tuple[object, ...]
+#: Handles kept in all; of more the one that was used longest ago goes.
+MOST = 24
 
-#: Idle handles that are kept of one table, and of all; the ones used last stay.
-_OF_ONE, _OF_ALL = 8, 64
-
-_idle: dict[_Key, list[DeltaTable]] = {}
 _lock = threading.Lock()
+_kept: list[tuple[tuple[object, ...], tuple[int, ...], DeltaTable]] = []
 
 
 @contextmanager
-def borrowed(warehouse: Warehouse, name: str, opened: Callable[[], DeltaTable | None]) -> Iterator[DeltaTable | None]:
-    """Lend a handle at the newest version of a table; after an error other than a lost race all are opened anew.
+def borrowed(
+    warehouse: Warehouse, name: str, opened: Callable[[Warehouse, str], DeltaTable | None]
+) -> Iterator[DeltaTable | None]:
+    """Lend a table at its newest version for reading, None where it was never written.
 
     Parameters
     ----------
@@ -37,58 +36,49 @@ def borrowed(warehouse: Warehouse, name: str, opened: Callable[[], DeltaTable | 
     name : str
         Of the table.
     opened : callable
-        Opens it where no handle is idle; None where there is no table.
-
-    Yields
-    ------
-    DeltaTable or None
-        For this thread alone, until the block ends.
+        Opens it where no handle is at hand.
     """
-    from deltalake.exceptions import CommitFailedError, DeltaError
-
     key = _key(warehouse, name)
-    table = _take(key)
-    if table is not None:
-        try:
-            table.update_incremental()
-        except (DeltaError, OSError, ValueError):  # opening it says what is wrong, in words
-            table = None
-    table = table if table is not None else opened()
-    try:
-        yield table
-    except CommitFailedError:
-        _give_back(_key(warehouse, name), table)
-        raise
-    except BaseException:
-        with _lock:  # the others may be as wrong: of a table that was deleted and made anew in a bucket
-            _idle.pop(key, None)
-        raise
-    _give_back(_key(warehouse, name), table)  # it may have been made meanwhile
-
-
-def _key(warehouse: Warehouse, name: str) -> _Key:
-    """Return what a handle stands for: the address, who asks, and, in a folder, the very table that is there now."""
-    asks = tuple(sorted((warehouse.options or {}).items()))
-    if warehouse.folder is None:
-        return (os.getpid(), warehouse.address(name), asks)
-    try:
-        born = (warehouse.folder / name / "_delta_log" / f"{0:020d}.json").stat()
-    except OSError:
-        return (os.getpid(), warehouse.address(name), asks)
-    return (os.getpid(), warehouse.address(name), asks, born.st_ino, born.st_mtime_ns)
-
-
-def _take(key: _Key) -> DeltaTable | None:
-    with _lock:
-        idle = _idle.get(key)
-        return idle.pop() if idle else None
-
-
-def _give_back(key: _Key, table: DeltaTable | None) -> None:
+    table = _taken(warehouse, name, key)
     if table is None:
+        table = opened(warehouse, name)
+    yield table
+    # behind the yield: a handle over which something went wrong is not kept
+    if table is not None:
+        _keep(warehouse, name, key, table)
+
+
+def _key(warehouse: Warehouse, name: str) -> tuple[object, ...]:
+    # handles do not survive a fork
+    return (os.getpid(), warehouse.address(name), tuple(sorted((warehouse.options or {}).items())))
+
+
+def _taken(warehouse: Warehouse, name: str, key: tuple[object, ...]) -> DeltaTable | None:
+    from deltalake.exceptions import DeltaError
+
+    with _lock:
+        at = next((i for i in range(len(_kept) - 1, -1, -1) if _kept[i][0] == key), None)
+        if at is None:
+            return None
+        _, mark, table = _kept.pop(at)
+    if warehouse.mark_of(name, *_commit(table.version())) != mark:
+        return None
+    if warehouse.mark_of(name, *_commit(table.version() + 1)) is None:
+        return table
+    with suppress(DeltaError, OSError, ValueError):
+        table.update_incremental()
+        return table
+    return None
+
+
+def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: DeltaTable) -> None:
+    mark = warehouse.mark_of(name, *_commit(table.version()))
+    if mark is None:
         return
     with _lock:
-        idle = _idle.pop(key, [])
-        _idle[key] = [*idle, table][-_OF_ONE:]  # at the end of the order: used last
-        while sum(map(len, _idle.values())) > _OF_ALL:
-            del _idle[next(iter(_idle))]
+        _kept.append((key, mark, table))
+        del _kept[:-MOST]
+
+
+def _commit(version: int) -> tuple[str, str]:
+    return "_delta_log", f"{version:020d}.json"

@@ -134,7 +134,7 @@ def record(warehouse: Warehouse, rows: Iterable[LogRow]) -> tuple[LogRow, ...]:
         return ()
 
     def attempt() -> tuple[LogRow, ...]:
-        with delta.writing(warehouse, "logs") as table:
+        with delta.ensured(warehouse, "logs") as table:
             known = delta.rows(table, "logs", {"log_id": [row.log_id for row in given]})
             held = _latest([_row(r) for r in known.rows(named=True)])
             fresh = []

@@ -49,46 +49,46 @@ def record(warehouse: Warehouse, run: Run) -> bool:
     return bool(record_all(warehouse, [run]))
 
 
-def record_all(warehouse: Warehouse, found: Sequence[Run]) -> tuple[str, ...]:
+def record_all(warehouse: Warehouse, runs: Sequence[Run]) -> tuple[str, ...]:
     """Store how runs stand, in place of how they stood, in at most one commit.
 
     Parameters
     ----------
     warehouse : Warehouse
         Made where there is none.
-    found : sequence of Run
-        Each run once.
+    runs : sequence of Run
+        Of one id the last counts.
 
     Returns
     -------
     tuple of str
-        Ids of those that stood otherwise before, in the order given.
+        Ids of those that stand otherwise than before, sorted.
     """
-    if not found:
+    rows = {
+        run.run_id: {
+            "run_id": run.run_id,
+            "flow": run.flow,
+            "vessel": run.vessel,
+            "status": run.status,
+            "counts_json": canonical_json(run.counts),
+            "message_json": canonical_json(run.message),
+        }
+        for run in runs
+    }
+    if not rows:
         return ()
-    rows = {run.run_id: _as_columns(run) for run in found}
 
     def attempt() -> tuple[str, ...]:
-        with delta.writing(warehouse, "runs") as table:
-            stored = delta.rows(table, "runs", {"run_id": sorted(rows)}).rows(named=True)
-            known = {row["run_id"]: row for row in stored}
-            changed = tuple(name for name, row in rows.items() if known.get(name) != row)
+        with delta.ensured(warehouse, "runs") as table:
+            stored = {
+                row["run_id"]: row for row in delta.rows(table, "runs", {"run_id": sorted(rows)}).rows(named=True)
+            }
+            changed = tuple(name for name in sorted(rows) if stored.get(name) != rows[name])
             if changed:
                 delta.replace(table, "runs", [rows[name] for name in changed], one_of("run_id", changed))
             return changed
 
     return with_retry(attempt)
-
-
-def _as_columns(run: Run) -> dict[str, Any]:
-    return {
-        "run_id": run.run_id,
-        "flow": run.flow,
-        "vessel": run.vessel,
-        "status": run.status,
-        "counts_json": canonical_json(run.counts),
-        "message_json": canonical_json(run.message),
-    }
 
 
 def some(warehouse: Warehouse, run_ids: Sequence[str]) -> list[Run]:

@@ -125,7 +125,7 @@ def replace(warehouse: Warehouse, vessel: str, found: Mapping[str, Sequence[Segm
                 raise ValueError(f"{segment.segment_id} is of {segment.vessel!r}, {segment.ingest_id}: not {ingest}")
 
     def attempt() -> tuple[str, ...]:
-        with delta.writing(warehouse, "segments") as table:
+        with delta.ensured(warehouse, "segments") as table:
             known = delta.rows(table, "segments", {"vessel_key": key, "ingest_id": sorted(found)})
             stored = [_segment(row) for row in known.rows(named=True)]
             changed = tuple(

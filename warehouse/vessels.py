@@ -58,7 +58,7 @@ def register_all(
         return ()
 
     def attempt() -> tuple[tuple[str, VesselProfile], ...]:
-        with delta.writing(warehouse, "vessels") as table:
+        with delta.ensured(warehouse, "vessels") as table:
             known = delta.rows(table, "vessels").sort("revision").rows(named=True)
             last = {
                 row["vessel"]: (row["revision"], row["profile_sha256"]) for row in known

@@ -9,7 +9,8 @@ import numpy as np
 from pipeline.diagnose.run import Run
 from pipeline.identify.scoring import Mask
 from pipeline.model.augmented import Augmented
-from pipeline.model.extended import N_AFTER, N_BEFORE, extended
+from pipeline.model.dynamics import N_AFTER, N_BEFORE
+from pipeline.model.extended import extended
 from pipeline.model.lanes import LANES, MOST, ONE
 from pipeline.normalise.series import Float
 from schemas.model_spec import ModelSpec

@@ -127,16 +127,22 @@ def fit(
 
 
 def climb(
-    filtered: tuple[Filtered, ...], hull: Float, levels: Float, values: Float, workers: Executor, max_iterations: int
+    filtered: tuple[Filtered, ...],
+    hull: Float,
+    levels: Float,
+    values: Float,
+    workers: Executor,
+    max_iterations: int,
+    wanted: float = -np.inf,
 ) -> Fit:
-    """Climb to the maximum by damped Fisher scoring."""
+    """Climb to the maximum by damped Fisher scoring; given up where the log-likelihood ``wanted`` is out of reach."""
     model = filtered[0].model
     layout = _Layout(filtered, workers)
     # a number that happens to lie near 0 may grow to the size that it has in other ships
     least = 0.05 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
     begin = np.where(np.abs(hull) < least, np.copysign(least, hull), hull)
     theta = np.concatenate([begin, np.clip(values, model.low, model.high) / layout.unit, levels.ravel()])
-    found = search.climb(layout, theta, max_iterations, _DECREMENT)
+    found = search.climb(layout, theta, max_iterations, _DECREMENT, wanted)
     theta, score, information = found.theta, found.score, found.information
     lines = layout.linearised_at(theta)
     shared = layout.shared

@@ -16,120 +16,44 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.compiled import STEP, njit
+from pipeline.compiled import FILLING, njit
+from pipeline.model.dynamics import (
+    N_AFTER,
+    N_BEFORE,
+    ON_INITIAL,
+    ON_LATERAL,
+    ON_NOISE,
+    PARAMETER,
+    PSI,
+    RDOT,
+    SHIP,
+    SPEED,
+    VDOT,
+    F,
+    M,
+    R,
+    V,
+    add_programs,
+    dynamics,
+)
 from pipeline.model.lanes import each
 from pipeline.model.moments import add_noise, carry_covariance, exponential, mirror, take_in
-from pipeline.model.terms.program import DEPTH, evaluate
-from pipeline.model.terms.symbols import SYMBOLS
+from pipeline.model.terms.program import DEPTH
 
 #: rows of the input table from one instant to the next, and substeps; a substep reads three rows
 ROWS, SUBSTEPS = 4, 2
-#: places of symbols among the variables; states come first, in the filter's order
-DELTA, SPEED, VDOT, RDOT = (SYMBOLS.index(name) for name in ("delta", "V", "vdot", "rdot"))
-SHIP, CHANNEL, PARAMETER = SYMBOLS.index("a11"), SYMBOLS.index("U"), len(SYMBOLS)
-#: columns of the input table: V, delta, and the symbols of channels and of the run
-N_INPUT = 2 + PARAMETER - CHANNEL
-#: states before those of effects, and after
-N_BEFORE, N_AFTER, MOST_EXTRA = 5, 3, 4
-V, R, PSI, F, M = 0, 1, 2, 3, 4
-#: what a program is added to
-ON_SPEED, ON_RUDDER, ON_SWAY, ON_YAW, ON_EXTRA, ON_LATERAL, ON_YAW_RATE, ON_HEADING = 0, 1, 2, 3, 4, 5, 6, 7
-ON_NOISE, ON_INITIAL = 8, 9
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
-@njit(**STEP)
-def _add(  # type: ignore[no-untyped-def]
-    kind, place, programs, code, constants, values, slopes, stack, by, width, total, lanes
-):
-    """Fill ``total``, shape (1 + width, lanes), with the sum of all programs of a kind (and place, for extra states).
-
-    Return whether there is any.
-    """
-    for j in range(width + 1):
-        for b in range(each(lanes)):
-            total[j, b] = 0.0
-    found = False
-    for p in range(programs.shape[0]):
-        if programs[p, 0] == kind and programs[p, 1] == place:
-            found = True
-            evaluate(code[programs[p, 2] : programs[p, 3]], constants, values, slopes, stack, by, width, lanes)
-            for j in range(width + 1):
-                for b in range(each(lanes)):
-                    total[j, b] += stack[0, j, b]
-    return found
-
-
-@njit(**STEP)
-def _dynamics(  # type: ignore[no-untyped-def]
-    x, row, rudder, ship, width, carried, table, values, slopes, stack, by, total, f, J, lanes
-):
-    """Fill f = dx/dt of chain and effects' states, shape (width, lanes), and its derivatives J, (width, width, lanes).
-
-    ``carried`` is ``width``, or 0 where J is not wanted.
-    """
-    programs, code, constants = table
-    hull, (arm, mu_F, mu_M, exponent, V0) = ship
-    busy = programs.shape[0] > 0
-    for b in range(each(lanes)):
-        values[SPEED, b], values[DELTA, b] = row[0], rudder[b]
-    if busy:
-        for i in range(width):
-            for b in range(each(lanes)):
-                values[i, b] = x[i, b]
-        for i in range(N_INPUT - 2):
-            for b in range(each(lanes)):
-                values[CHANNEL + i, b] = row[2 + i]
-        for j in range(carried):
-            for b in range(each(lanes)):
-                slopes[SPEED, j, b] = slopes[DELTA, j, b] = 0.0
-        for kind in range(2):
-            where = SPEED if kind == 0 else DELTA
-            if _add(kind, 0, programs, code, constants, values, slopes, stack, by, carried, total, lanes):
-                for b in range(each(lanes)):
-                    values[where, b] += total[0, b]
-                    for j in range(carried):
-                        slopes[where, j, b] = total[j + 1, b]
-    for b in range(each(lanes)):
-        U, delta = values[SPEED, b], values[DELTA, b]
-        square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
-        v, r, force = x[V, b], x[R, b], x[F, b]
-        f[V, b] = hull[0, b] * U * v + hull[1, b] * U * r + hull[4, b] * square * delta + force
-        f[R, b] = hull[2, b] * U * v + hull[3, b] * U * r + hull[5, b] * square * delta + arm * force + x[M, b]
-        f[PSI, b], f[F, b], f[M, b] = r, -mu_F * force, -mu_M * x[M, b]
-    if carried > 0:
-        J[:, :, :] = 0.0
-        for b in range(each(lanes)):
-            U = values[SPEED, b]
-            square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
-            J[V, V, b], J[V, R, b], J[V, F, b] = hull[0, b] * U, hull[1, b] * U, 1.0
-            J[R, V, b], J[R, R, b], J[R, F, b], J[R, M, b] = hull[2, b] * U, hull[3, b] * U, arm, 1.0
-            J[PSI, R, b], J[F, F, b], J[M, M, b] = 1.0, -mu_F, -mu_M
-            for j in range(width):
-                J[V, j, b] += hull[4, b] * square * slopes[DELTA, j, b]
-                J[R, j, b] += hull[5, b] * square * slopes[DELTA, j, b]
-    if busy:
-        for kind in range(2 + width - N_BEFORE):
-            target = kind if kind < 2 else N_BEFORE + kind - 2
-            on, place = (ON_SWAY + kind, 0) if kind < 2 else (ON_EXTRA, kind - 2)
-            _add(on, place, programs, code, constants, values, slopes, stack, by, carried, total, lanes)
-            for b in range(each(lanes)):
-                f[target, b] = total[0, b] + (f[target, b] if kind < 2 else 0.0)
-            for j in range(carried):
-                for b in range(each(lanes)):
-                    J[target, j, b] += total[j + 1, b]
-
-
-@njit(**STEP)
+@njit(**FILLING)
 def _begin(P, table, values, slopes, stack, by, total, drive, lanes):  # type: ignore[no-untyped-def]
     """Add the initial variance of the effects' own states to P, and fill the intensities of what drives them."""
-    programs, code, constants = table
     width = P.shape[0] - N_AFTER
     for i in range(width - N_BEFORE):
-        _add(ON_INITIAL, i, programs, code, constants, values, slopes, stack, by, width, total, lanes)
+        add_programs(ON_INITIAL, i, table, values, slopes, stack, by, width, total, lanes)
         for b in range(each(lanes)):
             P[N_BEFORE + i, N_BEFORE + i, b] += total[0, b] ** 2
-        _add(ON_NOISE, i, programs, code, constants, values, slopes, stack, by, width, total, lanes)
+        add_programs(ON_NOISE, i, table, values, slopes, stack, by, width, total, lanes)
         for b in range(each(lanes)):
             drive[4 + i, b] = total[0, b] ** 2
 
@@ -149,7 +73,7 @@ def _live_states(P0, width):  # type: ignore[no-untyped-def]
     return before[:m], after[:k]
 
 
-@njit(**STEP)
+@njit(**FILLING)
 def _substep(  # type: ignore[no-untyped-def]
     x, P, rows, rudders, h, drive, decay, ship, live, after, table, values, slopes, stack, by, total, room, lanes
 ):
@@ -159,22 +83,22 @@ def _substep(  # type: ignore[no-untyped-def]
     """
     k1, k2, k3, k4, xs, A, J, Phi, term, work, nodes, w, W, coupled = room
     width = k1.shape[0]
-    _dynamics(x, rows[0], rudders[0], ship, width, 0, table, values, slopes, stack, by, total, k1, J, lanes)
+    dynamics(x, rows[0], rudders[0], ship, width, 0, table, values, slopes, stack, by, total, k1, J, lanes)
     for i in live:
         for b in range(each(lanes)):
             xs[i, b] = x[i, b] + 0.5 * h * k1[i, b]
-    _dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k2, J, lanes)
+    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k2, J, lanes)
     for i in live:
         for b in range(each(lanes)):
             xs[i, b] = x[i, b] + 0.5 * h * k2[i, b]
-    _dynamics(xs, rows[1], rudders[1], ship, width, width, table, values, slopes, stack, by, total, k3, A, lanes)
+    dynamics(xs, rows[1], rudders[1], ship, width, width, table, values, slopes, stack, by, total, k3, A, lanes)
     for b in range(each(lanes)):
         # what a unit of rudder does at the middle
         w[V, b], w[R, b] = ship[0][4, b] * values[SPEED, b] ** 2, ship[0][5, b] * values[SPEED, b] ** 2
     for i in live:
         for b in range(each(lanes)):
             xs[i, b] = x[i, b] + h * k3[i, b]
-    _dynamics(xs, rows[2], rudders[2], ship, width, 0, table, values, slopes, stack, by, total, k4, J, lanes)
+    dynamics(xs, rows[2], rudders[2], ship, width, 0, table, values, slopes, stack, by, total, k4, J, lanes)
     for i in live:
         for b in range(each(lanes)):
             x[i, b] += h / 6.0 * (k1[i, b] + 2.0 * k2[i, b] + 2.0 * k3[i, b] + k4[i, b])
@@ -206,7 +130,7 @@ def _substep(  # type: ignore[no-untyped-def]
             w[i, b] = 0.0
 
 
-@njit(**STEP)
+@njit(**FILLING)
 def _measurements(  # type: ignore[no-untyped-def]
     k,
     x,
@@ -233,11 +157,10 @@ def _measurements(  # type: ignore[no-untyped-def]
     lanes,
 ):
     """Predict the measurements of instant ``k``, take them in, and add theirs to the log-likelihoods."""
-    programs, code, constants = table
     k1, J, gain, weight, h, stood, value, S = room
     n, width = x.shape[0], k1.shape[0]
     # linearised once, where the prediction stands; one measurement after the other moves on from there
-    _dynamics(x, row, rudder, ship, width, width, table, values, slopes, stack, by, total, k1, J, lanes)
+    dynamics(x, row, rudder, ship, width, width, table, values, slopes, stack, by, total, k1, J, lanes)
     for i in range(n):
         for b in range(each(lanes)):
             stood[i, b] = x[i, b]
@@ -261,7 +184,7 @@ def _measurements(  # type: ignore[no-untyped-def]
             elif channel == 1:
                 h[n - 1, b] = 1.0
                 value[b] += stood[n - 1, b]
-        if _add(ON_LATERAL + channel, 0, programs, code, constants, values, slopes, stack, by, width, total, lanes):
+        if add_programs(ON_LATERAL + channel, 0, table, values, slopes, stack, by, width, total, lanes):
             for b in range(each(lanes)):
                 value[b] += total[0, b]
                 for j in range(width):

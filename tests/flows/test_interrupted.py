@@ -62,7 +62,7 @@ def at_write(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
         return wrapped
 
     monkeypatch.setattr(delta, "replace", dying(delta.replace))
-    monkeypatch.setattr(delta, "writing", dying(delta.writing))
+    monkeypatch.setattr(delta, "ensured", dying(delta.ensured))
     monkeypatch.setattr(Warehouse, "write_bytes", dying(Warehouse.write_bytes))
     return lambda number: left.__setitem__(0, number)
 
@@ -140,7 +140,7 @@ def wait_for(process: subprocess.Popen[bytes], reached: Callable[[], bool]) -> N
     ("table", "sent"),
     [
         ("segments", signal.SIGKILL),
-        ("logs", signal.SIGKILL),
+        ("logs", signal.SIGTERM),
         ("logs", signal.SIGINT),
     ],
 )

@@ -13,8 +13,9 @@ from pipeline.diagnose.run import Run, Ship
 from pipeline.identify.chain import LONGEST
 from pipeline.identify.kernel import N_STATE, likelihood, no_trace
 from pipeline.model.augmented import Augmented
+from pipeline.model.dynamics import N_INPUT
 from pipeline.model.effects import from_expression
-from pipeline.model.extended import N_INPUT, ROWS
+from pipeline.model.extended import ROWS
 from pipeline.model.terms.effect import Effect, ExtraState, Parameter
 from schemas.errors import UsageError
 from schemas.model_spec import ModelSpec

@@ -1,74 +1,91 @@
-"""Open tables that are lent: the newest version, one thread at a time, and never those of a table that is gone."""
+"""Tables kept open: never stale, never shared, never of another folder."""
 
 from __future__ import annotations
 
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
-from shutil import rmtree
-from threading import Barrier, Thread
-from typing import Any
 
 import pytest
 
-from warehouse import delta, runs
+from warehouse import delta, handles, runs
 from warehouse.store import Warehouse
 
-
-def record(warehouse: Warehouse, name: str, status: str = "done") -> None:
-    runs.record(warehouse, runs.Run(name, "test", None, status))
+ROOT = Path(__file__).parents[2]
 
 
-def names(warehouse: Warehouse) -> list[str]:
-    return [run.run_id for run in runs.all_runs(warehouse)]
+def put(warehouse: Warehouse, status: str, name: str = "run-1") -> None:
+    runs.record(warehouse, runs.Run(name, "ingest", None, status))
 
 
-def test_a_read_sees_what_others_committed_and_opens_once(
-    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    record(warehouse, "a")
-    assert names(warehouse) == ["a"]
-    other = Warehouse(warehouse.uri)
-    with monkeypatch.context() as patched:
-        patched.setattr(delta, "open_table", lambda *_: pytest.fail("opened anew"))
-        for name in "bcd":
-            record(other, name)
-            assert names(warehouse)[-1] == name
-    assert delta.versions(warehouse) == {"runs": 4}
+def stands(warehouse: Warehouse) -> dict[str, str]:
+    return {run.run_id: run.status for run in runs.all_runs(warehouse)}
 
 
-def test_a_table_made_anew_at_the_same_place_is_another(warehouse: Warehouse) -> None:
-    record(warehouse, "old")
-    record(warehouse, "older")
-    assert names(warehouse) == ["old", "older"]
+def test_a_handle_is_used_again(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(warehouse, "one")
+    assert stands(warehouse) == {"run-1": "one"}
+    monkeypatch.setattr(delta, "open_table", lambda *_: pytest.fail("opened anew"))
+    assert stands(warehouse) == {"run-1": "one"}
+    put(warehouse, "two")
+    assert stands(warehouse) == {"run-1": "two"}
+
+
+def test_what_another_process_wrote_is_seen(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    assert stands(warehouse) == {"run-1": "one"}
+    code = (
+        "from warehouse import runs; from warehouse.store import Warehouse\n"
+        f"runs.record(Warehouse({warehouse.uri!r}), runs.Run('run-1', 'ingest', None, 'two'))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, timeout=60)
+    assert stands(warehouse) == {"run-1": "two"}
+
+
+def test_a_folder_that_was_replaced_is_opened_anew(warehouse: Warehouse, tmp_path: Path) -> None:
     assert warehouse.folder is not None
-    rmtree(warehouse.folder)
-    record(Warehouse(warehouse.uri), "new")
-    assert names(warehouse) == ["new"] and delta.versions(warehouse) == {"runs": 1}
+    put(warehouse, "one")
+    early = Path(shutil.copytree(warehouse.folder, tmp_path / "early"))
+    put(warehouse, "two")
+    late = Path(shutil.copytree(warehouse.folder, tmp_path / "late"))
+    assert stands(warehouse) == {"run-1": "two"}
+    for copy, status in ((early, "one"), (late, "two")):
+        shutil.rmtree(warehouse.folder)
+        shutil.copytree(copy, warehouse.folder)
+        assert stands(warehouse) == {"run-1": status}
+    shutil.rmtree(warehouse.folder)
+    warehouse.create()
+    assert stands(warehouse) == {}
 
 
-def test_two_threads_never_share_one(warehouse: Warehouse) -> None:
-    record(warehouse, "a")
-    seen: list[Any] = []
-    both = Barrier(2)
-
-    def hold() -> None:
-        with delta.writing(warehouse, "runs") as table:
-            seen.append(table)
-            both.wait(timeout=60)
-
-    threads = [Thread(target=hold) for _ in range(2)]
-    for one in threads:
-        one.start()
-    for one in threads:
-        one.join()
-    assert len({id(table) for table in seen}) == 2
+def test_nobody_shares_a_handle(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    with delta.reading(warehouse, "runs") as first, delta.reading(warehouse, "runs") as second:
+        assert first is not second
+        assert first is not None and second is not None
+        put(warehouse, "two")
+        with delta.reading(warehouse, "runs") as third:
+            assert third is not None
+            assert third.version() == first.version() + 1 == second.version() + 1
 
 
-def test_a_lost_race_is_noticed_by_a_handle_that_was_lent_before(warehouse: Warehouse, tmp_path: Path) -> None:
-    from deltalake.exceptions import CommitFailedError
+def test_one_over_which_something_went_wrong_is_not_kept(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    with delta.reading(warehouse, "runs") as held:
+        pass
+    with pytest.raises(ZeroDivisionError), delta.reading(warehouse, "runs") as bad:
+        raise ZeroDivisionError
+    assert bad is held, "it was the one that was kept"
+    with delta.reading(warehouse, "runs") as next_one:
+        assert next_one is not bad
 
-    record(warehouse, "a", "first")
-    with pytest.raises(CommitFailedError), delta.writing(warehouse, "runs") as table:
-        rows = delta.rows(table, "runs").rows(named=True)
-        record(Warehouse(warehouse.uri), "a", "second")
-        delta.replace(table, "runs", rows, "run_id = 'a'")
-    assert [run.status for run in runs.all_runs(warehouse)] == ["second"]
+
+def test_many_threads_lose_nothing(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda i: put(warehouse, "done", f"run-{i}"), range(2, 14)))
+        seen = list(pool.map(lambda _: len(stands(warehouse)), range(8)))
+    assert seen == [13] * 8
+    assert len(handles._kept) <= handles.MOST

@@ -2,10 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
 import click
 
 from workbench.cli.options import json_option, vessel_option, warehouse_option
 from workbench.terminal import print_json, print_table
+
+if TYPE_CHECKING:
+    from pipeline.ingest.readings import LostStretch
 
 
 @click.group("logs")
@@ -19,7 +25,8 @@ def command() -> None:
 @json_option
 def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers: records read = kept + rejected."""
-    from warehouse import logs, vessels
+    from flows.lost import as_json as lost_as_json
+    from warehouse import logs, lost, vessels
     from warehouse.instant import iso_utc
     from warehouse.store import Warehouse
 
@@ -27,6 +34,8 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     warehouse.require()
     if vessel is not None:
         vessels.require(warehouse, vessel)
+    rows_of_logs = logs.current(warehouse, vessel)
+    gone = lost.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
     found = [
         {
             "log_id": row.log_id,
@@ -40,16 +49,30 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
             "records_kept": row.tally.records_kept,
             "records_rejected": row.tally.records_rejected,
             "rejected_by_reason": dict(row.tally.by_reason),
+            "partial": row.ingest_id in gone,
+            "lost": lost_as_json(gone.get(row.ingest_id, ())),
             "notes": list(row.notes),
         }
-        for row in logs.current(warehouse, vessel)
+        for row in rows_of_logs
     ]
     if as_json:
         print_json(found)
         return
     head = ["log_id", "vessel", "file_name", "format", "start", "records_read", "records_kept", "records_rejected"]
     rows = [[str(one[name])[: 12 if name == "log_id" else 40] for name in head] for one in found]
+    if gone:
+        head.append("damage")
+        rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, rows_of_logs, strict=True)]
     print_table([name.replace("_", " ") for name in head], rows)
+
+
+def _damage(lost: Sequence[LostStretch]) -> str:
+    """Say in a word what of a log is lost."""
+    if not lost:
+        return ""
+    counted = [one.messages for one in lost if one.messages is not None]
+    many = f", {sum(counted)} messages" if len(counted) == len(lost) else ""
+    return f"partial: {len(lost)} stretch{'es' if len(lost) > 1 else ''} lost{many}"
 
 
 @command.command("rejected")
