@@ -53,11 +53,22 @@ def json_payloads(rng: np.random.Generator, time_ns: NDArray[np.int64]) -> Bytes
     """Return one JSON message a row: its time, a number of all the digits of a double, a truth and a word."""
     template = b'{"stamp": 0000000000.000000, "value": 00.00000000000000, "valid": true, "unit": "deg"}'
     rows = np.tile(np.frombuffer(template, dtype=np.uint8), (time_ns.size, 1))
-    _digits(rows, 10, time_ns // 1_000_000_000, 10)
-    _digits(rows, 21, time_ns % 1_000_000_000 // 1_000, 6)
+    stamp_json(rows, time_ns)
     _digits(rows, 38, rng.integers(10, 40, time_ns.size), 2)
     _digits(rows, 41, rng.integers(0, 10**14, time_ns.size), 14)
     return rows
+
+
+def stamp_json(rows: Bytes, time_ns: NDArray[np.int64]) -> None:
+    """Write the times into JSON messages."""
+    _digits(rows, 10, time_ns // 1_000_000_000, 10)
+    _digits(rows, 21, time_ns % 1_000_000_000 // 1_000, 6)
+
+
+def stamp_imu(rows: Bytes, time_ns: NDArray[np.int64]) -> None:
+    """Write the times into IMU messages."""
+    rows[:, 4:8] = (time_ns // 1_000_000_000).astype("<i4")[:, None].view(np.uint8)
+    rows[:, 8:12] = (time_ns % 1_000_000_000).astype("<u4")[:, None].view(np.uint8)
 
 
 def _digits(rows: Bytes, at: int, number: NDArray[np.int64], width: int) -> None:
@@ -70,8 +81,7 @@ def imu_payloads(rng: np.random.Generator, time_ns: NDArray[np.int64]) -> Bytes:
     head = b"\x00\x01\x00\x00" + bytes(8) + struct.pack("<I", 9) + b"imu_link\0" + bytes(3)
     rows = np.zeros((time_ns.size, len(head) + 37 * 8), dtype=np.uint8)
     rows[:, : len(head)] = np.frombuffer(head, dtype=np.uint8)
-    rows[:, 4:8] = (time_ns // 1_000_000_000).astype("<i4")[:, None].view(np.uint8)
-    rows[:, 8:12] = (time_ns % 1_000_000_000).astype("<u4")[:, None].view(np.uint8)
+    stamp_imu(rows, time_ns)
     numbers = np.zeros((time_ns.size, 37))
     for first, last in ((0, 4), (13, 16), (25, 28)):
         numbers[:, first:last] = rng.uniform(-0.5, 0.5, (time_ns.size, last - first))
@@ -79,16 +89,25 @@ def imu_payloads(rng: np.random.Generator, time_ns: NDArray[np.int64]) -> Bytes:
     return rows
 
 
+#: Chunks whose values differ; behind them they come again, with their own times.
+_POOL = 6
+
+
 def chunks(topics: tuple[Topic, ...], ticks: int, ticks_a_chunk: int) -> Iterator[tuple[bytes, int, int, int]]:
     """Yield the records of every chunk with its messages and its first and last log time; each topic once a tick."""
-    rng = np.random.default_rng(7)
-    for first in range(0, ticks, ticks_a_chunk):
+    made: dict[tuple[int, int], Bytes] = {}
+    for turn, first in enumerate(range(0, ticks, ticks_a_chunk)):
         n = min(ticks_a_chunk, ticks - first)
+        rng = np.random.default_rng((7, turn))
         tick = START_NS + STEP_NS * np.arange(first, first + n, dtype=np.int64)
         parts = []
         for number, topic in enumerate(topics, start=1):
             time_ns = tick + 1_000 * number + rng.integers(0, 1_000, n)
-            payloads = (json_payloads if topic[1] == "json" else imu_payloads)(rng, time_ns)
+            key = (turn % _POOL, number)
+            if key not in made or made[key].shape[0] != n:
+                made[key] = (json_payloads if topic[1] == "json" else imu_payloads)(rng, time_ns)
+            payloads = made[key]
+            (stamp_json if topic[1] == "json" else stamp_imu)(payloads, time_ns)
             head = struct.pack("<BQHI", 5, 22 + payloads.shape[1], number, 0) + bytes(16)
             rows = np.empty((n, len(head) + payloads.shape[1]), dtype=np.uint8)
             rows[:, : len(head)] = np.frombuffer(head, dtype=np.uint8)

@@ -16,11 +16,10 @@ from numpy.typing import NDArray
 from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.mcap_chunk import CHUNK_LIMIT, head_of, unpacked
 from pipeline.ingest.mcap_records import MESSAGE_INDEX
-from pipeline.ingest.mcap_walk import HEAD
+from pipeline.ingest.mcap_walk import HEAD, heads
 from pipeline.ingest.readings import LostStretch
 from pipeline.ingest.spans import Bytes, Index, as_bytes
 
-_MESSAGE_HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
 _LATEST = np.uint64(np.iinfo(np.int64).max)
 
@@ -90,14 +89,8 @@ def messages_of(content: Bytes, first: Index, end: Index, piece: Piece) -> Batch
     piece : Piece
         Where ``content`` comes from.
     """
-    n, size = first.size, _MESSAGE_HEAD.itemsize
-    whole = end - first >= size
-    head = np.zeros(n, dtype=_MESSAGE_HEAD)
-    if whole.any():
-        head[whole] = np.ascontiguousarray(content[first[whole][:, None] + np.arange(size)]).view(_MESSAGE_HEAD)[:, 0]
-    channel = np.where(whole, head["channel"].astype(np.int64), -1)
-    log_time, publish_time = (np.minimum(head[k], _LATEST).astype(np.int64) for k in ("log_time", "publish_time"))
-    return Batch(content, np.where(whole, first + size, first), end, channel, log_time, publish_time, (piece,))
+    payload, channel, log_time, publish_time = heads(content, first, end)
+    return Batch(content, payload, end, channel, log_time, publish_time, (piece,))
 
 
 def joined(batches: list[Batch]) -> Batch:

@@ -43,8 +43,11 @@ from pipeline.ingest.unpack import allowance, too_large, too_many
 #: Bytes that are read from the file at once, and messages that are handed on together, unpacked.
 WINDOW = 4 << 20
 
-#: The same right behind damage, where there may be more of it.
+#: Bytes that are read at once right behind damage, where there may be more of it.
 _FIRST_WINDOW = 1 << 14
+
+#: From here on a chunk is handed on as it is; smaller ones are worth a copy that puts them together.
+_LARGE = 1 << 19
 
 #: Bytes of a chunk's head that tell it for one.
 _CHUNK_HEAD = 64
@@ -114,11 +117,12 @@ class McapStream:
         size = 0
         for batch in self._pieces():
             self._count(batch)
-            if batch.lost or size + batch.content.size > WINDOW:
+            alone = batch.lost or batch.content.size >= _LARGE
+            if alone or size + batch.content.size > WINDOW:
                 if waiting:
                     yield joined(waiting)
                 waiting, size = [], 0
-            if batch.lost:
+            if alone:
                 yield batch
             else:
                 waiting.append(batch)

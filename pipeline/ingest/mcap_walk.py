@@ -46,6 +46,23 @@ def _fill_compiled(buffer, at, opcode, first, end):
 
 
 @njit(cache=True)
+def _heads_compiled(buffer, first, end, channel, log_time, publish_time):
+    latest = np.uint64(0x7FFFFFFFFFFFFFFF)
+    for i in range(first.size):
+        at = first[i]
+        if end[i] - at < 22:
+            channel[i] = -1
+            continue
+        channel[i] = np.int64(buffer[at]) | np.int64(buffer[at + 1]) << 8
+        log, publish = np.uint64(0), np.uint64(0)
+        for k in range(8):
+            log |= np.uint64(buffer[at + 6 + k]) << np.uint64(8 * k)
+            publish |= np.uint64(buffer[at + 14 + k]) << np.uint64(8 * k)
+        log_time[i], publish_time[i] = np.int64(min(log, latest)), np.int64(min(publish, latest))
+        first[i] = at + 22
+
+
+@njit(cache=True)
 def _chunk_after_compiled(buffer, start, stop, file_left):
     for at in range(start, stop - 57):
         if buffer[at] != 6:
@@ -123,3 +140,27 @@ def chunk_after(buffer: Bytes, left: int) -> int:
         -1 where there is none whose head is whole in the buffer.
     """
     return int(_chunk_after_compiled(buffer, np.int64(0), np.int64(buffer.size), np.int64(left)))
+
+
+def heads(buffer: Bytes, first: Index, end: Index) -> tuple[Index, Index, Index, Index]:
+    """Read the heads of messages.
+
+    Parameters
+    ----------
+    buffer : ndarray of uint8
+    first, end : ndarray of int64, shape (m,)
+        Contents of the message records.
+
+    Returns
+    -------
+    payload : ndarray of int64, shape (m,)
+        Where the payloads begin.
+    channel : ndarray of int64, shape (m,)
+        -1 where a message is too short for a head.
+    log_time, publish_time : ndarray of int64, shape (m,)
+        Nanoseconds; what 63 bits do not hold is the last instant that they do.
+    """
+    payload, channel = first.copy(), np.empty(first.size, dtype=np.int64)
+    log_time, publish_time = np.zeros(first.size, dtype=np.int64), np.zeros(first.size, dtype=np.int64)
+    _heads_compiled(buffer, payload, end, channel, log_time, publish_time)
+    return payload, channel, log_time, publish_time
