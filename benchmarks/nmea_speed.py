@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
-from time import perf_counter
+from time import perf_counter, process_time
 
 import zstandard
 
@@ -23,26 +23,39 @@ from pipeline.ingest.nmea import decode
 from pipeline.ingest.read import read_log
 from schemas.profile import VesselProfile
 
+#: Seconds on the wall and of the processor.
+Spent = tuple[float, float]
+
 #: Times as fast as the rival with the fields read, that is wanted.
 TARGET = 8.0
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One log: seconds of each round, and what was found in it."""
+    """One log: what each round took, and what was found in it."""
 
     name: str
     lines: int
     megabytes: float
-    decoding: list[float]
-    reading: list[float]
-    rival: list[float]
+    decoding: list[Spent]
+    reading: list[Spent]
+    rival: list[Spent]
     told_wrong: str
     peak_bytes_per_byte: float
 
-    def ratio(self, mine: list[float]) -> float:
-        """Median over the rounds of the rival's time over ours."""
-        return median(theirs / ours for theirs, ours in zip(self.rival, mine, strict=True))
+    def ratio(self, mine: list[Spent], clock: int) -> float:
+        """Median over the rounds of the rival's time over ours; clock 0 hangs on the wall, 1 is the processor's."""
+        return median(theirs[clock] / ours[clock] for theirs, ours in zip(self.rival, mine, strict=True))
+
+    def rate(self, spent: list[Spent]) -> str:
+        """Thousand sentences per second of the processor."""
+        return f"{self.lines / median(cpu for _, cpu in spent) / 1e3:.0f}"
+
+
+def unpacked(name: str, data: bytes) -> bytes:
+    if name.endswith(".gz"):
+        return gzip.decompress(data)
+    return zstandard.ZstdDecompressor().decompressobj().decompress(data) if name.endswith(".zst") else data
 
 
 def rival(data: bytes) -> int:
@@ -60,20 +73,16 @@ def rival(data: bytes) -> int:
     return read
 
 
-def seconds(work: Callable[[], object]) -> float:
-    begin = perf_counter()
+def spent(work: Callable[[], object]) -> Spent:
+    begin, worked = perf_counter(), process_time()
     work()
-    return perf_counter() - begin
+    return perf_counter() - begin, process_time() - worked
 
 
 def measure(name: str, data: bytes, wrong: set[int] | None, rounds: int) -> Measured:
     """Time one log; ``wrong`` are the lines that were damaged, None where that is not known."""
     profile = VesselProfile()
-    content = data
-    if name.endswith(".gz"):
-        content = gzip.decompress(data)
-    elif name.endswith(".zst"):
-        content = zstandard.ZstdDecompressor().decompressobj().decompress(data)
+    content = unpacked(name, data)
     readings = read_log(name, data, profile)
     told = set(readings.rejected.filter(readings.rejected["reason"] == "checksum")["record"].to_list())
     found = f"{len(told)}" if wrong is None else f"{len(told & wrong)} of {len(wrong)}, {len(told - wrong)} others"
@@ -83,9 +92,9 @@ def measure(name: str, data: bytes, wrong: set[int] | None, rounds: int) -> Meas
     tracemalloc.stop()
     decoding, reading, theirs = [], [], []
     for _ in range(rounds):
-        decoding.append(seconds(lambda: decode(content)))
-        reading.append(seconds(lambda: read_log(name, data, profile)))
-        theirs.append(seconds(lambda: rival(content)))
+        decoding.append(spent(lambda: decode(content)))
+        reading.append(spent(lambda: read_log(name, data, profile)))
+        theirs.append(spent(lambda: rival(unpacked(name, data))))
     lines = readings.tally.records_read
     return Measured(name, lines, len(data) / 1e6, decoding, reading, theirs, found, peak)
 
@@ -97,24 +106,35 @@ def page(found: list[Measured], lines: int) -> list[str]:
             m.name,
             f"{m.lines}",
             f"{m.megabytes:.1f}",
-            f"{m.lines / median(m.rival) / 1e3:.0f}",
-            f"{m.lines / median(m.decoding) / 1e3:.0f}",
-            f"{m.lines / median(m.reading) / 1e3:.0f}",
-            f"{m.ratio(m.decoding):.1f}",
-            f"**{m.ratio(m.reading):.1f}**",
+            m.rate(m.rival),
+            m.rate(m.decoding),
+            m.rate(m.reading),
+            f"{m.ratio(m.decoding, 1):.1f}",
+            f"**{m.ratio(m.reading, 1):.1f}**",
+            f"{m.ratio(m.reading, 0):.1f}",
             m.told_wrong,
             f"{m.peak_bytes_per_byte:.1f}",
         ]
         for m in found
     ]
-    head = ["log", "lines", "MB", "pynmea2", "decoded", "read", "decoded / pynmea2", "read / pynmea2"]
+    head = [
+        "log",
+        "lines",
+        "MB",
+        "pynmea2",
+        "decoded",
+        "read",
+        "decoded / pynmea2",
+        "read / pynmea2",
+        "the same on the wall",
+    ]
     head += ["wrong checksums told", "peak memory, bytes a byte"]
     large = [m for m in found if m.lines >= lines]
-    least = min(m.ratio(m.reading) for m in large)
+    least = min(m.ratio(m.reading, 1) for m in large)
     return [
-        f"Thousand sentences a second, medians of the rounds; ratios are medians of the rounds' own ratios. Over the "
-        f"logs of {lines} lines and more, reading is at least {least:.1f} times as fast as pynmea2 with its fields "
-        f"read (wanted: {TARGET:g}).",
+        "Thousand sentences per second of the processor (on all cores together), medians of the rounds; ratios are "
+        f"medians of the rounds' own ratios. Over the logs of {lines} lines and more, reading takes at most a "
+        f"{least:.1f}th of the time of pynmea2 with its fields read (wanted: {TARGET:g}).",
         "",
         *table(head, rows),
         "",
@@ -141,11 +161,11 @@ def draw(found: list[Measured], path: Path) -> None:
     for k, one in enumerate(found):
         pairs = ((one.rival, "0.6", "pynmea2"), (one.reading, "C0", "read"), (one.decoding, "C2", "decoded"))
         for shift, (times, colour, label) in enumerate(pairs):
-            rate = one.lines / median(times) / 1e3
+            rate = float(one.rate(times))
             axes.barh(k + 0.27 * (shift - 1), rate, 0.25, color=colour, label=label if k == 0 else None)
     axes.set_yticks(range(len(found)), [m.name for m in found])
     axes.invert_yaxis()
-    axes.set_xlabel("thousand sentences a second")
+    axes.set_xlabel("thousand sentences per second of the processor")
     axes.legend(frameon=False)
     figure.savefig(path, dpi=120, metadata={"Software": None})
     plt.close(figure)
