@@ -107,15 +107,18 @@ def fleet(folder: Path, logs_each: int) -> Path:
     return place
 
 
-def compared(source: Path, place: Path, preview: dict[str, Any]) -> int:
+def compared(place: Path, preview: dict[str, Any]) -> int:
     """Count the sets whose values after adopting are, bit for bit, those that were told."""
+    from warehouse import parameter_sets
+    from warehouse.store import Warehouse
+
     wanted: dict[str, dict[str, float]] = {}
     for move in preview["moves"]:
         wanted.setdefault(move["becomes"], {})[move["parameter"]] = move["after"]
     found = 0
     for name, values in wanted.items():
-        stored = kempf(source, "params", "show", name, "--warehouse", str(place))["parameters"]
-        found += all(stored[parameter]["value"] == value for parameter, value in values.items())
+        stored = {e.name: e.value for e in parameter_sets.get(Warehouse(str(place)), name).parameters}
+        found += all(stored[parameter] == value for parameter, value in values.items())
     return found
 
 
@@ -131,7 +134,7 @@ def tried(folder: Path, place: Path, change: Change) -> Told:
     for hull in HULLS:
         kempf(source, "reprocess", "--vessel", hull, "--warehouse", str(own))
     adopted = perf_counter()
-    return Told(change, preview, compared(source, own, preview), preview["moved"], asked - begin, adopted - copied)
+    return Told(change, preview, compared(own, preview), preview["moved"], asked - begin, adopted - copied)
 
 
 def page(found: list[Told], verify_s: float) -> list[str]:

@@ -9,6 +9,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite
+from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import UsageError
@@ -21,6 +22,10 @@ from warehouse.store import Warehouse
 if TYPE_CHECKING:
     import polars as pl
     from deltalake import DeltaTable
+
+
+#: Half a 95 % interval, in standard errors.
+_HALF_WIDTH = NormalDist().inv_cdf(0.975)
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +48,22 @@ class History:
     note: str | None
 
     def rows(self) -> list[dict[str, Any]]:
-        """Return the rows as JSON content, with the start of the first segment as ISO 8601 text."""
-        listed = self.frame.rows(named=True)
-        result: list[dict[str, Any]] = plain([{**row, "start": iso_utc(row["start_utc_ns"])} for row in listed])
+        """Return the rows as JSON content.
+
+        Besides the columns: ``start`` of the first segment as ISO 8601 text, and ``low`` and ``high``, the ends of the
+        95 % interval (1.96 standard errors), None where there is no standard error.
+        """
+        listed = [
+            {**row, **_interval(row["value"], row["std"]), "start": iso_utc(row["start_utc_ns"])}
+            for row in self.frame.rows(named=True)
+        ]
+        result: list[dict[str, Any]] = plain(listed)
         return result
+
+
+def _interval(value: float, std: float | None) -> dict[str, float | None]:
+    half = None if std is None else _HALF_WIDTH * std
+    return {"low": None if half is None else value - half, "high": None if half is None else value + half}
 
 
 @dataclass(frozen=True)

@@ -98,7 +98,7 @@ def begun(harbour: Path, place: Path) -> subprocess.Popen[bytes]:
 
 def test_two_processes_with_one_log_leave_one(harbour: Path, tmp_path: Path, one_log: dict[str, Any]):
     both = [begun(harbour, tmp_path / "w") for _ in range(2)]
-    said = [(p.communicate(timeout=100), p.returncode) for p in both]
+    said = [(p.communicate(timeout=400), p.returncode) for p in both]
     assert [code for _, code in said] == [0, 0], said
     outcomes = [json.loads(out)[0]["outcome"] for (out, _), _ in said]
     assert sorted(outcomes) == ["new", "unchanged"]
@@ -140,7 +140,7 @@ def test_a_signal_at_any_moment_leaves_what_the_next_run_completes(
     ours = "|".join(map(str, asked(harbour, tmp_path)[:4]))
     command = [sys.executable, "-c", code, ours, *map(str, places)]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-    done = subprocess.run(command, capture_output=True, text=True, timeout=100, env=environment, check=True)
+    done = subprocess.run(command, capture_output=True, text=True, timeout=400, env=environment, check=True)
     codes = [int(line) for line in done.stdout.splitlines() if line.lstrip("-").isdigit()]
     assert codes == [130 if sent == signal.SIGINT else -sent for _, sent in moments], done.stderr
     assert done.stderr.count("the same command goes on") == 2

@@ -46,6 +46,9 @@ def test_rows_are_in_order_of_start_then_id(warehouse: Warehouse) -> None:
     assert found.note is None
     row = history.of_vessel(warehouse, "aurora", parameter="b2").rows()[0]
     assert (row["value"], row["std"], row["unit"]) == (1 / 3, None, "1/m^2")
+    assert (row["low"], row["high"]) == (None, None)
+    row = history.of_vessel(warehouse, "aurora", parameter="a11").rows()[0]
+    assert (row["low"], row["high"]) == pytest.approx((-0.1 - 0.0195996, -0.1 + 0.0195996), abs=1e-7)
     assert row["start"] == "2025-05-03T07:47:01.147000001Z"
 
 
