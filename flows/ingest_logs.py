@@ -7,16 +7,18 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from flows.examine_log import examine_frame
 from flows.files import read_bytes
 from flows.find_segments import Ingest, find_segments
 from flows.progress import Progress, silent
 from flows.unforeseen import as_told
 from pipeline.ingest.read import read_log
-from pipeline.ingest.readings import Tally
+from pipeline.ingest.readings import Readings, Tally
 from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
-from warehouse import code_version, logs, raw, segments, vessels
+from warehouse import code_version, examinations, logs, raw, segments, vessels
 from warehouse.deposit import Delivery, deposit, held
+from warehouse.examinations import StoredExamination
 from warehouse.keys import ingest_id, vessel_key
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
@@ -39,6 +41,8 @@ class IngestOutcome:
         How it was read, and why zigzags could not be looked for, where that is so.
     segments : tuple of Segment
         Found in this log.
+    examination : StoredExamination or None
+        What the channel doctor found in it.
     error : KempfError or None
         Why it failed; then nothing of the log was stored.
     """
@@ -50,6 +54,7 @@ class IngestOutcome:
     tally: Tally | None = None
     notes: tuple[str, ...] = ()
     segments: tuple[Segment, ...] = ()
+    examination: StoredExamination | None = None
     error: KempfError | None = None
 
     def show(self) -> dict[str, Any]:
@@ -64,6 +69,7 @@ class IngestOutcome:
             "rejected_by_reason": dict(self.tally.by_reason) if self.tally else {},
             "notes": list(self.notes),
             "segments": [segment.segment_id for segment in self.segments],
+            "channels": _channels(self.examination),
             **(self.error.to_json() if self.error else {}),
         }
 
@@ -72,6 +78,12 @@ def _ledger(tally: Tally | None, of: str) -> dict[str, int] | None:
     if tally is None:
         return None
     return {part: getattr(tally, f"{of}_{part}") for part in ("read", "kept", "rejected")}
+
+
+def _channels(examination: StoredExamination | None) -> dict[str, Any] | None:
+    if examination is None:
+        return None
+    return {"verdict": examination.verdict, "findings": examination.content.get("findings", [])}
 
 
 def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile | None) -> tuple[str, VesselProfile]:
@@ -164,14 +176,28 @@ def ingest_bytes(
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
         found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
-        return IngestOutcome(path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found)
+        seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
+        return IngestOutcome(path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, seen)
     readings = read_log(file_name, data, profile)
     log = raw.log_id(data)
     one = Ingest(vessel, log, ingest_id(log, profile.sha256, code))
     zigzags, notes = find_segments(one, profile, readings.frame)
-    # the zigzags before the row that makes the log count: what a crash leaves in between is not seen, and is not missed
+    seen = _examined(one, profile, file_name, readings, code)
+    # zigzags and verdict before the row that makes the log count: what a crash leaves in between is not seen, and is
+    # not missed
     segments.replace(warehouse, vessel, {one.ingest_id: zigzags})
+    examinations.replace(warehouse, seen)
     noted = replace(readings, notes=(*readings.notes, *notes))
     stored = deposit(warehouse, [Delivery(vessel, file_name, data, profile, noted, code)])[0]
     row = logs.of_ingest(warehouse, stored.ingest_id)
-    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, tuple(zigzags))
+    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, tuple(zigzags), seen)
+
+
+def _examined(one: Ingest, profile: VesselProfile, file_name: str, read: Readings, code: str) -> StoredExamination:
+    """Examine a log; should the doctor fail, that is the verdict, and the log is in all the same."""
+    try:
+        content = examine_frame(read.frame, profile, file_name, read.format).content
+    except Exception as error:  # noqa: BLE001 - a log is not lost because its channels could not be compared
+        content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(as_told(error))}
+    findings = tuple(finding["words"] for finding in content["findings"])
+    return StoredExamination(one.vessel, one.ingest_id, one.log_id, code, content["verdict"], findings, content)

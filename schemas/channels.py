@@ -71,6 +71,8 @@ _ALL = (
     Channel("water_depth", "m", 0.0, 12000.0, "none", "water depth below the transducer or keel"),
     Channel("roll", "rad", -pi / 2, pi / 2, "none", "roll angle, starboard down positive"),
     Channel("pitch", "rad", -pi / 2, pi / 2, "none", "pitch angle, bow up positive"),
+    Channel("velocity_forward", "m/s", -60.0, 60.0, "none", "velocity over ground along the bow, ahead positive"),
+    Channel("velocity_starboard", "m/s", -60.0, 60.0, "none", "velocity over ground across the bow, to starboard"),
 )
 
 #: Every canonical channel by name, in the order of the tables.

@@ -9,7 +9,7 @@ from warehouse.retry import with_retry
 from warehouse.store import Warehouse
 
 #: Tables that grow by single rows; readings come in whole files and are left alone.
-_SMALL = ("vessels", "logs", "segments", "parameter_sets", "aliases", "runs")
+_SMALL = ("vessels", "logs", "segments", "examinations", "parameter_sets", "aliases", "runs")
 
 
 def compact(warehouse: Warehouse, more_files_than: int = 50) -> tuple[str, ...]:

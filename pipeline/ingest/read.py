@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pipeline.ingest import sniff
 from pipeline.ingest.decoded import Decoded
+from pipeline.ingest.own_clocks import set_right
 from pipeline.ingest.readings import Readings
 from pipeline.ingest.screen import screen
 from pipeline.ingest.unpack import unpack
@@ -50,7 +51,7 @@ def read_log(name: str, data: bytes, profile: VesselProfile) -> Readings:
             {"name": name},
         )
     decoded = _decode(log_format, name, content, profile, source)
-    readings = screen(decoded, log_format)
+    readings = set_right(screen(decoded, log_format), source)
     if readings.frame.height == 0:
         raise _nothing(name, readings)
     if notes:

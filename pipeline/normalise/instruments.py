@@ -39,11 +39,14 @@ class Instruments:
         The log's source that serves each channel.
     notes : tuple of str
         Choices made, one sentence each.
+    derived : frozenset of str
+        Channels that the log does not have and that were computed from others.
     """
 
     series: dict[str, Series]
     sources: dict[str, str]
     notes: tuple[str, ...]
+    derived: frozenset[str] = frozenset()
 
     def get(self, channel: str) -> Series | None:
         """Return the series of a channel, or None where the log lacks it."""
@@ -83,8 +86,9 @@ def from_readings(frame: pl.DataFrame) -> Instruments:
         for name, one in _at_instants(group, time, values, source, notes).items():
             series[name] = one
             sources[name] = source
+    own = set(series)
     _add_speed_and_course(series, sources, notes)
-    return Instruments(series, sources, tuple(notes))
+    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own))
 
 
 def _choose(source: pl.Series, group: tuple[str, ...], notes: list[str]) -> str:

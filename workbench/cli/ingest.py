@@ -58,8 +58,21 @@ def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
         f"{name}: {outcome.outcome}, {tally.records_read} records read = {tally.records_kept} kept + "
         f"{tally.records_rejected} rejected{f' ({reasons})' if reasons else ''}; {_zigzags(outcome)}"
     )
+    tell_channels(outcome)
     for note in outcome.notes if notes else ():
         click.echo(f"  note: {one_line(note)[:600]}")
+
+
+def tell_channels(outcome: IngestOutcome) -> None:
+    """Print what the channel doctor found in a log, nothing where it is clean."""
+    examination = outcome.examination
+    if examination is None or examination.verdict not in ("faults", "failed"):
+        return
+    for words in examination.findings or (str(examination.content.get("why", "")),):
+        said = "channels" if examination.verdict == "faults" else "the channel doctor failed"
+        click.echo(f"  {click.style(said, fg='yellow')}: {one_line(words)[:600]}")
+    if examination.findings and outcome.log_id:
+        click.echo(f"  next: kempf doctor {outcome.log_id[:12]}")
 
 
 def _zigzags(outcome: IngestOutcome) -> str:
