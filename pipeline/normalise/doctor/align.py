@@ -19,8 +19,8 @@ LONGEST_S = 60.0
 _PARTS, _FEWEST, _WINDOWS = 12, 8, 600
 #: What is left over of one common lag, above which a lag that grows is looked for, and how much better that must be.
 _COMMON, _BETTER = 0.15, 0.8
-#: What a lag of honest clocks leaves over, times this, must be more than what another leaves: half a period of a zigzag
-#: and the other sign go together almost as well.
+#: The same where the slope's sign turns with the lag: half a period of a zigzag later the other sign does almost as
+#: well.
 _FAR_BETTER = 0.5
 #: No clock that ran at all runs faster or slower than this, s/s; growths that are tried.
 _FASTEST, _GROWTHS = 0.02, 41
@@ -110,13 +110,17 @@ def align(
     honest = (lags >= honest_s[0] - step) & (lags <= honest_s[1] + step)
     usual = float(np.min(common[honest])) if honest.any() else 1.0
     found = (float(lags[int(np.argmin(common))]), 0.0, float(np.min(common)))
-    if found[2] > _FAR_BETTER * usual and honest.any():
-        found = (float(lags[honest][int(np.argmin(common[honest]))]), 0.0, usual)
+    if honest.any():
+        near = int(np.flatnonzero(honest)[np.argmin(common[honest])])
+        together = np.sum(sums, axis=0)
+        turned = _sense(together[int(np.argmin(common))]) != _sense(together[near])
+        if found[2] > (_FAR_BETTER if turned else _BETTER) * usual:
+            found = (float(lags[near]), 0.0, usual)
     if found[2] > _COMMON:
         grown = _growing(sums, lags, span)
         if grown[2] < _BETTER * found[2]:
             found = grown
-    return _refined(x, second, edges, (found[0], found[1]), found[2] / max(usual, 1e-12), circle=circle)
+    return _refined(x, second, edges, (found[0], found[1]), (found[2], usual), circle=circle)
 
 
 def _read_later(edges: Nanoseconds, lag: float, rate: float) -> Nanoseconds:
@@ -126,7 +130,8 @@ def _read_later(edges: Nanoseconds, lag: float, rate: float) -> Nanoseconds:
 
 
 def _changes(second: Series, edges: Nanoseconds, *, circle: bool) -> Float:
-    change: Float = np.diff(second.at(edges, gap_limit_s(second)))
+    """Return the changes between edges of shape (..., n + 1), shape (..., n); NaN across gaps."""
+    change: Float = np.diff(second.at(edges.reshape(-1), gap_limit_s(second)).reshape(edges.shape))
     return np.mod(change + np.pi, 2.0 * np.pi) - np.pi if circle else change
 
 
@@ -135,8 +140,9 @@ def _sums(x: Float, second: Series, edges: Nanoseconds, lags: Float, *, circle: 
     parts = min(_PARTS, max(x.size // _FEWEST, 1))
     cuts = np.linspace(0, x.size, parts + 1).astype(int)[:-1]
     found = np.zeros((parts, lags.size, 6))
-    for k, lag in enumerate(lags):
-        y = _changes(second, _read_later(edges, float(lag), 0.0), circle=circle)
+    # all lags in one go: the search among the readings costs more than the sums
+    later = edges[None, :] + np.rint(lags * SECOND_NS).astype(np.int64)[:, None]
+    for k, y in enumerate(_changes(second, later, circle=circle)):
         good = np.isfinite(x) & np.isfinite(y)
         a, b = np.where(good, x, 0.0), np.where(good, y, 0.0)
         table = np.column_stack([good.astype(np.float64), a, b, a * a, a * b, b * b])
@@ -153,6 +159,12 @@ def _left_over(sums: Float) -> Float:
     # where half of the windows fell out, what is left says little
     thin = n < 0.5 * np.max(n)
     return np.where(thin, 1.0, np.sqrt(np.clip(1.0 - explained, 0.0, 1.0)))
+
+
+def _sense(sums: Float) -> bool:
+    """Return whether the second rises with the first, from sums of shape (6,)."""
+    n, a, b, _, ab, _ = sums
+    return bool(ab - a * b / max(n, 1.0) > 0.0)
 
 
 def _growing(sums: Float, lags: Float, span_s: float) -> tuple[float, float, float]:
@@ -178,7 +190,7 @@ def _growing(sums: Float, lags: Float, span_s: float) -> tuple[float, float, flo
 
 
 def _refined(
-    x: Float, second: Series, edges: Nanoseconds, guess: tuple[float, float], explains: float, *, circle: bool
+    x: Float, second: Series, edges: Nanoseconds, guess: tuple[float, float], left: tuple[float, float], *, circle: bool
 ) -> Alignment | None:
     """Improve lag and growth by Gauss and Newton's steps; their standard errors are those of the last one."""
     lag, rate = guess
@@ -201,5 +213,5 @@ def _refined(
     assert found is not None
     return Alignment(
         float(found.value[0]), float(found.std[0]), lag, float(found.std[2]), rate, float(found.std[3]),
-        found.left_over, explains,
+        found.left_over, min(left[0], found.left_over) / max(left[1], 1e-12),
     )  # fmt: skip

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from pipeline.normalise.doctor import heading_course, heading_rate, legs, rudder_order, rudder_turn, track, water_speed
@@ -22,8 +22,8 @@ CHECKS: tuple[Callable[[Log], list[Outcome]], ...] = (
 )
 #: Lies that are taken back one after the other, at most.
 _MOST_FAULTS = 4
-#: A mend that leaves so much more over than the best one is not as good.
-_WORSE = 1.3
+#: A mend that leaves so much more over than the best one, over all checks together, is not as good.
+_WORSE = 1.15
 
 
 @dataclass(frozen=True)
@@ -139,15 +139,14 @@ def _explained(
     log: Log, answers: list[list[Outcome]]
 ) -> tuple[tuple[Fault, ...], tuple[str, ...], list[list[Outcome]]] | None:
     """Return the faults that explain most, the names of what they explain, and the answers behind the first mend."""
-    wrong = _wrong(answers)
-    suspects = _suspects(wrong.values(), log.units)
-    trials = [trial for fault in suspects if (trial := _tried(log, fault, answers)) is not None]
+    suspects = _suspects(answers, log.units)
+    trials = [trial for fault, by in suspects if (trial := _tried(log, fault, by, answers)) is not None]
     if not trials:
         return None
     most = max(trials, key=lambda t: (len(t.mends), -t.fault.simplicity, -t.left_over))
     rivals = [t for t in trials if t.mends == most.mends]
     least = min(t.left_over for t in rivals)
-    rivals = [t for t in rivals if t.left_over <= _WORSE * least + 0.02]
+    rivals = [t for t in rivals if t.left_over <= _WORSE * least + 0.005]
     # of one channel's explanations the simplest; of equally simple ones that which fits best
     best: dict[tuple[str, ...], _Trial] = {}
     for trial in sorted(rivals, key=lambda t: (t.fault.simplicity, t.left_over)):
@@ -157,46 +156,47 @@ def _explained(
     return tuple(t.fault for t in kept), tuple(sorted(kept[0].mends)), kept[0].after
 
 
-def _suspects(outcomes: Iterable[Outcome], units: Mapping[str, str]) -> list[Fault]:
-    found: dict[tuple[object, ...], Fault] = {}
-    for outcome in outcomes:
+def _suspects(answers: list[list[Outcome]], units: Mapping[str, str]) -> list[tuple[Fault, set[int]]]:
+    """Return the faults that what disagrees suggests, each with the places in `CHECKS` of those that suspect it."""
+    found: dict[tuple[object, ...], tuple[Fault, set[int]]] = {}
+    for k, outcome in ((k, o) for k, some in enumerate(answers) for o in some if o.state == "disagree"):
         for fault in outcome.suspects:
             taken_for = fault.name.partition(" taken for ")[2].partition(",")[0]
             if taken_for and units.get(fault.channels[0], taken_for) != taken_for:
                 continue
+            held, by = found.get(fault.key, (fault, set()))
             # two checks may estimate one fault: the surer estimate is tried
-            held = found.get(fault.key)
-            if held is None or fault.std < held.std:
-                found[fault.key] = fault
+            found[fault.key] = (fault if fault.std < held.std else held, by | {k})
     return list(found.values())
 
 
-def _tried(log: Log, fault: Fault, answers: list[list[Outcome]]) -> _Trial | None:
+def _tried(log: Log, fault: Fault, by: set[int], answers: list[list[Outcome]]) -> _Trial | None:
     mended = fault.mended(log)
     if mended is log:
         return None
-    after = _asked_again(mended, fault, answers)
+    after = _asked_again(mended, fault, by, answers)
     if after is None:
         return None
     now, wrong = _by_name(after), _wrong(answers)
+    mends = frozenset(name for name in wrong if name not in now or now[name].state != "disagree")
     # a check that is only silenced is not mended, unless it has gone with the channels it compared
-    mends = frozenset(name for name in wrong if name not in now or now[name].state == "agree")
-    if not any(name in now for name in mends) and fault.kind != "frame":
+    if not any(name in now and now[name].state == "agree" for name in mends) and fault.kind != "frame":
         return None
-    touched = [o.left_over for o in now.values() if set(o.channels) & _touched(fault)]
-    return _Trial(fault, mends, sum(touched) / max(len(touched), 1), after)
+    left = [o.left_over for o in now.values() if o.state != "untestable"]
+    return _Trial(fault, mends, sum(left) / max(len(left), 1), after)
 
 
 def _touched(fault: Fault) -> set[str]:
     return set(fault.channels) | (set(VELOCITIES["earth"] + VELOCITIES["body"]) if fault.kind == "frame" else set())
 
 
-def _asked_again(mended: Log, fault: Fault, answers: list[list[Outcome]]) -> list[list[Outcome]] | None:
-    """Return the answers behind a mend; None as soon as a check disagrees that did not before."""
+def _asked_again(mended: Log, fault: Fault, by: set[int], answers: list[list[Outcome]]) -> list[list[Outcome]] | None:
+    """Return the answers behind a mend; None as soon as a check disagrees that did not before, or it mends nothing."""
     touched, after = _touched(fault), [list(some) for some in answers]
-    # those checks first that the mend is for: most mends fail there
-    order = sorted(range(len(CHECKS)), key=lambda k: not any(o.state == "disagree" for o in answers[k]))
-    for k in order:
+    # those checks first that suspect it: most mends fail there
+    for n, k in enumerate(sorted(range(len(CHECKS)), key=lambda k: (k not in by, k))):
+        if n == len(by) and not any(_fewer(answers[j], after[j]) for j in by):
+            return None
         if not any(touched & set(o.channels) for o in answers[k]) and fault.kind != "frame":
             continue
         after[k] = CHECKS[k](mended)
@@ -210,3 +210,8 @@ def _asked_again(mended: Log, fault: Fault, answers: list[list[Outcome]]) -> lis
         ):
             return None  # it silenced what agreed
     return after
+
+
+def _fewer(before: list[Outcome], after: list[Outcome]) -> bool:
+    still = {o.check for o in after if o.state == "disagree"}
+    return any(o.state == "disagree" and o.check not in still for o in before)

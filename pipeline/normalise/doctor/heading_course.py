@@ -80,7 +80,7 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> list[O
     figure = Figure("turned by the velocity for 1 turned by the heading", both.slope, std, low, high)
     words = f"the {_WORDS[kind]} turns {both.slope:.2f} +- {std:.2g} times as far as the heading"
     state = figure.state
-    if both.left_over > _TOGETHER and figure.outside < 2.0 * SURE:
+    if both.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
         state = "untestable"  # a slope through noise
     turn = Outcome(names[0], channels, state, words, (figure,), both.left_over, _suspects(kind, velocity.channels))
     if kind == "body":

@@ -63,7 +63,7 @@ def _turning(found: Alignment) -> Outcome:
     if abs(found.slope) > 4.0 * found.slope_std and found.left_over < 0.5:
         suspects.append(Fault("scale", ("yaw_rate",), 1.0 / found.slope, "scale", found.slope_std, simplicity=3))
     state = figure.state
-    if found.left_over > _TOGETHER and figure.outside < 2.0 * SURE:
+    if found.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
         state = "untestable"  # a slope through noise
     return Outcome("heading_rate", _CHANNELS, state, words, (figure,), found.left_over, tuple(suspects))
 

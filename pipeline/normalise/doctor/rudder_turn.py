@@ -30,6 +30,8 @@ HONEST_S = (-8.0, 4.0)
 _FAR_BETTER = 0.6
 #: What the rudder must explain of the change of the rate beyond what the rate itself explains.
 _EXPLAINS = 0.05
+#: What it must explain to tell when it was put over, and how well that is told then, s.
+_CLOCKED, _SHIFT_STD_S = 0.3, 1.0
 _FEWEST = 16
 
 
@@ -51,7 +53,7 @@ def examine(log: Log) -> list[Outcome]:
         if rudder not in log.series:
             continue
         for name, channels, turned in _witnesses(log):
-            found.append(_compare(f"{rudder}_{name}", (rudder, *channels), log, turned))
+            found += _compare(f"{rudder}_{name}", (rudder, *channels), log, turned)
     return found
 
 
@@ -66,7 +68,7 @@ def _witnesses(log: Log) -> list[tuple[str, tuple[str, ...], tuple[Series, Serie
     return found
 
 
-def _compare(name: str, channels: tuple[str, ...], log: Log, turned: tuple[Series, Series]) -> Outcome:
+def _compare(name: str, channels: tuple[str, ...], log: Log, turned: tuple[Series, Series]) -> list[Outcome]:
     rudder = log.series[channels[0]]
     angle, rate = turned
     moved, swung = swing(rudder.value), swing(angle.value)
@@ -77,16 +79,17 @@ def _compare(name: str, channels: tuple[str, ...], log: Log, turned: tuple[Serie
         )
         words = f"the rudder moves within {figure.value:.2g} deg while she turns through {np.rad2deg(swung):.0f} deg"
         suspects = (Fault("unit", channels[:1], 180.0 / np.pi, "rad taken for deg"),)
-        return Outcome(name, channels, "disagree", words, (figure,), 1.0, suspects)
+        return [Outcome(name, channels, "disagree", words, (figure,), 1.0, suspects)]
     if moved < _LEAST_RUDDER or swung < _LEAST_TURN:
-        return untestable(name, channels, "the rudder was hardly used, or she hardly turned")
+        return [untestable(name, channels, "the rudder was hardly used, or she hardly turned")]
     edges = edges_of(rudder, angle, rate, window_s=_window(rudder))
     if edges.size < _FEWEST:
-        return untestable(name, channels, "too short to tell her answer from chance")
+        return [untestable(name, channels, "too short to tell her answer from chance")]
     answered = _best(edges, rudder, angle, rate, _makes_way(log, edges))
     if answered is None:
-        return untestable(name, channels, "too little of it overlaps")
-    return _judged(name, channels, *answered)
+        return [untestable(name, channels, "too little of it overlaps")]
+    found, shift, explains = answered
+    return [_judged(name, channels, found, explains), _clock(f"{name}_clock", channels, found, shift, explains)]
 
 
 def _window(rudder: Series) -> float:
@@ -139,8 +142,8 @@ def _best(
     if not without:
         return None
     left = np.full(_SHIFTS.size, np.inf)
-    for k, shift in enumerate(_SHIFTS):
-        put = np.diff(total.at(edges + round(shift * SECOND_NS), gap))
+    moved = edges[None, :] + np.rint(_SHIFTS * SECOND_NS).astype(np.int64)[:, None]
+    for k, put in enumerate(np.diff(total.at(moved.reshape(-1), gap).reshape(moved.shape))):
         left[k] = _residual(np.column_stack([put, turn, long]), jump) or np.inf
     honest = (HONEST_S[0] <= _SHIFTS) & (HONEST_S[1] >= _SHIFTS)
     usual = float(np.min(left[honest]))
@@ -163,7 +166,23 @@ def _residual(columns: Float, observed: Float) -> float | None:
     return float(np.mean((y - (A / unit) @ value) ** 2))
 
 
-def _judged(name: str, channels: tuple[str, ...], found: Fit, shift: float, explains: float) -> Outcome:
+def _clock(name: str, channels: tuple[str, ...], found: Fit, shift: float, explains: float) -> Outcome:
+    """Judge the shift of the rudder at which she answers best."""
+    if explains < _CLOCKED or abs(found.value[0]) < SURE * found.std[0]:
+        return untestable(name, channels, "her answer to the rudder is too faint to tell when it was put over")
+    figure = Figure("time of the rudder behind that of her answer", shift, _SHIFT_STD_S, *HONEST_S, "s")
+    when = "before" if shift > 0 else "after"
+    words = f"she turns as if the rudder had been put over {abs(shift):.0f} s {when} the log says"
+    middle = 0.5 * (HONEST_S[0] + HONEST_S[1])
+    late, std = shift - middle, 0.5 * (HONEST_S[1] - HONEST_S[0])
+    suspects = (
+        Fault("latency", channels[:1], late, "late" if late > 0 else "early", std),
+        Fault("latency", channels[1:], -late, "early" if late > 0 else "late", std),
+    )
+    return Outcome(name, channels, figure.state, words, (figure,), min(1.0 - explains, 1.0), suspects)
+
+
+def _judged(name: str, channels: tuple[str, ...], found: Fit, explains: float) -> Outcome:
     answer, std = float(found.value[0]), float(found.std[0])
     if explains < _EXPLAINS or abs(answer) < SURE * std:
         return untestable(name, channels, "her answer to the rudder is lost in what else turns her")
