@@ -13,6 +13,7 @@ from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.series import SECOND_NS, Series
 from schemas.channels import CHANNELS
 
+_FASTEST = 0.015
 _CIRCLE = ("heading", "course_over_ground")
 _GNSS = ("latitude", "longitude", "speed_over_ground", "course_over_ground")
 
@@ -134,7 +135,8 @@ def _fast(*names: str) -> Lie:
     def lie(log: Log, random: np.random.Generator) -> Told:
         one = log.series[names[0]]
         span = float(one.time_utc_ns[-1] - one.time_utc_ns[0]) / SECOND_NS
-        rate = float(random.uniform(5.0, 20.0) * random.choice([-1.0, 1.0])) / span
+        # no clock that ran at all is out by more than a hundredth or two
+        rate = min(float(random.uniform(5.0, 20.0)) / span, _FASTEST) * float(random.choice([-1.0, 1.0]))
         return Told(_shifted(log, names, lambda t: t * (1.0 + rate)), "clock_scale", names, rate)
 
     return lie

@@ -109,7 +109,7 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
 
     table = open_table(warehouse, name)
     if table is not None:
-        return table
+        return _with_every_column(warehouse, table, name)
     warehouse.create()
     try:
         DeltaTable.create(
@@ -126,6 +126,21 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
     made = open_table(warehouse, name)
     assert made is not None
     return made
+
+
+def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> DeltaTable:
+    """Add the columns that a table from before they were known lacks; its rows have nothing there."""
+    from deltalake import Schema
+
+    held = {field.name for field in table.schema().fields}
+    wanted = Schema.from_arrow(arrow_schema(TABLES[name])).fields
+    missing = [field for field in wanted if field.name not in held]
+    if not missing:
+        return table
+    table.alter.add_columns(missing)
+    altered = open_table(warehouse, name)
+    assert altered is not None
+    return altered
 
 
 def read(
@@ -172,6 +187,12 @@ def rows(table: DeltaTable | None, name: str, where: Where | None = None, column
         lazy = empty.lazy()
     else:
         lazy = pl.scan_delta(table)
+        held = {field.name for field in table.schema().fields}
+        if any(column.name not in held for column in TABLES[name].columns):
+            empty = pl.from_arrow(arrow_schema(TABLES[name]).empty_table())
+            assert isinstance(empty, pl.DataFrame)
+            absent = {column: kind for column, kind in empty.schema.items() if column not in held}
+            lazy = lazy.with_columns(pl.lit(None, dtype=kind).alias(column) for column, kind in absent.items())
     for column, value in (where or {}).items():
         # one value prunes files by their statistics
         lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))

@@ -63,6 +63,8 @@ def tell(name: str, content: dict[str, Any], *, everything: bool) -> None:
                 click.echo(f"   profile: {line}")
             if not fault["profile"]:
                 click.echo(f"   profile: none mends it ({fault['words']}): mend it where the log is made")
+    if content.get("why"):
+        click.echo(one_line(content["why"])[:600])
     if everything:
         _table(content)
     if content["untested"]:

@@ -24,7 +24,7 @@ _COMMON, _BETTER = 0.15, 0.8
 _FAR_BETTER = 0.5
 #: No clock that ran at all runs faster or slower than this, s/s; growths that are tried.
 _FASTEST, _GROWTHS = 0.02, 41
-_ROUNDS = 4
+_ROUNDS = 12
 #: Beyond a quarter of a turn in one window, what is left of a direction without its whole turns is ambiguous, rad.
 _QUARTER = 0.5 * np.pi
 
@@ -201,6 +201,7 @@ def _refined(
     along = (middle - middle[middle.size // 2]) / SECOND_NS
     found: Fit | None = None
     for _ in range(_ROUNDS):
+        last = (lag, rate)
         at = _read_later(edges, lag, rate)
         y = _changes(second, at, circle=circle)
         slope = (second.at(at + step, gap) - second.at(at - step, gap)) / (2.0 * step / SECOND_NS)
@@ -210,6 +211,8 @@ def _refined(
             return None
         lag -= float(np.clip(found.value[2], -3.0, 3.0))
         rate = float(np.clip(rate - found.value[3], -_FASTEST, _FASTEST))
+        if abs(lag - last[0]) < 0.1 * found.std[2] and abs(rate - last[1]) < 0.1 * found.std[3]:
+            break
     assert found is not None
     return Alignment(
         float(found.value[0]), float(found.std[0]), lag, float(found.std[2]), rate, float(found.std[3]),
