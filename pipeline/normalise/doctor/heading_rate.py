@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from pipeline.normalise.doctor.align import Alignment, align
@@ -39,6 +41,12 @@ def examine(log: Log) -> list[Outcome]:
     if found is None or max(swing(heading.value), swing(turned.value)) < _LEAST_TURN:
         why = "the ship hardly turned, or the two hardly overlap"
         return [untestable(name, _CHANNELS, why) for name in ("heading_rate", "heading_rate_clock")]
+    if swing(heading.value) == 0.0:
+        # a compass that stands still is no lie that could be taken back
+        return [
+            replace(_turning(found), suspects=()),
+            untestable("heading_rate_clock", _CHANNELS, "the heading stands still"),
+        ]
     return [_turning(found), _clocks(log, found, (-late, late))]
 
 
