@@ -197,15 +197,17 @@ def page(data: Path, many: int) -> list[str]:
     return [
         "## Real traps",
         "",
-        "Measured logs read with the profile less the line that mends them. Testable: the checks could compare the channel "
-        "(a zigzag within a degree shows no frame). Silent: with the proposed line in the profile nothing disagrees.",
+        "Measured logs read with the profile less the line that mends them. Testable: the checks could compare the "
+        "channel (a zigzag within a degree shows no frame). Silent: with the proposed line in the profile nothing "
+        "disagrees.",
         "",
         *result_page.table(["trap", "logs", "testable", "named alone", "then silent", "line"], traps_found),
         "",
         f"## Lies told about honest logs: {many} simulated ones and {len(logs) - many} of eight ships",
         "",
-        "Found: the right fault of the right channel is named, alone or as one of these. Accused: another channel is named "
-        "alone. By correlations: medians and correlations of pairs, and the right channel is in a pair that looks wrong.",
+        "Found: the right fault of the right channel is named, alone or as one of these. Accused: another channel is "
+        "named alone. By correlations: medians and correlations of pairs, and the right channel is in a pair that "
+        "looks wrong.",
         "",
         *result_page.table(["lie", "found", "named alone", "accused", "by correlations", "not found in (size)"], rows),
         "",
@@ -217,8 +219,8 @@ def page(data: Path, many: int) -> list[str]:
         "",
         "## Cost",
         "",
-        f"An honest log takes {clean_s:.2f} s, one that lies {doctor_s / told / clean_s:.1f} times as long; the correlations "
-        f"take {eye_s / told / clean_s:.2f} times as long as an honest log's examination.",
+        f"An honest log takes {clean_s:.2f} s, one that lies {doctor_s / told / clean_s:.1f} times as long; the "
+        f"correlations take {eye_s / told / clean_s:.2f} times as long as an honest log's examination.",
         "",
         "![Found by lie, and by the size of two of them](doctor.png)",
     ]

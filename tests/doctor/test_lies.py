@@ -13,6 +13,7 @@ from pipeline.normalise.doctor.log import Log
 from pipeline.normalise.series import SECOND_NS, Series
 from tests.doctor import made
 
+SWAP = Fault("swap", ("latitude", "longitude"))
 GNSS = ("speed_over_ground", "course_over_ground")
 
 
@@ -72,7 +73,7 @@ LIES = {
         Fault("unit", ("speed_through_water",), 1 / 3.6, "km/h taken for m/s"),
     ),
     "west positive": (lambda log: changed(log, "longitude", -1.0), Fault("sign", ("longitude",))),
-    "swapped": (lambda log: Fault("swap", ("latitude", "longitude")).mended(log), Fault("swap", ("latitude", "longitude"))),
+    "swapped": (lambda log: SWAP.mended(log), SWAP),
 }  # fmt: skip
 
 
@@ -128,10 +129,14 @@ def test_two_lies_at_once_are_both_found() -> None:
 def test_what_nothing_confirms_cannot_be_tested() -> None:
     found = examine(made.log("heading"))
     assert (found.verdict, found.untested) == ("untested", ("heading",))
-    straight = {
-        name: Series(one.time_utc_ns[:120], one.value[:120] * 0.0 + 0.5) for name, one in made.log().series.items()
-    }
-    assert not examine(Log(straight)).findings
+    still = {n: Series(s.time_utc_ns[:120], s.value[:120] * 0.0) for n, s in made.log().series.items()}
+    assert not examine(Log(still)).findings
+
+
+def test_a_compass_that_stands_still_contradicts_without_a_mend() -> None:
+    log = changed(made.log("heading", "yaw_rate"), "heading", 0.0)
+    (finding,) = examine(log).findings
+    assert (finding.faults, finding.channels) == ((), ("heading", "yaw_rate"))
 
 
 def test_a_contradiction_that_no_lie_explains_is_told_without_a_culprit() -> None:
