@@ -73,7 +73,7 @@ LIES = {
         Fault("unit", ("speed_through_water",), 1 / 3.6, "km/h taken for m/s"),
     ),
     "west positive": (lambda log: changed(log, "longitude", -1.0), Fault("sign", ("longitude",))),
-    "swapped": (lambda log: SWAP.mended(log), SWAP),
+    "swapped": (SWAP.mended, SWAP),
 }  # fmt: skip
 
 
