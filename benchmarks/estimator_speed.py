@@ -30,7 +30,7 @@ from pipeline.identify.likelihood import Likelihood
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings, identify
 from pipeline.identify.pooling import Member
 from pipeline.identify.record import Record, make_record
-from pipeline.identify.starts import starting_points, thinned
+from pipeline.identify.starts import starting_points
 from pipeline.normalise.instruments import Instruments
 from pipeline.normalise.series import SECOND_NS, Series
 from pipeline.simulate.trial import PAPER_ENVIRONMENT, simulate_trial, zigzag_settings
@@ -107,7 +107,7 @@ def seconds(work: Callable[[], Any], repeats: int) -> list[float]:
 
 def started(sailed: Sailed) -> Any:
     """Theta that our own race takes for the likeliest start."""
-    coarse = SETTINGS.bind(thinned(sailed.record, SETTINGS.coarse_instants), sailed.spec, sailed.arm_per_m)
+    coarse = SETTINGS.coarse(sailed.record, sailed.spec, sailed.arm_per_m)
     return max((theta for _, theta in starting_points(sailed.record)), key=coarse.value)
 
 
@@ -303,7 +303,12 @@ class _Watched(MaximumLikelihoodSettings):
     """Settings whose likelihoods note the time they spend in the kernel."""
 
     def bind(self, record: Record, spec: ModelSpec, arm_per_m: float) -> Likelihood:
-        bound = super().bind(record, spec, arm_per_m)
+        return self._watched(super().bind(record, spec, arm_per_m))
+
+    def coarse(self, record: Record, spec: ModelSpec, arm_per_m: float) -> Likelihood:
+        return self._watched(super().coarse(record, spec, arm_per_m))
+
+    def _watched(self, bound: Likelihood) -> Likelihood:
         noted: list[float] = self.__dict__["inside"]
 
         def watched(function: Callable[..., Any]) -> Callable[..., Any]:

@@ -20,6 +20,7 @@ from schemas.errors import KempfError, NotFound, UsageError
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 from warehouse import aliases, code_version, delta, logs, parameter_sets, provenance, readings, segments, vessels
+from warehouse.keys import vessel_key
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
@@ -140,7 +141,7 @@ def _identify_log(
     profile = vessels.get(warehouse, row.profile_sha256)
     companions = [beside.get(s.segment_id, ()) if job.request.estimator in CAN else () for s in found]
     wanted = [inputs_of(s, row.profile_sha256, job.request, c) for s, c in zip(found, companions, strict=True)]
-    missing = _missing(warehouse, wanted)
+    missing = _missing(warehouse, row.vessel, wanted)
     asked = [c for c, inputs in zip(companions, wanted, strict=True) if parameter_set_id(inputs) in missing]
     ingests = {row.ingest_id, *(s.ingest_id for c in asked for s in c)} if missing else set()
     held = {job.by_ingest[i].log_id: from_readings(readings.read(warehouse, i)) for i in sorted(ingests)}
@@ -172,9 +173,10 @@ def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
     )
 
 
-def _missing(warehouse: Warehouse, wanted: Sequence[Inputs]) -> set[str]:
+def _missing(warehouse: Warehouse, vessel: str, wanted: Sequence[Inputs]) -> set[str]:
     names = {parameter_set_id(inputs) for inputs in wanted}
-    stored = delta.read(warehouse, "parameter_sets", {"parameter_set_id": sorted(names)}, ("parameter_set_id",))
+    where: delta.Where = {"vessel_key": vessel_key(vessel), "parameter_set_id": sorted(names)}
+    stored = delta.read(warehouse, "parameter_sets", where, ("parameter_set_id",))
     return names - set(stored["parameter_set_id"].to_list())
 
 

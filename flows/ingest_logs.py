@@ -10,13 +10,14 @@ from typing import Any
 from flows.examine_log import examine_frame
 from flows.files import read_bytes
 from flows.find_segments import Ingest, find_segments
+from flows.lost import as_json
 from flows.progress import Progress, silent
 from flows.unforeseen import as_told
 from pipeline.ingest.read import read_log
-from pipeline.ingest.readings import Readings, Tally
+from pipeline.ingest.readings import LostStretch, Readings, Tally
 from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
-from warehouse import code_version, examinations, logs, raw, segments, vessels
+from warehouse import code_version, examinations, logs, lost, raw, segments, vessels
 from warehouse.deposit import Delivery, deposit, held
 from warehouse.examinations import StoredExamination
 from warehouse.keys import ingest_id, vessel_key
@@ -41,6 +42,8 @@ class IngestOutcome:
         How it was read, and why zigzags could not be looked for, where that is so.
     segments : tuple of Segment
         Found in this log.
+    lost : tuple of LostStretch
+        What of a damaged log could not be read.
     examination : StoredExamination or None
         What the channel doctor found in it.
     error : KempfError or None
@@ -54,6 +57,7 @@ class IngestOutcome:
     tally: Tally | None = None
     notes: tuple[str, ...] = ()
     segments: tuple[Segment, ...] = ()
+    lost: tuple[LostStretch, ...] = ()
     examination: StoredExamination | None = None
     error: KempfError | None = None
 
@@ -68,6 +72,8 @@ class IngestOutcome:
             "values": _ledger(self.tally, "values"),
             "rejected_by_reason": dict(self.tally.by_reason) if self.tally else {},
             "notes": list(self.notes),
+            "partial": bool(self.lost),
+            "lost": as_json(self.lost),
             "segments": [segment.segment_id for segment in self.segments],
             "channels": _channels(self.examination),
             **(self.error.to_json() if self.error else {}),
@@ -177,7 +183,10 @@ def ingest_bytes(
         row = logs.of_ingest(warehouse, there.ingest_id)
         found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
         seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
-        return IngestOutcome(path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, seen)
+        gone = _lost(warehouse, row)
+        return IngestOutcome(
+            path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, lost=gone, examination=seen
+        )
     readings = read_log(file_name, data, profile)
     log = raw.log_id(data)
     one = Ingest(vessel, log, ingest_id(log, profile.sha256, code))
@@ -190,7 +199,21 @@ def ingest_bytes(
     noted = replace(readings, notes=(*readings.notes, *notes))
     stored = deposit(warehouse, [Delivery(vessel, file_name, data, profile, noted, code)])[0]
     row = logs.of_ingest(warehouse, stored.ingest_id)
-    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, tuple(zigzags), seen)
+    return IngestOutcome(
+        path,
+        stored.outcome,
+        row.log_id,
+        row.ingest_id,
+        row.tally,
+        row.notes,
+        tuple(zigzags),
+        lost=_lost(warehouse, row),
+        examination=seen,
+    )
+
+
+def _lost(warehouse: Warehouse, row: logs.LogRow) -> tuple[LostStretch, ...]:
+    return lost.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id, ())
 
 
 def _examined(one: Ingest, profile: VesselProfile, file_name: str, read: Readings, code: str) -> StoredExamination:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -9,9 +10,11 @@ from flows.identify_vessel import build
 from flows.pool_vessel import POOLED, build_pooled
 from flows.vessel_model import ESTIMATOR, build_model
 from pipeline.ingest.read import read_log
-from pipeline.normalise.instruments import from_readings
+from pipeline.normalise.instruments import Instruments, from_readings
+from schemas.profile import VesselProfile
 from warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
 from warehouse.agreement import Difference
+from warehouse.logs import LogRow
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet
 from warehouse.store import Warehouse
 
@@ -67,29 +70,93 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
         ``raw_bytes_damaged``.
     """
     stored = parameter_sets.get(warehouse, name)
-    inputs = _inputs(stored)
-    profile = vessels.get(warehouse, inputs.profile_sha256)
+    return judged(stored, rebuilt(stored, *raw_inputs(warehouse, stored)), tolerance)
+
+
+def raw_inputs(
+    warehouse: Warehouse, stored: ParameterSet, known: Mapping[tuple[str, str], Instruments] | None = None
+) -> tuple[dict[str, Instruments], VesselProfile]:
+    """Read what a parameter set was made from again from the raw bytes.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    stored : ParameterSet
+    known : mapping of (str, str) to Instruments, optional
+        Logs that were read already, by ingest and hash of the profile.
+
+    Returns
+    -------
+    dict of str to Instruments
+        Series by log.
+    VesselProfile
+
+    Raises
+    ------
+    NotFound
+        ``no_raw_log``, ``no_profile``, ``no_ingest``.
+    KempfError
+        ``raw_bytes_damaged``.
+    """
+    profile_sha256 = str(stored.provenance["inputs"]["profile_sha256"])
+    profile = vessels.get(warehouse, profile_sha256)
     instruments = {}
     for ingest_id in stored.provenance["ingest_ids"]:
         row = logs.of_ingest(warehouse, str(ingest_id))
-        instruments[row.log_id] = from_readings(read_log(row.file_name, raw.get(warehouse, row.log_id), profile).frame)
-    told = dict(stored.provenance)
+        there = (known or {}).get((row.ingest_id, profile_sha256))
+        instruments[row.log_id] = there or read_again(warehouse, row, profile)
+    return instruments, profile
+
+
+def read_again(warehouse: Warehouse, row: LogRow, profile: VesselProfile) -> Instruments:
+    """Read one log again from its raw bytes.
+
+    Raises
+    ------
+    NotFound
+        ``no_raw_log``.
+    KempfError
+        ``raw_bytes_damaged``.
+    """
+    return from_readings(read_log(row.file_name, raw.get(warehouse, row.log_id), profile).frame)
+
+
+def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profile: VesselProfile) -> ParameterSet:
+    """Compute a stored parameter set again with the present code.
+
+    Parameters
+    ----------
+    stored : ParameterSet
+    instruments : mapping of str to Instruments
+        Series by log, see `raw_inputs`.
+    profile : VesselProfile
+        The one it was made with.
+
+    Raises
+    ------
+    KempfError
+        It can no longer be identified; the reason says why.
+    """
+    inputs, told = inputs_of(stored), dict(stored.provenance)
     if inputs.estimator == POOLED:
-        rebuilt = build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, told)
-    elif inputs.estimator == ESTIMATOR:
-        rebuilt = build_model(instruments, profile, inputs, stored.vessel, told, stored.parent)
-    else:
-        one = instruments[inputs.bounds[0].log_id]
-        rebuilt = build(one, profile, inputs, stored.vessel, stored.segment_ids, told, instruments)
-    verdict, differences = agreement.verdict(stored, rebuilt, tolerance)
+        return build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, told)
+    if inputs.estimator == ESTIMATOR:
+        return build_model(instruments, profile, inputs, stored.vessel, told, stored.parent)
+    one = instruments[inputs.bounds[0].log_id]
+    return build(one, profile, inputs, stored.vessel, stored.segment_ids, told, instruments)
+
+
+def judged(stored: ParameterSet, again: ParameterSet, tolerance: float = 1e-9) -> Rerun:
+    """Return the verdict on a parameter set that was computed again."""
+    verdict, differences = agreement.verdict(stored, again, tolerance)
     now, then = code_version.packages(), dict(stored.provenance.get("packages") or {})
     changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}
-    return Rerun(
-        stored.parameter_set_id, verdict, differences, inputs.code_version != code_version.fingerprint(), changed
-    )
+    other_code = inputs_of(stored).code_version != code_version.fingerprint()
+    return Rerun(stored.parameter_set_id, verdict, differences, other_code, changed)
 
 
-def _inputs(stored: ParameterSet) -> Inputs:
+def inputs_of(stored: ParameterSet) -> Inputs:
+    """Return all that a stored parameter set is a function of."""
     told = stored.provenance["inputs"]
     return Inputs(
         log_ids=tuple(told["log_ids"]),

@@ -16,7 +16,12 @@ from numba import njit
 from numba.core import caching, config
 from numba.core.dispatcher import Dispatcher
 
-__all__ = ["njit"]
+__all__ = ["FILLING", "STEP", "njit"]
+
+#: for a function that fills arrays and makes none: counting references to them would take longer than its arithmetic
+FILLING: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+#: for what runs at every instant: put into its caller, too
+STEP: dict[str, Any] = {**FILLING, "forceinline": True}
 
 
 def went_in(function: Any) -> str:

@@ -71,6 +71,10 @@ _ALL = (
     Channel("water_depth", "m", 0.0, 12000.0, "none", "water depth below the transducer or keel"),
     Channel("roll", "rad", -pi / 2, pi / 2, "none", "roll angle, starboard down positive"),
     Channel("pitch", "rad", -pi / 2, pi / 2, "none", "pitch angle, bow up positive"),
+    Channel("lateral_speed_through_water", "m/s", -20.0, 20.0, "none", "log speed sideways, starboard positive"),
+    Channel("distance_through_water", "m", 0.0, 1e10, "none", "distance through the water that the log has counted"),
+    Channel("true_wind_speed", "m/s", 0.0, 100.0, "none", "wind speed over ground"),
+    Channel("true_wind_direction", "rad", -2 * pi, 2 * pi, "circle", "where the wind blows from, clockwise from north"),
     Channel("velocity_forward", "m/s", -60.0, 60.0, "none", "velocity over ground along the bow, ahead positive"),
     Channel("velocity_starboard", "m/s", -60.0, 60.0, "none", "velocity over ground across the bow, to starboard"),
 )

@@ -1,7 +1,7 @@
 """The sentences of NMEA 0183 that carry a canonical channel: type, fields, units, and where each says that it is void.
 
-Positions count the fields behind the address, from 1. HDG (three fields make one heading) and XDR (a list of
-transducers) do not fit a table of fields; they stand in `SPECIAL`.
+Positions count the fields behind the address, from 1. Sentences whose channels do not stand at fixed fields with one
+unit, such as the list of transducers of XDR, are named in `SPECIAL`.
 
 References
 ----------
@@ -16,8 +16,10 @@ from typing import Literal
 Form = Literal["number", "latitude", "longitude"]
 
 _KNOT = 1852.0 / 3600.0
+_FOOT = 0.3048
 _TRUE = {"T": 1.0}
 _KNOTS = {"N": 1.0}
+_KILOMETRES = {"K": 1 / 1.852}
 
 
 @dataclass(frozen=True)
@@ -59,8 +61,12 @@ class Sentence:
     least : int
         Fewest fields of a whole sentence.
     fields : tuple of NmeaField
+        A channel that stands twice is read from the later field where the earlier one is empty.
     valid : dict of int to str, optional
         Field -> characters that mean valid data; anything else there makes the sentence void.
+    modes : dict of int to str, optional
+        Field of the mode indicator -> letters of a measurement; any other letter makes the sentence void: dead
+        reckoning, manual input, a simulator, no fix. An empty field, as one that is not there, says nothing.
     carries : dict of int to tuple of str, optional
         Field -> contents with which the sentence carries the channel at all (relative wind, not true wind).
     utc, date : int, optional
@@ -72,6 +78,7 @@ class Sentence:
     least: int
     fields: tuple[NmeaField, ...] = ()
     valid: dict[int, str] | None = None
+    modes: dict[int, str] | None = None
     carries: dict[int, tuple[str, ...]] | None = None
     utc: int | None = None
     date: int | None = None
@@ -84,18 +91,26 @@ def _position(first: int) -> tuple[NmeaField, NmeaField]:
     )
 
 
+#: Modes of a position system in which it measures: autonomous, differential, RTK with fixed and with float integers,
+#: precise.
+_FIXES = "ADRFP"
+
+_THROUGH_WATER = "speed_through_water"
+
 _ALL = (
     Sentence(
         "RMC",
-        "recommended minimum: time, date, position, speed and course over ground",
+        "recommended minimum: time, date, position, speed and course over ground, magnetic variation",
         9,
         (*_position(3), NmeaField(7, "speed_over_ground", "kn"), NmeaField(8, "course_over_ground", "deg")),
         valid={2: "A"},
+        modes={12: _FIXES},
         utc=1,
         date=9,
     ),
-    Sentence("GGA", "GNSS fix", 6, _position(2), valid={6: "123456789"}, utc=1),
-    Sentence("GLL", "geographic position", 4, _position(1), valid={6: "A"}, utc=5),
+    # qualities 6, 7, 8 are dead reckoning, manual input and a simulator; 9 is a receiver's own word for corrections
+    Sentence("GGA", "GNSS fix", 6, _position(2), valid={6: "123459"}, utc=1),
+    Sentence("GLL", "geographic position", 4, _position(1), valid={6: "A"}, modes={7: _FIXES}, utc=5),
     Sentence("ZDA", "time and date", 4, utc=1),
     Sentence(
         "VTG",
@@ -104,19 +119,38 @@ _ALL = (
         (
             NmeaField(1, "course_over_ground", "deg", letter=2, factors=_TRUE),
             NmeaField(5, "speed_over_ground", "kn", letter=6, factors=_KNOTS),
+            NmeaField(7, "speed_over_ground", "kn", letter=8, factors=_KILOMETRES),
         ),
+        modes={9: _FIXES},
     ),
     Sentence("HDT", "true heading", 1, (NmeaField(1, "heading", "deg"),)),
     Sentence("THS", "true heading and status", 2, (NmeaField(1, "heading", "deg"),), valid={2: "AE"}),
+    Sentence("HDG", "magnetic heading with deviation and variation", 5),
+    Sentence("HDM", "magnetic heading", 1),
     Sentence("ROT", "rate of turn", 1, (NmeaField(1, "yaw_rate", "deg/min"),), valid={2: "A"}),
-    Sentence("RSA", "rudder sensor angle, starboard or single", 1, (NmeaField(1, "rudder_angle", "deg"),), {2: "A"}),
+    Sentence("RSA", "rudder sensor angles: starboard or single, port", 1),
     Sentence(
         "VHW",
-        "speed through water",
+        "speed through water; its headings repeat the compass and are left to it",
         6,
-        (NmeaField(5, "speed_through_water", "kn", letter=6, factors=_KNOTS),),
+        (
+            NmeaField(5, _THROUGH_WATER, "kn", letter=6, factors=_KNOTS),
+            NmeaField(7, _THROUGH_WATER, "kn", letter=8, factors=_KILOMETRES),
+        ),
     ),
-    Sentence("VBW", "dual ground and water speed", 3, (NmeaField(1, "speed_through_water", "kn"),), {3: "A"}),
+    Sentence(
+        "VBW",
+        "dual ground and water speed",
+        3,
+        (NmeaField(1, _THROUGH_WATER, "kn"), NmeaField(2, "lateral_speed_through_water", "kn")),
+        valid={3: "A"},
+    ),
+    Sentence(
+        "VLW",
+        "distance travelled through the water, in all and since a reset",
+        2,
+        (NmeaField(1, "distance_through_water", "nmi", letter=2, factors={"N": 1.0}),),
+    ),
     Sentence(
         "MWV",
         "wind speed and angle",
@@ -129,6 +163,16 @@ _ALL = (
         carries={2: ("R",)},
     ),
     Sentence(
+        "MWD",
+        "true wind speed and direction",
+        8,
+        (
+            NmeaField(1, "true_wind_direction", "deg", letter=2, factors=_TRUE),
+            NmeaField(5, "true_wind_speed", "kn", letter=6, factors=_KNOTS),
+            NmeaField(7, "true_wind_speed", "kn", letter=8, factors={"M": 1.0 / _KNOT}),
+        ),
+    ),
+    Sentence(
         "RPM",
         "shaft revolutions of the single or first shaft",
         3,
@@ -137,16 +181,35 @@ _ALL = (
         carries={1: ("S",), 2: ("0", "1", "")},
     ),
     Sentence("DPT", "depth below the transducer", 1, (NmeaField(1, "water_depth", "m"),)),
-    Sentence("DBT", "depth below the transducer", 4, (NmeaField(3, "water_depth", "m", letter=4, factors={"M": 1.0}),)),
-    Sentence("HDG", "magnetic heading with deviation and variation", 5),
+    Sentence(
+        "DBT",
+        "depth below the transducer",
+        4,
+        (
+            NmeaField(3, "water_depth", "m", letter=4, factors={"M": 1.0}),
+            NmeaField(1, "water_depth", "m", letter=2, factors={"f": _FOOT}),
+            NmeaField(5, "water_depth", "m", letter=6, factors={"F": 6.0 * _FOOT}),
+        ),
+    ),
     Sentence("XDR", "transducers: roll and pitch", 4),
 )
 
 #: Sentences by their three letters.
 SENTENCES: dict[str, Sentence] = {sentence.name: sentence for sentence in _ALL}
 
-#: Sentences whose channels are not read by position.
-SPECIAL: frozenset[str] = frozenset({"HDG", "XDR"})
+#: Channels of the sentences whose channels do not stand at fixed fields with one unit -> unit that the standard fixes.
+SPECIAL: dict[str, dict[str, str]] = {
+    "HDG": {"heading": "deg"},
+    "HDM": {"heading": "deg"},
+    "RSA": {"rudder_angle": "deg"},
+    "XDR": {"roll": "deg", "pitch": "deg"},
+}
+
+#: Sentences that are read for their time alone.
+SILENT: frozenset[str] = frozenset({"ZDA"})
 
 #: Names under which XDR transducers of type A (angle), unit D (degrees) report roll and pitch.
 XDR_ANGLES: dict[str, str] = {"ROLL": "roll", "PTCH": "pitch", "PITCH": "pitch"}
+
+#: Talkers of the satellite systems: one receiver speaks as several of them.
+SATELLITES: frozenset[str] = frozenset({"GP", "GN", "GL", "GA", "GB", "BD", "GI", "GQ", "QZ"})

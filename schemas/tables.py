@@ -116,6 +116,19 @@ _ALL = (
         partition_by=("vessel_key", "ingest_id"),
     ),
     Table(
+        "lost",
+        "one stretch of a damaged log that could not be read",
+        (
+            *_VESSEL,
+            _INGEST,
+            Column("number", "integer", "place among the stretches of the log, in the order of the file"),
+            Column("since_utc_ns", "integer", "by the logger's clock, null where nothing tells", "ns"),
+            Column("until_utc_ns", "integer", "by the logger's clock, null where nothing tells", "ns"),
+            Column("messages", "integer", "how many records are lost, null where nothing tells", "1"),
+            Column("why", "text", "what is damaged"),
+        ),
+    ),
+    Table(
         "examinations",
         "what the channel doctor found in one ingest",
         (

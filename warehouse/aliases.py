@@ -38,13 +38,13 @@ def point(warehouse: Warehouse, vessel: str, parameter_set_id: str, alias: str =
     row = {"vessel_key": key, "vessel": vessel, "alias": alias, "parameter_set_id": found.parameter_set_id}
 
     def attempt() -> bool:
-        table = delta.ensure_table(warehouse, "aliases")
-        stored = delta.rows(table, "aliases", {"vessel_key": key, "alias": alias})
-        if stored["parameter_set_id"].to_list() == [found.parameter_set_id]:
-            return False
-        predicate = f"vessel_key = {quoted(key)} AND alias = {quoted(alias)}"
-        delta.replace(table, "aliases", [row], predicate)
-        return True
+        with delta.ensured(warehouse, "aliases") as table:
+            stored = delta.rows(table, "aliases", {"vessel_key": key, "alias": alias})
+            if stored["parameter_set_id"].to_list() == [found.parameter_set_id]:
+                return False
+            predicate = f"vessel_key = {quoted(key)} AND alias = {quoted(alias)}"
+            delta.replace(table, "aliases", [row], predicate)
+            return True
 
     return with_retry(attempt)
 
@@ -66,10 +66,10 @@ def withdraw(warehouse: Warehouse, vessel: str, alias: str = CURRENT) -> bool:
     key = vessel_key(vessel)
 
     def attempt() -> bool:
-        table = delta.ensure_table(warehouse, "aliases")
-        if delta.rows(table, "aliases", {"vessel_key": key, "alias": alias}).height == 0:
-            return False
-        delta.replace(table, "aliases", [], f"vessel_key = {quoted(key)} AND alias = {quoted(alias)}")
-        return True
+        with delta.ensured(warehouse, "aliases") as table:
+            if delta.rows(table, "aliases", {"vessel_key": key, "alias": alias}).height == 0:
+                return False
+            delta.replace(table, "aliases", [], f"vessel_key = {quoted(key)} AND alias = {quoted(alias)}")
+            return True
 
     return with_retry(attempt)

@@ -7,7 +7,8 @@ under `warehouse.retry.with_retry`. (Merges lose the units in the field metadata
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from datetime import UTC, datetime
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any
@@ -15,6 +16,7 @@ from urllib.parse import unquote
 
 from schemas.errors import KempfError, NotFound
 from schemas.tables import TABLES, arrow_schema
+from warehouse import handles
 from warehouse.store import Warehouse, not_writable
 
 if TYPE_CHECKING:
@@ -112,20 +114,32 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
         return _with_every_column(warehouse, table, name)
     warehouse.create()
     try:
-        DeltaTable.create(
-            warehouse.address(name),
-            schema=arrow_schema(TABLES[name]),
-            mode="ignore",
-            partition_by=list(TABLES[name].partition_by) or None,
-            configuration=_CONFIGURATION,
-            storage_options=warehouse.options,
-        )
+        with writing(warehouse.address(name)):
+            DeltaTable.create(
+                warehouse.address(name),
+                schema=arrow_schema(TABLES[name]),
+                mode="ignore",
+                partition_by=list(TABLES[name].partition_by) or None,
+                configuration=_CONFIGURATION,
+                storage_options=warehouse.options,
+            )
     except DeltaError:  # another writer made it at the same moment
         if open_table(warehouse, name) is None:
             raise
     made = open_table(warehouse, name)
     assert made is not None
     return made
+
+
+@contextmanager
+def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
+    """Lend a table for reading, deciding and writing; it is made, and the warehouse too, where it is not there.
+
+    What was lent is not to be used after. One over which a commit failed is opened anew the next time.
+    """
+    with handles.borrowed(warehouse, name, ensure_table) as table:
+        assert table is not None
+        yield table
 
 
 def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> DeltaTable:
@@ -137,7 +151,8 @@ def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> De
     missing = [field for field in wanted if field.name not in held]
     if not missing:
         return table
-    table.alter.add_columns(missing)
+    with writing(warehouse.address(name)):
+        table.alter.add_columns(missing)
     altered = open_table(warehouse, name)
     assert altered is not None
     return altered
@@ -174,7 +189,26 @@ def read(
         ``table_unreadable``.
     """
     warehouse.require()
-    return rows(open_table(warehouse, name, version), name, where, columns)
+    with reading(warehouse, name, version) as table:
+        return rows(table, name, where, columns)
+
+
+@contextmanager
+def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iterator[DeltaTable | None]:
+    """Lend a table for reading, as `open_table` opens it; what was lent is not to be used after, and not to be written.
+
+    Raises
+    ------
+    NotFound
+        ``no_table_version``.
+    KempfError
+        ``table_unreadable``.
+    """
+    with handles.borrowed(warehouse, name, open_table) as table:
+        if version is None or (table is not None and table.version() == version):
+            yield table
+            return
+    yield open_table(warehouse, name, version)
 
 
 def rows(table: DeltaTable | None, name: str, where: Where | None = None, columns: Sequence[str] = ()) -> pl.DataFrame:
@@ -195,7 +229,8 @@ def rows(table: DeltaTable | None, name: str, where: Where | None = None, column
             lazy = lazy.with_columns(pl.lit(None, dtype=kind).alias(column) for column, kind in absent.items())
     for column, value in (where or {}).items():
         # one value prunes files by their statistics
-        lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))
+        one = value if isinstance(value, str) else value[0] if len(value) == 1 else None
+        lazy = lazy.filter(pl.col(column) == one if one is not None else pl.col(column).is_in(value))
     try:
         return (lazy.select(columns) if columns else lazy).collect()
     except (OSError, pl.exceptions.ComputeError, pl.exceptions.PanicException) as error:
@@ -213,7 +248,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
     Parameters
     ----------
     table : DeltaTable
-        Opened by `ensure_table`; what was read from it is what the commit rests on.
+        Lent by `ensured`; what was read from it is what the commit rests on.
     name : str
         Its name.
     new : sequence of dict, or polars.DataFrame
@@ -226,7 +261,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
     deltalake.exceptions.CommitFailedError
         Another writer changed what the predicate names: read again, see `warehouse.retry.with_retry`.
     KempfError
-        ``warehouse_not_writable``.
+        ``disk_full``, ``warehouse_not_writable``.
     """
     import polars as pl
     import pyarrow as pa
@@ -237,7 +272,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
         data = new.select(schema.names).to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema)
     else:
         data = pa.Table.from_pylist(list(new), schema=schema)
-    try:
+    with writing(table.table_uri):
         write_deltalake(
             table,
             data,
@@ -245,14 +280,48 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
             predicate=predicate,
             writer_properties=WriterProperties(compression="ZSTD"),
         )
+
+
+@contextmanager
+def writing(address: str) -> Iterator[None]:
+    """Tell what the storage refuses while something is written to an address as one clear error.
+
+    Raises
+    ------
+    KempfError
+        ``disk_full``, ``warehouse_not_writable``.
+    """
+    from deltalake.exceptions import DeltaError
+
+    try:
+        yield
     except OSError as error:
-        raise not_writable(table.table_uri, error) from error
+        raise not_writable(address, error) from error
+    except DeltaError as error:
+        # a commit that the disk has no room for is no lost race: trying it again would not help
+        told = not_writable(address, OSError(str(error)))
+        if told.code == "disk_full":
+            raise told from error
+        raise
 
 
 def versions(warehouse: Warehouse) -> dict[str, int]:
     """Return the newest version of every table that was written, for the provenance of what is made from them."""
-    opened = {name: open_table(warehouse, name) for name in TABLES}
-    return {name: table.version() for name, table in opened.items() if table is not None}
+    found = {}
+    for name in TABLES:
+        with reading(warehouse, name) as table:
+            if table is not None:
+                found[name] = table.version()
+    return found
+
+
+def _commit_times(table: DeltaTable) -> list[tuple[int, int]]:
+    """Return version and time of every commit, ms; those that an open table knows are not read again."""
+    known: dict[int, int] = vars(table).setdefault("kempf_commit_times", {})
+    missing = table.version() + 1 - len(known)
+    if missing > 0:
+        known.update((entry["version"], entry["timestamp"]) for entry in table.history(missing))
+    return sorted(known.items())
 
 
 def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | None:
@@ -261,10 +330,10 @@ def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | N
     Commit times are those written into the commits, which copying a warehouse keeps; where clocks of two writers
     disagree a version counts as no older than the one before it.
     """
-    table = open_table(warehouse, name)
-    if table is None:
-        return None
-    commits = sorted((entry["version"], entry["timestamp"]) for entry in table.history())
+    with reading(warehouse, name) as table:
+        if table is None:
+            return None
+        commits = _commit_times(table)
     limit_ms = instant.astimezone(UTC).timestamp() * 1000.0
     known = list(accumulate((stamp for _, stamp in commits), max))
     held = [version for (version, _), stamp in zip(commits, known, strict=True) if stamp <= limit_ms]

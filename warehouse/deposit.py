@@ -11,7 +11,7 @@ from typing import Literal
 
 from pipeline.ingest.readings import Readings
 from schemas.profile import VesselProfile
-from warehouse import logs, raw, readings, vessels
+from warehouse import logs, lost, raw, readings, vessels
 from warehouse.keys import ingest_id, vessel_key
 from warehouse.store import Warehouse
 
@@ -121,6 +121,7 @@ def _store(warehouse: Warehouse, fresh: Sequence[tuple[Delivery, logs.LogRow]]) 
     batch = [(row.vessel, row.ingest_id, delivery.readings) for delivery, row in fresh]
     readings.write(warehouse, batch)
     readings.write_rejected(warehouse, batch)
+    lost.write(warehouse, batch)
     return logs.record(warehouse, [row for _, row in fresh])
 
 

@@ -82,12 +82,12 @@ def insert(warehouse: Warehouse, one: StoredDiagnosis) -> bool:
     }
 
     def attempt() -> bool:
-        table = delta.ensure_table(warehouse, "diagnoses")
-        if delta.rows(table, "diagnoses", {"diagnosis_id": one.diagnosis_id}).height:
-            return False
-        predicate = f"vessel_key = {quoted(row['vessel_key'])} AND diagnosis_id = {quoted(one.diagnosis_id)}"
-        delta.replace(table, "diagnoses", [row], predicate)
-        return True
+        with delta.ensured(warehouse, "diagnoses") as table:
+            if delta.rows(table, "diagnoses", {"diagnosis_id": one.diagnosis_id}).height:
+                return False
+            predicate = f"vessel_key = {quoted(row['vessel_key'])} AND diagnosis_id = {quoted(one.diagnosis_id)}"
+            delta.replace(table, "diagnoses", [row], predicate)
+            return True
 
     return with_retry(attempt)
 

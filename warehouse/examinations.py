@@ -59,13 +59,13 @@ def replace(warehouse: Warehouse, one: StoredExamination) -> bool:
     }
 
     def attempt() -> bool:
-        table = delta.ensure_table(warehouse, "examinations")
-        held = delta.rows(table, "examinations", {"vessel_key": key, "ingest_id": one.ingest_id}).rows(named=True)
-        if held == [row]:
-            return False
-        predicate = f"{one_of('vessel_key', [key])} AND {one_of('ingest_id', [one.ingest_id])}"
-        delta.replace(table, "examinations", [row], predicate)
-        return True
+        with delta.ensured(warehouse, "examinations") as table:
+            held = delta.rows(table, "examinations", {"vessel_key": key, "ingest_id": one.ingest_id}).rows(named=True)
+            if held == [row]:
+                return False
+            predicate = f"{one_of('vessel_key', [key])} AND {one_of('ingest_id', [one.ingest_id])}"
+            delta.replace(table, "examinations", [row], predicate)
+            return True
 
     return with_retry(attempt)
 

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
 from math import isfinite
@@ -107,12 +109,13 @@ def of_vessel(
         ``as_of_without_zone``, ``no_parameter``: none of the vessel's sets has such a parameter.
     """
     warehouse.require()
-    table = _sets_as_of(warehouse, as_of)
-    if table is None and as_of is not None:
-        vessels.require(warehouse, vessel)
-        nothing = _exploded(None, vessel, [])
-        return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
-    frame = _exploded(table, vessel, _past_ingests(warehouse, vessel, as_of))
+    with _sets_as_of(warehouse, as_of) as table:
+        if table is None and as_of is not None:
+            vessels.require(warehouse, vessel)
+            nothing = _exploded(None, vessel, [])
+            return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
+        frame = _exploded(table, vessel, _past_ingests(warehouse, vessel, as_of))
+        version = table.version() if table is not None else None
     if not superseded:
         frame = frame.remove(frame["superseded"])
     note: str | None = None
@@ -121,7 +124,7 @@ def of_vessel(
         note = f"No parameter set of {vessel!r} " + ("is stored." if as_of is None else f"by {as_of.isoformat()}.")
     elif parameter is not None:
         frame = _only(frame, parameter)
-    return History(frame, table.version() if table is not None else None, note)
+    return History(frame, version, note)
 
 
 def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None) -> list[Comparable]:
@@ -144,8 +147,8 @@ def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None)
         ``as_of_without_zone``.
     """
     warehouse.require()
-    table = _sets_as_of(warehouse, as_of)
-    found = _marked(table, vessel, _past_ingests(warehouse, vessel, as_of), _COMPARED)
+    with _sets_as_of(warehouse, as_of) as table:
+        found = _marked(table, vessel, _past_ingests(warehouse, vessel, as_of), _COMPARED)
     kinds: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for row in found.rows(named=True):
         if not row["superseded"]:
@@ -207,9 +210,12 @@ def _not_comparable(row: dict[str, Any], names: dict[str, str], seen: set[str]) 
     return "" if names and _known(row).keys() >= names.keys() else "without standard errors"
 
 
-def _sets_as_of(warehouse: Warehouse, as_of: datetime | None) -> DeltaTable | None:
+@contextmanager
+def _sets_as_of(warehouse: Warehouse, as_of: datetime | None) -> Iterator[DeltaTable | None]:
     if as_of is None:
-        return delta.open_table(warehouse, "parameter_sets")
+        with delta.reading(warehouse, "parameter_sets") as table:
+            yield table
+        return
     if as_of.tzinfo is None:
         raise UsageError(
             "as_of_without_zone",
@@ -217,7 +223,11 @@ def _sets_as_of(warehouse: Warehouse, as_of: datetime | None) -> DeltaTable | No
             "Write it with one, such as 2025-05-03T12:00:00Z.",
         )
     version = delta.version_as_of(warehouse, "parameter_sets", as_of)
-    return None if version is None else delta.open_table(warehouse, "parameter_sets", version)
+    if version is None:
+        yield None
+        return
+    with delta.reading(warehouse, "parameter_sets", version) as table:
+        yield table
 
 
 def _past_ingests(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> list[str]:
@@ -225,9 +235,9 @@ def _past_ingests(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> 
     version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
     if as_of is not None and version is None:
         return []
-    table = delta.open_table(warehouse, "logs", version)
     columns = ("log_id", "ingest_id", "revision")
-    rows = delta.rows(table, "logs", {"vessel_key": vessel_key(vessel)}, columns).sort("log_id", "revision")
+    hers = {"vessel_key": vessel_key(vessel)}
+    rows = delta.read(warehouse, "logs", hers, columns, version).sort("log_id", "revision")
     present = {row["log_id"]: row["ingest_id"] for row in rows.rows(named=True)}
     return [row["ingest_id"] for row in rows.rows(named=True) if present[row["log_id"]] != row["ingest_id"]]
 

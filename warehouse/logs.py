@@ -134,18 +134,18 @@ def record(warehouse: Warehouse, rows: Iterable[LogRow]) -> tuple[LogRow, ...]:
         return ()
 
     def attempt() -> tuple[LogRow, ...]:
-        table = delta.ensure_table(warehouse, "logs")
-        known = delta.rows(table, "logs", {"log_id": [row.log_id for row in given]})
-        held = _latest([_row(r) for r in known.rows(named=True)])
-        fresh = []
-        for row in given:
-            last = held.get(row.log_id)
-            refuse_other_vessel(last, row.vessel, row.file_name)
-            if last is None or last.ingest_id != row.ingest_id:
-                fresh.append(replace(row, revision=1 if last is None else last.revision + 1))
-        if fresh:
-            delta.replace(table, "logs", [_as_columns(row) for row in fresh], _new_rows(fresh))
-        return tuple(fresh)
+        with delta.ensured(warehouse, "logs") as table:
+            known = delta.rows(table, "logs", {"log_id": [row.log_id for row in given]})
+            held = _latest([_row(r) for r in known.rows(named=True)])
+            fresh = []
+            for row in given:
+                last = held.get(row.log_id)
+                refuse_other_vessel(last, row.vessel, row.file_name)
+                if last is None or last.ingest_id != row.ingest_id:
+                    fresh.append(replace(row, revision=1 if last is None else last.revision + 1))
+            if fresh:
+                delta.replace(table, "logs", [_as_columns(row) for row in fresh], _new_rows(fresh))
+            return tuple(fresh)
 
     return with_retry(attempt)
 

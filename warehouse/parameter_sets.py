@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from json import loads
 from typing import TYPE_CHECKING, Any
 
@@ -50,17 +50,18 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
     keys = {vessel_key(one.vessel) for one in given.values()}
 
     def attempt() -> tuple[str, ...]:
-        table = delta.ensure_table(warehouse, "parameter_sets")
-        known = delta.rows(table, "parameter_sets", {"parameter_set_id": sorted(given)})
-        stored = [_set(r) for r in known.rows(named=True)]
-        for one in stored:
-            _refuse_other(one, given[one.parameter_set_id])
-        fresh = [name for name in given if name not in {one.parameter_set_id for one in stored}]
-        if fresh:
-            rows = [_as_columns(given[name]) for name in fresh]
-            predicate = f"{one_of('vessel_key', keys)} AND {one_of('parameter_set_id', fresh)}"
-            delta.replace(table, "parameter_sets", rows, predicate)
-        return tuple(fresh)
+        with delta.ensured(warehouse, "parameter_sets") as table:
+            # an id is made of logs, and a log is of one vessel: no other vessel's files need be looked into
+            known = delta.rows(table, "parameter_sets", {"vessel_key": sorted(keys), "parameter_set_id": sorted(given)})
+            stored = [_set(r) for r in known.rows(named=True)]
+            for one in stored:
+                _refuse_other(one, given[one.parameter_set_id])
+            fresh = [name for name in given if name not in {one.parameter_set_id for one in stored}]
+            if fresh:
+                rows = [_as_columns(given[name]) for name in fresh]
+                predicate = f"{one_of('vessel_key', keys)} AND {one_of('parameter_set_id', fresh)}"
+                delta.replace(table, "parameter_sets", rows, predicate)
+            return tuple(fresh)
 
     return with_retry(attempt)
 
@@ -95,6 +96,35 @@ def get(warehouse: Warehouse, name: str) -> ParameterSet:
             {"beginning": name, "found": found},
         )
     return get(warehouse, found[0])
+
+
+def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
+    """Return the parameter sets of a vessel, all or some of them by their whole ids, in one reading of the table.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    names : collection of str, optional
+        Ids; one that she does not have is left out.
+
+    Returns
+    -------
+    list of ParameterSet
+        Sorted by start, then id.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    if names is not None and not names:
+        warehouse.require()
+        return []
+    hers: dict[str, str | list[str]] = {"vessel_key": vessel_key(vessel)}
+    chosen = hers if names is None else {**hers, "parameter_set_id": sorted(names)}
+    frame = delta.read(warehouse, "parameter_sets", chosen).sort("start_utc_ns", "parameter_set_id")
+    return [_set(row) for row in frame.rows(named=True)]
 
 
 def summaries(warehouse: Warehouse, vessel: str | None = None) -> pl.DataFrame:

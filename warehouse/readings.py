@@ -92,6 +92,7 @@ def _write(warehouse: Warehouse, name: str, batch: Sequence[tuple[str, str, pl.D
     predicate = f"{one_of('vessel_key', vessels)} AND {one_of('ingest_id', ingests)}"
 
     def attempt() -> None:
-        delta.replace(delta.ensure_table(warehouse, name), name, rows, predicate)
+        with delta.ensured(warehouse, name) as table:
+            delta.replace(table, name, rows, predicate)
 
     with_retry(attempt)

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from json import loads
 from typing import Any
 
 from warehouse import delta
 from warehouse.canonical import canonical_json, plain, sha256
-from warehouse.keys import quoted
+from warehouse.keys import one_of
 from warehouse.retry import with_retry
 from warehouse.store import Warehouse
 
@@ -43,22 +43,47 @@ def record(warehouse: Warehouse, run: Run) -> bool:
     bool
         Whether anything changed.
     """
-    row = {
-        "run_id": run.run_id,
-        "flow": run.flow,
-        "vessel": run.vessel,
-        "status": run.status,
-        "counts_json": canonical_json(run.counts),
-        "message_json": canonical_json(run.message),
-    }
+    return bool(record_all(warehouse, [run]))
 
-    def attempt() -> bool:
-        table = delta.ensure_table(warehouse, "runs")
-        stored = delta.rows(table, "runs", {"run_id": run.run_id})
-        if stored.rows(named=True) == [row]:
-            return False
-        delta.replace(table, "runs", [row], f"run_id = {quoted(run.run_id)}")
-        return True
+
+def record_all(warehouse: Warehouse, runs: Sequence[Run]) -> tuple[str, ...]:
+    """Store how runs stand, in place of how they stood, in at most one commit.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    runs : sequence of Run
+        Of one id the last counts.
+
+    Returns
+    -------
+    tuple of str
+        Ids of those that stand otherwise than before, sorted.
+    """
+    rows = {
+        run.run_id: {
+            "run_id": run.run_id,
+            "flow": run.flow,
+            "vessel": run.vessel,
+            "status": run.status,
+            "counts_json": canonical_json(run.counts),
+            "message_json": canonical_json(run.message),
+        }
+        for run in runs
+    }
+    if not rows:
+        return ()
+
+    def attempt() -> tuple[str, ...]:
+        with delta.ensured(warehouse, "runs") as table:
+            stored = {
+                row["run_id"]: row for row in delta.rows(table, "runs", {"run_id": sorted(rows)}).rows(named=True)
+            }
+            changed = tuple(name for name in sorted(rows) if stored.get(name) != rows[name])
+            if changed:
+                delta.replace(table, "runs", [rows[name] for name in changed], one_of("run_id", changed))
+            return changed
 
     return with_retry(attempt)
 

@@ -125,18 +125,20 @@ def replace(warehouse: Warehouse, vessel: str, found: Mapping[str, Sequence[Segm
                 raise ValueError(f"{segment.segment_id} is of {segment.vessel!r}, {segment.ingest_id}: not {ingest}")
 
     def attempt() -> tuple[str, ...]:
-        table = delta.ensure_table(warehouse, "segments")
-        known = delta.rows(table, "segments", {"vessel_key": key, "ingest_id": sorted(found)})
-        stored = [_segment(row) for row in known.rows(named=True)]
-        changed = tuple(
-            ingest
-            for ingest in sorted(found)
-            if _text(found[ingest]) != _text([s for s in stored if s.ingest_id == ingest])
-        )
-        if changed:
-            rows = [_as_columns(segment) for ingest in changed for segment in _sorted(found[ingest])]
-            delta.replace(table, "segments", rows, f"{one_of('vessel_key', [key])} AND {one_of('ingest_id', changed)}")
-        return changed
+        with delta.ensured(warehouse, "segments") as table:
+            known = delta.rows(table, "segments", {"vessel_key": key, "ingest_id": sorted(found)})
+            stored = [_segment(row) for row in known.rows(named=True)]
+            changed = tuple(
+                ingest
+                for ingest in sorted(found)
+                if _text(found[ingest]) != _text([s for s in stored if s.ingest_id == ingest])
+            )
+            if changed:
+                rows = [_as_columns(segment) for ingest in changed for segment in _sorted(found[ingest])]
+                delta.replace(
+                    table, "segments", rows, f"{one_of('vessel_key', [key])} AND {one_of('ingest_id', changed)}"
+                )
+            return changed
 
     return with_retry(attempt)
 

@@ -6,20 +6,25 @@ marker file, which also says how it is laid out.
 
 from __future__ import annotations
 
+import contextlib
+import errno
 import json
 import os
+import re
 import secrets
+import shutil
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 from typing import Any
+from urllib.parse import unquote
 
 from schemas.errors import KempfError, NotFound, UsageError
 
 #: Name and content of the file that marks a warehouse.
 MARKER = "kempf-warehouse.json"
-LAYOUT = 1
+LAYOUT = 2
 
 #: Characters that the readers of the tables give another meaning: escapes, patterns, and = as a partition's folder.
 _UNADDRESSABLE = "%=[]*?^|{}" if os.sep == "\\" else "%=[]*?^|{}\\"
@@ -128,13 +133,31 @@ class Warehouse:
                 "Look at the permissions of the folder, or at the address and the credentials of the object store.",
             ) from error
 
+    def size_of(self, *parts: str) -> int | None:
+        """Return the size of a file inside, bytes; None where there is none."""
+        files, root = self._files
+        size: int | None = files.get_file_info("/".join((root, *parts))).size
+        return size
+
+    def mark_of(self, *parts: str) -> tuple[int, ...] | None:
+        """Return numbers that change where a file inside is replaced by another; None where there is none."""
+        if self.folder is not None:
+            try:
+                found = self.folder.joinpath(*parts).stat()
+            except OSError:
+                return None
+            return found.st_ino, found.st_mtime_ns, found.st_size
+        files, root = self._files
+        told = files.get_file_info("/".join((root, *parts)))
+        return None if told.mtime_ns is None else (told.mtime_ns, told.size or 0)
+
     def write_bytes(self, data: bytes, *parts: str) -> None:
         """Write a file inside, all of it or nothing: a reader never sees a part.
 
         Raises
         ------
         KempfError
-            ``warehouse_not_writable``: the disk is full, the folder is protected, ...
+            ``disk_full``; ``warehouse_not_writable``: the folder is protected, ...
         """
         files, root = self._files
         target = "/".join((root, *parts))
@@ -224,10 +247,46 @@ class Warehouse:
         self.write_bytes(json.dumps({"layout": LAYOUT}).encode() + b"\n", MARKER)
 
 
+#: What the system calls a disk, or a share of one, that has no room left.
+_FULL = (errno.ENOSPC, errno.EDQUOT)
+_FULL_WORDS = ("no space left", "disk quota exceeded", "not enough space")
+
+
 def not_writable(where: str, error: OSError) -> KempfError:
-    """Return the error of a write that failed."""
+    """Return the error of a write that failed; a full disk has one of its own.
+
+    Parameters
+    ----------
+    where : str
+        Folder or address that was written to.
+    error : OSError
+    """
+    if where.startswith("file://"):
+        where = unquote(where.removeprefix("file://")).rstrip("/")
+    told = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", str(error)).split())
+    if error.errno in _FULL or any(words in told.lower() for words in _FULL_WORDS):
+        free = _free_bytes(where)
+        return KempfError(
+            "disk_full",
+            f"There is no room left for {where}"
+            + (f": {free} bytes are free on its disk, which was not enough." if free is not None else "."),
+            "Make room on it, or move the warehouse to a larger one; then run the same command again: what was "
+            "finished is kept, nothing is half in.",
+            {"path": where, "free_bytes": free},
+        )
     return KempfError(
         "warehouse_not_writable",
-        f"Writing to {where} failed: {error}.",
+        f"Writing to {where} failed: {told}.",
         "Look at the free space and the permissions of the folder, then run the command again.",
+        {"path": where},
     )
+
+
+def _free_bytes(where: str) -> int | None:
+    """Return what a person without special rights may still write there, bytes; None where nobody can tell."""
+    if "://" in where:
+        return None
+    path = Path(where)
+    with contextlib.suppress(OSError):
+        return shutil.disk_usage(next(p for p in (path, *path.parents) if p.exists())).free
+    return None

@@ -58,30 +58,32 @@ def register_all(
         return ()
 
     def attempt() -> tuple[tuple[str, VesselProfile], ...]:
-        table = delta.ensure_table(warehouse, "vessels")
-        known = delta.rows(table, "vessels").sort("revision").rows(named=True)
-        last = {row["vessel"]: (row["revision"], row["profile_sha256"]) for row in known}  # the highest revision stays
-        rows: list[dict[str, Any]] = []
-        changed = []
-        for vessel, profile in profiles:
-            revision, current_sha256 = last.get(vessel, (0, ""))
-            if current_sha256 == profile.sha256:
-                continue
-            last[vessel] = (revision + 1, profile.sha256)
-            changed.append((vessel, profile))
-            rows.append(
-                {
-                    "vessel_key": keys[vessel],
-                    "vessel": vessel,
-                    "revision": revision + 1,
-                    "profile_sha256": profile.sha256,
-                    "profile_json": profile.canonical_json(),
-                }
-            )
-        if rows:
-            named = (f"(vessel_key = {quoted(row['vessel_key'])} AND revision = {row['revision']})" for row in rows)
-            delta.replace(table, "vessels", rows, " OR ".join(named))
-        return tuple(changed)
+        with delta.ensured(warehouse, "vessels") as table:
+            known = delta.rows(table, "vessels").sort("revision").rows(named=True)
+            last = {
+                row["vessel"]: (row["revision"], row["profile_sha256"]) for row in known
+            }  # the highest revision stays
+            rows: list[dict[str, Any]] = []
+            changed = []
+            for vessel, profile in profiles:
+                revision, current_sha256 = last.get(vessel, (0, ""))
+                if current_sha256 == profile.sha256:
+                    continue
+                last[vessel] = (revision + 1, profile.sha256)
+                changed.append((vessel, profile))
+                rows.append(
+                    {
+                        "vessel_key": keys[vessel],
+                        "vessel": vessel,
+                        "revision": revision + 1,
+                        "profile_sha256": profile.sha256,
+                        "profile_json": profile.canonical_json(),
+                    }
+                )
+            if rows:
+                named = (f"(vessel_key = {quoted(row['vessel_key'])} AND revision = {row['revision']})" for row in rows)
+                delta.replace(table, "vessels", rows, " OR ".join(named))
+            return tuple(changed)
 
     return with_retry(attempt)
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.identify.chain import LONGEST
 from pipeline.identify.fit import fit_percent
 from pipeline.identify.kernel import N_STATE, N_THETA, likelihood, no_trace
 from pipeline.identify.record import MEASUREMENTS, Record
@@ -86,7 +87,7 @@ def free_run(record: Record, hull: Hull, spec: ModelSpec) -> FreeRun:
     nothing = np.full((n, 3), np.nan)
     likelihood(
         *(theta, False, used.time_s, used.speed_m_s, used.rudder_rad, np.zeros(n), np.zeros(n), nothing),
-        *(np.zeros(n, dtype=np.bool_), np.zeros((n, 2)), 0.0, 1.0, 1.0, 1.0, 1.0, x0, P0, trace),
+        *(np.zeros(n, dtype=np.bool_), np.zeros((n, 2)), 0.0, 1.0, 1.0, 1.0, 1.0, LONGEST, x0, P0, trace),
     )
     predicted = states[:, [0, 1, 4]]
     return FreeRun(record.time_s, predicted, record.measured - predicted)

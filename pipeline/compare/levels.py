@@ -55,7 +55,7 @@ def fit_levels(filtered: Filtered, hull: Float, values: Float, start: Float) -> 
     for _ in range(_MAX_ITERATIONS):
         if not np.isfinite(passed.log_likelihood):
             break
-        others = [sensitivity.passed(filtered, point.moved(first + i, _STEP)) for i in used.tolist()]
+        others = sensitivity.passes(filtered, [point.moved(first + i, _STEP) for i in used.tolist()])
         J = np.column_stack([sensitivity.difference(passed, other, _STEP) for other in others])
         score, information = J.T @ sensitivity.whitened(passed), J.T @ J
         held = ((point.levels <= LOWEST)[used] & (score < 0.0)) | ((point.levels >= HIGHEST)[used] & (score > 0.0))

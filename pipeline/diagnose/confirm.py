@@ -69,6 +69,9 @@ class Confirmation:
         Whether a parameter of the effect ended at a bound.
     unseen : Unseen
         Of ``fit``.
+    outdone : bool
+        Whether the refit was given up, for it could not come near what another one reached; its gains are then those of
+        ``before``: none.
     """
 
     fit: Fit
@@ -78,6 +81,7 @@ class Confirmation:
     held_out_gains: Float
     at_bound: bool
     unseen: Unseen
+    outdone: bool = False
 
     @property
     def holds(self) -> bool:
@@ -87,12 +91,19 @@ class Confirmation:
             self.bic_change < -BIC_SAVING
             and np.mean(gains > 0.0) > 0.5
             and np.sum(gains) > 0.0
-            and not self.at_bound
+            and not (self.at_bound or self.outdone)
             and np.isfinite(self.fit.log_likelihood)
         )
 
 
-def confirm(base: Fit, before: Unseen, candidate: Candidate, held: Sequence[Run], workers: Executor) -> Confirmation:
+def confirm(
+    base: Fit,
+    before: Unseen,
+    candidate: Candidate,
+    held: Sequence[Run],
+    workers: Executor,
+    most_bic: float = np.inf,
+) -> Confirmation:
     """Refit a model with one effect more.
 
     Parameters
@@ -105,25 +116,30 @@ def confirm(base: Fit, before: Unseen, candidate: Candidate, held: Sequence[Run]
     held : sequence of Run
         Held out.
     workers : Executor
+    most_bic : float, optional
+        The change of the information criterion without which it is of no use: another one did better.
     """
-    fit = added(base, candidate, workers)
+    price = len(candidate.effect.parameters) * float(np.log(base.count))
+    wanted = base.log_likelihood + 0.5 * (price - most_bic)
+    fit = added(base, candidate, workers, wanted)
     model = fit.model
-    new = model.names[len(base.model.names) :]
     ratio = 2.0 * (fit.log_likelihood - base.log_likelihood)
     last = slice(base.values.size, None)
     reach = 1e-9 * np.maximum(np.abs(model.high[last]), np.abs(model.low[last]))
     low, high, at = model.low[last], model.high[last], fit.values[last]
     # at a lower bound of 0 the effect is absent, which the criterion tells; any other bound is implausible
     bound = (at >= high - reach) | ((at <= low + reach) & (low != 0.0))
-    after = unseen(fit, held, workers)
+    outdone = not fit.converged and fit.log_likelihood < wanted
+    after = before if outdone else unseen(fit, held, workers)
     return Confirmation(
         fit=fit,
         likelihood_ratio=ratio,
-        bic_change=len(new) * float(np.log(fit.count)) - ratio,
+        bic_change=price - ratio,
         fold_gains=after.folds - before.folds,
         held_out_gains=after.held - before.held,
         at_bound=bool(np.any(bound)),
         unseen=after,
+        outdone=outdone,
     )
 
 

@@ -179,7 +179,8 @@ def diagnose(
             ):
                 continue
             told(f"step {len(steps)}: refitting with {candidate.effect.title}")
-            tried.append((candidate, confirm(last.fit, alone, candidate, held, workers)))
+            most = min((k.bic_change for _, k in tried if k.holds), default=np.inf) + WINDOW
+            tried.append((candidate, confirm(last.fit, alone, candidate, held, workers, most)))
         best = undecided([pair for pair in tried if pair[1].holds])
         if not best:
             steps[-1] = replace(last, refused=(*last.refused, *tried))

@@ -9,10 +9,14 @@ import numpy as np
 from pipeline.diagnose.run import Run
 from pipeline.identify.scoring import Mask
 from pipeline.model.augmented import Augmented
-from pipeline.model.extended import N_AFTER, N_BEFORE, extended
+from pipeline.model.dynamics import N_AFTER, N_BEFORE
+from pipeline.model.extended import extended
+from pipeline.model.lanes import LANES, MOST, ONE
 from pipeline.normalise.series import Float
 from schemas.model_spec import ModelSpec
 
+#: so few sets of parameters go through one by one: a group of lanes costs as much as these
+_ALONE = 4
 #: standard deviations of (v, r, psi, F, M, c_1, c_2, b) at the first instant, SI: wide, the data decide
 INITIAL_STD = np.array([2.0, 0.2, 0.2, 0.1, 0.01, 2.0, 2.0, 0.01])
 
@@ -87,32 +91,62 @@ class Filtered:
         states : bool, optional
         withheld : ndarray of bool, shape (n,), optional
         """
+        return self._filtered(hull[:, None], levels[:, None], values[:, None], states=states, withheld=withheld)[0]
+
+    def run_filters(self, hulls: Float, levels: Float, values: Float) -> list[Passed]:
+        """Run the filter for several sets of parameters at once, much faster than one after the other.
+
+        Parameters
+        ----------
+        hulls, levels : ndarray, shape (6, k)
+        values : ndarray, shape (p, k)
+        """
+        return self._filtered(hulls, levels, values, states=False, withheld=None)
+
+    def _filtered(
+        self, hulls: Float, levels: Float, values: Float, *, states: bool, withheld: Mask | None
+    ) -> list[Passed]:
         extra = self.model.extra
         std = INITIAL_STD * self.present()
         wide = np.concatenate([std[:N_BEFORE], np.zeros(extra), std[N_BEFORE:]])
-        return self._pass(hull, levels, values, np.zeros(wide.size), np.diag(wide**2), states=states, withheld=withheld)
+        used = np.where(np.array(self.levels_used())[:, None], levels, np.array([[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]).T)
+        x0 = np.zeros((wide.size, hulls.shape[1]))
+        return self._passes(hulls, used, values, x0, np.diag(wide**2), states=states, withheld=withheld)
 
     def free(self, hull: Float, values: Float, start: Float) -> Float:
         """Let the ship run from a state on, with no measurement taken in; return what would be measured, shape (n, 3).
+
+        See `free_from`; ``start`` is of shape (8,).
+        """
+        one: Float = self.free_from(hull, values, start[:, None])[..., 0]
+        return one
+
+    def free_from(self, hull: Float, values: Float, starts: Float) -> Float:
+        """Let the ship run from several states on, with no measurement taken in; return what would be measured.
 
         Parameters
         ----------
         hull : ndarray, shape (6,)
         values : ndarray, shape (p,)
-        start : ndarray, shape (8,)
-            (v, r, psi, F, M, c_1, c_2, b); the last five stay as they are but for their correlation rates.
-        """
-        extra = self.model.extra
-        x0 = np.concatenate([start[:N_BEFORE], np.zeros(extra), start[N_BEFORE:]])
-        n = self.run.measured.shape[0]
-        held = np.ones(n, dtype=np.bool_)
-        quiet = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
-        P0 = np.zeros((x0.size, x0.size))
-        return self._pass(hull, quiet, values, x0, P0, states=False, withheld=held, still=True).predicted
+        starts : ndarray, shape (8, k)
+            (v, r, psi, F, M, c_1, c_2, b); the last five stay as they are.
 
-    def _pass(
+        Returns
+        -------
+        ndarray, shape (n, 3, k)
+        """
+        k = starts.shape[1]
+        x0 = np.concatenate([starts[:N_BEFORE], np.zeros((self.model.extra, k)), starts[N_BEFORE:]])
+        held = np.ones(self.run.measured.shape[0], dtype=np.bool_)
+        quiet = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+        hulls, levels, same = (np.repeat(column[:, None], k, axis=1) for column in (hull, quiet, values))
+        P0 = np.zeros((x0.shape[0], x0.shape[0]))
+        passes = self._passes(hulls, levels, same, x0, P0, states=False, withheld=held, still=True)
+        return np.stack([one.predicted for one in passes], axis=-1)
+
+    def _passes(
         self,
-        hull: Float,
+        hulls: Float,
         levels: Float,
         values: Float,
         x0: Float,
@@ -121,36 +155,65 @@ class Filtered:
         states: bool,
         withheld: Mask | None,
         still: bool = False,
-    ) -> Passed:
-        run, spec = self.run, self.spec
-        n, size = run.measured.shape[0], x0.size
-        inputs = run.inputs
-        if any(effect.rudder_course is not None for effect in self.model.effects):
-            inputs = inputs.copy()
-            inputs[:, 1] = self.model.rudder(run.fine_time_s, inputs[:, 1], values)
-        rates = np.array(
-            [
-                spec.wind_correlation_rate_per_s,
-                spec.moment_correlation_rate_per_s,
-                spec.current_correlation_rate_per_s,
-            ]
+    ) -> list[Passed]:
+        """Run the filter in groups of lanes, and what is left over by itself or in a group filled up with itself."""
+        done: list[Passed] = []
+        while len(done) < hulls.shape[1]:
+            left = hulls.shape[1] - len(done)
+            lanes, together = (LANES, MOST) if left > _ALONE else (ONE, 1)
+            at = np.minimum(len(done) + np.arange(together), hulls.shape[1] - 1)
+            hull, level, value, start = (np.ascontiguousarray(part[:, at]) for part in (hulls, levels, values, x0))
+            made = self._lanes(hull, level, value, start, P0, lanes, states=states, withheld=withheld, still=still)
+            done += made[: min(left, together)]
+        return done
+
+    def _lanes(
+        self,
+        hulls: Float,
+        levels: Float,
+        values: Float,
+        x0: Float,
+        P0: Float,
+        lanes: tuple[int, ...],
+        *,
+        states: bool,
+        withheld: Mask | None,
+        still: bool,
+    ) -> list[Passed]:
+        run, spec, ship = self.run, self.spec, self.run.ship
+        (n, _), (size, k) = run.measured.shape, x0.shape
+        assert size == N_BEFORE + self.model.extra + N_AFTER
+        rates = (
+            *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
+            spec.current_correlation_rate_per_s,
         )
-        ship = run.ship
         told = np.array(
             [
                 *(ship.arm_per_m, ship.length_m, ship.draught_m, run.approach_m_s, run.approach_per_s),
                 spec.rudder_speed_exponent,
             ]
         )
-        used = np.where(self.levels_used(), levels, [0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
+        rows = n if states else 0
         kept = (
-            *(np.full((n, 3), np.nan), np.full((n, 3), np.nan)),
-            *(np.empty((n if states else 0, size)), np.empty((n if states else 0, size))),
+            *(np.full((n, 3, k), np.nan), np.full((n, 3, k), np.nan)),
+            *(np.empty((rows, size, k)), np.empty((rows, size, k))),
         )
-        value = extended(
-            *(hull, used, values, run.step_s, inputs, run.rudder_noise, run.measured, run.offset_s),
-            *(np.zeros(n, dtype=np.bool_) if withheld is None else withheld, run.current_row, told),
-            *(np.zeros(3) if still else rates, x0, P0, self.model.table, kept),
+        found = extended(
+            *(hulls, levels, values, run.step_s, run.inputs, self._rudders(values), run.rudder_noise, run.measured),
+            *(run.offset_s, np.zeros(n, dtype=np.bool_) if withheld is None else withheld, run.current_row, told),
+            *(np.zeros(3) if still else np.array(rates), x0, P0, self.model.table, kept, lanes),
         )
-        assert size == N_BEFORE + self.model.extra + N_AFTER
-        return Passed(float(value), run.measured - kept[0], kept[1], *(kept[i] for i in (0, 2, 3)))
+        predicted, variance, filtered, spread = (np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in kept)
+        return [
+            Passed(float(found[b]), run.measured - predicted[b], variance[b], predicted[b], filtered[b], spread[b])
+            for b in range(k)
+        ]
+
+    def _rudders(self, values: Float) -> Float:
+        """Return the rudder as the effects have it for every set of their parameters, shape (rows, k)."""
+        measured = self.run.inputs[:, 1]
+        if all(effect.rudder_course is None for effect in self.model.effects):
+            return np.repeat(measured[:, None], values.shape[1], axis=1)
+        own, of = np.unique(values, axis=1, return_inverse=True)
+        courses = [self.model.rudder(self.run.fine_time_s, measured, one) for one in own.T]
+        return np.ascontiguousarray(np.stack(courses, axis=-1)[:, of])

@@ -7,6 +7,7 @@ nothing. It says whether something that repeats itself is left, whatever its nam
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 from itertools import pairwise
@@ -80,6 +81,10 @@ class Flexible:
         Size of every term of `TERMS`, fitted to all runs.
     formula : tuple of Term
         The few terms that explain most of it; exploratory.
+    columns : ndarray, shape (N, len(TERMS))
+        What the terms do to the whitened innovations, of unit size, without what the fitted parameters imitate.
+    parts : tuple of slice
+        The rows of each run.
     """
 
     gain: float
@@ -87,6 +92,18 @@ class Flexible:
     shrinkage: float
     coefficients: Float
     formula: tuple[Term, ...]
+    columns: Float
+    parts: tuple[slice, ...]
+
+    def foreseen(self, signal: Float) -> float:
+        """Return what the reference would gain of a signal by itself, were there no noise.
+
+        Parameters
+        ----------
+        signal : ndarray, shape (N,)
+            What something does to the whitened innovations: `pipeline.diagnose.screen.Candidate.direction`, say.
+        """
+        return float(np.sum(_gains(self.columns, signal, self.parts, self.shrinkage)))
 
     @property
     def repeats(self) -> bool:
@@ -116,19 +133,27 @@ def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> Flexible:
     unit = np.where(kept, 1.0 / np.where(kept, norm, 1.0), 0.0)
     Z = clean * unit
     ends = np.cumsum([0, *sizes])
-    parts = [slice(a, b) for a, b in pairwise(ends)]
+    parts = tuple(slice(a, b) for a, b in pairwise(ends))
+    tried = {shrinkage: _gains(Z, known.u, parts, shrinkage) for shrinkage in _SHRINKAGE}
+    best = max(tried, key=lambda shrinkage: float(np.sum(tried[shrinkage])))
+    coefficients: Float = unit * np.linalg.solve(Z.T @ Z + _penalty(Z, best), Z.T @ known.u)
+    formula = search(clean * kept, known.u, list(parts), TERMS)
+    return Flexible(float(np.sum(tried[best])), tried[best], best, coefficients, formula, Z, parts)
+
+
+def _penalty(Z: Float, shrinkage: float) -> Float:
+    # a column of unit norm explains u with a coefficient of the order of one where there is only noise
+    found: Float = np.eye(Z.shape[1]) * shrinkage / 100.0
+    return found
+
+
+def _gains(Z: Float, u: Float, parts: Sequence[slice], shrinkage: float) -> Float:
+    """Return the log-likelihood gained in each run by what the other runs say, shape (runs,)."""
     grams = [Z[p].T @ Z[p] for p in parts]
-    moments = [Z[p].T @ known.u[p] for p in parts]
+    moments = [Z[p].T @ u[p] for p in parts]
     whole, moment = np.sum(grams, axis=0), np.sum(moments, axis=0)
-    best: tuple[float, Float, float] = (-np.inf, np.zeros(len(parts)), _SHRINKAGE[-1])
-    for shrinkage in _SHRINKAGE:
-        # a column of unit norm explains u with a coefficient of the order of one where there is only noise
-        penalty = np.eye(Z.shape[1]) * shrinkage / 100.0
-        gains = []
-        for G, m in zip(grams, moments, strict=True):
-            w = np.linalg.solve(whole - G + penalty, moment - m)
-            gains.append(float(w @ m - 0.5 * w @ G @ w))
-        if sum(gains) > best[0]:
-            best = (sum(gains), np.array(gains), shrinkage)
-    w = np.linalg.solve(whole + np.eye(Z.shape[1]) * best[2] / 100.0, moment)
-    return Flexible(best[0], best[1], best[2], w * unit, search(clean * kept, known.u, parts, TERMS))
+    gains = []
+    for G, m in zip(grams, moments, strict=True):
+        w = np.linalg.solve(whole - G + _penalty(Z, shrinkage), moment - m)
+        gains.append(w @ m - 0.5 * w @ G @ w)
+    return np.array(gains)

@@ -98,12 +98,12 @@ def free_run_of(filtered: Filtered, hull: Float, values: Float) -> FreeRun:
     made = np.isfinite(run.measured)
     weight = (1.0 / np.maximum(spread(run.measured), 1e-9))[None, :] * np.ones_like(run.measured)
 
-    def errors(constants: Float) -> Float:
-        predicted = filtered.free(hull, values, constants)
-        found: Float = ((run.measured - predicted) * weight)[made]
+    def errors(starts: Float) -> Float:
+        predicted = filtered.free_from(hull, values, starts)
+        found: Float = ((run.measured[..., None] - predicted) * weight[..., None])[made]
         return found
 
-    constants, base = start.copy(), errors(start)
+    constants, base = start.copy(), errors(start[:, None])[:, 0]
     if not np.all(np.isfinite(base)):
         n = run.measured.shape
         return FreeRun(run.name, np.full(n, np.nan), np.where(made, np.inf, np.nan), start)
@@ -111,19 +111,16 @@ def free_run_of(filtered: Filtered, hull: Float, values: Float) -> FreeRun:
     # beside thousands of measurements the prior only keeps what they do not tell from growing
     loose = 0.05 * np.sqrt(base.size) / _PRIOR[used]
     for _ in range(_ROUNDS):
-        columns = []
-        for i in used:
-            moved = constants.copy()
-            moved[i] += _STEP[i]
-            columns.append((errors(moved) - base) / _STEP[i])
-        J = np.vstack([np.column_stack(columns), np.diag(0.02 * loose)])
+        steps = np.diag(_STEP)[:, used]
+        columns = (errors(constants[:, None] + steps) - base[:, None]) / steps.sum(axis=0)
+        J = np.vstack([columns, np.diag(0.02 * loose)])
         e = np.concatenate([base, 0.02 * loose * (constants - anchor)[used]])
         if not np.all(np.isfinite(J)):
             break
         step = np.linalg.lstsq(J, -e, rcond=1e-10)[0]
         trial = constants.copy()
         trial[used] += step
-        there = errors(trial)
+        there = errors(trial[:, None])[:, 0]
         if not np.all(np.isfinite(there)) or there @ there > base @ base:
             break
         settled = base @ base - there @ there < 1e-6 * (base @ base)

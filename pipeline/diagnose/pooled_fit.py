@@ -15,6 +15,7 @@ from pipeline.diagnose.sensitivity import N_HULL, N_LEVELS, Point
 from pipeline.identify import search
 from pipeline.identify.scoring import Mask
 from pipeline.model.augmented import Augmented
+from pipeline.model.lanes import MOST
 from pipeline.model.ship import mariner_like
 from pipeline.normalise.series import Float
 from schemas.model_spec import ModelSpec
@@ -126,16 +127,22 @@ def fit(
 
 
 def climb(
-    filtered: tuple[Filtered, ...], hull: Float, levels: Float, values: Float, workers: Executor, max_iterations: int
+    filtered: tuple[Filtered, ...],
+    hull: Float,
+    levels: Float,
+    values: Float,
+    workers: Executor,
+    max_iterations: int,
+    wanted: float = -np.inf,
 ) -> Fit:
-    """Climb to the maximum by damped Fisher scoring."""
+    """Climb to the maximum by damped Fisher scoring; given up where the log-likelihood ``wanted`` is out of reach."""
     model = filtered[0].model
     layout = _Layout(filtered, workers)
     # a number that happens to lie near 0 may grow to the size that it has in other ships
     least = 0.05 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
     begin = np.where(np.abs(hull) < least, np.copysign(least, hull), hull)
     theta = np.concatenate([begin, np.clip(values, model.low, model.high) / layout.unit, levels.ravel()])
-    found = search.climb(layout, theta, max_iterations, _DECREMENT)
+    found = search.climb(layout, theta, max_iterations, _DECREMENT, wanted)
     theta, score, information = found.theta, found.score, found.information
     lines = layout.linearised_at(theta)
     shared = layout.shared
@@ -226,19 +233,17 @@ def linearise(
     filtered: Sequence[Filtered], points: Sequence[Point], bases: Sequence[Passed], workers: Executor
 ) -> tuple[Linearised, ...]:
     """Return u and J of every run at its point, ``bases`` being the passes there."""
-    # a pass of one run is the smallest piece of work: so three runs keep two cores busy
-    jobs = []
-    for i, (one, point, base) in enumerate(zip(filtered, points, bases, strict=True)):
+    # a group of lanes of one run is the smallest piece of work: so three runs keep two cores busy
+    jobs: list[tuple[int, list[int]]] = []
+    for i, (one, base) in enumerate(zip(filtered, bases, strict=True)):
         if np.isfinite(base.log_likelihood):
-            by = sensitivity.steps(one, point)
-            jobs += [(i, index, float(by[index])) for index in sensitivity.active(one)]
-    made = workers.map(
-        lambda job: sensitivity.column(filtered[job[0]], points[job[0]], bases[job[0]], job[1], job[2]), jobs
-    )
-    columns: list[list[tuple[int, Float]]] = [[] for _ in bases]
-    for (i, index, _), column in zip(jobs, made, strict=True):
-        columns[i].append((index, column))
-    return tuple(_line(base, own) for base, own in zip(bases, columns, strict=True))
+            wanted = sensitivity.active(one)
+            jobs += [(i, wanted[k : k + MOST]) for k in range(0, len(wanted), MOST)]
+    made = workers.map(lambda job: sensitivity.columns(filtered[job[0]], points[job[0]], bases[job[0]], job[1]), jobs)
+    found: list[list[tuple[int, Float]]] = [[] for _ in bases]
+    for (i, wanted), columns in zip(jobs, made, strict=True):
+        found[i] += zip(wanted, columns, strict=True)
+    return tuple(_line(base, own) for base, own in zip(bases, found, strict=True))
 
 
 def _line(base: Passed, columns: Sequence[tuple[int, Float]]) -> Linearised:

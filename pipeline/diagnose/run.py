@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from pipeline.identify.record import Record
-from pipeline.model.extended import N_INPUT, ROWS
+from pipeline.model.dynamics import N_INPUT
+from pipeline.model.extended import ROWS
 from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TELLING
 from pipeline.normalise.grid import gap_limit_s
 from pipeline.normalise.instruments import Instruments

@@ -9,6 +9,7 @@ from predicted states, with the filter's own way of swallowing it, by no formula
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -56,6 +57,12 @@ def passed(filtered: Filtered, point: Point) -> Passed:
     return filtered.run_filter(point.hull, np.exp(point.levels), point.values)
 
 
+def passes(filtered: Filtered, points: Sequence[Point]) -> list[Passed]:
+    """Run the filter at several points at once."""
+    hulls, levels = (np.stack(part, axis=-1) for part in ([p.hull for p in points], [p.levels for p in points]))
+    return filtered.run_filters(hulls, np.exp(levels), np.stack([p.values for p in points], axis=-1))
+
+
 def whitened(one: Passed) -> Float:
     """Return u, shape (2 m,): over the measurements made, whitened innovations, then what tells of their spread."""
     made = np.isfinite(one.innovation)
@@ -94,6 +101,19 @@ def _typical(filtered: Filtered, point: Point) -> Float:
     return typical
 
 
-def column(filtered: Filtered, point: Point, base: Passed, index: int, by: float) -> Float:
-    """Return one column of J, shape (2 m,), by one pass of the filter."""
-    return difference(base, passed(filtered, point.moved(index, by)), by)
+def columns(filtered: Filtered, point: Point, base: Passed, wanted: Sequence[int]) -> list[Float]:
+    """Return columns of J, each of shape (2 m,), by a pass of the filter for each, several passes at once.
+
+    Parameters
+    ----------
+    filtered : Filtered
+    point : Point
+    base : Passed
+        The pass there.
+    wanted : sequence of int
+        Places in `Point.vector`.
+    """
+    by = steps(filtered, point)[list(wanted)]
+    moved = [point.moved(index, step) for index, step in zip(wanted, by.tolist(), strict=True)]
+    others = passes(filtered, moved)
+    return [difference(base, other, step) for other, step in zip(others, by.tolist(), strict=True)]

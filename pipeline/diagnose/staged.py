@@ -48,7 +48,7 @@ def plain(runs: Sequence[Run], spec: ModelSpec, start: Start, workers: Executor)
     return found, gross
 
 
-def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
+def added(base: Fit, candidate: Candidate, workers: Executor, wanted: float = -np.inf) -> Fit:
     """Fit a model with one effect more.
 
     A hull fitted without a lag of the rudder has bent itself to stand in for it, and from there the way to the true
@@ -61,6 +61,8 @@ def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
     candidate : Candidate
         Of the screen beside ``base``.
     workers : Executor
+    wanted : float, optional
+        Log-likelihood without which the fit is of no use: climbs that cannot reach it are given up, not converged.
     """
     model = base.model.with_effect(candidate.effect)
     begin = _begin(candidate)
@@ -77,15 +79,19 @@ def added(base: Fit, candidate: Candidate, workers: Executor) -> Fit:
         hull, begin = best.hull, best.values[base.values.size :]
     else:
         hull = base.hull
-    found = _climbed(base, model, hull, begin, workers, _TO_THE_END)
+    found = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted)
     if is_ship(base.hull):
         return found
     # what the score foretells beside such a hull says little, and the disturbances beside it have eaten the effect
     levels = base.levels.copy()
     levels[:, : len(INTENSITIES)] = np.log(INTENSITIES)
     calm = replace(base, levels=np.clip(levels, pooled_fit.LOWEST, pooled_fit.HIGHEST))
-    others = [_climbed(calm, model, ordinary, size, workers, _TO_THE_END) for size in _sizes(candidate.effect)]
-    return max([found, *others], key=lambda one: one.log_likelihood)
+    for size in _sizes(candidate.effect):
+        # a lower hill need not be climbed to its top
+        least = max(wanted, found.log_likelihood)
+        other = _climbed(calm, model, ordinary, size, workers, _TO_THE_END, wanted=least)
+        found = max(found, other, key=lambda one: one.log_likelihood)
+    return found
 
 
 def _sizes(effect: Effect) -> list[Float]:
@@ -119,10 +125,11 @@ def _climbed(
     workers: Executor,
     iterations: int,
     chosen: slice = slice(None),
+    wanted: float = -np.inf,
 ) -> Fit:
     filtered = tuple(replace(one, model=model) for one in base.runs[chosen])
     values = np.concatenate([base.values, begin])
-    return pooled_fit.climb(filtered, hull, base.levels[chosen], values, workers, iterations)
+    return pooled_fit.climb(filtered, hull, base.levels[chosen], values, workers, iterations, wanted)
 
 
 def _begin(candidate: Candidate) -> Float:

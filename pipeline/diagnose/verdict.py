@@ -21,6 +21,9 @@ LEFT_OVER = 12.0
 LEFT_SHARE = 0.07
 #: so many effects are a string, which stands in for something else where the first has less than this share of the gain
 STRING, FIRST_SHARE = 3, 0.8
+#: what explains the innovations must show to the flexible reference as far as the reference can see it: it lacks at
+#: most this share of what it would gain, or so little log-likelihood as chance takes away
+UNSEEN_SHARE, UNSEEN = 0.5, 5.0
 #: said of an effect that improves the prediction while something that repeats itself is left
 STANDS_IN = "it stands in for something that none of the known effects explains"
 #: an effect whose possible size is smaller than this many standard errors cannot be seen
@@ -59,10 +62,12 @@ def verdict(diagnosis: Diagnosis) -> Verdict:
 def something_left(diagnosis: Diagnosis) -> bool:
     """Tell whether something is there that the catalogue does not name.
 
-    Either the flexible reference still finds what repeats itself, or it took a string of effects of which the first
-    explains little: terms that together imitate what none of them is.
+    Either the flexible reference still finds what repeats itself; or the first effect goes by v, r, rudder or heading
+    and yet the reference, which tries all of these, does not see it in runs that did not fit it: what it imitates is
+    something else; or it took a string of effects of which the first explains little: terms that together imitate what
+    none of them is.
     """
-    if _reference_gains(diagnosis):
+    if _reference_gains(diagnosis) or _unseen_by_reference(diagnosis):
         return True
     ratios = [step.chosen_from[0][1].likelihood_ratio for step in diagnosis.steps[1:]]
     return len(ratios) >= STRING and ratios[0] < FIRST_SHARE * sum(ratios)
@@ -74,6 +79,14 @@ def _reference_gains(diagnosis: Diagnosis) -> bool:
     if before is None or after is None:
         return False
     return after.repeats and after.gain > max(LEFT_OVER, LEFT_SHARE * before.gain)
+
+
+def _unseen_by_reference(diagnosis: Diagnosis) -> bool:
+    """Tell whether the first effect found should have shown to the flexible reference, and did not."""
+    if diagnosis.before is None or len(diagnosis.steps) < 2:
+        return False
+    foreseen = diagnosis.before.foreseen(diagnosis.steps[1].chosen_from[0][0].direction)
+    return foreseen - diagnosis.before.gain > max(UNSEEN, UNSEEN_SHARE * foreseen)
 
 
 def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
@@ -136,6 +149,8 @@ def refusal(one: Confirmation) -> str:
     gains = np.concatenate([one.fold_gains, one.held_out_gains])
     if not np.isfinite(one.fit.log_likelihood):
         return "the fit runs away"
+    if one.outdone:
+        return "another one is so much better that it was not fitted to the end"
     if one.at_bound:
         return "its size ends at the bound of what is physical"
     if one.bic_change > -6.0:

@@ -13,8 +13,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.compiled import njit
-from pipeline.identify.chain import LONGEST, N_CHAIN, PSI, STEP, M, R, V, discretise, rates, room_for_a_step
+from pipeline.compiled import STEP, njit
+from pipeline.identify.chain import N_CHAIN, PSI, M, R, V, discretise, rates, room_for_a_step
 from pipeline.normalise.series import Float
 
 #: theta = (a11, a12, a21, a22, b1, b2, log sigma_F, sigma_M, sigma_V, sigma_v, sigma_r, sigma_psi); the second half
@@ -40,7 +40,9 @@ def _advance(  # type: ignore[no-untyped-def]
     at once. ``chain`` is how many states belong to the chain; only its rows of F depend on the parameters. ``error`` is
     where the speed's error stands, n where there is none, and ``dE`` how its column of F depends on them.
     """
-    n, width = x.size, x.size * N_THETA
+    # asked of the array: a loop of a length that the compiler knew, it would write out number by number
+    n, m = x.size, dx.shape[1]
+    width = n * m
     for i in range(n):
         moved[i] = g[i]
         for c in range(n):
@@ -53,14 +55,14 @@ def _advance(  # type: ignore[no-untyped-def]
                     W[i, c] += f * P[k, c]
     if derivatives:
         for i in range(n):
-            for j in range(N_THETA):
+            for j in range(m):
                 dmoved[i, j] = dg[i, j]
             for q in range(width):
                 dW[i, q] = 0.0
             for k in range(n):
                 f = F[i, k]
                 if f != 0.0:
-                    for j in range(N_THETA):
+                    for j in range(m):
                         dmoved[i, j] += f * dx[k, j]
                     half = 0.5 * f
                     for q in range(width):
@@ -72,16 +74,16 @@ def _advance(  # type: ignore[no-untyped-def]
                         if d != 0.0:
                             dmoved[i, j] += d * x[k]
                             for c in range(n):
-                                dW[i, c * N_THETA + j] += d * P[k, c]
+                                dW[i, c * m + j] += d * P[k, c]
                 if error < n:
                     for j in range(6):
                         d = dE[i, j]
                         dmoved[i, j] += d * x[error]
                         for c in range(n):
-                            dW[i, c * N_THETA + j] += d * P[error, c]
+                            dW[i, c * m + j] += d * P[error, c]
             for c in range(n):
-                for j in range(N_THETA):
-                    dWt[c, i * N_THETA + j] = dW[i, c * N_THETA + j]
+                for j in range(m):
+                    dWt[c, i * m + j] = dW[i, c * m + j]
         # with A = F dP / 2 + dF P the derivative is A F' + F A'
         for c in range(n):
             for q in range(width):
@@ -93,11 +95,11 @@ def _advance(  # type: ignore[no-untyped-def]
                         dW[c, q] += f * dWt[k, q]
         for i in range(n):
             for c in range(i + 1):
-                for j in range(N_THETA):
-                    value = dW[i, c * N_THETA + j] + dW[c, i * N_THETA + j] + dQ[i, c * N_THETA + j]
-                    dP[i, c * N_THETA + j] = value
-                    dP[c, i * N_THETA + j] = value
-            for j in range(N_THETA):
+                for j in range(m):
+                    value = dW[i, c * m + j] + dW[c, i * m + j] + dQ[i, c * m + j]
+                    dP[i, c * m + j] = value
+                    dP[c, i * m + j] = value
+            for j in range(m):
                 dx[i, j] = dmoved[i, j]
     for i in range(n):
         x[i] = moved[i]
@@ -117,7 +119,8 @@ def _update(  # type: ignore[no-untyped-def]
 
     A withheld one is only predicted.
     """
-    n, width = x.size, x.size * N_THETA
+    n, m = x.size, dx.shape[1]
+    width = n * m
     e, S = y, noise
     for i in range(n):
         total = 0.0
@@ -135,7 +138,7 @@ def _update(  # type: ignore[no-untyped-def]
     if derivatives:
         for q in range(width):
             dPh[q] = 0.0
-        for j in range(N_THETA):
+        for j in range(m):
             de[j], dS[j] = 0.0, 0.0
         for c in range(n):
             f = h[row, c]
@@ -143,35 +146,35 @@ def _update(  # type: ignore[no-untyped-def]
                 # dP h, by symmetry a sum of rows
                 for q in range(width):
                     dPh[q] += f * dP[c, q]
-                for j in range(N_THETA):
+                for j in range(m):
                     de[j] -= f * dx[c, j]
         dS[level] = 2.0 * noise
         for c in range(n):
             f = h[row, c]
             if f != 0.0:
-                for j in range(N_THETA):
-                    dS[j] += f * dPh[c * N_THETA + j]
+                for j in range(m):
+                    dS[j] += f * dPh[c * m + j]
         whole, half, surplus = 1.0 / S, 0.5 / (S * S), 0.5 * (e * e / S - 1.0) / S
-        for j in range(N_THETA):
+        for j in range(m):
             score[j] = -e * whole * de[j] + surplus * dS[j]
-        for m in range(N_THETA):
-            a, b = de[m] * whole, dS[m] * half
-            for j in range(N_THETA):
-                information[m, j] += a * de[j] + b * dS[j]
+        for i in range(m):
+            a, b = de[i] * whole, dS[i] * half
+            for j in range(m):
+                information[i, j] += a * de[j] + b * dS[j]
         # the gain is P h / S: its derivative times e, and itself times the derivative of e
         for i in range(n):
             g = gain[i]
-            for j in range(N_THETA):
-                d = dPh[i * N_THETA + j]
+            for j in range(m):
+                d = dPh[i * m + j]
                 dx[i, j] += (d - g * dS[j]) * whole * e + g * de[j]
                 # P - P h h' P / S loses g_c z_i + g_i z_c with z = dP h - g dS / 2
-                dPh[i * N_THETA + j] = d - 0.5 * g * dS[j]
-                gains[i * N_THETA + j] = g
+                dPh[i * m + j] = d - 0.5 * g * dS[j]
+                gains[i * m + j] = g
         for i in range(n):
             g = gain[i]
             for c in range(n):
-                for j in range(N_THETA):
-                    tile[c * N_THETA + j] = dPh[i * N_THETA + j]
+                for j in range(m):
+                    tile[c * m + j] = dPh[i * m + j]
             for q in range(width):
                 dP[i, q] -= gains[q] * tile[q] + g * dPh[q]
     for i in range(n):
@@ -241,6 +244,7 @@ def likelihood(  # type: ignore[no-untyped-def]
     mu_M,
     mu_V,
     mu_e,
+    longest,
     x0,
     P0,
     trace,
@@ -269,6 +273,8 @@ def likelihood(  # type: ignore[no-untyped-def]
         h_1 and h_2 at the instants; used where y_v is measured.
     arm, mu_F, mu_M, mu_V, mu_e : float
         l, 1/m, and the correlation rates of the disturbances and of the speed's error, 1/s.
+    longest : float
+        Largest |A| h of one step; what lies farther apart is crossed in several.
     x0 : ndarray, shape (9,); P0 : ndarray, shape (9, 9)
         Mean and covariance of the state at the first instant. States that have no variance are left out.
     trace : tuple of ndarray
@@ -325,7 +331,7 @@ def likelihood(  # type: ignore[no-untyped-def]
             size = rates(theta, U, arm, mu_F, mu_M, A, b)
             if not (size <= FASTEST_PER_S):
                 return -np.inf, score, information
-            n_sub = max(1, int(np.ceil(size * span / LONGEST)))
+            n_sub = max(1, int(np.ceil(size * span / longest)))
             s = span / n_sub
             decay = np.exp(-mu_V * s)
             noise_V = square_V * (1.0 - decay * decay)

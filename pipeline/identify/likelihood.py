@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.identify.chain import LONGEST
 from pipeline.identify.kernel import LOG_MEASUREMENT, N_STATE, N_THETA, likelihood, no_trace
 from pipeline.identify.record import Record
 from pipeline.identify.scoring import Mask
@@ -52,6 +53,8 @@ class Likelihood:
         Standard deviations of the state (v, r, F, M, psi, c_1, c_2, b) at the first instant.
     sigma_low, sigma_high : tuple of float
         Bounds of the noise levels, order of `schemas.model_spec.NOISE_PARAMETERS`.
+    longest : float
+        Largest |A| h of one step of the filter; the default is exact to the last bits of a double.
 
     Attributes
     ----------
@@ -69,6 +72,7 @@ class Likelihood:
         initial_std: tuple[float, ...],
         sigma_low: tuple[float, ...],
         sigma_high: tuple[float, ...],
+        longest: float = LONGEST,
     ) -> None:
         self.record, self.spec, self.arm_per_m = record, spec, arm_per_m
         used = record.used
@@ -89,7 +93,7 @@ class Likelihood:
         taken = np.zeros(record.time_s.size, dtype=np.bool_)
         noise = (record.rudder_noise_rad_sqrt_s, error.gain_rad_s_m)
         inputs = (record.time_s, record.speed_m_s, record.rudder_rad, *noise)
-        self._fixed = (*inputs, record.measured, taken, row, arm_per_m, *rates, np.zeros(N_STATE), P0)
+        self._fixed = (*inputs, record.measured, taken, row, arm_per_m, *rates, longest, np.zeros(N_STATE), P0)
         self.low = np.concatenate([np.full(6, -np.inf), np.log(sigma_low)])
         self.high = np.concatenate([np.full(6, np.inf), np.log(sigma_high)])
         # a disturbance that the specification leaves out has no intensity at all

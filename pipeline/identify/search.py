@@ -24,6 +24,9 @@ _DAMPED = 0.1
 _SHORTER, _TRIES = 0.3, 3
 #: a logarithm that falls by more than this in a step, with less than so much left to gain, is on its way to nothing
 _SINKING, _LITTLE = 0.2, 0.05
+#: a climb that is to reach a height is given up where so many times its promise would not take it there: promises are
+#: kept within a factor of two or so, but for those of the first steps
+_HOPE, _FIRST = 4.0, 3
 _HULL = 6
 
 
@@ -82,13 +85,20 @@ def free(objective: Objective[C], theta: Float, score: Float) -> Mask:
     return objective.active & ~pressed
 
 
-def climb(objective: Objective[Float], start: Float, max_iterations: int, decrement: float) -> Search[Float]:
+def climb(
+    objective: Objective[Float], start: Float, max_iterations: int, decrement: float, wanted: float = -np.inf
+) -> Search[Float]:
     """Climb from one start, the information a matrix; see `climb_by`."""
-    return climb_by(DenseSteps(), objective, start, max_iterations, decrement)
+    return climb_by(DenseSteps(), objective, start, max_iterations, decrement, wanted)
 
 
 def climb_by(
-    steps: Steps[C], objective: Objective[C], start: Float, max_iterations: int, decrement: float
+    steps: Steps[C],
+    objective: Objective[C],
+    start: Float,
+    max_iterations: int,
+    decrement: float,
+    wanted: float = -np.inf,
 ) -> Search[C]:
     """Climb from one start.
 
@@ -100,6 +110,8 @@ def climb_by(
     max_iterations : int
     decrement : float
         Converged when half the squared Newton decrement, the log-likelihood still to be gained, falls below this.
+    wanted : float, optional
+        Log-likelihood without which the end is of no use: where it is out of reach the climb is given up.
 
     Returns
     -------
@@ -120,6 +132,9 @@ def climb_by(
         gain = float(0.5 * score @ steps.damped(score, curvature, movable, 0.0))
         if gain < decrement:
             converged, reason = True, "the log-likelihood still to be gained is below the limit"
+            break
+        if len(passes) > _FIRST and value + _HOPE * gain < wanted:
+            reason = "what is wanted is out of reach"
             break
         found = None
         while damping < 1e9:

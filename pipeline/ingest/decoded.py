@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Protocol, Self
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Spans
+from pipeline.ingest.readings import LostStretch, Reason
 
 Float = NDArray[np.float64]
 Flag = NDArray[np.bool_]
@@ -21,6 +22,26 @@ NO_TIME = np.int64(np.iinfo(np.int64).min)
 #: Reasons by code; code 0 is a record that is still good.
 REASONS: tuple[Reason, ...] = tuple(Reason)
 CODE: dict[Reason, int] = {reason: i + 1 for i, reason in enumerate(REASONS)}
+
+
+class Pieces(Protocol):
+    """The bytes of records: in memory, or read again when they are asked for."""
+
+    def __len__(self) -> int:
+        """Return the number of records."""
+        ...
+
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Self:
+        """Return some of them, chosen by mask or by ascending index."""
+        ...
+
+    def binary(self) -> pl.Series:
+        """Return them as a column of bytes."""
+        ...
+
+    def text(self) -> pl.Series:
+        """Return them as a column of text, the long ones cut."""
+        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +76,9 @@ class Decoded:
 
     Attributes
     ----------
-    raw : Spans
+    raw : Pieces
         Each record as it stands in the file, shape (n,).
-    content : Spans
+    content : Pieces
         The part that tells two records apart (without the logger's stamp), shape (n,).
     time_utc_ns : ndarray of int64, shape (n,)
         `NO_TIME` where there is none.
@@ -71,16 +92,19 @@ class Decoded:
         By name of the channel.
     notes : list of str
         What a person should know.
+    lost : tuple of LostStretch
+        What of the log could not be read.
     """
 
-    raw: Spans
-    content: Spans
+    raw: Pieces
+    content: Pieces
     time_utc_ns: Nanoseconds
     source: NDArray[np.int64]
     source_names: tuple[str, ...]
     reason: Code
     channels: dict[str, Values]
     notes: list[str] = field(default_factory=list)
+    lost: tuple[LostStretch, ...] = ()
 
     def __len__(self) -> int:
         return len(self.raw)

@@ -21,8 +21,11 @@ from schemas.profile import Source, TimeColumn, start_ns
 
 _QUOTE, _TAB, _FEED = 34, 9, 10
 
-#: Stands for a separator within quotation marks while the rows are split.
-_HIDDEN = 31
+#: Most characters of a cell that are looked at: far more than any number or time has.
+_LONGEST_CELL = 1_000
+
+#: Most names of columns that a message lists.
+_SHOWN = 40
 
 #: Largest count of nanoseconds that is added to a start, so that the sum is an int64.
 _FARTHEST = 1 << 62
@@ -76,20 +79,19 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     wanted = [source.time.column, *source.channels]
     _check_columns(name, layout, wanted)
     check_once(name, source.channels)
-    whole, cells = _cells(layout)
+    whole, cells = _cells(layout, wanted)
     n = len(layout.rows)
     reason = np.zeros(n, dtype=np.int8)
     reason[~whole] = CODE[Reason.MALFORMED]
     record = np.flatnonzero(whole)
-    place = {column: f"c{k}" for k, column in enumerate(layout.columns)}
-    text = cells[place[source.time.column]]
+    text = cells[source.time.column]
     instant, good, notes = _times(text, source.time)
     time = np.full(n, NO_TIME, dtype=np.int64)
     time[record[good]] = instant[good]
     reason[record[~good & text.is_not_null().to_numpy()]] = CODE[Reason.MALFORMED]
     channels: dict[str, Values] = {}
     for column, mapped in source.channels.items():
-        value = cells[place[column]]
+        value = cells[column]
         there = value.is_not_null().to_numpy()
         values = channels.setdefault(mapped.channel, Values.empty(n))
         values.put(record[there], (number(value) * mapped.factor + mapped.offset_si)[there])
@@ -97,16 +99,16 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
 
 
 def columns_found(data: bytes, source: Source | None) -> list[str]:
-    """Return the names of the columns that a file's header shows, for a person who writes its profile."""
+    """Return the first names of columns that a file's header shows, for a person who writes its profile."""
     layout = _layout(data, source or Source(match="*"))
-    return list(layout.columns)
+    return list(layout.columns[:_SHOWN])
 
 
 def _layout(data: bytes, source: Source) -> Layout:
     lines = trimmed(lines_of(as_bytes(_as_utf8(data, source.encoding))))
     behind_header = np.arange(len(lines)) >= source.header_lines
     lines = lines.take(behind_header & (lines.stop > lines.start))
-    first = lines.take(np.arange(min(1, len(lines)))).text(limit=1 << 20).to_list()
+    first = lines.take(np.arange(min(1, len(lines)))).text(limit=1 << 30).to_list()
     separator = source.separator or separator_of(first[0] if first else "")
     if source.columns is not None:
         return Layout(_untrimmed(lines, separator), tuple(source.columns), separator)
@@ -147,9 +149,10 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
         raise DataRejected(
             "columns_missing",
             f"{name} lacks columns that the profile maps: {', '.join(map(repr, missing))}; "
-            f"it has {', '.join(map(repr, found)) or 'none'}.",
+            f"it has {', '.join(map(repr, found[:_SHOWN])) or 'none'}"
+            f"{f' and {len(found) - _SHOWN} more' if len(found) > _SHOWN else ''}.",
             "Mend the names in the profile's source, or its separator, header_lines or columns.",
-            {"name": name, "missing": missing, "found": found},
+            {"name": name, "missing": missing, "found": found[:_SHOWN]},
         )
     twice = sorted({column for column in wanted if found.count(column) > 1})
     if twice:
@@ -161,13 +164,13 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
         )
 
 
-def _cells(layout: Layout) -> tuple[NDArray[np.bool_], pl.DataFrame]:
-    """Cut the rows into text cells ``c0``, ``c1`` ...; also tell which rows have as many as the header."""
+def _cells(layout: Layout, wanted: list[str]) -> tuple[NDArray[np.bool_], dict[str, pl.Series]]:
+    """Cut the cells of some columns out of the rows; also tell which rows have as many cells as the header."""
     rows, width = layout.rows, len(layout.columns)
     buffer = np.append(rows.buffer, np.uint8(_FEED))
-    buffer[rows.stop] = _FEED
     separator = layout.separator or "\x1f"
     if separator == "whitespace":
+        buffer[rows.stop] = _FEED
         buffer, rows = _one_tab(buffer, rows)
         separator = "\t"
     quote = buffer == _QUOTE
@@ -176,44 +179,30 @@ def _cells(layout: Layout) -> tuple[NDArray[np.bool_], pl.DataFrame]:
     whole = np.ones(len(rows), dtype=np.bool_)
     if quoted:
         inside, even = _inside_quotes(quote, rows)
-        buffer[mark & inside] = _HIDDEN
         mark &= ~inside
         whole &= even
     places = np.flatnonzero(mark)
-    cells = np.searchsorted(places, rows.stop) - np.searchsorted(places, rows.start) + 1
-    whole &= cells == width
-    body = Spans(buffer, rows.start, rows.stop).take(whole).joined(extra=1).tobytes()
-    head = separator.encode() * (width - 1) + b"\n" if width > 1 else b"x\n"
-    names = [f"c{k}" for k in range(width)]
-    table = pl.read_csv(
-        head + _as_text(body),
-        has_header=False,
-        schema=dict.fromkeys(names, pl.String),
-        separator=separator,
-        quote_char=None,
-    ).slice(1)
-    assert table.height == int(whole.sum())
-    columns = [pl.col(c).str.strip_chars() for c in names]
-    if quoted:
-        columns = [_unquoted(column, separator) for column in columns]
-    return whole, table.select(column.replace("", None) for column in columns)
+    low, high = np.searchsorted(places, rows.start), np.searchsorted(places, rows.stop)
+    whole &= high - low + 1 == width
+    low, good = low[whole], rows.take(whole)
+    # a file may have very many columns of which few are asked for: only these are cut
+    bounds = np.append(places, 0)
+    cells = {}
+    for name in wanted:
+        k = layout.columns.index(name)
+        start = good.start if k == 0 else bounds[np.minimum(low + k - 1, places.size)] + 1
+        stop = good.stop if k == width - 1 else bounds[np.minimum(low + k, places.size)]
+        text = Spans(buffer, start, stop).text(limit=_LONGEST_CELL)
+        cell = _unquoted(pl.col("raw").str.strip_chars()) if quoted else pl.col("raw").str.strip_chars()
+        cells[name] = text.to_frame().select(cell.replace("", None)).to_series()
+    return whole, cells
 
 
-def _unquoted(cell: pl.Expr, separator: str) -> pl.Expr:
+def _unquoted(cell: pl.Expr) -> pl.Expr:
     """Take off the marks round a quoted cell; where they stand otherwise they are part of the text."""
     inner = cell.str.slice(1, cell.str.len_chars() - 2).str.replace_all('""', '"', literal=True).str.strip_chars()
     is_quoted = cell.str.starts_with('"') & cell.str.ends_with('"') & (cell.str.len_chars() >= 2)
-    shown = pl.when(is_quoted).then(inner).otherwise(cell)
-    return shown.str.replace_all(chr(_HIDDEN), separator, literal=True)
-
-
-def _as_text(body: bytes) -> bytes:
-    """Return the bytes with U+FFFD for what is no UTF-8."""
-    try:
-        body.decode("utf-8")
-    except UnicodeDecodeError:
-        return body.decode("utf-8", errors="replace").encode("utf-8")
-    return body
+    return pl.when(is_quoted).then(inner).otherwise(cell)
 
 
 def _inside_quotes(quote: NDArray[np.bool_], rows: Spans) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:

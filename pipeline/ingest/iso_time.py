@@ -2,24 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 from numpy.typing import NDArray
 
+from pipeline.ingest.cells import Word, all_digits, eight_digits, first_digits, leading_digits, words
 from pipeline.ingest.spans import Spans
 
 _Int = NDArray[np.int64]
 _Flag = NDArray[np.bool_]
-_At = Callable[[_Int], _Int]
 
 DAY_NS = 86_400_000_000_000
 SECOND_NS = 1_000_000_000
 
-#: Digits of YYYY-MM-DDThh:mm:ss by place, and the signs between them.
-_DIGITS = {"year": (0, 4), "month": (5, 7), "day": (8, 10), "hour": (11, 13), "minute": (14, 16), "second": (17, 19)}
-_SIGNS = {4: b"-", 7: b"-", 10: b"Tt ", 13: b":", 16: b":"}
 _MONTH_DAYS = np.array([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31])
+_POWER = 10 ** np.arange(10, dtype=np.int64)
 
 
 def days_since_1970(
@@ -71,69 +67,94 @@ def parse(text: Spans) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np
     if n == 0 or text.buffer.size == 0:
         none = np.zeros(n, dtype=np.bool_)
         return np.zeros(n, dtype=np.int64), none, none.copy()
-    last = text.buffer.size - 1
-
-    def at(place: NDArray[np.int64]) -> NDArray[np.int64]:
-        byte = text.buffer[np.minimum(place, last)].astype(np.int64)
-        return np.where(place < text.stop, byte, 0)
-
     good = text.stop - text.start >= 19
     # a shorter text is none already: whatever stands behind it may be read
-    base = np.minimum(text.start, max(last - 18, 0))
-    for place, signs in _SIGNS.items():
-        good &= np.isin(text.buffer[np.minimum(base + place, last)], np.frombuffer(signs, dtype=np.uint8))
-    part: dict[str, NDArray[np.int64]] = {}
-    for name, (first, end) in _DIGITS.items():
-        number = np.zeros(n, dtype=np.int64)
-        for place in range(first, end):
-            digit = text.buffer[np.minimum(base + place, last)] - np.uint8(48)
-            good &= digit <= 9
-            number = number * 10 + digit
-        part[name] = number
-    days, exists = days_since_1970(part["year"], part["month"], part["day"])
+    first, second, third = (words(text.buffer, np.minimum(text.start + k, text.buffer.size)) for k in (0, 8, 16))
+    # neighbours mostly share their minute: each is read once
+    same = (first[1:] == first[:-1]) & (second[1:] == second[:-1])
+    heads = np.flatnonzero(np.append([True], ~same))
+    minutes, sound = _minutes(first[heads], second[heads])
+    often = np.diff(heads, append=n)
+    seconds, colon = _between_signs(third & _SECONDS, ":00")
     # 60 is a leap second; it becomes the first of the next minute
-    good &= exists & (part["hour"] < 24) & (part["minute"] < 60) & (part["second"] <= 60)
-    # int64 nanoseconds hold the years 1678 to 2261
-    good &= (part["year"] > 1678) & (part["year"] < 2261)
-    fraction, behind, whole = _fraction(at, text.start + 19)
-    shift, zoned, fits = _zone(at, behind, text.stop)
+    good &= np.repeat(sound, often) & colon & (seconds <= 60)
+    fraction, behind, whole = _fraction(text)
+    shift, zoned, fits = _zone(text, behind)
     good &= whole & fits
-    seconds = days * 86_400 + part["hour"] * 3_600 + part["minute"] * 60 + part["second"] - shift
+    seconds += np.repeat(minutes * 60, often) - shift
     return np.where(good, np.where(good, seconds, 0) * SECOND_NS + fraction, 0), good, good & zoned
 
 
-def _fraction(at: _At, place: _Int) -> tuple[_Int, _Int, _Flag]:
-    """Read up to nine digits of a second; further digits are cut off."""
-    point = np.isin(at(place), np.frombuffer(b".,", dtype=np.uint8))
+#: The byte between date and time, third of the second word, and what it may be.
+_BETWEEN = np.uint64(0xFF << 16)
+_MAY_STAND_BETWEEN = np.array([ord(sign) << 16 for sign in "Tt "], dtype=np.uint64)
+#: The sign and two digits at the beginning of the third word.
+_SECONDS = np.uint64(0xFFFFFF)
+
+
+def _minutes(first: Word, second: Word) -> tuple[_Int, _Flag]:
+    """Read YYYY-MM-DDThh:mm, cut in two words, as minutes since 1970."""
+    date, dashes = _between_signs(first, "0000-00-")
+    clock, signs = _between_signs(second & ~_BETWEEN, "00 00:00")
+    year, month = date // 10_000, date // 10 % 1_000
+    day, hour, minute = clock // 1_000_000, clock // 1_000 % 1_000, clock % 1_000
+    days, good = days_since_1970(year, month, day)
+    good &= dashes & signs & np.isin(second & _BETWEEN, _MAY_STAND_BETWEEN) & (hour < 24) & (minute < 60)
+    # int64 nanoseconds hold the years 1678 to 2261
+    good &= (year > 1678) & (year < 2261)
+    return days * 1_440 + hour * 60 + minute, good
+
+
+def _between_signs(word: Word, form: str) -> tuple[_Int, _Flag]:
+    """Read the digits of words of one form, ``0`` where a digit stands; a sign counts as the digit zero.
+
+    A blank in the form is a byte that has been cleared. A form of fewer than eight characters is of the last digits.
+    """
+    zeros = sum(ord("0") << 8 * k for k in range(8) if k >= len(form) or form[k] != "0")
+    mask = np.uint64(sum(0xFF << 8 * k for k in range(8) if k >= len(form) or form[k] != "0"))
+    signs = np.uint64(sum(ord(sign) << 8 * k for k, sign in enumerate(form) if sign not in "0 "))
+    digits = (word & ~mask) | np.uint64(zeros)
+    value = eight_digits(digits) // int(_POWER[8 - len(form)])
+    return value, ((word & mask) == signs) & all_digits(digits)
+
+
+def _fraction(text: Spans) -> tuple[_Int, _Int, _Flag]:
+    """Read up to nine digits of a second; further digits, up to sixteen in all, are cut off."""
+    end = text.buffer.size
+    place = text.start + 19
+    sign = text.buffer[np.minimum(place, end - 1)]
+    point = ((sign == ord(".")) | (sign == ord(","))) & (place < text.stop)
     place = place + point
-    value = np.zeros(place.shape, dtype=np.int64)
-    running = point.copy()
-    read = np.zeros(place.shape, dtype=np.int64)
-    for _ in range(18):
-        digit = at(place) - 48
-        running &= (digit >= 0) & (digit <= 9)
-        if not running.any():
-            break
-        value = np.where(running & (read < 9), value * 10 + digit, value)
-        read += running
-        place = place + running
-    value *= 10 ** np.maximum(9 - read, 0)
-    return value, place, ~point | (read > 0)
+    early = words(text.buffer, np.minimum(place, end))
+    count = np.where(point, np.clip(np.minimum(leading_digits(early), text.stop - place), 0, None), 0)
+    value = eight_digits(first_digits(early, count)) * _POWER[9 - count]
+    long = np.flatnonzero(count == 8)
+    if long.size:
+        late = words(text.buffer, np.minimum(place[long] + 8, end))
+        more = np.clip(np.minimum(leading_digits(late), text.stop[long] - place[long] - 8), 0, None)
+        ninth = (late & np.uint64(0xFF)).astype(np.int64) - ord("0")
+        value[long] += np.where(more > 0, ninth, 0)
+        count[long] += more
+    return value, place + count, ~point | (count > 0)
 
 
-def _zone(at: _At, place: _Int, stop: _Int) -> tuple[_Int, _Flag, _Flag]:
+def _zone(text: Spans, place: _Int) -> tuple[_Int, _Flag, _Flag]:
     """Read nothing, Z, +hh, +hhmm or +hh:mm; return the seconds to take off, whether it is there, whether it fits."""
-    rest = stop - place
-    sign = at(place)
-    is_z = (rest == 1) & np.isin(sign, np.frombuffer(b"Zz", dtype=np.uint8))
-    is_offset = np.isin(rest, (3, 5, 6)) & np.isin(sign, np.frombuffer(b"+-", dtype=np.uint8))
-    colon = rest == 6
-    is_offset &= ~colon | (at(place + 3) == 58)
-    digits = [at(place + k) - 48 for k in (1, 2)]
-    digits += [np.where(rest > 3, at(place + k + colon) - 48, 0) for k in (3, 4)]
-    for digit in digits:
-        is_offset &= (digit >= 0) & (digit <= 9)
-    hours, minutes = digits[0] * 10 + digits[1], digits[2] * 10 + digits[3]
-    is_offset &= (hours <= 15) & (minutes < 60)
-    seconds = (hours * 3_600 + minutes * 60) * np.where(sign == 45, -1, 1)
-    return np.where(is_offset, seconds, 0), is_z | is_offset, (rest == 0) | is_z | is_offset
+    rest = text.stop - place
+    sign = text.buffer[np.minimum(place, text.buffer.size - 1)]
+    zoned = (rest == 1) & ((sign == ord("Z")) | (sign == ord("z")))
+    seconds = np.zeros(place.shape, dtype=np.int64)
+    fits = (rest == 0) | zoned
+    told = np.flatnonzero(~fits & np.isin(rest, (3, 5, 6)) & ((sign == ord("+")) | (sign == ord("-"))))
+    if told.size:
+        colon = rest[told] == 6
+        word = words(text.buffer, place[told] + 1)
+        good = ~colon | ((word >> np.uint64(16)) & np.uint64(0xFF) == ord(":"))
+        minutes = word >> np.where(colon, 24, 16).astype(np.uint64)
+        both = first_digits(word, np.full(told.size, 2)), first_digits(minutes, np.where(rest[told] == 3, 0, 2))
+        good &= all_digits(both[0]) & all_digits(both[1])
+        hour, minute = eight_digits(both[0]), eight_digits(both[1])
+        good &= (hour <= 15) & (minute < 60)
+        seconds[told] = np.where(good, (hour * 3_600 + minute * 60) * np.where(sign[told] == ord("-"), -1, 1), 0)
+        zoned[told] = fits[told] = good
+    return seconds, zoned, fits

@@ -1,47 +1,100 @@
-"""MCAP logs with JSON messages: topics and fields to canonical channels, as the profile maps them."""
+"""MCAP logs: the messages of every topic to canonical channels, as the profile maps them or their definition tells."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
-from pipeline.ingest.mapping import check_once
-from pipeline.ingest.mcap_chunks import Batch, Container, open_container
-from pipeline.ingest.mcap_json import fields_of
-from pipeline.ingest.numerals import number
+from pipeline.ingest.log_file import LogFile
+from pipeline.ingest.mcap_batch import Batch, joined
+from pipeline.ingest.mcap_payloads import PayloadsBuilder
+from pipeline.ingest.mcap_records import Channel
+from pipeline.ingest.mcap_stream import McapStream
+from pipeline.ingest.mcap_topics import Route
+from pipeline.ingest.message_columns import NoReaderError
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.spans import Spans
 from schemas.errors import DataRejected, UsageError
+from schemas.known_messages import OFFERED, TAKEN, plain_name
 from schemas.profile import ChannelMap, Source
+
+T = TypeVar("T", bound=np.generic)
 
 _TIMES = ("log_time", "publish_time")
 
+#: Topics that are named in a message to a person, at most.
+_NAMED = 20
+
 
 @dataclass(frozen=True, eq=False)
-class _Messages:
-    """All messages of a file behind each other."""
+class Part:
+    """The records of some megabytes of the file, decoded and not yet checked.
 
-    payload: Spans
+    Attributes
+    ----------
+    batch : Batch
+        Where they stand.
+    time_ns : ndarray of int64, shape (m,)
+    topic : ndarray of int64, shape (m,)
+        Place of the topic in the order in which topics come, -1 where it cannot be told.
+    reason : ndarray of int8, shape (m,)
+        Code of the reason for which a record is refused, 0 for none.
+    text : ndarray of bool, shape (m,)
+        Whether the payload is text.
+    values : dict of str to list of (record, value)
+        By canonical channel, in SI: numbers of records within the part, shape (k,), and what they carry, shape (k,).
+    """
+
+    batch: Batch
+    time_ns: NDArray[np.int64]
     topic: NDArray[np.int64]
-    time: NDArray[np.int64]
-    lost: NDArray[np.bool_]
+    reason: NDArray[np.int8]
+    text: NDArray[np.bool_]
+    values: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]]
 
 
-def decode(name: str, data: bytes, source: Source | None, patterns: list[str]) -> Decoded:
+_NO_BATCH = joined([])
+
+
+def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
+    """Decode an MCAP log a few megabytes at a time, for those who keep less of it than `decode` does.
+
+    Parameters
+    ----------
+    name, log, source
+        See `decode`; the source has channels.
+
+    Yields
+    ------
+    Part
+        In the order of the file.
+
+    Raises
+    ------
+    UsageError, DataRejected
+        See `decode`, but for what can be told only at the end of the file.
+    """
+    return _Job(name, log, source, set()).parts()
+
+
+def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) -> Decoded:
     """Decode an MCAP log as the profile's source describes it.
 
     Parameters
     ----------
     name : str
         Name of the file, for messages.
-    data : bytes
-        The whole file.
+    log : LogFile
+        Must stay open as long as the result is used.
     source : Source or None
         Its keys are ``<topic>.<field>``, nested fields with dots; its time, where given, names ``log_time`` (also taken
-        where nothing is given) or ``publish_time``.
+        where nothing is given), ``publish_time`` or a field of the messages. Without channels the messages are read
+        whose definition says all, see `schemas.known_messages.TAKEN`.
     patterns : list of str
         File patterns of the profile, for the message where none fits.
 
@@ -52,133 +105,239 @@ def decode(name: str, data: bytes, source: Source | None, patterns: list[str]) -
     Raises
     ------
     UsageError
-        The profile has no source for the file, or names a time that MCAP does not have.
+        Neither profile nor definitions say what a topic means (``no_source_for_log``), no message has the time that the
+        profile names (``no_time_column``), or two fields of one message are mapped to one channel.
     DataRejected
-        A topic that the profile maps is not in the file.
+        A topic that the profile maps is not in the file (``topics_missing``), or it unpacks to far more than a log of
+        its size holds.
     """
-    found = open_container(data)
-    topics = tuple(sorted({topic for topic, _ in found.channels.values()}))
-    if source is None or not source.channels:
-        raise UsageError(
-            "no_source_for_log",
-            f"{name} is an MCAP file, for which the profile maps no topic; "
-            f"its topics are {', '.join(topics) or 'none'}.",
-            "Add a source to the profile that maps '<topic>.<field>' to channels. See docs/profile.md.",
-            {"name": name, "topics": list(topics), "patterns": patterns},
+    job = _Job(name, log, source, set())
+    found = job.run()
+    if job.misled():
+        # a topic that came late owns a key of one that came before it: /a.b behind /a
+        job = _Job(name, log, source, {channel.topic for channel in job.stream.channels.values()})
+        found = job.run()
+    job.require_something(patterns)
+    return found
+
+
+class _Job:
+    """One pass over the file."""
+
+    def __init__(self, name: str, log: LogFile, source: Source | None, topics: set[str]) -> None:
+        self.name, self.log, self.source = name, log, source
+        self.stream = McapStream(name, log)
+        self.topics = topics | {channel.topic for channel in self.stream.channels.values()}
+        self.keys = dict(source.channels) if source else {}
+        self.owners = self._owners()
+        time = source.time if source else None
+        self.clock = time.column if time and time.column in _TIMES else _TIMES[0]
+        self.time_field = time if time and time.column not in _TIMES else None
+        self.asked: dict[str, tuple[str, str]] = {}
+        self.routes: dict[int, Route | None] = {}
+        self.refused: dict[str, str] = {}
+        self.seen: dict[str, set[str]] = {}
+        self.timed, self.untimed = False, set[str]()
+        self.places: dict[str, int] = {}
+        self.taken: list[str] = []
+        self.offered: dict[str, str] = {}
+
+    def misled(self) -> bool:
+        """Whether a topic that came late owns a key that was asked of another one."""
+        self.topics |= {channel.topic for channel in self.stream.channels.values()}
+        last = self._owners()
+        return any(last[key] != owner for key, owner in self.asked.items())
+
+    def _owners(self) -> dict[str, tuple[str, str]]:
+        """Split the profile's keys into topic and field: the longest topic that fits."""
+        owners = {}
+        for key in self.keys:
+            fitting = [topic for topic in self.topics if key.startswith(topic + ".")]
+            if fitting:
+                topic = max(fitting, key=len)
+                owners[key] = (topic, key[len(topic) + 1 :])
+        return owners
+
+    def run(self) -> Decoded:
+        """Read the file through."""
+        places = PayloadsBuilder()
+        parts: list[Part] = []
+        for part in self.parts():
+            places.add(part.batch)
+            parts.append(replace(part, batch=_NO_BATCH))
+        topics = tuple(sorted(self.places))
+        order = np.array([topics.index(name) for name in self.places] + [-1], dtype=np.int64)
+        payloads = places.build(self.log, _joined([part.text for part in parts], np.empty(0, np.bool_)))
+        return Decoded(
+            payloads,
+            payloads,
+            _joined([part.time_ns for part in parts], np.empty(0, np.int64)),
+            order[_joined([part.topic for part in parts], np.empty(0, np.int64))],
+            topics,
+            _joined([part.reason for part in parts], np.empty(0, np.int8)),
+            _dense(parts),
+            [*self.stream.notes, *self._notes()],
+            tuple(self.stream.lost),
         )
-    clock = source.time.column if source.time else _TIMES[0]
-    if clock not in _TIMES:
-        raise UsageError(
-            "no_time_column",
-            f"The source for {name} takes its time from {clock!r}; an MCAP message has {' and '.join(_TIMES)}.",
-            "Name one of these as the column of 'time', or leave 'time' out.",
-            {"name": name, "column": clock},
+
+    def parts(self) -> Iterator[Part]:
+        """Read the file a few megabytes at a time; no more than that is held."""
+        for batch in self.stream.batches():
+            yield self._part(batch)
+
+    def _part(self, batch: Batch) -> Part:
+        n = batch.first.size
+        time = (batch.log_time if self.clock == _TIMES[0] else batch.publish_time).copy()
+        topic, text = np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+        part = Part(batch, time, topic, np.zeros(n, dtype=np.int8), text, {})
+        for number in np.unique(batch.channel).tolist():
+            record = np.flatnonzero(batch.channel == number)
+            channel = self.stream.channels.get(number)
+            if channel is None:
+                part.reason[record], time[record] = CODE[Reason.MALFORMED], NO_TIME
+                continue
+            topic[record] = self.places.setdefault(channel.topic, len(self.places))
+            text[record] = channel.encoding == "json"
+            if batch.lost:
+                part.reason[record] = CODE[Reason.MALFORMED]
+            elif (route := self._route(number, channel)) is None:
+                part.reason[record] = CODE[Reason.NO_CHANNEL]
+            else:
+                self._read(part, record, channel.topic, route)
+        return part
+
+    def _read(self, part: Part, record: NDArray[np.int64], topic: str, route: Route) -> None:
+        """Decode the messages of one channel."""
+        batch = part.batch
+        done = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
+        part.reason[record[~done.good]] = CODE[Reason.MALFORMED]
+        if done.time_ns is not None:
+            told = done.time_ns >= 0
+            self.timed |= bool(told.any())
+            part.time_ns[record[told]] = done.time_ns[told]
+            if not told[done.good].all():
+                self.untimed.add(topic)
+        for key, (value, present) in done.values.items():
+            mapped = route.mapped[key]
+            if present.any():
+                self.seen.setdefault(topic, set()).add(key)
+                found = record[present], value[present] * mapped.factor + mapped.offset_si
+                part.values.setdefault(mapped.channel, []).append(found)
+
+    def _route(self, number: int, channel: Channel) -> Route | None:
+        """Return the reader of a channel, None where nothing is asked of it or it cannot be read."""
+        if number not in self.routes:
+            self.routes[number] = self._new_route(channel)
+        return self.routes[number]
+
+    def _new_route(self, channel: Channel) -> Route | None:
+        schema = self.stream.schemas.get(channel.schema)
+        if channel.topic not in self.topics:
+            self.topics.add(channel.topic)
+            self.owners = self._owners()
+        own = {key: owner for key, owner in self.owners.items() if owner[0] == channel.topic}
+        mapped = {field: self.keys[key] for key, (_, field) in own.items()}
+        kind = plain_name(schema.name) if schema else ""
+        if not self.keys and kind in TAKEN:
+            mapped = TAKEN[kind]
+            self.taken.append(f"{channel.topic} ({', '.join(one.channel for one in mapped.values())})")
+        elif not mapped and kind in OFFERED:
+            self.offered[channel.topic] = _lines(channel.topic, OFFERED[kind])
+        if not mapped:
+            return None
+        for key, owner in own.items():
+            self.asked.setdefault(key, owner)
+        try:
+            return Route(channel, schema, mapped, self.time_field)
+        except NoReaderError as why:
+            self.refused[channel.topic] = str(why)
+            return None
+
+    def _notes(self) -> list[str]:
+        """Say what a person should know of the topics."""
+        notes = [f"Topic {topic} {why}." for topic, why in self.refused.items()]
+        if self.taken:
+            notes.append(f"Read without a profile, by the definition of the messages: {', '.join(self.taken)}.")
+        absent = {}
+        for number, route in self.routes.items():
+            topic = self.stream.channels[number].topic
+            for key in route.mapped if route else ():
+                if key not in self.seen.get(topic, ()):
+                    why = route.absent.get(key) if route else None
+                    absent[topic, key] = f"No message of {topic} has the field {key}{f': {why}' if why else ''}."
+        notes += absent.values()
+        assert self.time_field is not None or not self.untimed
+        for topic in sorted(self.untimed):
+            notes.append(
+                f"Messages of {topic} without {self.time_field.column if self.time_field else ''} have log time."
+            )
+        read = {self.stream.channels[number].topic for number, route in self.routes.items() if route}
+        unmapped = sorted(set(self.places) - read - set(self.refused))
+        if unmapped:
+            more = f" and {len(unmapped) - _NAMED} more" if len(unmapped) > _NAMED else ""
+            notes.append(f"Topics without a channel: {', '.join(unmapped[:_NAMED])}{more}.")
+        for topic, lines in self.offered.items():
+            notes.append(f"Topic {topic} is mapped so if its axes are those of REP-103: {lines}.")
+        return notes
+
+    def require_something(self, patterns: list[str]) -> None:
+        """Refuse a file of which nothing was asked that it has."""
+        topics = sorted({channel.topic for channel in self.stream.channels.values()})
+        named = ", ".join(topics[:_NAMED]) or "none"
+        if not self.keys and not self.taken:
+            offers = " ".join(lines for _, lines in sorted(self.offered.items()))
+            raise UsageError(
+                "no_source_for_log",
+                f"{self.name} is an MCAP file, for which the profile maps no topic; its topics are {named}.",
+                "Add a source to the profile that maps '<topic>.<field>' to channels. See docs/profile.md."
+                + (f" With axes as in REP-103: {offers}." if offers else ""),
+                {"name": self.name, "topics": topics, "patterns": patterns},
+            )
+        if self.time_field is not None and not self.timed:
+            column = self.time_field.column
+            raise UsageError(
+                "no_time_column",
+                f"The source for {self.name} takes its time from {column!r}, which no message that it maps has; "
+                f"every MCAP message has {' and '.join(_TIMES)}.",
+                "Name one of these or a field of the messages, such as header.stamp, as the column of 'time', "
+                "or leave 'time' out.",
+                {"name": self.name, "column": column},
+            )
+        missing = [key for key in self.keys if key not in self.owners]
+        if missing and not self.stream.partial:
+            raise DataRejected(
+                "topics_missing",
+                f"{self.name} lacks topics that the profile maps: {', '.join(missing)}; it has {named}.",
+                "Mend the keys '<topic>.<field>' in the profile's source, or take out those that this logger lacks.",
+                {"name": self.name, "missing": missing, "found": topics},
+            )
+        if missing:
+            self.stream.notes.append(f"What is left of the file has no topic for {', '.join(missing)}.")
+
+
+def _lines(topic: str, fields: dict[str, ChannelMap]) -> str:
+    """Return lines for a profile."""
+    lines = []
+    for key, one in fields.items():
+        extra = (", positive: port" if one.positive == "port" else "") + (
+            f", offset: {one.offset:.6g}" if one.offset else ""
         )
-    mapped = _by_topic(name, source, topics, found)
-    messages = _messages(found, topics, clock)
-    reason, channels = _read_topics(found, messages, topics, mapped)
-    reason[messages.lost | (messages.topic < 0)] = CODE[Reason.MALFORMED]
-    time = np.where(messages.topic < 0, NO_TIME, messages.time)
-    return Decoded(messages.payload, messages.payload, time, messages.topic, topics, reason, channels, found.notes)
+        lines.append(f"'{topic}.{key}: {{channel: {one.channel}, unit: {one.unit}{extra}}}'")
+    return ", ".join(lines)
 
 
-def _by_topic(name: str, source: Source, topics: tuple[str, ...], found: Container) -> dict[str, dict[str, ChannelMap]]:
-    """Split the profile's keys into topic and field, by the topics that the file has."""
-    mapped: dict[str, dict[str, ChannelMap]] = {}
-    missing = []
-    for key, channel in source.channels.items():
-        fitting = [topic for topic in topics if key.startswith(topic + ".")]
-        if not fitting:
-            missing.append(key)
-            continue
-        topic = max(fitting, key=len)
-        mapped.setdefault(topic, {})[key[len(topic) + 1 :]] = channel
-    if missing and not found.partial:
-        raise DataRejected(
-            "topics_missing",
-            f"{name} lacks topics that the profile maps: {', '.join(missing)}; it has {', '.join(topics) or 'none'}.",
-            "Mend the keys '<topic>.<field>' in the profile's source, or take out those that this logger lacks.",
-            {"name": name, "missing": missing, "found": list(topics)},
-        )
-    if missing:
-        found.notes.append(f"What is left of the file has no topic for {', '.join(missing)}.")
-    return mapped
+def _joined(parts: list[NDArray[T]], empty: NDArray[T]) -> NDArray[T]:
+    return np.concatenate([empty, *parts])
 
 
-def _messages(found: Container, topics: tuple[str, ...], clock: str) -> _Messages:
-    """Lay all batches behind each other in one buffer, with one spare byte behind each."""
-    place = {topic: k for k, topic in enumerate(topics)}
-    table = np.full(1 << 16, -1, dtype=np.int64)
-    for number_of, (topic, _) in found.channels.items():
-        table[number_of] = place[topic]
-    used = [_slim(batch) for batch in found.batches]
-    base = np.concatenate(([0], np.cumsum([b.content.size + 1 for b in used]))).astype(np.int64)
-    buffer = np.full(int(base[-1]), 32, dtype=np.uint8)
-    for batch, at in zip(used, base[:-1], strict=True):
-        buffer[at : at + batch.content.size] = batch.content
-
-    def all_of(parts: list[NDArray[np.int64]]) -> NDArray[np.int64]:
-        return np.concatenate([np.empty(0, dtype=np.int64), *parts])
-
-    channel = all_of([b.channel for b in used])
-    return _Messages(
-        Spans(
-            buffer,
-            all_of([b.first + at for b, at in zip(used, base[:-1], strict=True)]),
-            all_of([b.end + at for b, at in zip(used, base[:-1], strict=True)]),
-        ),
-        np.where(channel < 0, -1, table[np.maximum(channel, 0)]),
-        all_of([getattr(b, clock) for b in used]),
-        np.concatenate([np.zeros(0, np.bool_), *(np.full(b.first.size, b.lost) for b in used)]).astype(np.bool_),
-    )
-
-
-def _slim(batch: Batch) -> Batch:
-    """Return a batch without the bytes in front of its first message and behind its last one."""
-    if batch.first.size == 0 or batch.lost:
-        return batch
-    low, high = int(batch.first[0]), int(batch.end[-1])
-    return Batch(
-        batch.content[low:high],
-        batch.first - low,
-        batch.end - low,
-        batch.channel,
-        batch.log_time,
-        batch.publish_time,
-    )
-
-
-def _read_topics(
-    found: Container, messages: _Messages, topics: tuple[str, ...], mapped: dict[str, dict[str, ChannelMap]]
-) -> tuple[NDArray[np.int8], dict[str, Values]]:
-    """Return the reason of every message and the channels, read topic by topic."""
-    n = len(messages.payload)
-    reason = np.zeros(n, dtype=np.int8)
+def _dense(parts: list[Part]) -> dict[str, Values]:
+    """Lay the values of all parts out over all records."""
+    n = sum(part.time_ns.size for part in parts)
     channels: dict[str, Values] = {}
-    encodings: dict[str, set[str]] = {}
-    for topic, encoding in found.channels.values():
-        encodings.setdefault(topic, set()).add(encoding)
-    for k, topic in enumerate(topics):
-        record = np.flatnonzero((messages.topic == k) & ~messages.lost)
-        foreign = encodings[topic] - {"json"}
-        check_once(f"{topic}", mapped.get(topic, {}))
-        if topic not in mapped or foreign:
-            reason[record] = CODE[Reason.NO_CHANNEL]
-            if topic in mapped:
-                kinds = ", ".join(sorted(foreign)) or "no encoding"
-                found.notes.append(f"Topic {topic} is encoded as {kinds}; only JSON is read.")
-            continue
-        if record.size == 0:
-            continue
-        text, good = fields_of(messages.payload.take(record), list(mapped[topic]))
-        reason[record[~good]] = CODE[Reason.MALFORMED]
-        for column, (field_name, channel) in zip(text.columns, mapped[topic].items(), strict=True):
-            there = text[column].is_not_null().to_numpy() & good
-            if not there.any():
-                found.notes.append(f"No message of {topic} has the field {field_name}.")
-            value = number(text[column]) * channel.factor + channel.offset_si
-            channels.setdefault(channel.channel, Values.empty(n)).put(record[there], value[there])
-    unmapped = [topic for topic in topics if topic not in mapped]
-    if unmapped:
-        found.notes.append(f"Topics without a channel: {', '.join(unmapped)}.")
-    return reason, channels
+    base = 0
+    for part in parts:
+        for name, found in part.values.items():
+            for record, value in found:
+                channels.setdefault(name, Values.empty(n)).put(base + record, value)
+        base += part.time_ns.size
+    return channels

@@ -19,7 +19,8 @@ from pipeline.ingest.spans import Bytes, Index
 HEAD = 9
 
 
-def _count(buffer, start, stop):  # type: ignore[no-untyped-def]
+@njit(cache=True)
+def _count_compiled(buffer, start, stop):
     at, n = start, 0
     while at + 9 <= stop:
         length = np.uint64(0)
@@ -32,7 +33,8 @@ def _count(buffer, start, stop):  # type: ignore[no-untyped-def]
     return n, at
 
 
-def _fill(buffer, at, opcode, first, end):  # type: ignore[no-untyped-def]
+@njit(cache=True)
+def _fill_compiled(buffer, at, opcode, first, end):
     for i in range(opcode.size):
         length = np.uint64(0)
         for k in range(8):
@@ -43,8 +45,43 @@ def _fill(buffer, at, opcode, first, end):  # type: ignore[no-untyped-def]
         end[i] = at
 
 
-_count_compiled = njit(cache=True)(_count)
-_fill_compiled = njit(cache=True)(_fill)
+@njit(cache=True)
+def _chunk_after_compiled(buffer, start, stop, file_left):
+    for at in range(start, stop - 57):
+        if buffer[at] != 6:
+            continue
+        length = _whole_number(buffer, at + 1, 8)
+        if length > np.uint64(file_left - (at - start) - 9):
+            continue
+        name = _whole_number(buffer, at + 37, 4)
+        packed = np.uint64(0)
+        if name == 4:
+            if not (
+                buffer[at + 41] == 122 and buffer[at + 42] == 115 and buffer[at + 43] == 116 and buffer[at + 44] == 100
+            ):
+                continue
+            packed = _whole_number(buffer, at + 45, 8)
+        elif name == 3:
+            if not (buffer[at + 41] == 108 and buffer[at + 42] == 122 and buffer[at + 43] == 52):
+                continue
+            packed = _whole_number(buffer, at + 44, 8)
+        elif name == 0:
+            packed = _whole_number(buffer, at + 41, 8)
+            if packed != _whole_number(buffer, at + 25, 8):
+                continue
+        else:
+            continue
+        if packed <= length and np.uint64(40) + name + packed == length:
+            return at
+    return -1
+
+
+@njit(cache=True)
+def _whole_number(buffer, at, width):
+    value = np.uint64(0)
+    for k in range(width):
+        value |= np.uint64(buffer[at + k]) << np.uint64(8 * k)
+    return value
 
 
 def walk(buffer: Bytes, start: int, stop: int) -> tuple[NDArray[np.uint8], Index, Index, int]:
@@ -69,3 +106,20 @@ def walk(buffer: Bytes, start: int, stop: int) -> tuple[NDArray[np.uint8], Index
     first, end = np.empty(n, dtype=np.int64), np.empty(n, dtype=np.int64)
     _fill_compiled(buffer, np.int64(start), opcode, first, end)
     return opcode, first, end, int(reached)
+
+
+def chunk_after(buffer: Bytes, left: int) -> int:
+    """Find the first place at which a chunk may begin: opcode, compression and the three lengths fit each other.
+
+    Parameters
+    ----------
+    buffer : ndarray of uint8
+    left : int
+        Bytes of the file from the beginning of the buffer on.
+
+    Returns
+    -------
+    int
+        -1 where there is none whose head is whole in the buffer.
+    """
+    return int(_chunk_after_compiled(buffer, np.int64(0), np.int64(buffer.size), np.int64(left)))

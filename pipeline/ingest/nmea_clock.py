@@ -5,21 +5,25 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import polars as pl
-from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import NO_TIME, Nanoseconds
-from pipeline.ingest.iso_time import DAY_NS, SECOND_NS, days_since_1970
+from pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds
+from pipeline.ingest.iso_time import DAY_NS, SECOND_NS
+from pipeline.ingest.nmea_calendar import date, mend_rollover, time_of_day, year_month_day
 from pipeline.ingest.nmea_fields import Said
 from pipeline.ingest.nmea_frames import Frames
-from pipeline.ingest.numerals import number
-from schemas.nmea import SENTENCES
-
-#: Two-digit years from here on are of the last century.
-_CENTURY = 70
+from pipeline.ingest.nmea_spread import spread
+from pipeline.ingest.readings import Reason
+from pipeline.ingest.spans import Index
+from schemas.nmea import SATELLITES, SENTENCES
 
 #: Evidence asked for before untimed sentences are given to the fix that follows them.
 _LEAST_AGREEMENTS, _RATIO = 5, 2
+
+#: A logger's clock that leads or lags the receiver's by more than this is worth a note, s.
+_LEAD_S = 1.0
+
+#: A date that holds for no longer than this between two others that agree is that of a field updated late, ns.
+_BRIEF_NS = 60 * SECOND_NS
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,15 +34,33 @@ class Clock:
     ----------
     time_utc_ns : ndarray of int64, shape (n,)
         `NO_TIME` where none can be given.
-    follows : bool
-        Whether untimed sentences of a plain log belong to the fix behind them.
-    stamp_lead_s : float
-        Median of stamp minus own time of the dated sentences, s; NaN where there is none.
+    notes : list of str
+        What a person should know of how they were found.
     """
 
     time_utc_ns: Nanoseconds
-    follows: bool
-    stamp_lead_s: float
+    notes: list[str]
+
+
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """What the sentences themselves tell of time, line by line; `NO_TIME` where nothing."""
+
+    of_day: Nanoseconds
+    full: Nanoseconds  # with the date
+    void: Flag  # the receiver says that it has no fix
+
+    @property
+    def timed(self) -> Flag:
+        """Whether the line tells a time of day."""
+        told: Flag = self.of_day != NO_TIME
+        return told
+
+    @property
+    def dated(self) -> Flag:
+        """Whether the line tells a date too."""
+        told: Flag = self.full != NO_TIME
+        return told
 
 
 def clock_of(frames: Frames, said: dict[str, Said]) -> Clock:
@@ -54,65 +76,155 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> Clock:
     -------
     Clock
     """
-    n = len(frames.lines)
-    of_day = np.full(n, NO_TIME, dtype=np.int64)
-    midnight = np.full(n, NO_TIME, dtype=np.int64)
-    for name, what in said.items():
-        utc, date = SENTENCES[name].utc, SENTENCES[name].date
-        if utc is None:
-            continue
-        of_day[what.record] = _time_of_day(what.text[f"f{utc}"])
-        if date is not None:
-            midnight[what.record] = _date(what.text[f"f{date}"])
-        elif name == "ZDA":
-            midnight[what.record] = _ymd(*(number(what.text[f"f{k}"]) for k in (4, 3, 2)))
-    timed = of_day != NO_TIME
-    dated = timed & (midnight != NO_TIME)
-    own = _with_date(of_day, np.where(dated, midnight + of_day, NO_TIME), frames.stamp_ns)
+    told, late = _told(frames, said)
+    notes = []
+    if late:
+        notes.append(
+            f"{late} dates were 1024 weeks or twice that too early (the overflow of GPS weeks) and were put right."
+        )
     if frames.stamped:
-        both = dated & (frames.stamp_ns != NO_TIME)
-        lead = float(np.median((frames.stamp_ns - own)[both])) / SECOND_NS if both.any() else float("nan")
-        return Clock(np.where(own != NO_TIME, own, frames.stamp_ns), follows=False, stamp_lead_s=lead)
+        both = told.dated & (frames.stamp_ns != NO_TIME)
+        lead = np.median((frames.stamp_ns - told.full)[both]) if both.any() else np.float64(0.0)
+        near = np.where(frames.stamp_ns != NO_TIME, frames.stamp_ns - np.int64(np.round(lead)), NO_TIME)
+        own = _nearest_day(told, near, notes)
+        if abs(lead) > _LEAD_S * SECOND_NS:
+            ahead = "ahead of" if lead > 0 else "behind"
+            seconds = abs(float(lead)) / SECOND_NS
+            notes.append(f"The logger's stamps are {seconds:.3f} s {ahead} the receiver's UTC (median).")
+        return Clock(np.where(own != NO_TIME, own, frames.stamp_ns), notes)
+    speaks = _of_a_dated_talker(frames, told.dated) & told.timed
+    own = _nearest_day(told, _by_counting_days(told, speaks), notes)
     follows = _follows(said)
-    fix = (own != NO_TIME) & _of_a_dated_talker(frames, dated)
+    if follows:
+        notes.append("VTG repeats the fix behind it: sentences without a time are given that of the next fix.")
+    fix = (own != NO_TIME) & speaks
+    n = own.size
     carrier = _next(fix) if follows else _latest(fix)
     carried = np.where((carrier >= 0) & (carrier < n), own[np.clip(carrier, 0, max(n - 1, 0))], NO_TIME)
-    return Clock(np.where(own != NO_TIME, own, carried), follows, float("nan"))
+    return Clock(
+        np.where(own != NO_TIME, own, carried + _delays(frames, said, own, fix, carried, follows, notes)), notes
+    )
 
 
-def _of_a_dated_talker(frames: Frames, dated: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _delays(
+    frames: Frames,
+    said: dict[str, Said],
+    own: Nanoseconds,
+    fix: Flag,
+    carried: Nanoseconds,
+    follows: bool,
+    notes: list[str],
+) -> Nanoseconds:
+    """Return what is added to the time of the fix for the sentences that share it with others of their source."""
+    source = np.full(own.size, -1, dtype=np.int64)
+    for name, what in said.items():
+        good = (what.reason == 0) & (own[what.record] == NO_TIME) & (carried[what.record] != NO_TIME)
+        # an instrument may tell roll and pitch in two sentences of one address: these are one measurement
+        kinds = (
+            [there.astype(np.int64) << k for k, (_, there) in enumerate(what.values.values())] if name == "XDR" else []
+        )
+        source[what.record] = np.where(good, frames.address[what.record] * 4 + sum(kinds), -1)
+    record, at = np.flatnonzero(source >= 0), np.flatnonzero(fix)
+    delay, shared = spread(own[at], at, record, source[record], follows=follows)
+    delays = np.zeros(own.size, dtype=np.int64)
+    delays[record] = delay
+    several = np.flatnonzero(np.bincount(frames.address[record[shared > 1]]))
+    if several.size:
+        names = ", ".join(sorted(frames.names[code] for code in several))
+        notes.append(f"Sentences that come several times between two fixes were spread evenly over it: {names}.")
+    return delays
+
+
+def _told(frames: Frames, said: dict[str, Said]) -> tuple[_Told, int]:
+    """Collect what the sentences tell of time; also return how many dates were put right."""
+    n = len(frames.lines)
+    of_day, midnight = np.full(n, NO_TIME, dtype=np.int64), np.full(n, NO_TIME, dtype=np.int64)
+    void = np.zeros(n, dtype=np.bool_)
+    for name, what in said.items():
+        sentence, fields = SENTENCES[name], what.fields
+        if sentence.utc is None:
+            continue
+        of_day[what.record] = time_of_day(fields.at(sentence.utc))
+        void[what.record] = what.reason == CODE[Reason.VOID]
+        if sentence.date is not None:
+            midnight[what.record] = date(fields.at(sentence.date))
+        elif name == "ZDA":
+            midnight[what.record] = year_month_day(fields.at(4), fields.at(3), fields.at(2))
+    dated = (of_day != NO_TIME) & (midnight != NO_TIME)
+    full = np.where(dated, midnight + of_day, NO_TIME)
+    full, late = mend_rollover(full, dated, frames.stamp_ns)
+    return _Told(of_day, full, void), late
+
+
+def _of_a_dated_talker(frames: Frames, dated: Flag) -> Flag:
     """Tell which sentences come from a talker that also tells the date.
 
     A display that repeats a receiver's position without the date repeats it late, too: it gives its own sentences
     their time, but carries none to others.
     """
-    talkers = {frames.names[code][:2] for code in np.unique(frames.address[dated]) if code >= 0}
-    of_name = [name[:2] in talkers for name in frames.names]
+    talker = ["GN" if name[:2] in SATELLITES else name[:2] for name in frames.names]
+    talkers = {talker[code] for code in np.flatnonzero(np.bincount(frames.address[dated]))}
+    of_name = [one in talkers for one in talker]
     return np.array([*of_name, False], dtype=np.bool_)[frames.address]
 
 
-def _with_date(of_day: Nanoseconds, full: Nanoseconds, stamp: Nanoseconds) -> Nanoseconds:
-    """Complete times of day by the nearest day: to the latest dated sentence, else the first one, else the stamp."""
-    dated = full != NO_TIME
-    if dated.any():
-        latest = _latest(dated)
-        anchor = full[np.where(latest >= 0, latest, int(np.flatnonzero(dated)[0]))]
-    else:
-        anchor = stamp
-    known = (of_day != NO_TIME) & (anchor != NO_TIME)
-    safe_anchor, safe_day = np.where(known, anchor, 0), np.where(known, of_day, 0)
-    guess = safe_anchor // DAY_NS * DAY_NS + safe_day
+def _by_counting_days(told: _Told, speaks: Flag) -> Nanoseconds:
+    """Return for each line the latest instant before it - before the first one, the first.
+
+    Times of day are counted on from one sentence to the next, over any number of midnights; a date puts the count
+    right. What a receiver without a fix says counts only where no other speaks.
+    """
+    fixed = speaks & ~told.void
+    at = np.flatnonzero(fixed if bool(np.any(fixed & told.dated)) else speaks)
+    n = told.of_day.size
+    if at.size == 0:
+        return np.full(n, NO_TIME)
     half = DAY_NS // 2
-    guess += DAY_NS * ((safe_anchor - guess > half).astype(np.int64) - (guess - safe_anchor > half))
-    return np.where(dated, full, np.where(known, guess, NO_TIME))
+    step = (np.diff(told.of_day[at]) + half) % DAY_NS - half
+    counted = told.of_day[at[0]] + np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(step)))
+    anchor = np.flatnonzero(told.dated[at])
+    offset, _ = _without_brief_dates(told.full[at[anchor]] - counted[anchor], counted[anchor])
+    latest = np.searchsorted(anchor, np.arange(at.size), side="right") - 1
+    instant = counted + offset[np.maximum(latest, 0)]
+    place = np.searchsorted(at, np.arange(n), side="right") - 1
+    near: Nanoseconds = instant[np.maximum(place, 0)]
+    return near
 
 
-def _latest(mark: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _without_brief_dates(offset: Nanoseconds, counted: Nanoseconds) -> tuple[Nanoseconds, int]:
+    """Replace the offset of a short run between two runs that agree; return how many were replaced."""
+    cuts = np.flatnonzero(np.diff(offset)) + 1
+    if cuts.size < 2:
+        return offset, 0
+    begin, end = cuts[:-1], cuts[1:]
+    brief = (offset[begin - 1] == offset[end]) & (counted[end] - counted[begin - 1] <= _BRIEF_NS)
+    offset, replaced = offset.copy(), 0
+    for first, last in zip(begin[brief], end[brief], strict=True):
+        offset[first:last] = offset[last]
+        replaced += int(last - first)
+    return offset, replaced
+
+
+def _nearest_day(told: _Told, near: Nanoseconds, notes: list[str]) -> Nanoseconds:
+    """Complete the times of day by their own date, else by the day that brings them nearest to other instants."""
+    known = told.timed & (near != NO_TIME)
+    anchor, of_day = np.where(known, near, 0), np.where(known, told.of_day, 0)
+    half = DAY_NS // 2
+    guess = anchor + (of_day - anchor % DAY_NS + half) % DAY_NS - half
+    at = np.flatnonzero(known & told.dated)
+    offset, brief = _without_brief_dates(told.full[at] - guess[at], guess[at])
+    guess[at] += offset
+    if brief:
+        notes.append(f"{brief} dates that disagree with those around them were put right: told late at midnight.")
+    return np.where(known, guess, told.full)
+
+
+def _latest(mark: Flag) -> Index:
     """Return for each place the latest marked one up to it, -1 before the first."""
     return np.maximum.accumulate(np.where(mark, np.arange(mark.size), -1)) if mark.size else np.empty(0, np.int64)
 
 
-def _next(mark: NDArray[np.bool_]) -> NDArray[np.int64]:
+def _next(mark: Flag) -> Index:
     """Return for each place the next marked one from it on, n behind the last."""
     place = np.where(mark, np.arange(mark.size), mark.size)
     return np.minimum.accumulate(place[::-1])[::-1] if mark.size else np.empty(0, np.int64)
@@ -122,11 +234,8 @@ def _follows(said: dict[str, Said]) -> bool:
     """Tell whether VTG repeats the speed of the RMC behind it rather than of the one before it."""
     if "RMC" not in said or "VTG" not in said:
         return False
-    rmc, vtg = said["RMC"], said["VTG"]
-    at, speed = rmc.record, number(rmc.text["f7"])
-    asked, its = vtg.record, number(vtg.text["f5"])
-    if at.size == 0:
-        return False
+    at, asked = said["RMC"].record, said["VTG"].record
+    speed, its = (said[name].values["speed_over_ground"][0] for name in ("RMC", "VTG"))
     behind = np.searchsorted(at, asked)
     between = (behind > 0) & (behind < at.size)
     ahead = np.abs(its - speed[np.clip(behind - 1, 0, at.size - 1)])
@@ -134,33 +243,3 @@ def _follows(said: dict[str, Said]) -> bool:
     # NaN compares false: what is void bears no witness
     next_wins, last_wins = int(np.sum(between & (after < ahead))), int(np.sum(between & (ahead < after)))
     return next_wins >= _LEAST_AGREEMENTS and next_wins > _RATIO * last_wins
-
-
-def _time_of_day(text: pl.Series) -> Nanoseconds:
-    """Read hhmmss.ss as nanoseconds of the day; `NO_TIME` where it is none."""
-    text = text.fill_null("")
-    good = text.str.contains(r"^\d{6}(\.\d*)?$").to_numpy().copy()
-    hours, minutes, seconds = (_digits(text.str.slice(k, 2)) for k in (0, 2, 4))
-    fraction = _digits(text.str.slice(7, 9).str.pad_end(9, "0"))
-    good &= (hours < 24) & (minutes < 60) & (seconds <= 60)
-    return np.where(good, (hours * 3_600 + minutes * 60 + seconds) * SECOND_NS + fraction, NO_TIME)
-
-
-def _date(text: pl.Series) -> Nanoseconds:
-    """Read ddmmyy as nanoseconds of its midnight; `NO_TIME` where it is none."""
-    text = text.fill_null("")
-    six = text.str.contains(r"^\d{6}$").to_numpy()
-    day, month, year = (_digits(text.str.slice(k, 2)) for k in (0, 2, 4))
-    days, exists = days_since_1970(year + np.where(year >= _CENTURY, 1900, 2000), month, day)
-    return np.where(six & exists, days * DAY_NS, NO_TIME)
-
-
-def _ymd(year: NDArray[np.float64], month: NDArray[np.float64], day: NDArray[np.float64]) -> Nanoseconds:
-    known = np.isfinite(year) & np.isfinite(month) & np.isfinite(day) & (year > 1900) & (year < 2200)
-    y, m, d = (np.where(known, np.nan_to_num(v, posinf=0, neginf=0), 1).astype(np.int64) for v in (year, month, day))
-    days, exists = days_since_1970(y, m, d)
-    return np.where(known & exists, days * DAY_NS, NO_TIME)
-
-
-def _digits(text: pl.Series) -> NDArray[np.int64]:
-    return text.cast(pl.Int64, strict=False).fill_null(0).to_numpy()

@@ -1,27 +1,76 @@
 """What NMEA sentences say: fields by the table in `schemas.nmea`, in columns, one sentence type at a time.
 
-When they say it is settled in `nmea_clock`.
+When they say it is settled in `nmea_clock`; which of two rudders and which magnetic variation holds, by looking at the
+whole log, in `nmea_rudders` and `nmea_magnetic`.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
-import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import CODE, Float
+from pipeline.ingest.cells import Cells
+from pipeline.ingest.decoded import CODE, Flag, Float
 from pipeline.ingest.nmea_frames import Frames
-from pipeline.ingest.numerals import number
 from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Index, Spans
+from pipeline.ingest.spans import Index
 from schemas.channels import CHANNELS
-from schemas.nmea import SENTENCES, SPECIAL, XDR_ANGLES, NmeaField, Sentence
+from schemas.nmea import SENTENCES, SILENT, XDR_ANGLES, NmeaField, Sentence
 from schemas.units import factor_to_si
 
-#: Most fields that are read of a sentence: XDR may hold ten transducers of four fields.
-_MOST = 40
+#: Most transducers that are read of one sentence.
+_TRANSDUCERS = 10
+
+_DEGREE = factor_to_si("deg", "rad", "angle")
+
+
+@dataclass(frozen=True, eq=False)
+class Fields:
+    """The sentences of one type, field by field.
+
+    Attributes
+    ----------
+    frames : Frames
+    record : ndarray of int64, shape (m,)
+        Their records, ascending.
+    """
+
+    frames: Frames
+    record: Index
+
+    @cached_property
+    def count(self) -> Index:
+        """Number of fields behind the address, shape (m,)."""
+        return self.frames.commas[self.record]
+
+    def at(self, place: int) -> Cells:
+        """Return the fields at a place, counted from 1; empty where a sentence ends before it."""
+        comma, stop = self.frames.comma, self._stop
+        if comma.size == 0:
+            return Cells(self.frames.body.buffer, stop, stop)
+        here = self._first + (place - 1)
+        start = comma[np.minimum(here, comma.size - 1)] + 1
+        end = np.where(self.count > place, comma[np.minimum(here + 1, comma.size - 1)], stop)
+        if self._fewest < place:
+            there = self.count >= place
+            start, end = np.where(there, start, stop), np.where(there, end, stop)
+        return Cells.of(self.frames.body.buffer, start, end)
+
+    @cached_property
+    def _stop(self) -> Index:
+        return self.frames.body.stop[self.record]
+
+    @cached_property
+    def _first(self) -> Index:
+        return self.frames.first_comma[self.record]
+
+    @cached_property
+    def _fewest(self) -> int:
+        return int(self.count.min(initial=0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,30 +79,29 @@ class Said:
 
     Attributes
     ----------
-    record : ndarray of int64, shape (m,)
-        Their records, ascending.
-    text : polars.DataFrame, shape (m, fields)
-        Fields ``f1``, ``f2`` ...; null where empty or absent.
+    fields : Fields
     reason : ndarray of int8, shape (m,)
         Code of the refusal, 0 for none.
     values : dict of str to (ndarray, ndarray)
         Channel -> value in SI (NaN where the text is no number) and whether it is there, each shape (m,).
     """
 
-    record: Index
-    text: pl.DataFrame
+    fields: Fields
     reason: NDArray[np.int8]
-    values: dict[str, tuple[Float, NDArray[np.bool_]]] = field(default_factory=dict)
+    values: dict[str, tuple[Float, Flag]] = field(default_factory=dict)
+
+    @property
+    def record(self) -> Index:
+        """Records of the sentences, ascending, shape (m,)."""
+        return self.fields.record
 
 
-def read_type(frames: Frames, separated: Spans, record: Index, name: str) -> Said:
+def read_type(frames: Frames, record: Index, name: str) -> Said:
     """Read the sentences of one type.
 
     Parameters
     ----------
     frames : Frames
-    separated : Spans
-        The bodies over a buffer in which a line feed stands behind each, and nothing that is not printable within.
     record : ndarray of int64, shape (m,)
         Records of the sentences, ascending; whole, with the right checksum.
     name : str
@@ -64,100 +112,102 @@ def read_type(frames: Frames, separated: Spans, record: Index, name: str) -> Sai
     Said
     """
     sentence = SENTENCES[name]
-    commas = frames.commas[record]
-    width = min(int(commas.max(initial=0)), _MOST) if name == "XDR" else _width(sentence)
-    text = _split(separated.take(record), max(width, sentence.least))
-    reason = np.zeros(record.size, dtype=np.int8)
-    for place, valid in (sentence.valid or {}).items():
-        mark = text[f"f{place}"].fill_null("")
-        # a sentence of an older edition ends before the mark
-        reason[(~mark.is_in(list(valid))).to_numpy() & (commas >= place)] = CODE[Reason.VOID]
+    fields = Fields(frames, record)
+    said = Said(fields, np.zeros(record.size, dtype=np.int8))
+    said.reason[_void(fields, sentence)] = CODE[Reason.VOID]
     for place, wanted in (sentence.carries or {}).items():
-        reason[(~text[f"f{place}"].fill_null("").is_in(list(wanted))).to_numpy()] = CODE[Reason.NO_CHANNEL]
-    if name == "ZDA":
-        reason[:] = CODE[Reason.NO_CHANNEL]
-    reason[commas < sentence.least] = CODE[Reason.MALFORMED]
-    said = Said(record, text, reason)
-    if name in SPECIAL:
-        {"HDG": _read_hdg, "XDR": _read_xdr}[name](said)
+        said.reason[~fields.at(place).is_one_of(wanted)] = CODE[Reason.NO_CHANNEL]
+    if name in SILENT:
+        said.reason[:] = CODE[Reason.NO_CHANNEL]
+    said.reason[fields.count < sentence.least] = CODE[Reason.MALFORMED]
+    if name in _SPECIAL:
+        _SPECIAL[name](said)
     for item in sentence.fields:
-        said.values[item.channel] = _read_field(text, item)
+        value, there = _read_field(fields, item)
+        if item.channel in said.values:
+            first, was = said.values[item.channel]
+            value, there = np.where(was, first, value), was | there
+        said.values[item.channel] = (value, there)
     present = np.zeros(record.size, dtype=np.bool_)
     for _, there in said.values.values():
         present |= there
-    reason[(reason == 0) & ~present] = CODE[Reason.VOID]
+    said.reason[(said.reason == 0) & ~present] = CODE[Reason.VOID]
     return said
 
 
-def _width(sentence: Sentence) -> int:
-    places = [p for f in sentence.fields for p in (f.position, f.letter or 0)]
-    places += [sentence.utc or 0, sentence.date or 0, 4 if sentence.name == "ZDA" else 0]
-    return max([sentence.least, *places, *(sentence.valid or {}), *(sentence.carries or {})])
+def _void(fields: Fields, sentence: Sentence) -> Flag:
+    """Tell which sentences say themselves that they are not valid; an older edition ends before the mark."""
+    void = np.zeros(fields.record.size, dtype=np.bool_)
+    for place, valid in (sentence.valid or {}).items():
+        void |= ~fields.at(place).is_one_of(tuple(valid)) & (fields.count >= place)
+    for place, measured in (sentence.modes or {}).items():
+        void |= ~fields.at(place).is_one_of((*measured, ""))
+    return void
 
 
-def _split(body: Spans, width: int) -> pl.DataFrame:
-    """Split the sentences at their commas; the address is left out."""
-    names = [f"f{k}" for k in range(width + 1)]
-    # the first line makes the reader take the full width; it is dropped again
-    head = b"," * width + b"\n"
-    table = pl.read_csv(
-        head + body.joined(extra=1).tobytes(),
-        has_header=False,
-        schema=dict.fromkeys(names, pl.String),
-        quote_char=None,
-        truncate_ragged_lines=True,
-    )
-    clean = [pl.col(c).str.strip_chars().replace("", None) for c in names[1:]]
-    return table.slice(1).select(clean)
-
-
-def _read_field(text: pl.DataFrame, item: NmeaField) -> tuple[Float, NDArray[np.bool_]]:
-    column = text[f"f{item.position}"]
-    value = number(column)
+def _read_field(fields: Fields, item: NmeaField) -> tuple[Float, Flag]:
+    cells = fields.at(item.position)
+    value = cells.number()
     if item.form != "number":
         # ddmm.mmm: whole degrees are the hundreds
         degrees = np.floor(value / 100.0)
         minutes = value - 100.0 * degrees
         value = np.where(minutes < 60.0, degrees + minutes / 60.0, np.nan)
     if item.letter is not None and item.factors is not None:
-        letter = text[f"f{item.letter}"].fill_null("")
-        factor = np.full(len(letter), np.nan)
+        factor = np.full(256, np.nan)
         for name, times in item.factors.items():
-            factor[(letter == name).to_numpy()] = times
-        value = value * factor
-    value = value * factor_to_si(item.unit, CHANNELS[item.channel].unit, item.channel)
-    return value, column.is_not_null().to_numpy()
+            factor[ord(name)] = times
+        value = value * factor[fields.at(item.letter).letter()]
+    return value * factor_to_si(item.unit, CHANNELS[item.channel].unit, item.channel), cells.there()
 
 
-def _read_hdg(said: Said) -> None:
-    """Magnetic heading plus deviation plus variation, east positive; without variation it is no true heading."""
-    text = said.text
-    heading, variation = number(text["f1"]), number(text["f4"])
-    deviation = np.where(text["f2"].is_null().to_numpy(), 0.0, number(text["f2"]) * _east(text["f3"]))
-    true = np.mod(heading + deviation + variation * _east(text["f5"]), 360.0) * (np.pi / 180.0)
-    said.values["heading"] = (true, text["f1"].is_not_null().to_numpy())
-    magnetic = text["f4"].is_null().to_numpy() & text["f1"].is_not_null().to_numpy()
-    said.reason[(said.reason == 0) & magnetic] = CODE[Reason.NO_CHANNEL]
+def east(letter: Cells) -> Float:
+    """Return 1 for E, -1 for W, NaN for any other letter."""
+    side = letter.letter()
+    return np.where(side == ord("E"), 1.0, np.where(side == ord("W"), -1.0, np.nan))
 
 
-def _east(letter: pl.Series) -> Float:
-    side = letter.fill_null("")
-    return np.where((side == "E").to_numpy(), 1.0, np.where((side == "W").to_numpy(), -1.0, np.nan))
+def _read_magnetic(said: Said) -> None:
+    """Read the magnetic heading with its deviation, east positive, rad; the variation is added in `nmea_magnetic`."""
+    heading = said.fields.at(1)
+    value = heading.number()
+    if bool(np.any(said.fields.count >= 3)):
+        deviation = said.fields.at(2)
+        value = value + np.where(deviation.there(), deviation.number() * east(said.fields.at(3)), 0.0)
+    said.values["heading"] = (value * _DEGREE, heading.there())
 
 
-def _read_xdr(said: Said) -> None:
-    """Transducers in groups of type, value, unit, name; roll and pitch are angles (A) in degrees (D)."""
-    text, m = said.text, said.record.size
+def _read_starboard(said: Said) -> None:
+    """Read the rudder of a ship with one; `nmea_rudders` looks for a second one."""
+    angle, status = said.fields.at(1), said.fields.at(2)
+    void = ~status.is_one_of(("A",)) & (said.fields.count >= 2)
+    said.values["rudder_angle"] = (angle.number() * _DEGREE, angle.there() & ~void)
+
+
+def _read_transducers(said: Said) -> None:
+    """Read transducers, groups of type, value, unit, name; roll and pitch are angles (A) in degrees (D)."""
+    fields, m = said.fields, said.record.size
     named = np.zeros(m, dtype=np.bool_)
     for channel in sorted(set(XDR_ANGLES.values())):
         said.values[channel] = (np.full(m, np.nan), np.zeros(m, dtype=np.bool_))
-    for k in range(1, text.width - 2, 4):
-        kind, value, unit, name = (text[f"f{k + j}"].fill_null("") for j in range(4))
-        angle = ((kind == "A") & (unit == "D")).to_numpy()
-        for label, channel in XDR_ANGLES.items():
-            mine = angle & (name == label).to_numpy()
+    for k in range(1, min(int(fields.count.max(initial=0)), 4 * _TRANSDUCERS), 4):
+        angle = fields.at(k).is_one_of(("A",)) & fields.at(k + 2).is_one_of(("D",))
+        if not angle.any():
+            continue
+        value, label = fields.at(k + 1), fields.at(k + 3)
+        number, filled = value.number() * _DEGREE, value.there()
+        for name, channel in XDR_ANGLES.items():
+            mine = angle & label.is_one_of((name,))
             named |= mine
-            mine &= (value != "").to_numpy()
+            mine &= filled
             got, there = said.values[channel]
-            got[mine], there[mine] = number(value)[mine] * (np.pi / 180.0), True
+            got[mine], there[mine] = number[mine], True
     said.reason[(said.reason == 0) & ~named] = CODE[Reason.NO_CHANNEL]
+
+
+_SPECIAL: dict[str, Callable[[Said], None]] = {
+    "HDG": _read_magnetic,
+    "HDM": _read_magnetic,
+    "RSA": _read_starboard,
+    "XDR": _read_transducers,
+}

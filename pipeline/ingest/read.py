@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from typing import BinaryIO
+
 from pipeline.ingest import sniff
 from pipeline.ingest.decoded import Decoded
+from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.own_clocks import set_right
 from pipeline.ingest.readings import Readings
 from pipeline.ingest.screen import screen
@@ -11,18 +15,22 @@ from pipeline.ingest.unpack import unpack
 from schemas.errors import DataRejected, UsageError
 from schemas.profile import Source, VesselProfile
 
+#: Notes that a refusal repeats, at most.
+_NOTES = 3
+
 _TOLD = "See docs/profile.md for how to describe a log."
 
 
-def read_log(name: str, data: bytes, profile: VesselProfile) -> Readings:
+def read_log(name: str, log: bytes | BinaryIO, profile: VesselProfile) -> Readings:
     """Read one log.
 
     Parameters
     ----------
     name : str
         Name of the file without its folder: chooses the profile's source and stands in messages.
-    data : bytes
-        The file as delivered, perhaps compressed with gzip or zstd.
+    log : bytes or binary file
+        The file as delivered, perhaps compressed with gzip or zstd; of a file that is open an MCAP log is read a few
+        megabytes at a time, any other one whole.
     profile : VesselProfile
 
     Returns
@@ -37,42 +45,47 @@ def read_log(name: str, data: bytes, profile: VesselProfile) -> Readings:
     UsageError
         The profile does not say how the file is to be read.
     """
-    if not data:
+    file = LogFile(log)
+    if file.size == 0:
         raise DataRejected("empty_log", f"{name} is empty.", "Copy the file again from the logger.", {"name": name})
-    content, notes = unpack(name, data)
+    notes: list[str] = []
+    packed = False
+    if file.read(0, len(sniff.MCAP_MAGIC)) != sniff.MCAP_MAGIC:
+        data = file.whole()
+        content, notes = unpack(name, data)
+        packed = content is not data
+        file = LogFile(content)
     source = profile.source_for(name)
-    log_format: str | None = (source.format if source else None) or sniff.sniff(content)
+    log_format: str | None = (source.format if source else None) or sniff.sniff(file.read(0, sniff.SAMPLE))
     if log_format is None:
         raise DataRejected(
             "unknown_format",
-            f"{name} is neither MCAP, nor NMEA 0183, nor delimited text"
-            f"{' once unpacked' if content is not data else ''}.",
+            f"{name} is neither MCAP, nor NMEA 0183, nor delimited text{' once unpacked' if packed else ''}.",
             "Export the log as one of these; " + _TOLD,
             {"name": name},
         )
-    decoded = _decode(log_format, name, content, profile, source)
+    decoded = _decode(log_format, name, file, profile, source)
     readings = set_right(screen(decoded, log_format), source)
     if readings.frame.height == 0:
         raise _nothing(name, readings)
     if notes:
-        readings = Readings(
-            readings.frame, readings.rejected, readings.tally, (*notes, *readings.notes), readings.format
-        )
+        readings = replace(readings, notes=(*notes, *readings.notes))
     return readings
 
 
-def _decode(log_format: str, name: str, data: bytes, profile: VesselProfile, source: Source | None) -> Decoded:
+def _decode(log_format: str, name: str, log: LogFile, profile: VesselProfile, source: Source | None) -> Decoded:
     """Call the reader of the format; each is imported where it is used, `kempf --help` pays for none."""
     if log_format == "nmea":
         from pipeline.ingest import nmea
 
-        return nmea.decode(data, name, source)
+        return nmea.decode(log.whole(), name, source)
     if log_format == "mcap":
         from pipeline.ingest import mcap_log
 
-        return mcap_log.decode(name, data, source, [s.match for s in profile.sources])
+        return mcap_log.decode(name, log, source, [s.match for s in profile.sources])
     from pipeline.ingest import delimited
 
+    data = log.whole()
     if source is None or source.time is None or not source.channels:
         found = delimited.columns_found(data, source)
         lacks = "no source" if source is None else "a source without time or channels"
@@ -105,9 +118,14 @@ def _nothing(name: str, readings: Readings) -> DataRejected:
     return DataRejected(
         "no_valid_reading",
         f"{name} holds no valid reading: {readings.tally.records_read} records, "
-        f"of them {listed or 'none usable'}.{years}",
+        f"of them {listed or 'none usable'}.{years}{''.join(f' {note}' for note in readings.notes[:_NOTES])}",
         step.get(most, "Look at the reasons; most often the profile does not fit the log."),
-        {"name": name, "records_read": readings.tally.records_read, "by_reason": counts},
+        {
+            "name": name,
+            "records_read": readings.tally.records_read,
+            "by_reason": counts,
+            "notes": list(readings.notes),
+        },
     )
 
 

@@ -67,6 +67,25 @@ class Tally:
 
 
 @dataclass(frozen=True)
+class LostStretch:
+    """A stretch of a damaged log that could not be read.
+
+    Attributes
+    ----------
+    since_ns, until_ns : int or None
+        By the logger's clock, UTC nanoseconds; None where nothing tells.
+    messages : int or None
+        How many records are lost, where the file tells.
+    why : str
+    """
+
+    since_ns: int | None
+    until_ns: int | None
+    messages: int | None
+    why: str
+
+
+@dataclass(frozen=True)
 class Readings:
     """The readings of one log.
 
@@ -82,6 +101,8 @@ class Readings:
         What a person should know of how the file was read, one sentence each.
     format : {"delimited", "mcap", "nmea"}
         How the file was read.
+    lost : tuple of LostStretch
+        What of a damaged log could not be read, in the order of the file; empty for a whole one.
     """
 
     frame: pl.DataFrame
@@ -89,3 +110,9 @@ class Readings:
     tally: Tally
     notes: tuple[str, ...] = ()
     format: str = ""
+    lost: tuple[LostStretch, ...] = ()
+
+    @property
+    def partial(self) -> bool:
+        """Whether something of the log is lost."""
+        return bool(self.lost)

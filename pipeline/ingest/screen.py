@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 import polars as pl
+import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Float, Values
+from pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Values
 from pipeline.ingest.iso_time import DAY_NS, SECOND_NS, days_since_1970
 from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Reason, Tally
 from pipeline.ingest.spans import Index
@@ -77,6 +78,9 @@ def _by_source(decoded: Decoded, reason: Code) -> list[Index]:
     """Return the good records of each source, in the order of the file."""
     good = np.flatnonzero(reason == 0)
     source = decoded.source[good]
+    if len(decoded.source_names) <= np.iinfo(np.int16).max:
+        # numbers of two bytes are sorted by counting them
+        source = source.astype(np.int16)
     order = np.argsort(source, kind="stable")
     cuts = np.flatnonzero(np.diff(source[order])) + 1
     return [part for part in np.split(good[order], cuts) if part.size]
@@ -137,16 +141,15 @@ def _readings(decoded: Decoded, reason: Code, refused: dict[str, Code], log_form
     }
     values_read = values_kept = 0
     for channel in CHANNELS.values():
-        there = np.zeros(kept.size, dtype=np.bool_)
-        value: Float = np.full(kept.size, np.nan)
-        if channel.name in refused:
-            offered = decoded.channels[channel.name].present[kept]
-            there = offered & (refused[channel.name][kept] == 0)
-            value = decoded.channels[channel.name].value[kept]
-            values_read += int(np.sum(offered))
+        if channel.name not in refused:
+            columns[channel.column] = pl.Series(pa.nulls(kept.size, pa.float64()))
+            continue
+        offered = decoded.channels[channel.name].present[kept]
+        there = offered & (refused[channel.name][kept] == 0)
+        values_read += int(np.sum(offered))
         values_kept += int(np.sum(there))
-        # what is kept is finite, so NaN marks exactly what is not there
-        columns[channel.column] = pl.Series(np.where(there, value, np.nan), dtype=pl.Float64).fill_nan(None)
+        # by way of Arrow: a mask of its own spares a query of the engine a column
+        columns[channel.column] = pl.Series(pa.array(decoded.channels[channel.name].value[kept], mask=~there))
     frame = pl.DataFrame(columns, schema=READING_SCHEMA)
     rejected = _rejected(decoded, reason, refused)
     counts = rejected.group_by("reason").len().sort("reason")
@@ -160,7 +163,7 @@ def _readings(decoded: Decoded, reason: Code, refused: dict[str, Code], log_form
         values_rejected=rejected.height - records_rejected,
         by_reason=dict(counts.iter_rows()),
     )
-    return Readings(frame, rejected, tally, tuple(decoded.notes), log_format)
+    return Readings(frame, rejected, tally, tuple(decoded.notes), log_format, decoded.lost)
 
 
 def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.DataFrame:
@@ -172,8 +175,8 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
     distinct = np.unique(record)
     text = decoded.raw.take(distinct).text()
     time = decoded.time_utc_ns[record]
-    names = np.array([None, *(str(r) for r in REASONS)], dtype=object)
-    words = np.concatenate([names[code[where]] for where, _, code in parts])
+    words = pl.Series([None, *(str(r) for r in REASONS)], dtype=pl.String)
+    codes = np.concatenate([code[where] for where, _, code in parts])
     table = pl.DataFrame(
         {
             "record": record,
@@ -182,7 +185,7 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
             "channel": pl.concat(
                 [pl.repeat(name, where.size, dtype=pl.String, eager=True) for where, name, _ in parts]
             ),
-            "reason": pl.Series(words.tolist(), dtype=pl.String),
+            "reason": words.gather(codes.astype(np.int64)),
             "raw": text.gather(np.searchsorted(distinct, record)),
         },
         schema=REJECTED_SCHEMA,

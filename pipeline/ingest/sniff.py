@@ -10,7 +10,7 @@ Format = Literal["delimited", "mcap", "nmea"]
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 
 #: Bytes of the file that are looked at.
-_SAMPLE = 1 << 16
+SAMPLE = 1 << 16
 
 #: Share of the lines that look like sentences from which a text is an NMEA log.
 _SHARE = 0.5
@@ -26,14 +26,14 @@ def sniff(data: bytes) -> Format | None:
     Parameters
     ----------
     data : bytes
-        Unpacked content.
+        Unpacked content, or its first `SAMPLE` bytes.
     """
     if data.startswith(MCAP_MAGIC):
         return "mcap"
-    lines = [line for line in data[:_SAMPLE].split(b"\n") if line.strip()]
+    lines = [line for line in re.split(rb"[\r\n]", data[:SAMPLE]) if line.strip()]
     if lines and sum(bool(_SENTENCE.match(line.lstrip(b"\0"))) for line in lines) >= _SHARE * len(lines):
         return "nmea"
-    sample = data[:_SAMPLE].replace(b"\xef\xbb\xbf", b"", 1)
+    sample = data[:SAMPLE].replace(b"\xef\xbb\xbf", b"", 1)
     odd = sum(byte < 9 or 13 < byte < 32 or byte == 127 for byte in sample)
     wide = sample.startswith((b"\xff\xfe", b"\xfe\xff"))
     if lines and (wide or odd <= len(sample) // 1000):

@@ -94,8 +94,13 @@ def as_bytes(data: bytes) -> Bytes:
 
 
 def lines_of(buffer: Bytes) -> Spans:
-    """Cut a buffer at its line feeds; the line feeds and carriage returns before them are left out."""
+    """Cut a buffer at its line feeds, without them and the carriage returns before them.
+
+    A buffer without any line feed is cut at its carriage returns.
+    """
     feeds = np.flatnonzero(buffer == 10).astype(np.int64)
+    if feeds.size == 0:
+        feeds = np.flatnonzero(buffer == 13).astype(np.int64)
     start = np.concatenate((np.zeros(1, dtype=np.int64), feeds + 1))
     stop = np.concatenate((feeds, np.full(1, buffer.size, dtype=np.int64)))
     if buffer.size:
@@ -128,6 +133,24 @@ def trimmed(spans: Spans) -> Spans:
         start[i] += len(whole) - len(kept)
         stop[i] = start[i] + len(kept.rstrip(b" \t\r\v\f\n"))
     return Spans(buffer, start, stop)
+
+
+def first_within(places: Index, start: Index, stop: Index) -> Index:
+    """Return the first of the ascending places in each stretch, -1 for none."""
+    if places.size == 0:
+        return np.full(start.shape, -1, dtype=np.int64)
+    at = np.searchsorted(places, start)
+    found = places[np.minimum(at, places.size - 1)]
+    return np.where((at < places.size) & (found < stop), found, -1)
+
+
+def last_within(places: Index, start: Index, stop: Index) -> Index:
+    """Return the last of the ascending places in each stretch, -1 for none."""
+    if places.size == 0:
+        return np.full(start.shape, -1, dtype=np.int64)
+    before = np.searchsorted(places, stop) - 1
+    found = places[np.maximum(before, 0)]
+    return np.where((before >= 0) & (found >= start), found, -1)
 
 
 def spans_of(column: pl.Series) -> Spans:

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.model import extended
+from pipeline.model import dynamics
 from pipeline.model.terms.effect import Effect, Parameter
 from pipeline.model.terms.expression import compiled
 from pipeline.model.terms.symbols import SYMBOLS
@@ -16,13 +16,13 @@ from pipeline.normalise.series import Float
 from schemas.errors import UsageError
 
 _PLACE = {
-    "speed": extended.ON_SPEED,
-    "rudder": extended.ON_RUDDER,
-    "sway": extended.ON_SWAY,
-    "yaw": extended.ON_YAW,
-    "lateral_speed": extended.ON_LATERAL,
-    "yaw_rate": extended.ON_YAW_RATE,
-    "heading": extended.ON_HEADING,
+    "speed": dynamics.ON_SPEED,
+    "rudder": dynamics.ON_RUDDER,
+    "sway": dynamics.ON_SWAY,
+    "yaw": dynamics.ON_YAW,
+    "lateral_speed": dynamics.ON_LATERAL,
+    "yaw_rate": dynamics.ON_YAW_RATE,
+    "heading": dynamics.ON_HEADING,
 }
 _INDEX = {name: i for i, name in enumerate(SYMBOLS)}
 
@@ -46,10 +46,10 @@ class Augmented:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise UsageError("effect_twice", f"The model holds {twice[0]!r} twice.", "Name every effect once.")
-        if self.extra > extended.MOST_EXTRA:
+        if self.extra > dynamics.MOST_EXTRA:
             raise UsageError(
                 "too_many_states",
-                f"The effects {', '.join(names)} bring {self.extra} states along; {extended.MOST_EXTRA} is the most.",
+                f"The effects {', '.join(names)} bring {self.extra} states along; {dynamics.MOST_EXTRA} is the most.",
                 "Leave one of those with states of their own out.",
             )
 
@@ -86,19 +86,19 @@ class Augmented:
     def table(self) -> Table:
         """Programs, their code and their constants, as `pipeline.model.extended` takes them."""
         programs, codes, constants = [], [], []
-        start, held, slot, first = 0, 0, 0, extended.PARAMETER
+        start, held, slot, first = 0, 0, 0, dynamics.PARAMETER
         for effect in self.effects:
             variables = dict(_INDEX)
             for name in ("m1", "m2", "m3", "m4"):
                 del variables[name]
             for i, state in enumerate(effect.states):
-                variables[state.name] = extended.N_BEFORE + slot + i
+                variables[state.name] = dynamics.N_BEFORE + slot + i
             variables |= {p.name: first + i for i, p in enumerate(effect.parameters)}
             texts = [(_PLACE[target], 0, text) for target, text in effect.terms.items()]
             for i, state in enumerate(effect.states):
-                texts.append((extended.ON_EXTRA, slot + i, state.derivative))
-                texts.append((extended.ON_NOISE, slot + i, state.noise))
-                texts.append((extended.ON_INITIAL, slot + i, state.initial_std))
+                texts.append((dynamics.ON_EXTRA, slot + i, state.derivative))
+                texts.append((dynamics.ON_NOISE, slot + i, state.noise))
+                texts.append((dynamics.ON_INITIAL, slot + i, state.initial_std))
             for kind, place, text in texts:
                 program = compiled(text, variables)
                 code = program.code.copy()

@@ -114,12 +114,38 @@ def test_a_small_rest_of_a_strong_effect_is_no_sign_of_another(late: tuple[Saile
     def left(before: float, after: float, gains: np.ndarray = gains) -> str:
         assert found.before is not None and found.after is not None
         first, last = replace(found.before, gain=before), replace(found.after, gain=after, gains=gains)
-        return verdict(replace(found, before=first, after=last))
+        found_there = with_direction(found, np.sqrt(before / found.before.gain))
+        return verdict(replace(found_there, before=first, after=last))
 
     # a hundredth of what it was, twelve and more as that is; a tenth; little of little; in one run of three alone
     assert left(1300.0, 13.0) == left(20.0, 11.0) == "explained"
     assert left(1300.0, 130.0) == left(20.0, 13.0) == "unexplained"
     assert left(1300.0, 130.0, np.array([131.0, -0.5, -0.5])) == "explained"
+
+
+def with_direction(found: Diagnosis, times: float) -> Diagnosis:
+    """The same diagnosis, the effect it found of so many times the size."""
+    (candidate, refit), *others = found.steps[1].chosen_from
+    larger = replace(candidate, direction=candidate.direction * times)
+    return replace(found, steps=(found.steps[0], replace(found.steps[1], chosen_from=((larger, refit), *others))))
+
+
+def test_what_the_reference_should_see_and_does_not_is_no_effect(
+    dragged: tuple[Sailed, Diagnosis], calm: tuple[Sailed, Diagnosis]
+) -> None:
+    _, found = dragged
+    assert found.before is not None
+    direction = found.steps[1].chosen_from[0][0].direction
+    foreseen = found.before.foreseen(direction)
+    # a drag is made of what the reference is made of: it sees all of it, half the score, and in truth it did
+    assert 0.4 < foreseen / float(direction @ direction) < 0.55
+    assert found.before.gain > 0.8 * foreseen
+    unseen = replace(found, before=replace(found.before, gain=0.3 * foreseen))
+    assert verdict(unseen) == "unexplained"
+    # a bias of the gyro does nothing that drift, turn, rudder or heading do
+    _, quiet = calm
+    bias = score(quiet.steps[0].fit, effects.get("gyro_bias")).direction
+    assert quiet.before is not None and quiet.before.foreseen(bias) < 0.05 * float(bias @ bias)
 
 
 def test_what_the_logs_lack_or_zigzags_cannot_tell_is_not_testable(calm: tuple[Sailed, Diagnosis]) -> None:

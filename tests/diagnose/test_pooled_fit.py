@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 
@@ -21,17 +23,22 @@ class Counted:
     """The filter, and how often it was asked."""
 
     def __init__(self) -> None:
-        self.passes, self.ask = 0, sensitivity.passed
+        self.passes, self.ask, self.ask_at_once = 0, sensitivity.passed, sensitivity.passes
 
-    def __call__(self, filtered: Filtered, point: Point) -> Passed:
+    def one(self, filtered: Filtered, point: Point) -> Passed:
         self.passes += 1
         return self.ask(filtered, point)
+
+    def several(self, filtered: Filtered, points: Sequence[Point]) -> list[Passed]:
+        self.passes += len(points)
+        return self.ask_at_once(filtered, points)
 
 
 @pytest.fixture
 def counted(monkeypatch: pytest.MonkeyPatch) -> Counted:
     found = Counted()
-    monkeypatch.setattr(sensitivity, "passed", found)
+    monkeypatch.setattr(sensitivity, "passed", found.one)
+    monkeypatch.setattr(sensitivity, "passes", found.several)
     return found
 
 

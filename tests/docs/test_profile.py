@@ -4,6 +4,7 @@ import itertools
 from math import radians
 from pathlib import Path
 
+import polars as pl
 import pytest
 import yaml
 
@@ -18,6 +19,7 @@ from schemas.channels import CHANNELS
 from schemas.profile import Antenna, ChannelMap, Source, TimeColumn, VesselProfile, merge, overlay, parse
 from schemas.units import TO_SI
 from tests.docs.console import blocks
+from tests.ingest.test_mcap_messages import START, fix, header, imu, ros
 
 FOLDER = Path(__file__).parents[2] / "docs"
 TEXT = (FOLDER / "profile.md").read_text(encoding="utf-8")
@@ -84,6 +86,23 @@ def test_mcap_example_reads_a_logger_file() -> None:
     readings = read_log("day.mcap", data, profile("ferry"))
     for mapped in profile("ferry").sources[0].channels.values():
         assert readings.frame[CHANNELS[mapped.channel].column].is_not_null().sum() > 10
+
+
+def test_ros_example_reads_axes_of_ros() -> None:
+    twist = {"linear": {"x": 3.0, "y": 4.0, "z": 0.0}, "angular": {"x": 0.0, "y": 0.0, "z": 0.0}}
+    messages = [
+        ("/fix", "sensor_msgs/msg/NavSatFix", fix(0)),
+        ("/vel", "geometry_msgs/msg/TwistStamped", {"header": header(1), "twist": twist}),
+        ("/imu", "sensor_msgs/msg/Imu", imu(2)),
+        ("/rudder", "std_msgs/msg/Float64", {"data": 5.0}),
+    ]
+    readings = read_log("day.mcap", ros(messages), profile("boat"))
+    assert readings.frame["time_utc_ns"].to_list()[:3] == [START + k * 10**9 + 250 for k in range(3)]
+    row = readings.frame.select(pl.exclude("record", "time_utc_ns", "source").max()).row(0, named=True)
+    assert (row["velocity_east_m_s"], row["velocity_north_m_s"], row["yaw_rate_rad_s"]) == (3.0, 4.0, -0.05)
+    assert row["heading_rad"] == pytest.approx(radians(90.0) - 0.3)
+    assert row["rudder_angle_rad"] == pytest.approx(radians(5.0))
+    assert row["latitude_rad"] == pytest.approx(radians(59.9))
 
 
 def test_ship_and_logger_files_are_laid_over_each_other() -> None:

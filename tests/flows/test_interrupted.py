@@ -140,7 +140,7 @@ def wait_for(process: subprocess.Popen[bytes], reached: Callable[[], bool]) -> N
     ("table", "sent"),
     [
         ("segments", signal.SIGKILL),
-        ("logs", signal.SIGKILL),
+        ("logs", signal.SIGTERM),
         ("logs", signal.SIGINT),
     ],
 )

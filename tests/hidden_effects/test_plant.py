@@ -12,6 +12,7 @@ from benchmarks.hidden_effects import plant, programme, sail
 from benchmarks.hidden_effects.effects import CATALOGUE, theta
 from benchmarks.hidden_effects.outsiders import OUTSIDERS
 from pipeline.model.effects import catalogue
+from pipeline.model.lanes import ONE
 from pipeline.model.terms.expression import compiled
 from pipeline.model.terms.program import DEPTH, evaluate
 from pipeline.simulate import programme as other
@@ -99,9 +100,9 @@ def said(text: str, c: dict[str, float]) -> float:
     n = 0.9 * FERRY.shaft_speed_per_s
     here |= {"n": n, "n0": n, "V0": 0.9 * FERRY.trial_speed_m_s} | p | c
     program = compiled(text, {name: k for k, name in enumerate(here)})
-    stack = np.zeros((DEPTH, 1))
-    evaluate(program.code, program.constants, np.array(list(here.values())), np.zeros((len(here), 0)), stack, 0)
-    return float(stack[0, 0])
+    stack, values = np.zeros((DEPTH, 1, 1)), np.array(list(here.values()))[:, None]
+    evaluate(program.code, program.constants, values, np.zeros((len(here), 0, 1)), stack, np.zeros((2, 1)), 0, ONE)
+    return float(stack[0, 0, 0])
 
 
 TERMS = sorted(name for name, e in CATALOGUE.items() if not e.sensor and catalogue()[name].terms and name != "waves")

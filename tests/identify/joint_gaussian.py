@@ -15,6 +15,8 @@ from scipy.integrate import quad_vec
 from scipy.linalg import cho_factor, cho_solve, expm
 
 Float = NDArray[np.float64]
+#: largest |A| h that the filter crosses in one step; the joint density takes none
+LONGEST_STEP = 0.5
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +52,7 @@ class Case:
             self.moment_rate,
             self.current_rate,
             self.error_rate,
+            LONGEST_STEP,
             self.x0,
             self.P0,
         )

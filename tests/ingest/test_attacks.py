@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import os
+import time
 from pathlib import Path
 
 import polars as pl
@@ -82,3 +83,22 @@ def test_impossible_settings_are_refused_where_they_stand(source: dict[str, obje
     with pytest.raises(UsageError) as caught:
         parse({"vessel": "a", "sources": [{"match": "*", **source}]}, "profile.yaml")
     assert caught.value.code == "profile_invalid"
+
+
+@pytest.mark.parametrize("squeeze", [gzip.compress, zstandard.ZstdCompressor().compress])
+def test_a_small_file_that_unpacks_to_far_more_than_a_log_is_refused(squeeze) -> None:
+    for content, code in ((bytes(80 << 20), "log_too_large"), (b"\n" * 2_000_000, "too_many_records")):
+        with pytest.raises(DataRejected) as caught:
+            unpack("log.gz", squeeze(content))
+        assert caught.value.code == code
+
+
+@pytest.mark.parametrize("squeeze", [gzip.compress, zstandard.ZstdCompressor().compress])
+def test_very_many_small_members_take_a_time_that_grows_with_their_number(squeeze) -> None:
+    one = squeeze(b"a\n")
+    seconds = []
+    for n in (2_000, 40_000):
+        begin = time.perf_counter()
+        assert unpack("log.gz", one * n) == (b"a\n" * n, [])
+        seconds.append(time.perf_counter() - begin)
+    assert seconds[1] < 100 * seconds[0]

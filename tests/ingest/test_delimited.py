@@ -2,6 +2,7 @@
 
 import math
 from datetime import UTC, datetime
+from time import process_time
 
 import pytest
 
@@ -152,3 +153,26 @@ def test_two_columns_for_one_channel_are_a_usage_error():
 def test_a_column_named_twice_is_refused():
     with pytest.raises(DataRejected, match="more than one column named 'sog'"):
         read(f"utc,sog,sog,hdg\n{T}1Z,1,2,3\n")
+
+
+def test_a_header_of_very_many_columns_costs_no_more_than_its_bytes():
+    wide = b",".join(b"c%d" % k for k in range(100_000))
+    data = b"t,h," + wide + b"\n" + b"\n".join(b"%d,%d" % (k, k) + b",3" * 100_000 for k in range(3))
+    source = {"match": "*", "time": {"column": "t", "unit": "s", "start": "2025-05-03T00:00:00Z"}}
+    given = VesselProfile.model_validate(
+        {"sources": [{**source, "channels": {"h": {"channel": "heading", "unit": "deg"}}}]}
+    )
+    begin = process_time()
+    assert read_log("wide.csv", data, given).frame.height == 3
+    assert process_time() - begin < 2.0
+
+
+def test_a_message_does_not_list_very_many_columns():
+    data = b",".join(b"c%d" % k for k in range(50_000)) + b"\n1,2\n"
+    with pytest.raises(DataRejected, match="and 49960 more") as caught:
+        read_log("wide.csv", data, profile({"x": {"channel": "heading", "unit": "deg"}}))
+    assert len(caught.value.message) < 1_000
+
+
+def test_lines_may_end_with_carriage_returns_alone():
+    assert read(f"utc,sog,hdg\r{T}1Z,10,90\r{T}2Z,,91\r").frame.height == 2

@@ -5,6 +5,8 @@ from pathlib import Path
 
 import yaml
 
+from pipeline.ingest.cdr_definition import types_of
+from schemas.known_messages import TAKEN
 from schemas.profile import parse
 
 ROOT = Path(__file__).parents[2]
@@ -21,3 +23,23 @@ def test_every_field_of_every_message_is_mapped_with_its_unit():
         for field, what in message["properties"].items():
             told[f"{message['topic']}.{field}"] = what["unit"]
     assert told == mapped
+
+
+def test_the_same_messages_as_ros_definitions_are_read_without_a_profile():
+    names = set()
+    for path in (ROOT / "schemas" / "messages").glob("*.msg"):
+        message = json.loads(path.with_suffix(".json").read_text())
+        fields = types_of(f"kempf_msgs/msg/{path.stem}", path.read_text())[f"kempf_msgs/{path.stem}"]
+        assert [(field.name, field.kind, field.count) for field in fields] == [
+            (field, "float64", None) for field in message["properties"]
+        ]
+        taken = TAKEN[f"kempf_msgs/{path.stem}"]
+        assert {field: one.unit for field, one in taken.items()} == {
+            field: what["unit"] for field, what in message["properties"].items()
+        }
+        assert all(
+            f"{what['unit']}; {what['description']}" in path.read_text() for what in message["properties"].values()
+        )
+        names.add(path.stem)
+    assert names == {path.stem for path in (ROOT / "schemas" / "messages").glob("*.json")}
+    assert {f"kempf_msgs/{name}" for name in names} == {name for name in TAKEN if name.startswith("kempf_msgs/")}

@@ -10,8 +10,9 @@ import pytest
 from pipeline.diagnose.filtered import Filtered
 from pipeline.diagnose.run import Run, Ship
 from pipeline.model.augmented import Augmented
+from pipeline.model.dynamics import N_INPUT
 from pipeline.model.effects import catalogue
-from pipeline.model.extended import N_INPUT, ROWS
+from pipeline.model.extended import ROWS
 from pipeline.model.ship import mariner_like
 from pipeline.model.terms.effect import Effect
 from pipeline.model.terms.symbols import CHANNEL_SYMBOLS

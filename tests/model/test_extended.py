@@ -10,10 +10,12 @@ from scipy.integrate import solve_ivp
 
 from pipeline.diagnose.filtered import INITIAL_STD, Filtered
 from pipeline.diagnose.run import Run, Ship
+from pipeline.identify.chain import LONGEST
 from pipeline.identify.kernel import N_STATE, likelihood, no_trace
 from pipeline.model.augmented import Augmented
+from pipeline.model.dynamics import N_INPUT
 from pipeline.model.effects import from_expression
-from pipeline.model.extended import N_INPUT, ROWS
+from pipeline.model.extended import ROWS
 from pipeline.model.terms.effect import Effect, ExtraState, Parameter
 from schemas.errors import UsageError
 from schemas.model_spec import ModelSpec
@@ -71,7 +73,17 @@ def test_without_effects_it_is_the_kernel():
     trace = (innovation, variance, *no_trace()[2:])
     value, _, _ = likelihood(
         *(theta, False, run.time_s, run.speed_m_s, run.rudder_rad, run.rudder_noise, np.zeros(N), run.measured),
-        *(np.zeros(N, dtype=np.bool_), run.current_row, run.ship.arm_per_m, *rates, 1.0, np.zeros(N_STATE), P0, trace),
+        *(
+            np.zeros(N, dtype=np.bool_),
+            run.current_row,
+            run.ship.arm_per_m,
+            *rates,
+            1.0,
+            LONGEST,
+            np.zeros(N_STATE),
+            P0,
+            trace,
+        ),
     )
     # the kernel holds the speed over a step at its mean and takes the noise of the current for stationary
     assert passed.log_likelihood == pytest.approx(value, abs=2e-2)

@@ -100,7 +100,7 @@ def test_clocks_that_disagree_do_not_reorder_versions(warehouse: Warehouse, monk
     put(warehouse, "a", START_NS)
     stamps = [(0, 1000), (1, 5000), (2, 3000), (3, 6000)]
     entries = [{"version": v, "timestamp": t} for v, t in reversed(stamps)]
-    monkeypatch.setattr(DeltaTable, "history", lambda self: entries)
+    monkeypatch.setattr(DeltaTable, "history", lambda self, limit=None: entries)
 
     def at(ms: int) -> int | None:
         return delta.version_as_of(warehouse, "parameter_sets", datetime.fromtimestamp(ms / 1000, UTC))

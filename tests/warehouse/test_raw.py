@@ -62,6 +62,6 @@ def test_a_failed_write_leaves_nothing(warehouse: Warehouse, monkeypatch: pytest
     full = Warehouse(warehouse.uri)
     with pytest.raises(KempfError) as caught:
         raw.put(full, b"log")
-    assert caught.value.code == "warehouse_not_writable"
+    assert caught.value.code == "disk_full"
     assert warehouse.folder is not None
     assert [p for p in (warehouse.folder / "raw").rglob("*") if p.is_file()] == []

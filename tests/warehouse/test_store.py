@@ -168,7 +168,7 @@ def test_a_full_disk_is_told(warehouse: Warehouse, monkeypatch: pytest.MonkeyPat
     monkeypatch.setattr("deltalake.write_deltalake", full)
     with pytest.raises(KempfError) as caught:
         runs.record(warehouse, runs.Run("run-1", "ingest", None, "completed"))
-    assert caught.value.code == "warehouse_not_writable"
+    assert caught.value.code == "disk_full"
 
 
 def test_an_address_of_an_unknown_kind_is_refused() -> None:

@@ -16,6 +16,7 @@ from tests.workbench.driving import kempf, refused, tree
 
 HOSTILE = [
     "../../x",
+    "a\x00/../../b",
     "/etc/passwd",
     "a/b",
     "..",
@@ -137,6 +138,9 @@ def test_topics_that_are_called_like_paths(tmp_path: Path):
     writer.start()
     schema = writer.register_schema("../../schema", "jsonschema", b'{"type": "object"}')
     channel = writer.register_channel("../../x", "json", schema)
+    writer.register_channel("nul\x00/../../../etc", "json", schema, {"../../x": "/etc/passwd"})
+    writer.add_attachment(0, 0, "../../attached", "text/plain", b"not to be written anywhere")
+    writer.add_metadata("../../metadata", {"../../key": "/etc/passwd"})
     for k in range(100):
         stamp = 1_746_252_000_000_000_000 + k * 100_000_000
         writer.add_message(channel, stamp, json.dumps({"/etc/passwd": float(k)}).encode(), stamp)

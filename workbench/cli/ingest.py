@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from flows.ingest_logs import IngestOutcome
+from flows.lost import as_json
 from workbench.cli.options import json_option, profile_option, vessel_option, warehouse_option
 from workbench.terminal import one_line, print_json, progress
 
@@ -58,6 +59,11 @@ def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
         f"{name}: {outcome.outcome}, {tally.records_read} records read = {tally.records_kept} kept + "
         f"{tally.records_rejected} rejected{f' ({reasons})' if reasons else ''}; {_zigzags(outcome)}"
     )
+    if outcome.lost:
+        times = [one["since"] or one["until"] for one in as_json(outcome.lost) if one["since"] or one["until"]]
+        many = f"{len(outcome.lost)} stretch{'es' if len(outcome.lost) > 1 else ''} of this log could not be read"
+        from_then = f", the first from {times[0]} on" if times else ""
+        click.echo(f"  {click.style('partial', fg='yellow')}: {many}{from_then}")
     tell_channels(outcome)
     for note in outcome.notes if notes else ():
         click.echo(f"  note: {one_line(note)[:600]}")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -10,6 +11,7 @@ from workbench.cli.options import json_option, vessel_option, warehouse_option
 from workbench.terminal import one_line, print_json, print_table
 
 if TYPE_CHECKING:
+    from pipeline.ingest.readings import LostStretch
     from warehouse.examinations import StoredExamination
 
 
@@ -24,7 +26,8 @@ def command() -> None:
 @json_option
 def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers: records read = kept + rejected, and what the channel doctor says of each."""
-    from warehouse import examinations, logs, vessels
+    from flows.lost import as_json as lost_as_json
+    from warehouse import examinations, logs, lost, vessels
     from warehouse.instant import iso_utc
     from warehouse.store import Warehouse
 
@@ -32,8 +35,9 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     warehouse.require()
     if vessel is not None:
         vessels.require(warehouse, vessel)
-    held = logs.current(warehouse, vessel)
-    said = examinations.of_ingests(warehouse, [row.ingest_id for row in held])
+    rows_of_logs = logs.current(warehouse, vessel)
+    gone = lost.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
+    said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
     found = [
         {
             "log_id": row.log_id,
@@ -47,10 +51,12 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
             "records_kept": row.tally.records_kept,
             "records_rejected": row.tally.records_rejected,
             "rejected_by_reason": dict(row.tally.by_reason),
+            "partial": row.ingest_id in gone,
+            "lost": lost_as_json(gone.get(row.ingest_id, ())),
             "notes": list(row.notes),
             "channels": _verdict(said.get(row.ingest_id)),
         }
-        for row in held
+        for row in rows_of_logs
     ]
     if as_json:
         print_json(found)
@@ -59,7 +65,11 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     rows = [
         [*(str(one[name])[: 12 if name == "log_id" else 40] for name in head), _brief(one["channels"])] for one in found
     ]
-    print_table([*(name.replace("_", " ") for name in head), "channels"], rows)
+    head.append("channels")
+    if gone:
+        head.append("damage")
+        rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, rows_of_logs, strict=True)]
+    print_table([name.replace("_", " ") for name in head], rows)
 
 
 def _verdict(examination: StoredExamination | None) -> dict[str, Any] | None:
@@ -115,6 +125,15 @@ def show(log_id: str, uri: str, as_json: bool) -> None:
         click.echo("channels: read before there was a channel doctor; `kempf reprocess` examines it")
     else:
         tell("channels", dict(seen.content), everything=True)
+
+
+def _damage(lost: Sequence[LostStretch]) -> str:
+    """Say in a word what of a log is lost."""
+    if not lost:
+        return ""
+    counted = [one.messages for one in lost if one.messages is not None]
+    many = f", {sum(counted)} messages" if len(counted) == len(lost) else ""
+    return f"partial: {len(lost)} stretch{'es' if len(lost) > 1 else ''} lost{many}"
 
 
 @command.command("rejected")

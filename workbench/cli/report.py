@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import click
@@ -44,7 +45,7 @@ def command(
     from workbench.new_file import require_new
     from workbench.report.made import made
 
-    path = Path(f"{vessel}.html".replace("/", "_")) if output is None else output
+    path = _called_after(vessel) if output is None else output
     require_new(path, "--output")
     warehouse = Warehouse(uri)
     spec, own = chosen_model(warehouse, vessel, set_id, model)
@@ -65,3 +66,20 @@ def command(
         return
     click.echo(f"{vessel}: {found.content.headline}")
     click.echo(f"{path}: {len(found.html) / 1e6:.1f} MB, one file, to be opened in any browser", err=True)
+
+
+#: Letters of a vessel's name that stand in a file's name as they are.
+_PLAIN = re.compile(r"[^\w .-]")
+
+
+def _called_after(vessel: str) -> Path:
+    r"""Return a file name here that is made of a vessel's name, whatever she is called.
+
+    Examples
+    --------
+    >>> str(_called_after("Aurora 2")), str(_called_after("../a\0b"))
+    ('Aurora 2.html', '_.._a_b.html')
+    """
+    plain = _PLAIN.sub("_", vessel)[:80]
+    # neither hidden nor an option to other programs
+    return Path(("_" if plain.startswith((".", "-")) else "") + f"{plain}.html")

@@ -3,38 +3,124 @@
 from __future__ import annotations
 
 import sys
+from typing import TYPE_CHECKING
 
 import click
 
-from schemas.errors import ThresholdExceeded
-from workbench.cli.options import json_option, warehouse_option
-from workbench.terminal import number, print_json, print_table
+from schemas.errors import DataRejected, ThresholdExceeded, UsageError
+from workbench.cli.options import json_option, vessel_option, warehouse_option
+from workbench.terminal import number, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from flows.rerun_all import Verification
+    from flows.rerun_set import Rerun
+    from warehouse.store import Warehouse
 
 
 @click.command("rerun")
-@click.argument("set_id")
+@click.argument("set_id", required=False)
+@click.option("--all", "all_sets", is_flag=True, help="Every parameter set, or with --vessel every one of hers.")
+@click.option(
+    "--verify/--preview",
+    default=True,
+    show_default=True,
+    help="With --all: hold every set against itself, built again; or say which sets the present code would move.",
+)
+@vessel_option(multiple=True)
 @click.option("--tolerance", type=float, default=1e-9, show_default=True, help="Relative; what still counts as equal.")
+@click.option("--afresh", is_flag=True, help="With --all: also sets that this code has verified before.")
+@click.option("--fail-above", type=float, metavar="X", help="With --preview: exit code 5 above X standard errors.")
 @warehouse_option
 @json_option
-def command(set_id: str, tolerance: float, uri: str, as_json: bool) -> None:
+def command(
+    set_id: str | None,
+    all_sets: bool,
+    verify: bool,
+    vessel: tuple[str, ...],
+    tolerance: float,
+    afresh: bool,
+    fail_above: float | None,
+    uri: str,
+    as_json: bool,
+) -> None:
     """Build a parameter set again from the raw bytes and say whether it is the same, bit for bit.
 
-    Exit code 5 where it is different.
+    Exit code 5 where one is different, 3 where one of --all cannot be built again. Interrupted, --all goes on where it
+    stopped when it is called again.
     """
-    from flows.rerun_set import rerun
     from warehouse.store import Warehouse
 
-    result = rerun(Warehouse(uri), set_id, tolerance)
+    if all_sets == (set_id is not None):
+        raise UsageError(
+            "one_or_all",
+            "Either one parameter set or --all was expected, found " + ("both." if all_sets else "neither."),
+            "Give the id of one, as `kempf params list` shows it, or --all.",
+        )
+    if not all_sets and (vessel or not verify or afresh):
+        raise UsageError("only_with_all", "--vessel, --preview and --afresh go with --all.", "Add --all, leave out ID.")
+    if fail_above is not None and verify:
+        raise UsageError("only_with_preview", "--fail-above goes with --preview.", "Add --preview, or leave it out.")
+    warehouse, vessels = Warehouse(uri), sorted(set(vessel))
+    if set_id is not None:
+        _one(warehouse, set_id, tolerance, as_json=as_json)
+    elif verify:
+        _verify(warehouse, vessels, tolerance, afresh=afresh, as_json=as_json)
+    else:
+        from workbench.cli.rerun_preview import preview
+
+        preview(warehouse, vessels, fail_above, as_json=as_json)
+
+
+def _one(warehouse: Warehouse, set_id: str, tolerance: float, *, as_json: bool) -> None:
+    from flows.rerun_set import rerun
+
+    result = rerun(warehouse, set_id, tolerance)
     if as_json:
         print_json(result.show())
     else:
-        click.echo(f"{result.parameter_set_id}: {result.verdict}")
-        if result.code_changed:
-            click.echo("  the code is not the one that made it")
-        for name, (then, now) in result.packages_changed.items():
-            click.echo(f"  {name} was {then}, is {now}")
-        if result.differences:
-            rows = [[d.field, str(d.stored), str(d.rebuilt), number(d.relative)] for d in result.differences[:20]]
-            print_table(["field", "stored", "rebuilt", "relative"], rows)
+        _tell(result)
     if result.verdict == "different":
         sys.exit(ThresholdExceeded.exit_code)
+
+
+def _tell(result: Rerun) -> None:
+    click.echo(f"{result.parameter_set_id}: {result.verdict}")
+    if result.code_changed:
+        click.echo("  the code is not the one that made it")
+    for name, (then, now) in result.packages_changed.items():
+        click.echo(f"  {name} was {then}, is {now}")
+    if result.differences:
+        rows = [[d.field, str(d.stored), str(d.rebuilt), number(d.relative)] for d in result.differences[:20]]
+        print_table(["field", "stored", "rebuilt", "relative"], rows)
+
+
+def _verify(warehouse: Warehouse, vessels: list[str], tolerance: float, *, afresh: bool, as_json: bool) -> None:
+    from flows.rerun_all import verify_all
+
+    with progress() as tell:
+        found = verify_all(warehouse, vessels, tolerance, afresh=afresh, progress=tell)
+    if as_json:
+        print_json(found.show())
+    else:
+        _tell_all(found)
+    counts = found.counts()
+    if counts["failed"]:
+        sys.exit(DataRejected.exit_code)
+    if counts["different"]:
+        sys.exit(ThresholdExceeded.exit_code)
+
+
+def _tell_all(found: Verification) -> None:
+    this, other = found.counts(code_changed=False), found.counts(code_changed=True)
+    rows = [[verdict, str(n), str(this[verdict]), str(other[verdict])] for verdict, n in found.counts().items()]
+    print_table(["verdict", "sets", "of this code", "of other code"], rows)
+    before = sum(v.known_before for v in found.verdicts)
+    if before:
+        click.echo(f"{before} of these were verified before by this code; --afresh builds them again, too.")
+    for one in found.verdicts:
+        if one.error is not None:
+            click.echo(f"{one.vessel}, {one.parameter_set_id}: {one.error.message} {one.error.next_step}", err=True)
+        elif one.verdict == "different":
+            fields = ", ".join(str(d["field"]) for d in one.told[:3])
+            more = f" and {one.differences - 3} more" if one.differences > 3 else ""
+            click.echo(f"{one.vessel}, {one.parameter_set_id}: different in {fields}{more}")

@@ -21,7 +21,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("c", "rad", 0.0, 0.2, (0.005,), "standard deviation of the yaw from waves"),
         Parameter(
-            "k", "1", 0.3, 6.0, (1.0, 1.7, 2.8), "frequency of encounter over the square root of gravity by length"
+            "k", "1", 0.7, 6.0, (1.0, 1.7, 2.8), "frequency of encounter over the square root of gravity by length"
         ),
     ),
     terms={"heading": "m1", "yaw_rate": "m2"},

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from pipeline.model.lanes import ONE
 from pipeline.model.ship import mariner_like
 from pipeline.model.terms.effect import Effect
 from pipeline.model.terms.expression import compiled
@@ -96,11 +97,11 @@ def run(program: Program, values: Float) -> Float:
         Of every variable, in the order of `pipeline.model.terms.symbols.SYMBOLS`, then parameters.
     """
     width = len(STATE_SYMBOLS)
-    slopes = np.zeros((values.size, width))
-    slopes[:width] = np.eye(width)
-    stack = np.zeros((DEPTH, width + 1))
-    evaluate(program.code, program.constants, values, slopes, stack, width)
-    result: Float = stack[0]
+    slopes = np.zeros((values.size, width, 1))
+    slopes[:width, :, 0] = np.eye(width)
+    stack = np.zeros((DEPTH, width + 1, 1))
+    evaluate(program.code, program.constants, values[:, None], slopes, stack, np.zeros((2, 1)), width, ONE)
+    result: Float = stack[0, :, 0]
     return result
 
 

@@ -1,0 +1,104 @@
+"""JSON messages, read in columns; a message that is no JSON object costs only itself."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.ingest.json_walk import ABSENT, NUMBER, OTHER, TEXT, walk
+from pipeline.ingest.message_columns import Columns
+from pipeline.ingest.numerals import number
+from pipeline.ingest.spans import Spans
+
+#: A tree of field names; the leaves are empty.
+Tree = dict[str, "Tree"]
+
+
+class JsonReader:
+    """Reads fields of JSON messages.
+
+    Parameters
+    ----------
+    wanted : list of str
+        Fields, nested ones with dots.
+    """
+
+    def __init__(self, wanted: list[str]) -> None:
+        self._paths = [name.split(".") for name in wanted]
+        tree: Tree = {}
+        for path in self._paths:
+            node = tree
+            for part in path:
+                node = node.setdefault(part, {})
+        self._nodes, self._keys = _flat(tree, self._paths)
+        #: a JSON schema need not name every field: what is missing shows in the messages
+        self.missing: dict[str, str] = {}
+
+    def read(self, payloads: Spans) -> Columns:
+        """Return the wanted fields of messages; numbers as text are numbers, null is absent.
+
+        Parameters
+        ----------
+        payloads : Spans
+            Shape (m,).
+        """
+        m, k = len(payloads), len(self._paths)
+        columns = Columns.empty(k, m)
+        found, value = np.zeros((m, k, 3), dtype=np.int64), np.zeros((m, k))
+        walk(payloads.buffer, payloads.start, payloads.stop, self._nodes.copy(), self._keys, found, value, columns.good)
+        kind, first, last = found[..., 0], found[..., 1], found[..., 2]
+        for i in np.flatnonzero(~columns.good):
+            payload = payloads.buffer[payloads.start[i] : payloads.stop[i]].tobytes()
+            columns.good[i] = self._slow(payload, kind[i], value[i])
+        value[kind != NUMBER] = np.nan
+        for slot in range(k):
+            text = np.flatnonzero((kind[:, slot] == TEXT) & columns.good)
+            if text.size:
+                # ascending, as stretches of one buffer are
+                value[text, slot] = number(Spans(payloads.buffer, first[text, slot], last[text, slot]).text())
+        columns.value[:] = value.T
+        columns.present[:] = (kind != ABSENT).T & columns.good
+        return columns
+
+    def _slow(self, payload: bytes, kind: NDArray[np.int64], value: NDArray[np.float64]) -> bool:
+        """Read one message by Python's own reader."""
+        kind[:] = ABSENT
+        try:
+            message = json.loads(payload)
+        except (ValueError, RecursionError):
+            return False
+        if not isinstance(message, dict):
+            return False
+        for slot, path in enumerate(self._paths):
+            kind[slot], value[slot] = _leaf(message, path)
+        return True
+
+
+def _leaf(value: Any, path: list[str]) -> tuple[int, float]:
+    for part in path:
+        value = value.get(part) if isinstance(value, dict) else None
+    if value is None:
+        return ABSENT, np.nan
+    if isinstance(value, bool) or not isinstance(value, int | float | str):
+        return OTHER, np.nan
+    try:
+        read = float(value)
+    except (ValueError, OverflowError):
+        return OTHER, np.nan
+    return NUMBER, read if np.isfinite(read) else np.nan
+
+
+def _flat(tree: Tree, paths: list[list[str]]) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
+    """Lay a tree out as `pipeline.ingest.json_walk.walk` wants it: the children of a node stand behind each other."""
+    nodes: list[tuple[Tree, bytes, tuple[str, ...]]] = [(tree, b"", ())]
+    slots = {tuple(path): slot for slot, path in enumerate(paths)}
+    rows, at = [], 0
+    for own, key, path in nodes:
+        rows.append((len(nodes), len(nodes) + len(own), at, at + len(key), slots.get(path, -1) if path else -1, -1))
+        nodes += [(below, name.encode(), (*path, name)) for name, below in own.items()]
+        at += len(key)
+    keys = b"".join(key for _, key, _ in nodes)
+    return np.array(rows, dtype=np.int64), np.frombuffer(keys or b"\0", dtype=np.uint8)

@@ -1,0 +1,161 @@
+"""What comes out of an MCAP file a few megabytes at a time: messages, told apart but not decoded, and what is lost.
+
+References
+----------
+MCAP specification, https://mcap.dev/spec, "Message (op=0x05)" and "Message Index (op=0x07)".
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.ingest.log_file import LogFile
+from pipeline.ingest.mcap_chunk import CHUNK_LIMIT, head_of, unpacked
+from pipeline.ingest.mcap_records import MESSAGE_INDEX
+from pipeline.ingest.mcap_walk import HEAD
+from pipeline.ingest.readings import LostStretch
+from pipeline.ingest.spans import Bytes, Index, as_bytes
+
+_MESSAGE_HEAD = np.dtype([("channel", "<u2"), ("sequence", "<u4"), ("log_time", "<u8"), ("publish_time", "<u8")])
+_INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])
+_LATEST = np.uint64(np.iinfo(np.int64).max)
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Where the bytes of messages come from, so that they can be read again.
+
+    Attributes
+    ----------
+    place, length : int
+        A record of the file with its head, or a stretch of records.
+    packed : bool
+        Whether it is a chunk, to be unpacked.
+    size : int
+        Bytes of the content.
+    """
+
+    place: int
+    length: int
+    packed: bool
+    size: int
+
+    def read(self, log: LogFile) -> Bytes:
+        """Return the content once more."""
+        data = log.read(self.place, self.length)
+        return as_bytes(unpacked(memoryview(data)[HEAD:], CHUNK_LIMIT) if self.packed else data)
+
+
+@dataclass(frozen=True, eq=False)
+class Batch:
+    """Some messages that follow each other in the file.
+
+    Attributes
+    ----------
+    content : ndarray of uint8
+        The pieces behind each other.
+    first, end : ndarray of int64, shape (m,)
+        Payloads in it; empty stretches for messages that are lost.
+    channel : ndarray of int64, shape (m,)
+        Channel ids, -1 where it cannot be told.
+    log_time, publish_time : ndarray of int64, shape (m,)
+        Nanoseconds.
+    pieces : tuple of Piece
+    lost : bool
+        Whether the messages are known from their index only.
+    """
+
+    content: Bytes
+    first: Index
+    end: Index
+    channel: NDArray[np.int64]
+    log_time: NDArray[np.int64]
+    publish_time: NDArray[np.int64]
+    pieces: tuple[Piece, ...] = ()
+    lost: bool = False
+
+
+def messages_of(content: Bytes, first: Index, end: Index, piece: Piece) -> Batch:
+    """Read the heads of messages; one too short for a head belongs to no channel.
+
+    Parameters
+    ----------
+    content : ndarray of uint8
+    first, end : ndarray of int64, shape (m,)
+        Contents of the message records.
+    piece : Piece
+        Where ``content`` comes from.
+    """
+    n, size = first.size, _MESSAGE_HEAD.itemsize
+    whole = end - first >= size
+    head = np.zeros(n, dtype=_MESSAGE_HEAD)
+    if whole.any():
+        head[whole] = np.ascontiguousarray(content[first[whole][:, None] + np.arange(size)]).view(_MESSAGE_HEAD)[:, 0]
+    channel = np.where(whole, head["channel"].astype(np.int64), -1)
+    log_time, publish_time = (np.minimum(head[k], _LATEST).astype(np.int64) for k in ("log_time", "publish_time"))
+    return Batch(content, np.where(whole, first + size, first), end, channel, log_time, publish_time, (piece,))
+
+
+def joined(batches: list[Batch]) -> Batch:
+    """Return batches of messages that follow each other as one."""
+    if len(batches) == 1:
+        return batches[0]
+    if not batches:
+        nothing = np.empty(0, dtype=np.int64)
+        return Batch(np.empty(0, dtype=np.uint8), nothing, nothing, nothing, nothing, nothing)
+    base = np.concatenate(([0], np.cumsum([b.content.size for b in batches])))[:-1]
+    return Batch(
+        np.concatenate([b.content for b in batches]),
+        np.concatenate([b.first + at for b, at in zip(batches, base, strict=True)]),
+        np.concatenate([b.end + at for b, at in zip(batches, base, strict=True)]),
+        np.concatenate([b.channel for b in batches]),
+        np.concatenate([b.log_time for b in batches]),
+        np.concatenate([b.publish_time for b in batches]),
+        tuple(piece for b in batches for piece in b.pieces),
+    )
+
+
+def lost_chunk(log: LogFile, place: int, length: int, why: str) -> tuple[Batch, LostStretch]:
+    """Stand in for a chunk that cannot be read: its messages by the index behind it, or one where there is none.
+
+    Parameters
+    ----------
+    log : LogFile
+    place, length : int
+        The chunk's record, with its head.
+    why : str
+    """
+    channel, time = _indexed(log, place + length)
+    head = head_of(log.read(place + HEAD, min(length - HEAD, 64)))
+    since = until = None
+    if time.size:
+        since, until = int(time.min()), int(time.max())
+    elif head is not None and 0 < head.since_ns <= head.until_ns <= int(_LATEST):
+        since, until = head.since_ns, head.until_ns
+    lost = LostStretch(since, until, int(time.size) or None, why)
+    if time.size == 0:
+        channel, time = np.full(1, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
+    nothing = np.zeros(time.size, dtype=np.int64)
+    return Batch(np.empty(0, np.uint8), nothing, nothing.copy(), channel, time, time, lost=True), lost
+
+
+def _indexed(log: LogFile, at: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return channel and log time of the messages that the indexes from a place on tell, sorted by time."""
+    channels, times = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    while len(head := log.read(at, HEAD + 6)) == HEAD + 6 and head[0] == MESSAGE_INDEX:
+        length, channel, size = struct.unpack_from("<QHI", head, 1)
+        entries = min(size, (length - 6) // _INDEX_ENTRY.itemsize) if length >= 6 else 0
+        if at + HEAD + length > log.size:
+            break
+        body = log.read(at + HEAD + 6, entries * _INDEX_ENTRY.itemsize)
+        table = np.frombuffer(body, dtype=_INDEX_ENTRY)
+        times.append(np.minimum(table["log_time"], _LATEST).astype(np.int64))
+        channels.append(np.full(entries, channel, dtype=np.int64))
+        at += HEAD + length
+    channel_of, time = np.concatenate(channels), np.concatenate(times)
+    order = np.argsort(time, kind="stable")
+    return channel_of[order], time[order]

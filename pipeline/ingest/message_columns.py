@@ -1,0 +1,59 @@
+"""What the reader of an encoding returns: some fields of many messages, each a column of numbers."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.ingest.spans import Spans
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Fields of messages.
+
+    Attributes
+    ----------
+    value : ndarray of float64, shape (k, m)
+        NaN where a field is absent, or is there and is no finite number.
+    present : ndarray of bool, shape (k, m)
+        Where the message carries the field, readable or not.
+    good : ndarray of bool, shape (m,)
+        Which messages could be decoded.
+    """
+
+    value: NDArray[np.float64]
+    present: NDArray[np.bool_]
+    good: NDArray[np.bool_]
+
+    @classmethod
+    def empty(cls, fields: int, messages: int) -> Columns:
+        """Return columns to be filled: nothing is there, no message is good."""
+        return cls(
+            np.full((fields, messages), np.nan),
+            np.zeros((fields, messages), dtype=np.bool_),
+            np.zeros(messages, dtype=np.bool_),
+        )
+
+
+class MessageReader(Protocol):
+    """Reads the fields that it was made for.
+
+    Attributes
+    ----------
+    missing : dict of str to str
+        Fields that are no number of the messages, as far as their definition tells; each with why.
+    """
+
+    missing: dict[str, str]
+
+    def read(self, payloads: Spans) -> Columns:
+        """Return the fields of messages, shape (m,) in, columns of m values out."""
+        ...
+
+
+class NoReaderError(Exception):
+    """Messages of a channel cannot be read; says why."""

@@ -1,0 +1,103 @@
+"""TAG blocks in front of NMEA sentences: where they end, their own checksum, the time of arrival they tell.
+
+The other parameters of a TAG block (source, destination, group, line count, text) carry no
+reading and are stepped over.
+
+References
+----------
+NMEA 0183 version 4.10, section 7; IEC 61162-450:2018, 7.2.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from pipeline.ingest.cells import Cells
+from pipeline.ingest.decoded import Flag, Nanoseconds
+from pipeline.ingest.iso_time import SECOND_NS
+from pipeline.ingest.nmea_checksum import checksum_right
+from pipeline.ingest.spans import Bytes, Index, Spans, first_within
+
+BACKSLASH = 92
+_COLON, _C, _COMMA, _STAR = 58, 99, 44, 42
+
+#: Seconds since 1970 that are later than this are milliseconds.
+_SECONDS_END = 100_000_000_000
+
+
+@dataclass(frozen=True, eq=False)
+class Tags:
+    """What stands between the backslashes in front of a sentence, line by line.
+
+    Attributes
+    ----------
+    start, behind : ndarray of int64, shape (n,)
+        Place of the first backslash (of the line's end where there is no block), and where the sentence may begin.
+    time_utc_ns : ndarray of int64, shape (n,)
+        Time of arrival, zero where it tells none.
+    timed : ndarray of bool, shape (n,)
+        Whether it tells one, under the right checksum.
+    broken : ndarray of bool, shape (n,)
+        Whether there is a block without its own checksum.
+    """
+
+    start: Index
+    behind: Index
+    time_utc_ns: Nanoseconds
+    timed: Flag
+    broken: Flag
+
+
+def tags_of(buffer: Bytes, prefix: Bytes, openings: Index, strokes: Index, lines: Spans) -> Tags:
+    """Find the TAG blocks of some lines.
+
+    Parameters
+    ----------
+    buffer, prefix : ndarray of uint8
+        See `pipeline.ingest.nmea_checksum.checksum_right`.
+    openings, strokes : ndarray of int64
+        Places of ``$`` or ``!``, and of backslashes, ascending.
+    lines : Spans
+
+    Returns
+    -------
+    Tags
+    """
+    n = len(lines)
+    none = np.zeros(n, dtype=np.bool_)
+    tags = Tags(lines.stop, lines.start, np.zeros(n, dtype=np.int64), none, none.copy())
+    if strokes.size == 0:
+        return tags
+    opening = first_within(strokes, lines.start, lines.stop)
+    sentence = first_within(openings, lines.start, lines.stop)
+    tagged = (opening >= 0) & ((sentence < 0) | (opening < sentence))
+    closing = first_within(strokes, np.where(tagged, opening + 1, lines.stop), lines.stop)
+    tagged &= closing >= 0
+    at = np.flatnonzero(tagged)
+    opening, closing = opening[at], closing[at]
+    star = closing - 3
+    right = (star > opening) & (buffer[star] == _STAR) & checksum_right(buffer, prefix, opening, star)
+    start, behind, broken = lines.stop.copy(), lines.start.copy(), none
+    start[at], behind[at] = opening, closing + 1
+    broken[at] = ~right
+    time, timed = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
+    time[at[right]], timed[at[right]] = _times(buffer, opening[right], star[right])
+    return Tags(start, behind, time, timed, broken)
+
+
+def _times(buffer: Bytes, opening: Index, star: Index) -> tuple[Nanoseconds, Flag]:
+    """Read the parameter c: seconds since 1970, which many loggers write in milliseconds."""
+    colon = np.flatnonzero(buffer == _COLON)
+    colon = colon[colon >= 2]
+    front = buffer[colon - 2]
+    colon = colon[(buffer[colon - 1] == _C) & ((front == BACKSLASH) | (front == _COMMA))]
+    ends = np.flatnonzero((buffer == _COMMA) | (buffer == _STAR))
+    told = first_within(colon, opening, star)
+    stop = first_within(ends, np.where(told >= 0, told, star), star + 1)
+    timed = (told >= 0) & (stop >= 0)
+    value, whole = Cells(buffer, np.where(timed, told + 1, 0), np.where(timed, stop, 0)).integer()
+    timed &= whole & (value < 1000 * _SECONDS_END)
+    milliseconds = np.where(value > _SECONDS_END, value, value * 1000)
+    return np.where(timed, milliseconds * (SECOND_NS // 1000), 0), timed

@@ -1,0 +1,122 @@
+"""Protobuf messages, read in columns by the descriptor that stands in the file.
+
+References
+----------
+Protocol Buffers, https://protobuf.dev/programming-guides/field_presence.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pipeline.ingest.message_columns import Columns, NoReaderError
+from pipeline.ingest.protobuf_definition import MESSAGE_TYPE, NUMBERS, ProtoField, ProtoTypes, proto_types_of
+from pipeline.ingest.protobuf_walk import DEEPEST, LENGTH, NARROW, VARINT, WIDE, walk
+from pipeline.ingest.spans import Spans
+
+_WIRE = {"f8": WIDE, "u8": WIDE, "i8": WIDE, "f4": NARROW, "u4": NARROW, "i4": NARROW}
+
+
+class ProtobufReader:
+    """Reads fields of protobuf messages of one type.
+
+    Parameters
+    ----------
+    name : str
+        Full name of the message.
+    descriptor_set : bytes
+        Content of the schema record.
+    wanted : list of str
+        Fields, nested ones with dots.
+
+    Raises
+    ------
+    NoReaderError
+        The descriptor cannot be read.
+    """
+
+    def __init__(self, name: str, descriptor_set: bytes, wanted: list[str]) -> None:
+        types = proto_types_of(descriptor_set)
+        if f".{name}" not in types:
+            raise NoReaderError(f"its descriptor has no message {name}")
+        self._kinds = [""] * len(wanted)
+        self._parent = np.full(len(wanted), -1, dtype=np.int64)
+        self._nodes: list[list[tuple[int, int, int, int]]] = [[]]
+        self.missing: dict[str, str] = {}
+        below: dict[tuple[str, ...], int] = {(): 0}
+        for slot, key in enumerate(wanted):
+            if why := self._add(types, f".{name}", tuple(key.split(".")), slot, below):
+                self.missing[key] = why
+        flat = [row for node in self._nodes for row in node]
+        self._rows = np.array(flat, dtype=np.int64).reshape(-1, 4)
+        self._row_of = np.cumsum([0] + [len(node) for node in self._nodes]).astype(np.int64)
+
+    def _add(
+        self, types: ProtoTypes, name: str, path: tuple[str, ...], slot: int, below: dict[tuple[str, ...], int]
+    ) -> str:
+        """Add the way to one field to the tree of messages that are entered; return why there is none."""
+        if len(path) > DEEPEST:
+            return "it is nested too deep"
+        chain: list[ProtoField] = []
+        for part in path:
+            own = types.get(name, {}).get(part)
+            if own is None:
+                return f"{name[1:] or path[0]} has no field {part}"
+            if own.repeated:
+                return f"{name[1:]}.{part} is a list of any length"
+            chain.append(own)
+            name = own.type_name if own.kind == MESSAGE_TYPE else ""
+        last = chain[-1]
+        if last.kind not in NUMBERS:
+            return f"{'.'.join(path)} is not a number"
+        for depth, own in enumerate(chain[:-1], start=1):
+            if path[:depth] not in below:
+                below[path[:depth]] = len(self._nodes)
+                self._nodes[below[path[: depth - 1]]].append((own.number, LENGTH, -1, len(self._nodes)))
+                self._nodes.append([])
+        self._kinds[slot] = NUMBERS[last.kind]
+        node = below[path[:-1]]
+        self._nodes[node].append((last.number, _WIRE.get(self._kinds[slot], VARINT), slot, 0))
+        if last.implicit:
+            self._parent[slot] = node
+        return ""
+
+    def read(self, payloads: Spans) -> Columns:
+        """Return the wanted fields of messages; a proto3 field that is left out is zero where its message is there.
+
+        Parameters
+        ----------
+        payloads : Spans
+            Shape (m,).
+        """
+        m, k = len(payloads), len(self._kinds)
+        found = Columns.empty(k, m)
+        bits = np.zeros((m, k), dtype=np.uint64)
+        present = np.zeros((m, k), dtype=np.bool_)
+        entered = np.zeros((m, len(self._nodes)), dtype=np.bool_)
+        walk(
+            payloads.buffer, payloads.start, payloads.stop, self._rows, self._row_of, bits, present, entered, found.good
+        )
+        for slot, kind in enumerate(self._kinds):
+            there = present[:, slot].copy()
+            if self._parent[slot] >= 0:
+                there |= entered[:, self._parent[slot]]
+            there &= found.good
+            found.present[slot] = there
+            if kind:
+                found.value[slot] = np.where(there, _numbers(bits[:, slot], kind), np.nan)
+        return found
+
+
+def _numbers(bits: NDArray[np.uint64], kind: str) -> NDArray[np.float64]:
+    """Return wire values as numbers."""
+    if kind == "uint":
+        return bits.astype(np.float64)
+    if kind == "int":
+        return bits.view(np.int64).astype(np.float64)
+    if kind == "zigzag":
+        half = (bits >> np.uint64(1)).view(np.int64)
+        return np.where(bits & np.uint64(1) == 1, ~half, half).astype(np.float64)
+    dtype = np.dtype(kind)
+    return bits.astype(f"<u{dtype.itemsize}").view(dtype.newbyteorder("<")).astype(np.float64)

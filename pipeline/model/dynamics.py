@@ -1,0 +1,106 @@
+"""What moves the ship of eq. (16) and what effects add to it: dx/dt with its derivatives, compiled.
+
+Everything stands in lanes (`pipeline.model.lanes`). Terms of effects are programs (`pipeline.model.terms.program`),
+added to what their kind says: to the speed and the rudder that the hull feels, to sway and yaw, to states of their own.
+"""
+
+from __future__ import annotations
+
+from pipeline.compiled import FILLING, njit
+from pipeline.model.lanes import each
+from pipeline.model.terms.program import evaluate
+from pipeline.model.terms.symbols import SYMBOLS
+
+#: places of symbols among the variables; states come first, in the filter's order
+DELTA, SPEED, VDOT, RDOT = (SYMBOLS.index(name) for name in ("delta", "V", "vdot", "rdot"))
+SHIP, CHANNEL, PARAMETER = SYMBOLS.index("a11"), SYMBOLS.index("U"), len(SYMBOLS)
+#: columns of the input table: V, delta, and the symbols of channels and of the run
+N_INPUT = 2 + PARAMETER - CHANNEL
+#: states before those of effects, and after
+N_BEFORE, N_AFTER, MOST_EXTRA = 5, 3, 4
+V, R, PSI, F, M = 0, 1, 2, 3, 4
+#: what a program is added to
+ON_SPEED, ON_RUDDER, ON_SWAY, ON_YAW, ON_EXTRA, ON_LATERAL, ON_YAW_RATE, ON_HEADING = 0, 1, 2, 3, 4, 5, 6, 7
+ON_NOISE, ON_INITIAL = 8, 9
+
+
+@njit(**FILLING)
+def add_programs(  # type: ignore[no-untyped-def]
+    kind, place, table, values, slopes, stack, by, width, total, lanes
+):
+    """Fill ``total``, shape (1 + width, lanes), with the sum of all programs of a kind (and place, for extra states).
+
+    Return whether there is any.
+    """
+    programs, code, constants = table
+    for j in range(width + 1):
+        for b in range(each(lanes)):
+            total[j, b] = 0.0
+    found = False
+    for p in range(programs.shape[0]):
+        if programs[p, 0] == kind and programs[p, 1] == place:
+            found = True
+            evaluate(code[programs[p, 2] : programs[p, 3]], constants, values, slopes, stack, by, width, lanes)
+            for j in range(width + 1):
+                for b in range(each(lanes)):
+                    total[j, b] += stack[0, j, b]
+    return found
+
+
+@njit(**FILLING)
+def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
+    x, row, rudder, ship, width, carried, table, values, slopes, stack, by, total, f, J, lanes
+):
+    """Fill f = dx/dt of chain and effects' states, shape (width, lanes), and its derivatives J, (width, width, lanes).
+
+    ``carried`` is ``width``, or 0 where J is not wanted.
+    """
+    hull, (arm, mu_F, mu_M, exponent, V0) = ship
+    busy = table[0].shape[0] > 0
+    for b in range(each(lanes)):
+        values[SPEED, b], values[DELTA, b] = row[0], rudder[b]
+    if busy:
+        for i in range(width):
+            for b in range(each(lanes)):
+                values[i, b] = x[i, b]
+        for i in range(N_INPUT - 2):
+            for b in range(each(lanes)):
+                values[CHANNEL + i, b] = row[2 + i]
+        for j in range(carried):
+            for b in range(each(lanes)):
+                slopes[SPEED, j, b] = slopes[DELTA, j, b] = 0.0
+        for kind in range(2):
+            where = SPEED if kind == 0 else DELTA
+            if add_programs(kind, 0, table, values, slopes, stack, by, carried, total, lanes):
+                for b in range(each(lanes)):
+                    values[where, b] += total[0, b]
+                    for j in range(carried):
+                        slopes[where, j, b] = total[j + 1, b]
+    for b in range(each(lanes)):
+        U, delta = values[SPEED, b], values[DELTA, b]
+        square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
+        v, r, force = x[V, b], x[R, b], x[F, b]
+        f[V, b] = hull[0, b] * U * v + hull[1, b] * U * r + hull[4, b] * square * delta + force
+        f[R, b] = hull[2, b] * U * v + hull[3, b] * U * r + hull[5, b] * square * delta + arm * force + x[M, b]
+        f[PSI, b], f[F, b], f[M, b] = r, -mu_F * force, -mu_M * x[M, b]
+    if carried > 0:
+        J[:, :, :] = 0.0
+        for b in range(each(lanes)):
+            U = values[SPEED, b]
+            square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
+            J[V, V, b], J[V, R, b], J[V, F, b] = hull[0, b] * U, hull[1, b] * U, 1.0
+            J[R, V, b], J[R, R, b], J[R, F, b], J[R, M, b] = hull[2, b] * U, hull[3, b] * U, arm, 1.0
+            J[PSI, R, b], J[F, F, b], J[M, M, b] = 1.0, -mu_F, -mu_M
+            for j in range(width):
+                J[V, j, b] += hull[4, b] * square * slopes[DELTA, j, b]
+                J[R, j, b] += hull[5, b] * square * slopes[DELTA, j, b]
+    if busy:
+        for kind in range(2 + width - N_BEFORE):
+            target = kind if kind < 2 else N_BEFORE + kind - 2
+            on, place = (ON_SWAY + kind, 0) if kind < 2 else (ON_EXTRA, kind - 2)
+            add_programs(on, place, table, values, slopes, stack, by, carried, total, lanes)
+            for b in range(each(lanes)):
+                f[target, b] = total[0, b] + (f[target, b] if kind < 2 else 0.0)
+            for j in range(carried):
+                for b in range(each(lanes)):
+                    J[target, j, b] += total[j + 1, b]

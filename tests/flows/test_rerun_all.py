@@ -1,0 +1,207 @@
+"""Every set built again: counted, interrupted, taken up again; and what other code would move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from flows import preview_code, rerun_all
+from flows.identify_vessel import Request, build, identify_vessel
+from flows.ingest_logs import ingest
+from flows.moves import Move
+from flows.preview_code import VesselPreview, preview_all
+from flows.rerun_all import verify_all
+from schemas.errors import NotFound
+from schemas.profile import VesselProfile
+from tests.flows.content import fresh, seen
+from tests.workbench.driving import kempf, refused, tree
+from warehouse import code_version, compaction, delta, logs, parameter_sets, runs
+from warehouse.parameter_set import ParameterSet
+from warehouse.store import Warehouse
+
+LEAST_SQUARES = Request(estimator="least-squares")
+NONE = {"bit-identical": 0, "equal within tolerance": 0, "different": 0, "failed": 0}
+
+
+@pytest.fixture(scope="module")
+def _identified(harbour: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("identified") / "w"
+    warehouse = fresh(folder)
+    profile = VesselProfile.model_validate(yaml.safe_load((harbour / "profile.yaml").read_text()))
+    ingest(warehouse, [harbour / f"mariner.{end}" for end in ("nmea.gz", "csv.gz")], given=profile)
+    identify_vessel(warehouse, "mariner", LEAST_SQUARES)
+    return folder
+
+
+@pytest.fixture
+def own(_identified: Path, tmp_path: Path) -> Warehouse:
+    from shutil import copytree
+
+    return fresh(copytree(_identified, tmp_path / "w"))
+
+
+def other_code(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(code_version, "fingerprint", lambda: "f" * 16)
+    for module in ("flows.find_segments",):  # has it by name
+        monkeypatch.setattr(f"{module}.fingerprint", lambda: "f" * 16)
+
+
+def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    before = seen(own)
+    found = verify_all(own)
+    assert found.counts() == {**NONE, "bit-identical": 2}
+    assert found.counts(code_changed=True) == NONE
+    assert seen(own) == before, "verdicts are runs, and nothing else is stored"
+    assert [run.status for run in runs.all_runs(own, "rerun")] == ["bit-identical"] * 2
+    monkeypatch.setattr(rerun_all, "rebuilt", lambda *_: pytest.fail("built again"))
+    version = delta.versions(own)["runs"]
+    again = verify_all(own)
+    assert (again.counts(), again.show()["known_before"]) == (found.counts(), 2)
+    assert delta.versions(own)["runs"] == version
+    assert verify_all(own, ["mariner"], afresh=False).counts() == found.counts()
+
+
+def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    built: list[str] = []
+    real = rerun_all.rebuilt
+
+    def noted(stored: Any, *rest: Any) -> Any:
+        built.append(stored.parameter_set_id)
+        return real(stored, *rest)
+
+    def stop(done: int, total: int, what: str) -> None:
+        if done >= 1:
+            raise KeyboardInterrupt
+
+    monkeypatch.setattr(rerun_all, "rebuilt", noted)
+    with pytest.raises(KeyboardInterrupt):
+        verify_all(own, progress=stop)
+    first = set(built)
+    assert len(first) == 1
+    built.clear()
+    found = verify_all(own)
+    assert first.isdisjoint(built) and len(built) == 1
+    assert found.counts() == {**NONE, "bit-identical": 2}
+    assert found.show()["known_before"] == 1
+
+
+def test_what_differs_and_what_cannot_be_built_is_told(own: Warehouse):
+    csv = next(row for row in logs.current(own) if row.format == "delimited")
+    assert own.folder is not None
+    (own.folder / "raw" / csv.log_id[:2] / csv.log_id).unlink()
+    told = kempf("rerun", "--all", "--warehouse", own.uri, "--json")
+    assert told.code == 3 and told.json["verdicts"] == {**NONE, "bit-identical": 1, "failed": 1}
+    assert {f["error"]["code"] for f in told.json["not_identical"]} == {"no_raw_log"}
+    assert len(runs.all_runs(own, "rerun")) == 1, "what failed is tried again"
+
+
+def test_a_set_that_was_tampered_with_is_different(own: Warehouse):
+    row = delta.read(own, "parameter_sets").rows(named=True)[0]
+    name = row["parameter_set_id"]
+    row["parameters"][0]["value"] *= 1.001
+    with delta.ensured(own, "parameter_sets") as table:
+        delta.replace(table, "parameter_sets", [row], f"parameter_set_id = '{name}'")
+    told = kempf("rerun", "--all", "--verify", "--warehouse", own.uri)
+    assert told.code == 5, told
+    assert f"mariner, {name}: different in parameters.a11.value" in told.out
+
+
+def test_an_old_set_is_built_again_after_compaction_and_vacuum(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    import os
+
+    names = [s.parameter_set_id for s in parameter_sets.get_all(own, "mariner")]
+    for i in range(3):
+        runs.record(own, runs.Run("run-0", "other", None, str(i)))
+    assert own.folder is not None
+    compaction.compact(own, more_files_than=1)
+    for path in own.folder.rglob("*"):
+        os.utime(path, (1, 1))
+    compaction.vacuum(own, 0.0)
+    assert kempf("rerun", names[0], "--warehouse", own.uri).code == 0
+    assert verify_all(own).counts() == {**NONE, "bit-identical": 2}
+    pins = parameter_sets.get(own, names[-1]).provenance["table_versions"]
+    assert all(delta.read(own, name, version=v).height or name in ("aliases",) for name, v in pins.items())
+
+
+def test_code_that_changes_nothing_moves_nothing(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    assert own.folder is not None
+    before = tree(own.folder)
+    (same,) = preview_all(own)
+    assert (same.sets, same.up_to_date, same.moves) == (2, 2, ())
+    other_code(monkeypatch)
+    (found,) = preview_all(own)
+    assert (found.sets, found.up_to_date, found.identical) == (2, 0, 2)
+    assert (found.moves, found.new, found.gone, found.failures) == ((), (), (), ())
+    assert tree(own.folder) == before, "nothing is stored"
+
+
+def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    other_code(monkeypatch)
+    (bent, other) = (row.log_id for row in logs.current(own))
+    steps = {"a11": 0.3, "a12": -1.5, "b2": 0.01}
+
+    def moved(*arguments: Any) -> ParameterSet:
+        """What the present code makes, of one log so many standard errors beside it."""
+        made = build(*arguments)
+        if made.log_ids != (bent,):
+            return made
+        beside = [replace(e, value=e.value + steps.get(e.name, 0.0) * (e.std or 0.0)) for e in made.parameters]
+        return replace(made, parameters=tuple(beside))
+
+    monkeypatch.setattr("flows.identify_vessel.build", moved)
+    assert own.folder is not None
+    before = tree(own.folder)
+    told = kempf("rerun", "--all", "--preview", "--fail-above", 1.4, "--warehouse", own.uri, "--json")
+    assert tree(own.folder) == before
+    assert told.code == 5
+    assert [told.json[k] for k in ("sets", "identical", "moved", "new", "gone")] == [2, 1, 1, 0, 0]
+    found = tuple(Move(**move) for move in told.json["moves"])
+    assert [m.parameter for m in found][:3] == ["a12", "a11", "b2"], "the largest first"
+    for move in found:
+        stored = {e.name: e for e in parameter_sets.get(own, move.parameter_set_id).parameters}[move.parameter]
+        assert (move.before, move.std, move.std_ratio) == (stored.value, stored.std, 1.0)
+        assert move.in_std == pytest.approx(steps.get(move.parameter, 0.0), rel=1e-9)
+    first = told.json["parameters"][0]
+    assert (first["vessel"], first["parameter"], first["sets"]) == ("mariner", "a12", 1)
+    assert other not in {move.parameter_set_id for move in found}
+    monkeypatch.setattr(preview_code, "preview_all", lambda *_: [VesselPreview("mariner", 2, 0, 1, found)])
+    shown = kempf("rerun", "--all", "--preview", "--fail-above", 1.6, "--warehouse", own.uri)
+    assert shown.code == 0 and "1 would say the same bit for bit, 1 would move" in shown.out
+    assert shown.out.splitlines()[2].split()[:3] == ["mariner", "a12", "-1.5"]
+
+
+def test_a_vessel_that_cannot_be_previewed_stops_no_other(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    other_code(monkeypatch)
+    (row, _) = logs.current(own)
+    assert own.folder is not None
+    kept = own.folder / "raw" / row.log_id[:2] / row.log_id
+    kept.write_bytes(kept.read_bytes()[:-10])
+    (found,) = preview_all(own)
+    assert [f["error"]["code"] for f in found.failures] == ["raw_bytes_damaged"]
+    assert (found.identical, len(found.gone)) == (1, 1)
+
+    def broken(*_: Any) -> Any:
+        raise ZeroDivisionError("division by zero")
+
+    monkeypatch.setattr(preview_code, "preview", broken)
+    (failed,) = preview_all(own)
+    assert "ZeroDivisionError" in failed.failures[0]["error"]["message"]
+
+
+def test_requests_that_make_no_sense(own: Warehouse, tmp_path: Path):
+    place = ("--warehouse", own.uri, "--json")
+    refused(kempf("rerun", *place), 2, "one_or_all")
+    refused(kempf("rerun", "ps-1", "--all", *place), 2, "one_or_all")
+    refused(kempf("rerun", "ps-1", "--preview", *place), 2, "only_with_all")
+    refused(kempf("rerun", "--all", "--fail-above", 1, *place), 2, "only_with_preview")
+    refused(kempf("rerun", "--all", "--vessel", "nobody", *place), 4, "no_vessel")
+    for asked in ("--verify", "--preview"):
+        with_none = kempf("rerun", "--all", asked, "--warehouse", tmp_path / "none", "--json")
+        refused(with_none, 4, "no_warehouse")
+    refused(kempf("compact", "--warehouse", tmp_path / "none", "--json"), 4, "no_warehouse")
+    with pytest.raises(NotFound):
+        verify_all(fresh(tmp_path / "none"))

@@ -1,0 +1,35 @@
+"""The fuzzing of the readers in a form that takes seconds; `python -m benchmarks.fuzz` takes as long as one likes."""
+
+import pytest
+from mcap.writer import CompressionType
+
+from benchmarks.fuzzing.campaign import run
+from benchmarks.fuzzing.corpus import READERS, START_NS, mcap_log
+from benchmarks.fuzzing.whole_chunks import vouched_times
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_damaged_inputs_crash_nothing_and_no_failed_checksum_is_accepted(reader):
+    found = run(reader, 1, seconds=1.5, iterations=150)
+    assert [(one.what, one.name, one.data[:500]) for one in found.findings] == []
+    assert found.iterations > 20
+    assert len(found.outcomes) > 3
+
+
+def test_a_reader_that_accepts_any_checksum_is_found_out(monkeypatch):
+    from pipeline.ingest import nmea_frames
+
+    monkeypatch.setattr(nmea_frames, "checksum_right", lambda buffer, prefix, first, star: star > first)
+    with pytest.raises(AssertionError, match="kept under a wrong checksum"):
+        run("nmea", 1, iterations=0)
+
+
+def test_a_chunk_that_fails_its_checksum_vouches_for_none_of_its_messages():
+    data = mcap_log(compression=CompressionType.NONE)
+    whole = vouched_times(data)
+    assert len(whole) == 80
+    damaged = bytearray(data)
+    damaged[data.index(b'"heading": 90')] ^= 1
+    lost = whole - vouched_times(bytes(damaged))
+    assert START_NS + 10 * 100_000_000 in lost
+    assert 1 < len(lost) < 20

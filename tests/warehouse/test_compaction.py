@@ -1,0 +1,147 @@
+"""Compacting and vacuuming: the past that counts stays, what nobody refers to goes."""
+
+from __future__ import annotations
+
+import os
+import time
+from datetime import UTC, datetime
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from schemas.errors import KempfError, NotFound
+from schemas.tables import TABLES, arrow_schema
+from tests.warehouse.samples import START_NS, delivery, inputs, parameter_set, segment
+from warehouse import aliases, compaction, delta, history, logs, parameter_sets, readings, runs, segments
+from warehouse.deposit import deposit
+from warehouse.provenance import collect
+from warehouse.store import Warehouse
+
+
+def content(warehouse: Warehouse, versions: dict[str, int] | None = None) -> dict[str, list[str]]:
+    """What tables say, at versions or now, whatever the order."""
+    at: dict[str, int | None] = dict(versions) if versions is not None else dict.fromkeys(delta.versions(warehouse))
+    return {n: sorted(map(repr, delta.read(warehouse, n, version=v).rows())) for n, v in at.items()}
+
+
+def lived_in(warehouse: Warehouse) -> list[dict[str, int]]:
+    """Four rounds of a log, its segment, a set, an alias, a run; return the versions that the sets were made from."""
+    pins = []
+    for i in range(4):
+        (stored,) = deposit(warehouse, [delivery("aurora", f"log {i}".encode())])
+        for start in (START_NS, START_NS + 10**9):  # found, then found otherwise: rows of no version that counts
+            found = [segment("aurora", stored.log_id, stored.ingest_id, start)]
+            segments.replace(warehouse, "aurora", {stored.ingest_id: found})
+        asked = inputs(stored.log_id, START_NS + i)
+        told = collect(warehouse, asked, [stored.ingest_id])
+        made = parameter_set("aurora", asked, provenance=told)
+        parameter_sets.insert(warehouse, [made])
+        aliases.point(warehouse, "aurora", made.parameter_set_id)
+        runs.record(warehouse, runs.Run("run-1", "reprocess", "aurora", f"round {i}"))
+        pins.append(told["table_versions"])
+    return pins
+
+
+def aged(warehouse: Warehouse) -> None:
+    """Let every file look a year old, so that only what the log of commits says can save it."""
+    assert warehouse.folder is not None
+    then = time.time() - 365 * 86400
+    for path in warehouse.folder.rglob("*"):
+        if path.is_file():
+            os.utime(path, (then, then))
+
+
+def test_what_a_parameter_set_refers_to_survives(warehouse: Warehouse) -> None:
+    pins = lived_in(warehouse)
+    now = content(warehouse)
+    then = [content(warehouse, at) for at in pins]
+    orphan = Path(str(warehouse.folder)) / "readings" / "part-of-nothing.parquet"
+    orphan.write_bytes(b"written, never committed")
+    half = Path(str(warehouse.folder)) / "raw" / "ab" / ".abcd.0123456789abcdef"
+    half.parent.mkdir(exist_ok=True)
+    half.write_bytes(b"half of a log")
+    compacted = compaction.compact(warehouse, more_files_than=1)
+    assert {"logs", "segments", "parameter_sets"} <= set(compacted)
+    time.sleep(0.05)
+    aged(warehouse)
+    said = {one.table: one for one in compaction.vacuum(warehouse, 0.0, dry_run=True)}
+    assert orphan.exists() and half.exists()
+    done = {one.table: one for one in compaction.vacuum(warehouse, 0.0)}
+    assert {n: one.files for n, one in done.items()} == {n: one.files for n, one in said.items()}
+    assert done["readings"].files == 1 and done["raw"].files == 1 and done["segments"].files >= 4
+    assert all(one.size_bytes > 0 for one in done.values() if one.files)
+    assert not orphan.exists() and not half.exists()
+    assert content(warehouse) == now
+    assert [content(warehouse, at) for at in pins] == then
+    assert compaction.pinned(warehouse) == {
+        name: tuple(sorted({at[name] for at in pins if name in at})) for name in sorted(set().union(*pins))
+    }
+    again = compaction.vacuum(warehouse, 0.0)
+    assert sum(one.files for one in again) == 0, "what was to go has gone"
+
+
+def test_every_moment_of_the_history_survives(warehouse: Warehouse) -> None:
+    moments = [datetime.now(UTC)]
+    for i in range(5):
+        parameter_sets.insert(warehouse, [parameter_set("aurora", inputs(start_utc_ns=START_NS + i))])
+        time.sleep(0.01)
+        moments.append(datetime.now(UTC))
+    compaction.compact(warehouse, more_files_than=1)
+    aged(warehouse)
+    compaction.vacuum(warehouse, 0.0)
+    known = [
+        history.of_vessel(warehouse, "aurora", as_of=moment).frame["parameter_set_id"].n_unique()
+        for moment in moments[1:]
+    ]
+    assert known == [1, 2, 3, 4, 5]
+
+
+def test_young_files_are_left_to_their_writers(warehouse: Warehouse) -> None:
+    lived_in(warehouse)
+    young = Path(str(warehouse.folder)) / "logs" / "part-of-a-writer-at-work.parquet"
+    young.write_bytes(b"not yet committed")
+    done = compaction.vacuum(warehouse)
+    assert sum(one.files for one in done) == 0
+    assert young.exists()
+
+
+def test_compaction_keeps_units_rows_and_readers(warehouse: Warehouse) -> None:
+    lived_in(warehouse)
+    before = content(warehouse)
+    assert compaction.compact(warehouse, more_files_than=1)
+    assert content(warehouse) == before
+    table = delta.open_table(warehouse, "parameter_sets")
+    assert table is not None
+    (uri,) = table.file_uris()
+    import pyarrow.parquet as pq
+
+    wanted = arrow_schema(TABLES["parameter_sets"])
+    for field in table.schema().fields:
+        assert {k.encode(): v.encode() for k, v in field.metadata.items()} == wanted.field(field.name).metadata
+    assert pl.read_parquet(uri).height == 4
+    assert pq.read_metadata(uri).row_group(0).column(0).compression == "ZSTD"
+    assert len(logs.current(warehouse)) == 4
+    assert all(readings.read(warehouse, row.ingest_id).height == 5 for row in logs.current(warehouse))
+    assert compaction.compact(warehouse, more_files_than=1) == (), "nothing is left to do"
+
+
+def test_sets_newer_than_their_tables_stop_it(warehouse: Warehouse) -> None:
+    lived_in(warehouse)
+    told = parameter_set("aurora", inputs(settings={"of": "another"}), provenance={"table_versions": {"segments": 99}})
+    parameter_sets.insert(warehouse, [told])
+    aged(warehouse)
+    before = sorted(p.name for p in Path(str(warehouse.folder)).rglob("*.parquet"))
+    with pytest.raises(KempfError) as caught:
+        compaction.vacuum(warehouse, 0.0)
+    assert caught.value.code == "version_lost"
+    after = sorted(p.name for p in Path(str(warehouse.folder)).rglob("*.parquet"))
+    assert after == before
+
+
+def test_nothing_to_compact(warehouse: Warehouse) -> None:
+    with pytest.raises(NotFound):
+        compaction.vacuum(warehouse)
+    warehouse.create()
+    assert compaction.compact(warehouse) == ()
+    assert [one.table for one in compaction.vacuum(warehouse)] == ["raw"]

@@ -1,0 +1,91 @@
+"""Tables kept open: never stale, never shared, never of another folder."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import pytest
+
+from warehouse import delta, handles, runs
+from warehouse.store import Warehouse
+
+ROOT = Path(__file__).parents[2]
+
+
+def put(warehouse: Warehouse, status: str, name: str = "run-1") -> None:
+    runs.record(warehouse, runs.Run(name, "ingest", None, status))
+
+
+def stands(warehouse: Warehouse) -> dict[str, str]:
+    return {run.run_id: run.status for run in runs.all_runs(warehouse)}
+
+
+def test_a_handle_is_used_again(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    put(warehouse, "one")
+    assert stands(warehouse) == {"run-1": "one"}
+    monkeypatch.setattr(delta, "open_table", lambda *_: pytest.fail("opened anew"))
+    assert stands(warehouse) == {"run-1": "one"}
+    put(warehouse, "two")
+    assert stands(warehouse) == {"run-1": "two"}
+
+
+def test_what_another_process_wrote_is_seen(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    assert stands(warehouse) == {"run-1": "one"}
+    code = (
+        "from warehouse import runs; from warehouse.store import Warehouse\n"
+        f"runs.record(Warehouse({warehouse.uri!r}), runs.Run('run-1', 'ingest', None, 'two'))"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, timeout=60)
+    assert stands(warehouse) == {"run-1": "two"}
+
+
+def test_a_folder_that_was_replaced_is_opened_anew(warehouse: Warehouse, tmp_path: Path) -> None:
+    assert warehouse.folder is not None
+    put(warehouse, "one")
+    early = Path(shutil.copytree(warehouse.folder, tmp_path / "early"))
+    put(warehouse, "two")
+    late = Path(shutil.copytree(warehouse.folder, tmp_path / "late"))
+    assert stands(warehouse) == {"run-1": "two"}
+    for copy, status in ((early, "one"), (late, "two")):
+        shutil.rmtree(warehouse.folder)
+        shutil.copytree(copy, warehouse.folder)
+        assert stands(warehouse) == {"run-1": status}
+    shutil.rmtree(warehouse.folder)
+    warehouse.create()
+    assert stands(warehouse) == {}
+
+
+def test_nobody_shares_a_handle(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    with delta.reading(warehouse, "runs") as first, delta.reading(warehouse, "runs") as second:
+        assert first is not second
+        assert first is not None and second is not None
+        put(warehouse, "two")
+        with delta.reading(warehouse, "runs") as third:
+            assert third is not None
+            assert third.version() == first.version() + 1 == second.version() + 1
+
+
+def test_one_over_which_something_went_wrong_is_not_kept(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    with delta.reading(warehouse, "runs") as held:
+        pass
+    with pytest.raises(ZeroDivisionError), delta.reading(warehouse, "runs") as bad:
+        raise ZeroDivisionError
+    assert bad is held, "it was the one that was kept"
+    with delta.reading(warehouse, "runs") as next_one:
+        assert next_one is not bad
+
+
+def test_many_threads_lose_nothing(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    with ThreadPoolExecutor(8) as pool:
+        list(pool.map(lambda i: put(warehouse, "done", f"run-{i}"), range(2, 14)))
+        seen = list(pool.map(lambda _: len(stands(warehouse)), range(8)))
+    assert seen == [13] * 8
+    assert len(handles._kept) <= handles.MOST

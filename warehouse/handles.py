@@ -1,0 +1,84 @@
+"""Open tables kept between readings: one of many files takes long to open anew and next to nothing to bring up to date.
+
+A handle is lent to one borrower at a time and brought to the newest version first, so that whoever holds it reads one
+version all the while. One whose newest commit is not the file it was (the folder was replaced) is thrown away.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from typing import TYPE_CHECKING
+
+from warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    from deltalake import DeltaTable
+
+#: Handles kept in all; of more the one that was used longest ago goes.
+MOST = 24
+
+_lock = threading.Lock()
+_kept: list[tuple[tuple[object, ...], tuple[int, ...], DeltaTable]] = []
+
+
+@contextmanager
+def borrowed(
+    warehouse: Warehouse, name: str, opened: Callable[[Warehouse, str], DeltaTable | None]
+) -> Iterator[DeltaTable | None]:
+    """Lend a table at its newest version for reading, None where it was never written.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    name : str
+        Of the table.
+    opened : callable
+        Opens it where no handle is at hand.
+    """
+    key = _key(warehouse, name)
+    table = _taken(warehouse, name, key)
+    if table is None:
+        table = opened(warehouse, name)
+    yield table
+    # behind the yield: a handle over which something went wrong is not kept
+    if table is not None:
+        _keep(warehouse, name, key, table)
+
+
+def _key(warehouse: Warehouse, name: str) -> tuple[object, ...]:
+    # handles do not survive a fork
+    return (os.getpid(), warehouse.address(name), tuple(sorted((warehouse.options or {}).items())))
+
+
+def _taken(warehouse: Warehouse, name: str, key: tuple[object, ...]) -> DeltaTable | None:
+    from deltalake.exceptions import DeltaError
+
+    with _lock:
+        at = next((i for i in range(len(_kept) - 1, -1, -1) if _kept[i][0] == key), None)
+        if at is None:
+            return None
+        _, mark, table = _kept.pop(at)
+    if warehouse.mark_of(name, *_commit(table.version())) != mark:
+        return None
+    if warehouse.mark_of(name, *_commit(table.version() + 1)) is None:
+        return table
+    with suppress(DeltaError, OSError, ValueError):
+        table.update_incremental()
+        return table
+    return None
+
+
+def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: DeltaTable) -> None:
+    mark = warehouse.mark_of(name, *_commit(table.version()))
+    if mark is None:
+        return
+    with _lock:
+        _kept.append((key, mark, table))
+        del _kept[:-MOST]
+
+
+def _commit(version: int) -> tuple[str, str]:
+    return "_delta_log", f"{version:020d}.json"

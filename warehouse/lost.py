@@ -1,0 +1,60 @@
+"""What of damaged logs could not be read, a stretch a row. Nothing here is seen before its row in ``logs``."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from pipeline.ingest.readings import LostStretch, Readings
+from warehouse import delta
+from warehouse.keys import one_of, vessel_key
+from warehouse.retry import with_retry
+from warehouse.store import Warehouse
+
+
+def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, Readings]]) -> None:
+    """Put the lost stretches of several ingests in place of what is there of them, in one commit.
+
+    Nothing is written where all logs are whole.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    batch : sequence of (str, str, Readings)
+        Vessel, ingest id, readings.
+    """
+    damaged = [(vessel, ingest, item) for vessel, ingest, item in batch if item.lost]
+    if not damaged:
+        return
+    rows = [
+        {
+            "vessel_key": vessel_key(vessel),
+            "vessel": vessel,
+            "ingest_id": ingest,
+            "number": number,
+            "since_utc_ns": one.since_ns,
+            "until_utc_ns": one.until_ns,
+            "messages": one.messages,
+            "why": one.why,
+        }
+        for vessel, ingest, item in damaged
+        for number, one in enumerate(item.lost)
+    ]
+    predicate = one_of("ingest_id", {ingest for _, ingest, _ in damaged})
+    with_retry(lambda: delta.replace(delta.ensure_table(warehouse, "lost"), "lost", rows, predicate))
+
+
+def of_ingests(warehouse: Warehouse, ingest_ids: Sequence[str]) -> dict[str, tuple[LostStretch, ...]]:
+    """Return the lost stretches of each of some ingests in the order of the file; ingests of whole logs are not in it.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    frame = delta.read(warehouse, "lost", {"ingest_id": sorted(set(ingest_ids))}).sort("ingest_id", "number")
+    found: dict[str, tuple[LostStretch, ...]] = {}
+    for row in frame.rows(named=True):
+        one = LostStretch(row["since_utc_ns"], row["until_utc_ns"], row["messages"], row["why"])
+        found[row["ingest_id"]] = (*found.get(row["ingest_id"], ()), one)
+    return found

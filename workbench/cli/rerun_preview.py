@@ -1,0 +1,123 @@
+"""``kempf rerun --all --preview``: what the present code would move, as it is shown."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from statistics import median
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from schemas.errors import DataRejected, ThresholdExceeded
+from workbench.terminal import number, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from flows.moves import Move
+    from flows.preview_code import VesselPreview
+    from warehouse.store import Warehouse
+
+#: Lines for a person; --json has all.
+_SHOWN = 20
+
+
+def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, *, as_json: bool) -> None:
+    """Show it; exit code 3 where something could not be done, 5 where a parameter moves further than is allowed."""
+    from flows.preview_code import preview_all
+
+    with progress() as tell:
+        found = preview_all(warehouse, vessels, tell)
+    moves = sorted((m for one in found for m in one.moves), key=lambda m: -m.size)
+    lines = _by_parameter(moves)
+    if as_json:
+        shown = [{k: v for k, v in line.items() if k != "size"} for line in lines]
+        print_json(
+            {
+                **_counts(found),
+                "parameters": shown,
+                "vessels": [one.show() for one in found],
+                "moves": [m.show() for m in moves],
+            }
+        )
+    else:
+        _tell(found, lines)
+    if any(one.failures for one in found):
+        sys.exit(DataRejected.exit_code)
+    if fail_above is not None and moves and moves[0].size > fail_above:
+        sys.exit(ThresholdExceeded.exit_code)
+
+
+def _counts(found: Sequence[VesselPreview]) -> dict[str, int]:
+    return {
+        "sets": sum(one.sets for one in found),
+        "up_to_date": sum(one.up_to_date for one in found),
+        "identical": sum(one.identical for one in found),
+        "moved": sum(len({m.parameter_set_id for m in one.moves}) for one in found),
+        "new": sum(len(one.new) for one in found),
+        "gone": sum(len(one.gone) for one in found),
+        "failures": sum(len(one.failures) for one in found),
+    }
+
+
+def _by_parameter(moves: Sequence[Move]) -> list[dict[str, Any]]:
+    """Return one line a vessel, model, estimator and parameter, the one with the largest move first."""
+    of: dict[tuple[str, str, str, str], list[Move]] = {}
+    for move in moves:
+        of.setdefault((move.vessel, move.model, move.estimator, move.parameter), []).append(move)
+    return [
+        {
+            "vessel": vessel,
+            "parameter": parameter,
+            "model": model,
+            "estimator": estimator,
+            "sets": len(group),
+            "largest_in_std": group[0].in_std,
+            "median_in_std": median(m.size for m in group),
+            "std_ratio": group[0].std_ratio,
+            "before": group[0].before,
+            "after": group[0].after,
+            "unit": group[0].unit,
+            "parameter_set_id": group[0].parameter_set_id,
+            "size": group[0].size,
+        }
+        for (vessel, model, estimator, parameter), group in of.items()
+    ]
+
+
+def _tell(found: Sequence[VesselPreview], lines: Sequence[dict[str, Any]]) -> None:
+    counts = _counts(found)
+    if counts["sets"] == counts["up_to_date"] and not counts["new"] and not counts["failures"]:
+        click.echo(f"All {counts['sets']} parameter sets that stand were made by this code: it would move none.")
+        return
+    click.echo(
+        f"{counts['sets']} parameter sets stand: {counts['up_to_date']} were made by this code, {counts['identical']} "
+        f"would say the same bit for bit, {counts['moved']} would move, {counts['gone']} would go without a successor, "
+        f"{counts['new']} would be new."
+    )
+    if lines:
+        head = ["vessel", "parameter", "largest move in std errors", "median", "std ratio", "before", "after", "unit"]
+        head += ["sets", "estimator", "model", "parameter set"]
+        rows = [
+            [
+                line["vessel"],
+                line["parameter"],
+                f"{line['largest_in_std']:+.2g}" if line["largest_in_std"] is not None else "-",
+                number(line["median_in_std"], 2),
+                number(line["std_ratio"], 3),
+                number(line["before"]),
+                number(line["after"]),
+                line["unit"],
+                str(line["sets"]),
+                line["estimator"],
+                line["model"],
+                line["parameter_set_id"],
+            ]
+            for line in lines[:_SHOWN]
+        ]
+        print_table(head, rows)
+        if len(lines) > _SHOWN:
+            click.echo(f"... and {len(lines) - _SHOWN} more; --json has all.")
+    for one in found:
+        for failure in one.failures:
+            click.echo(f"{one.vessel}, {failure['what']}: {failure['error']['message']}", err=True)
+    click.echo("Nothing was stored. next: kempf reprocess")
