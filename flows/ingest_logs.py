@@ -7,17 +7,19 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from flows.examine_log import examine_frame
 from flows.files import read_bytes
 from flows.find_segments import Ingest, find_segments
 from flows.lost import as_json
 from flows.progress import Progress, silent
 from flows.unforeseen import as_told
 from pipeline.ingest.read import read_log
-from pipeline.ingest.readings import LostStretch, Tally
+from pipeline.ingest.readings import LostStretch, Readings, Tally
 from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
-from warehouse import code_version, logs, lost, raw, segments, vessels
+from warehouse import code_version, examinations, logs, lost, raw, segments, vessels
 from warehouse.deposit import Delivery, Deposit, deposit, held
+from warehouse.examinations import StoredExamination
 from warehouse.keys import ingest_id, vessel_key
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
@@ -42,6 +44,8 @@ class IngestOutcome:
         Found in this log.
     lost : tuple of LostStretch
         What of a damaged log could not be read.
+    examination : StoredExamination or None
+        What the channel doctor found in it.
     error : KempfError or None
         Why it failed; then nothing of the log was stored.
     """
@@ -54,6 +58,7 @@ class IngestOutcome:
     notes: tuple[str, ...] = ()
     segments: tuple[Segment, ...] = ()
     lost: tuple[LostStretch, ...] = ()
+    examination: StoredExamination | None = None
     error: KempfError | None = None
 
     def show(self) -> dict[str, Any]:
@@ -70,6 +75,7 @@ class IngestOutcome:
             "partial": bool(self.lost),
             "lost": as_json(self.lost),
             "segments": [segment.segment_id for segment in self.segments],
+            "channels": _channels(self.examination),
             **(self.error.to_json() if self.error else {}),
         }
 
@@ -78,6 +84,12 @@ def _ledger(tally: Tally | None, of: str) -> dict[str, int] | None:
     if tally is None:
         return None
     return {part: getattr(tally, f"{of}_{part}") for part in ("read", "kept", "rejected")}
+
+
+def _channels(examination: StoredExamination | None) -> dict[str, Any] | None:
+    if examination is None:
+        return None
+    return {"verdict": examination.verdict, "findings": examination.content.get("findings", [])}
 
 
 def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile | None) -> tuple[str, VesselProfile]:
@@ -170,14 +182,25 @@ def ingest_bytes(
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
         found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
+        seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
+        gone = _lost(warehouse, row)
         return IngestOutcome(
-            path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, _lost(warehouse, row)
+            path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, lost=gone, examination=seen
         )
     read = read_one(vessel, file_name, data, profile)
     (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
-    gone = _lost(warehouse, row)
-    return IngestOutcome(path, stored.outcome, row.log_id, row.ingest_id, row.tally, row.notes, read.segments, gone)
+    return IngestOutcome(
+        path,
+        stored.outcome,
+        row.log_id,
+        row.ingest_id,
+        row.tally,
+        row.notes,
+        read.segments,
+        lost=_lost(warehouse, row),
+        examination=read.examination,
+    )
 
 
 def _lost(warehouse: Warehouse, row: logs.LogRow) -> tuple[LostStretch, ...]:
@@ -191,10 +214,11 @@ class ReadLog:
     delivery: Delivery
     ingest_id: str
     segments: tuple[Segment, ...]
+    examination: StoredExamination
 
 
 def read_one(vessel: str, file_name: str, data: bytes, profile: VesselProfile) -> ReadLog:
-    """Read a log and find its zigzags.
+    """Read a log, find its zigzags and compare its channels.
 
     Raises
     ------
@@ -206,8 +230,9 @@ def read_one(vessel: str, file_name: str, data: bytes, profile: VesselProfile) -
     log = raw.log_id(data)
     one = Ingest(vessel, log, ingest_id(log, profile.sha256, code))
     zigzags, notes = find_segments(one, profile, readings.frame)
+    seen = _examined(one, profile, file_name, readings, code)
     noted = replace(readings, notes=(*readings.notes, *notes))
-    return ReadLog(Delivery(vessel, file_name, data, profile, noted, code), one.ingest_id, tuple(zigzags))
+    return ReadLog(Delivery(vessel, file_name, data, profile, noted, code), one.ingest_id, tuple(zigzags), seen)
 
 
 def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
@@ -218,8 +243,20 @@ def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
     KempfError
         One is another vessel's, or the warehouse cannot be written; then none of them counts.
     """
-    # the zigzags before the rows that make the logs count: what a crash leaves in between is not seen, and not missed
+    # zigzags and verdicts before the rows that make the logs count: what a crash leaves in between is not seen, and not
+    # missed
     for vessel in sorted({one.delivery.vessel for one in read}):
         hers = {one.ingest_id: one.segments for one in read if one.delivery.vessel == vessel}
         segments.replace(warehouse, vessel, hers)
+        examinations.replace(warehouse, vessel, [one.examination for one in read if one.delivery.vessel == vessel])
     return deposit(warehouse, [one.delivery for one in read])
+
+
+def _examined(one: Ingest, profile: VesselProfile, file_name: str, read: Readings, code: str) -> StoredExamination:
+    """Examine a log; should the doctor fail, that is the verdict, and the log is in all the same."""
+    try:
+        content = examine_frame(read.frame, profile, file_name, read.format).content
+    except Exception as error:  # noqa: BLE001 - a log is not lost because its channels could not be compared
+        content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(as_told(error))}
+    findings = tuple(finding["words"] for finding in content["findings"])
+    return StoredExamination(one.vessel, one.ingest_id, one.log_id, code, content["verdict"], findings, content)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from pipeline.identify.estimate import Estimate, Value
@@ -69,9 +69,25 @@ def as_parameter_set(
         fit=result.fit,
         iterations=list(result.iterations),
         convergence=result.report,
-        warnings=(*result.warnings, *warnings),
+        warnings=(*result.warnings, *warnings, *channel_warnings(told)),
         parent=spec.parent,
         provenance=told,
+    )
+
+
+def channel_warnings(told: Mapping[str, Any]) -> tuple[str, ...]:
+    """Return what the channel doctor said of the logs behind a set, as its warnings.
+
+    Parameters
+    ----------
+    told : mapping
+        Provenance; a set from before there was a doctor has nothing of him.
+    """
+    found = dict(told.get("channels") or {})
+    return tuple(
+        f"channels of log {log[:12]}: {words}; see `kempf doctor {log[:12]}`"
+        for log in sorted(found)
+        for words in found[log]
     )
 
 

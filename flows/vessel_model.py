@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from flows.cores import usable
-from flows.parameter_set_of import arm_of, stored, without_arm
+from flows.parameter_set_of import arm_of, channel_warnings, stored, without_arm
 from flows.progress import Progress, silent
 from flows.vessel_runs import Chosen, VesselRuns, assemble, assembled
 from pipeline.diagnose.diagnosis import Step, step_of
@@ -332,7 +332,7 @@ def _as_parameter_set(
             "levels": {one.run.name: list(levels) for one, levels in zip(fit.runs, fit.levels, strict=True)},
             "left_out": runs.skipped,
         },
-        warnings=_warnings(step, runs) + without_arm(spec, arm_of(spec, profile)),
+        warnings=_warnings(step, runs) + without_arm(spec, arm_of(spec, profile)) + channel_warnings(told),
         parent=parent,
         provenance=told,
     )

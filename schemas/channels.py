@@ -75,6 +75,8 @@ _ALL = (
     Channel("distance_through_water", "m", 0.0, 1e10, "none", "distance through the water that the log has counted"),
     Channel("true_wind_speed", "m/s", 0.0, 100.0, "none", "wind speed over ground"),
     Channel("true_wind_direction", "rad", -2 * pi, 2 * pi, "circle", "where the wind blows from, clockwise from north"),
+    Channel("velocity_forward", "m/s", -60.0, 60.0, "none", "velocity over ground along the bow, ahead positive"),
+    Channel("velocity_starboard", "m/s", -60.0, 60.0, "none", "velocity over ground across the bow, to starboard"),
 )
 
 #: Every canonical channel by name, in the order of the tables.

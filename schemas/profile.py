@@ -32,19 +32,27 @@ class ChannelMap(_Frozen):
     positive: Literal["starboard", "port"] = "starboard"
     #: added after the sign is turned, in ``unit``: a known mounting or index error
     offset: float = 0.0
+    #: factor on the reading, before the offset: an instrument that is known to read so much too little
+    scale: float = Field(default=1.0, ge=-1e6, le=1e6)
+    #: so many seconds after the measurement the log says it was made
+    delay_s: float = Field(default=0.0, ge=-3600.0, le=3600.0)
+    #: seconds that this channel's clock counts in one second, from its source's first record on
+    clock_rate: float = Field(default=1.0, ge=0.9, le=1.1)
 
     @model_validator(mode="after")
     def _known(self) -> ChannelMap:
         if self.channel not in CHANNELS:
             raise ValueError(f"unknown channel {self.channel!r}; known: {', '.join(CHANNELS)}")
         factor_to_si(self.unit, CHANNELS[self.channel].unit, self.channel)
+        if self.scale == 0.0:
+            raise ValueError("scale is a factor other than 0")
         return self
 
     @property
     def factor(self) -> float:
-        """Factor from the log's unit and sign to SI."""
+        """Factor from the log's unit, sign and scale to SI."""
         sign = -1.0 if self.positive == "port" else 1.0
-        return sign * factor_to_si(self.unit, CHANNELS[self.channel].unit, self.channel)
+        return sign * self.scale * factor_to_si(self.unit, CHANNELS[self.channel].unit, self.channel)
 
     @property
     def offset_si(self) -> float:

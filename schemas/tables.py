@@ -129,6 +129,20 @@ _ALL = (
         ),
     ),
     Table(
+        "examinations",
+        "what the channel doctor found in one ingest",
+        (
+            *_VESSEL,
+            _INGEST,
+            _LOG,
+            Column("verdict", "text", "clean, faults, untested; failed where the doctor himself did"),
+            Column("findings", "texts", "what lies, a sentence each"),
+            Column("content_json", "text", "findings with evidence and profile lines, every check with its figures"),
+            _CODE,
+        ),
+        partition_by=("vessel_key",),
+    ),
+    Table(
         "segments",
         "one manoeuvre found in one ingest",
         (

@@ -113,7 +113,7 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
 
     table = open_table(warehouse, name)
     if table is not None:
-        return table
+        return _with_every_column(warehouse, table, name)
     warehouse.create()
     try:
         with writing(warehouse.address(name)):
@@ -143,6 +143,22 @@ def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
     with handles.borrowed(warehouse, name, ensure_table) as table:
         assert table is not None
         yield table
+
+
+def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> DeltaTable:
+    """Add the columns that a table from before they were known lacks; its rows have nothing there."""
+    from deltalake import Schema
+
+    held = {field.name for field in table.schema().fields}
+    wanted = Schema.from_arrow(arrow_schema(TABLES[name])).fields
+    missing = [field for field in wanted if field.name not in held]
+    if not missing:
+        return table
+    with writing(warehouse.address(name)):
+        table.alter.add_columns(missing)
+    altered = open_table(warehouse, name)
+    assert altered is not None
+    return altered
 
 
 def read(
@@ -212,6 +228,12 @@ def rows(table: DeltaTable | None, name: str, where: Where | None = None, column
         lazy = empty.lazy()
     else:
         lazy = pl.scan_delta(table)
+        held = {field.name for field in table.schema().fields}
+        if any(column.name not in held for column in TABLES[name].columns):
+            empty = pl.from_arrow(arrow_schema(TABLES[name]).empty_table())
+            assert isinstance(empty, pl.DataFrame)
+            absent = {column: kind for column, kind in empty.schema.items() if column not in held}
+            lazy = lazy.with_columns(pl.lit(None, dtype=kind).alias(column) for column, kind in absent.items())
     for column, value in (where or {}).items():
         # one value prunes files by their statistics
         one = value if isinstance(value, str) else value[0] if len(value) == 1 else None

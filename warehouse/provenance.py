@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from warehouse import code_version, delta
+from warehouse import code_version, delta, examinations
 from warehouse.parameter_set import Inputs
 from warehouse.store import Warehouse
 
@@ -36,8 +36,10 @@ def collect(
     -------
     dict
         JSON content with the keys ``inputs``, ``ingest_ids``, ``profile_sha256``, ``code_version``, ``git_commit``,
-        ``packages``, ``python``, ``table_versions``, ``flow_run``.
+        ``packages``, ``python``, ``table_versions``, ``flow_run``, ``channels``: what the channel doctor said of the
+        logs when the set was made, by log id, those with nothing to say left out.
     """
+    seen = examinations.of_ingests(warehouse, ingest_ids).values() if warehouse is not None and ingest_ids else ()
     if table_versions is None:
         table_versions = delta.versions(warehouse) if warehouse is not None else {}
     installed = code_version.packages()
@@ -51,4 +53,5 @@ def collect(
         "python": installed["python"],
         "table_versions": dict(sorted(table_versions.items())),
         "flow_run": flow_run,
+        "channels": {one.log_id: list(one.findings) for one in seen if one.findings},
     }

@@ -8,6 +8,7 @@ from typing import BinaryIO
 from pipeline.ingest import sniff
 from pipeline.ingest.decoded import Decoded
 from pipeline.ingest.log_file import LogFile
+from pipeline.ingest.own_clocks import set_right
 from pipeline.ingest.readings import Readings
 from pipeline.ingest.screen import screen
 from pipeline.ingest.unpack import unpack
@@ -64,7 +65,7 @@ def read_log(name: str, log: bytes | BinaryIO, profile: VesselProfile) -> Readin
             {"name": name},
         )
     decoded = _decode(log_format, name, file, profile, source)
-    readings = screen(decoded, log_format)
+    readings = set_right(screen(decoded, log_format), source)
     if readings.frame.height == 0:
         raise _nothing(name, readings)
     if notes:

@@ -21,6 +21,7 @@ _TOGETHER: tuple[tuple[str, ...], ...] = (
     ("latitude", "longitude"),
     ("speed_over_ground", "course_over_ground"),
     ("velocity_north", "velocity_east"),
+    ("velocity_forward", "velocity_starboard"),
     ("wind_speed", "wind_angle"),
 )
 #: sentences that carry the receiver's own time of the fix; preferred where two sources are equally fast
@@ -39,11 +40,14 @@ class Instruments:
         The log's source that serves each channel.
     notes : tuple of str
         Choices made, one sentence each.
+    derived : frozenset of str
+        Channels that the log does not have and that were computed from others.
     """
 
     series: dict[str, Series]
     sources: dict[str, str]
     notes: tuple[str, ...]
+    derived: frozenset[str] = frozenset()
 
     def get(self, channel: str) -> Series | None:
         """Return the series of a channel, or None where the log lacks it."""
@@ -83,8 +87,10 @@ def from_readings(frame: pl.DataFrame) -> Instruments:
         for name, one in _at_instants(group, time, values, source, notes).items():
             series[name] = one
             sources[name] = source
+    own = set(series)
     _add_speed_and_course(series, sources, notes)
-    return Instruments(series, sources, tuple(notes))
+    _add_from_the_bow(series, sources, notes)
+    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own))
 
 
 def _choose(source: pl.Series, group: tuple[str, ...], notes: list[str]) -> str:
@@ -119,6 +125,24 @@ def _at_instants(
             value = np.unwrap(value)
         result[name] = Series(held.time_utc_ns, value)
     return result
+
+
+def _add_from_the_bow(series: dict[str, Series], sources: dict[str, str], notes: list[str]) -> None:
+    """Turn body-fixed velocities by the heading into speed and course over ground where the log has only these."""
+    ahead, across, heading = (series.get(n) for n in ("velocity_forward", "velocity_starboard", "heading"))
+    if ahead is None or across is None or heading is None or "course_over_ground" in series:
+        return
+    time = ahead.time_utc_ns
+    beside, bow = across.at(time, gap_limit_s(across)), heading.at(time, gap_limit_s(heading))
+    known = np.isfinite(beside) & np.isfinite(bow)
+    if not known.any():
+        return
+    time, forward, beside, bow = time[known], ahead.value[known], beside[known], bow[known]
+    series["speed_over_ground"] = Series(time, np.hypot(forward, beside))
+    series["course_over_ground"] = Series(time, bow + np.unwrap(np.arctan2(beside, forward)))
+    for name in ("speed_over_ground", "course_over_ground"):
+        sources[name] = sources["velocity_forward"]
+    notes.append("speed and course over ground computed from the body-fixed velocities and the heading")
 
 
 def _add_speed_and_course(series: dict[str, Series], sources: dict[str, str], notes: list[str]) -> None:

@@ -1,11 +1,13 @@
 from __future__ import annotations
 
+import dataclasses
 import json
 from pathlib import Path
 
 import pytest
 
 from schemas.errors import KempfError, NotFound, UsageError
+from schemas.tables import TABLES
 from warehouse import aliases, compaction, delta, history, logs, parameter_sets, raw, runs, segments, vessels
 from warehouse.store import MARKER, Warehouse
 
@@ -173,3 +175,15 @@ def test_an_address_of_an_unknown_kind_is_refused() -> None:
     with pytest.raises(UsageError) as caught:
         Warehouse("foo://bar").exists()
     assert caught.value.code == "warehouse_path"
+
+
+def test_a_table_from_before_a_column_was_known_gets_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place, whole = Warehouse(str(tmp_path / "w")), TABLES["readings"]
+    monkeypatch.setitem(TABLES, "readings", dataclasses.replace(whole, columns=whole.columns[:-2]))
+    before = delta.ensure_table(place, "readings").schema().fields
+    monkeypatch.setitem(TABLES, "readings", whole)
+    assert delta.read(place, "readings").columns[-2:] == [column.name for column in whole.columns[-2:]]
+    after = delta.ensure_table(place, "readings").schema().fields
+    assert [field.name for field in after] == [column.name for column in whole.columns]
+    assert len(after) == len(before) + 2
+    assert after[-1].metadata["unit"] == "m/s"

@@ -64,8 +64,21 @@ def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
         many = f"{len(outcome.lost)} stretch{'es' if len(outcome.lost) > 1 else ''} of this log could not be read"
         from_then = f", the first from {times[0]} on" if times else ""
         click.echo(f"  {click.style('partial', fg='yellow')}: {many}{from_then}")
+    tell_channels(outcome)
     for note in outcome.notes if notes else ():
         click.echo(f"  note: {one_line(note)[:600]}")
+
+
+def tell_channels(outcome: IngestOutcome) -> None:
+    """Print what the channel doctor found in a log, nothing where it is clean."""
+    examination = outcome.examination
+    if examination is None or examination.verdict not in ("faults", "failed"):
+        return
+    for words in examination.findings or (str(examination.content.get("why", "")),):
+        said = "channels" if examination.verdict == "faults" else "the channel doctor failed"
+        click.echo(f"  {click.style(said, fg='yellow')}: {one_line(words)[:600]}")
+    if examination.findings and outcome.log_id:
+        click.echo(f"  next: kempf doctor {outcome.log_id[:12]}")
 
 
 def _zigzags(outcome: IngestOutcome) -> str:

@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import print_json, print_table
+from workbench.terminal import one_line, print_json, print_table
 
 if TYPE_CHECKING:
     from pipeline.ingest.readings import LostStretch
+    from warehouse.examinations import StoredExamination
 
 
 @click.group("logs")
 def command() -> None:
-    """List the logs, show what was rejected in one and why."""
+    """List the logs, show one with what its channels say, and what was rejected in it and why."""
 
 
 @command.command("list")
@@ -24,9 +25,9 @@ def command() -> None:
 @warehouse_option
 @json_option
 def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
-    """List the logs with their ledgers: records read = kept + rejected."""
+    """List the logs with their ledgers: records read = kept + rejected, and what the channel doctor says of each."""
     from flows.lost import as_json as lost_as_json
-    from warehouse import logs, lost, vessels
+    from warehouse import examinations, logs, lost, vessels
     from warehouse.instant import iso_utc
     from warehouse.store import Warehouse
 
@@ -36,6 +37,7 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
         vessels.require(warehouse, vessel)
     rows_of_logs = logs.current(warehouse, vessel)
     gone = lost.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
+    said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
     found = [
         {
             "log_id": row.log_id,
@@ -52,6 +54,7 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
             "partial": row.ingest_id in gone,
             "lost": lost_as_json(gone.get(row.ingest_id, ())),
             "notes": list(row.notes),
+            "channels": _verdict(said.get(row.ingest_id)),
         }
         for row in rows_of_logs
     ]
@@ -59,11 +62,69 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
         print_json(found)
         return
     head = ["log_id", "vessel", "file_name", "format", "start", "records_read", "records_kept", "records_rejected"]
-    rows = [[str(one[name])[: 12 if name == "log_id" else 40] for name in head] for one in found]
+    rows = [
+        [*(str(one[name])[: 12 if name == "log_id" else 40] for name in head), _brief(one["channels"])] for one in found
+    ]
+    head.append("channels")
     if gone:
         head.append("damage")
         rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, rows_of_logs, strict=True)]
     print_table([name.replace("_", " ") for name in head], rows)
+
+
+def _verdict(examination: StoredExamination | None) -> dict[str, Any] | None:
+    if examination is None:
+        return None
+    return {"verdict": examination.verdict, "findings": list(examination.findings)}
+
+
+def _brief(channels: Any) -> str:
+    """Say a verdict in a word or two; a dash for a log from before there was a doctor."""
+    if channels is None:
+        return "-"
+    many = len(channels["findings"])
+    return channels["verdict"] if not many else f"{many} fault{'' if many == 1 else 's'}"
+
+
+@command.command("show")
+@click.argument("log_id")
+@warehouse_option
+@json_option
+def show(log_id: str, uri: str, as_json: bool) -> None:
+    """Show one log: how it was read, and what the channel doctor found in it."""
+    from warehouse import examinations, logs
+    from warehouse.instant import iso_utc
+    from warehouse.store import Warehouse
+    from workbench.cli.doctor import tell
+
+    warehouse = Warehouse(uri)
+    row = logs.by_prefix(warehouse, log_id)
+    seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
+    facts = {
+        "log_id": row.log_id,
+        "ingest_id": row.ingest_id,
+        "vessel": row.vessel,
+        "file_name": row.file_name,
+        "format": row.format,
+        "start": iso_utc(row.start_utc_ns),
+        "end": iso_utc(row.end_utc_ns),
+        "records_read": row.tally.records_read,
+        "records_kept": row.tally.records_kept,
+        "records_rejected": row.tally.records_rejected,
+        "rejected_by_reason": dict(row.tally.by_reason),
+        "notes": list(row.notes),
+    }
+    if as_json:
+        print_json({**facts, "channels": dict(seen.content) if seen else None})
+        return
+    for name, value in facts.items():
+        listed = value if isinstance(value, list) else [value]
+        for one in listed:
+            click.echo(f"{name.replace('_', ' ')}: {one_line(str(one))}")
+    if seen is None:
+        click.echo("channels: read before there was a channel doctor; `kempf reprocess` examines it")
+    else:
+        tell("channels", dict(seen.content), everything=True)
 
 
 def _damage(lost: Sequence[LostStretch]) -> str:

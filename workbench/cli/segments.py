@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table
+from workbench.terminal import number, one_line, print_json, print_table
 
 
 @click.command("segments")
@@ -14,7 +14,7 @@ from workbench.terminal import number, print_json, print_table
 @json_option
 def command(vessel: str | None, uri: str, as_json: bool) -> None:
     """List the zigzags found, with their executes, overshoots and IMO criteria."""
-    from warehouse import logs, segments
+    from warehouse import examinations, logs, segments
     from warehouse.instant import iso_utc
     from warehouse.store import Warehouse
 
@@ -23,8 +23,11 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
     # another process may read a log anew between the two questions
     found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in names]
+    said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
+    lies = {name: list(one.findings) for name, one in said.items() if one.findings}
     if as_json:
-        print_json([segment.show(names[segment.ingest_id]) for segment in found])
+        shown = [segment.show(names[segment.ingest_id]) for segment in found]
+        print_json([{**one, "channels": lies.get(s.ingest_id, [])} for one, s in zip(shown, found, strict=True)])
         return
     if not found:
         click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
@@ -46,6 +49,9 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     ]
     head = ["segment", "vessel", "psi0/delta0", "kind", "first side", "K0 deg", "start UTC", "executes"]
     print_table([*head, "overshoots deg", "IMO"], rows)
+    for ingest, findings in lies.items():
+        for words in findings:
+            click.echo(f"warning: {one_line(names[ingest])}: {one_line(words)}")
 
 
 def _imo(criteria: object) -> str:

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 
 from flows.diagnose_vessel import diagnose_in_full
+from flows.parameter_set_of import channel_warnings
 from flows.progress import Progress, silent
 from flows.vessel_model import Own
 from pipeline.diagnose.diagnosis import DiagnosisSettings
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
-from warehouse import code_version, vessels
+from warehouse import code_version, examinations, vessels
 from warehouse.diagnoses import StoredDiagnosis
 from warehouse.store import Warehouse
 from workbench.report.content import ReportContent
@@ -74,6 +75,9 @@ def made(
         _provenance(stored, examined.chosen.profile_sha256, examined.runs.spec, settings)
         + [(f"left out, {name}", why) for name, why in sorted(examined.runs.skipped.items())],
     )
+    said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in examined.chosen.segments])
+    channels = channel_warnings({"channels": {one.log_id: one.findings for one in said.values() if one.findings}})
+    content = replace(content, sentences=(*content.sentences, *(f"Warning: {words}." for words in channels)))
     progress(0, 1, "drawing")
     return Report(stored.diagnosis_id, content, page(content))
 

@@ -1,0 +1,89 @@
+"""The job of the channel doctor: one log read with a profile, examined, its verdict with the profile lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from flows.files import read_bytes
+from pipeline.ingest.read import read_log
+from pipeline.normalise.doctor.examine import Examination, examine
+from pipeline.normalise.doctor.log import Log
+from pipeline.normalise.doctor.mend import entries
+from pipeline.normalise.doctor.verdict import told
+from pipeline.normalise.instruments import from_readings
+from schemas.profile import VesselProfile
+from warehouse import logs, readings, vessels
+from warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """One log and what the doctor found.
+
+    Attributes
+    ----------
+    file_name, format : str
+    log : Log
+        The channels as they came.
+    examination : Examination
+    content : dict
+        The same as JSON content, with the profile lines.
+    """
+
+    file_name: str
+    format: str
+    log: Log
+    examination: Examination
+    content: dict[str, Any]
+
+
+def examine_frame(frame: pl.DataFrame, profile: VesselProfile, file_name: str, log_format: str) -> Examined:
+    """Examine the readings of one log; nothing is stored.
+
+    Parameters
+    ----------
+    frame : polars.DataFrame
+        Readings, schema `pipeline.ingest.readings.READING_SCHEMA`.
+    profile : VesselProfile
+        With which they were read.
+    file_name : str
+    log_format : {"delimited", "mcap", "nmea"}
+    """
+    instruments = from_readings(frame)
+    known = entries(profile.source_for(file_name), log_format, instruments.sources)
+    units = {channel: mapped.unit for channel, (_, mapped) in known.items()}
+    log = Log.of(instruments, profile.length_m, units)
+    found = examine(log)
+    return Examined(file_name, log_format, log, found, told(found, known, log_format))
+
+
+def examine_file(path: Path, profile: VesselProfile) -> Examined:
+    """Read and examine a raw log that no warehouse knows.
+
+    Raises
+    ------
+    KempfError
+        The log cannot be read.
+    """
+    read = read_log(path.name, read_bytes(path, "raw log"), profile)
+    return examine_frame(read.frame, profile, path.name, read.format)
+
+
+def examine_held(warehouse: Warehouse, name: str) -> Examined:
+    """Examine a log of the warehouse, by a beginning of its id or by its file name.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_log``.
+    UsageError
+        ``ambiguous_log``.
+    """
+    row = logs.by_prefix(warehouse, name)
+    profile = vessels.get(warehouse, row.profile_sha256)
+    return examine_frame(readings.read(warehouse, row.ingest_id), profile, row.file_name, row.format)

@@ -1,0 +1,56 @@
+"""docs/doctor.md is true: its commands run, its checks are those of the code, its thresholds are the code's."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import get_args
+
+from pipeline.normalise.doctor import heading_course, heading_rate, legs, rudder_order, rudder_turn, track, water_speed
+from pipeline.normalise.doctor.examine import examine
+from pipeline.normalise.doctor.faults import Kind
+from pipeline.normalise.doctor.outcome import SURE
+from tests.docs.console import follow
+from tests.doctor import made
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "doctor.md").read_text(encoding="utf-8")
+
+
+def test_the_example_runs_to_its_output(tmp_path: Path) -> None:
+    assert follow(TEXT, tmp_path, f"export PYTHONPATH='{ROOT}'") == 4
+    assert (tmp_path / "ferry.png").stat().st_size > 10_000
+
+
+def test_every_check_is_told() -> None:
+    told = re.findall(r"`([a-z_.]+)`", TEXT.partition("| check |")[2].partition("\n\n")[0])
+    patterns = [name.replace(".", r"\.").replace(r"\.\.\.", r"[a-z_]*") for name in told]
+    for outcome in examine(made.log()).outcomes:
+        assert any(re.fullmatch(pattern, outcome.check) for pattern in patterns), outcome.check
+
+
+def test_thresholds_are_the_codes() -> None:
+    def row(check: str) -> str:
+        return next(line for line in TEXT.splitlines() if line.startswith(f"| `{check}"))
+
+    for check, (low, high) in (
+        ("heading_rate", heading_rate.SLOPES),
+        ("heading_course", heading_course.SLOPES),
+        ("heading_body", heading_course._BODY_SLOPES),
+        ("path_", track.RATIOS),
+        ("water_speed_", water_speed._RATIOS),
+        ("rudder_order_angle", rudder_order._SLOPES),
+    ):
+        assert f"{low:g} to {high:g}" in row(check), check
+    assert f"within {legs._DEVIATION_DEG:g} deg" in row("legs_")
+    assert f"within {track._ANGLES_DEG[1]:g} deg" in row("bearing_")
+    assert f"within {rudder_turn._NEUTRAL_DEG:g} deg" in row("rudder_angle_")
+    assert f"within {rudder_order._OFFSETS_DEG[1]:g} deg" in row("rudder_order_angle")
+    assert (SURE, heading_course.STREAM_SHARE) == (4.0, 1 / 8)
+    assert f"{heading_course.STREAM_STD_M_S:g} m/s, or an eighth" in TEXT
+
+
+def test_every_kind_of_fault_is_told() -> None:
+    table = TEXT.partition("| fault |")[2].partition("\n\n")[0]
+    for kind in get_args(Kind):
+        assert kind.replace("_", " ") in table, kind

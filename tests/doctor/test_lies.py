@@ -1,0 +1,172 @@
+"""Every kind of lie is named, alone where a third witness is there, as one of two where there is none."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from pipeline.normalise.doctor.examine import CHECKS, ask, examine
+from pipeline.normalise.doctor.faults import UNITS, Fault
+from pipeline.normalise.doctor.log import Log
+from pipeline.normalise.series import SECOND_NS, Series
+from tests.doctor import made
+
+SWAP = Fault("swap", ("latitude", "longitude"))
+GNSS = ("speed_over_ground", "course_over_ground")
+
+
+def late(log: Log, name: str, by_s: float, rate: float = 0.0) -> Log:
+    one = log.series[name]
+    since = (one.time_utc_ns - one.time_utc_ns[0]) * (1.0 + rate) + by_s * SECOND_NS
+    return log.with_series({name: Series(one.time_utc_ns[0] + np.rint(since).astype(np.int64), one.value)})
+
+
+def changed(log: Log, name: str, factor: float = 1.0, add: float = 0.0) -> Log:
+    one = log.series[name]
+    return log.with_series({name: Series(one.time_utc_ns, one.value * factor + add)})
+
+
+def test_an_honest_log_is_clean_and_every_channel_tested() -> None:
+    found = examine(made.log())
+    assert (found.verdict, found.findings, found.untested) == ("clean", (), ())
+    assert {o.check for o in found.outcomes if o.state != "agree"} <= {
+        "heading_track",
+        "heading_track_clock",
+        "legs_track",
+    }
+    assert len(CHECKS) == 7
+
+
+LIES = {
+    "rate sign": (lambda log: changed(log, "yaw_rate", -1.0), Fault("sign", ("yaw_rate",))),
+    "rate unit": (
+        lambda log: changed(log, "yaw_rate", 1 / 60),
+        Fault("unit", ("yaw_rate",), 60.0, "deg/s taken for deg/min"),
+    ),
+    "rate scale": (
+        lambda log: changed(log, "yaw_rate", 0.4),
+        Fault("scale", ("yaw_rate",), 2.5, "scale"),
+    ),
+    "heading sign": (lambda log: changed(log, "heading", -1.0, 2 * np.pi), Fault("sign", ("heading",))),
+    "heading from east": (
+        lambda log: changed(log, "heading", -1.0, np.pi / 2),
+        Fault("offset", ("heading",), np.pi / 2, "counted anticlockwise from east"),
+    ),
+    "compass turned": (lambda log: changed(log, "heading", 1.0, -1.2), Fault("offset", ("heading",), 1.2, "turned")),
+    "course turned": (
+        lambda log: changed(log, "course_over_ground", 1.0, 0.8),
+        Fault("offset", ("course_over_ground",), -0.8, "turned"),
+    ),
+    "rudder to port": (lambda log: changed(log, "rudder_angle", -1.0), Fault("sign", ("rudder_angle",))),
+    "order's zero": (
+        lambda log: changed(log, "rudder_order", 1.0, 0.7),
+        Fault("offset", ("rudder_order",), -0.7, "zero elsewhere"),
+    ),
+    "knots": (
+        lambda log: changed(log, "speed_over_ground", 3600 / 1852),
+        Fault("unit", ("speed_over_ground",), 1852 / 3600, "kn taken for m/s"),
+    ),
+    "log in km/h": (
+        lambda log: changed(log, "speed_through_water", 3.6),
+        Fault("unit", ("speed_through_water",), 1 / 3.6, "km/h taken for m/s"),
+    ),
+    "west positive": (lambda log: changed(log, "longitude", -1.0), Fault("sign", ("longitude",))),
+    "swapped": (SWAP.mended, SWAP),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", LIES)
+def test_the_odd_one_out_is_named_alone_with_its_size(name: str) -> None:
+    lie, told = LIES[name]
+    # what a column was taken for is in the profile; a radian of rate cannot have been taken for two things
+    units = {"yaw_rate": "deg/min", "speed_over_ground": "m/s", "speed_through_water": "m/s"}
+    found = examine(replace(lie(made.log()), units=units))
+    assert [f.key for f in found.findings[0].faults] == [told.key]
+    assert len(found.findings) == 1
+    fault = found.findings[0].faults[0]
+    assert fault.value == pytest.approx(told.value, abs=max(4.0 * fault.std, 0.05 * abs(told.value)))
+    assert found.findings[0].evidence
+
+
+def test_frames_taken_for_each_other() -> None:
+    log, psi = made.log(), made.truth()["heading"]
+    velocity = log.velocity("course")
+    assert velocity is not None
+    time, bare = velocity.time_utc_ns, log.with_series(dict.fromkeys(GNSS))
+    for names, value in (
+        (("velocity_forward", "velocity_starboard"), velocity.value),
+        (("velocity_north", "velocity_east"), velocity.value * np.exp(-1j * psi)),
+    ):
+        lying = bare.with_series({names[0]: Series(time, value.real), names[1]: Series(time, value.imag)})
+        (finding,) = examine(lying).findings
+        assert [(f.kind, f.channels) for f in finding.faults] == [("frame", names)]
+
+
+@pytest.mark.parametrize(("by_s", "rate"), [(6.0, 0.0), (0.0, 0.01)])
+def test_clocks(by_s: float, rate: float) -> None:
+    lying = late(made.log(), "yaw_rate", by_s, rate)
+    (finding,) = examine(lying).findings
+    faults = {f.channels: f for f in finding.faults}
+    fault = faults["yaw_rate",]
+    assert (fault.kind, len(faults) <= 2) == ("clock_scale" if rate else "latency", True)
+    assert fault.value == pytest.approx(rate or by_s, rel=0.05)
+
+
+def test_two_witnesses_make_one_of_these() -> None:
+    (finding,) = examine(changed(made.log("heading", "yaw_rate"), "yaw_rate", -1.0)).findings
+    assert {f.channels for f in finding.faults} == {("heading",), ("yaw_rate",)}
+
+
+def test_two_lies_at_once_are_both_found() -> None:
+    lying = changed(changed(made.log(), "rudder_angle", -1.0), "speed_over_ground", 3600 / 1852)
+    lying = replace(lying, units={"speed_over_ground": "m/s"})
+    found = {f.channels for x in examine(lying).findings for f in x.faults}
+    assert found == {("rudder_angle",), ("speed_over_ground",)}
+
+
+def test_what_nothing_confirms_cannot_be_tested() -> None:
+    found = examine(made.log("heading"))
+    assert (found.verdict, found.untested) == ("untested", ("heading",))
+    still = {n: Series(s.time_utc_ns[:120], s.value[:120] * 0.0) for n, s in made.log().series.items()}
+    assert not examine(Log(still)).findings
+
+
+def test_a_compass_that_stands_still_contradicts_without_a_mend() -> None:
+    log = changed(made.log("heading", "yaw_rate"), "heading", 0.0)
+    (finding,) = examine(log).findings
+    assert (finding.faults, finding.channels) == ((), ("heading", "yaw_rate"))
+
+
+def test_a_contradiction_that_no_lie_explains_is_told_without_a_culprit() -> None:
+    log = made.log("heading", "yaw_rate")
+    random = np.random.Generator(np.random.PCG64(1))
+    walk = 0.01 * np.cumsum(random.standard_normal(len(log.series["yaw_rate"])))
+    found = examine(log.with_series({"yaw_rate": Series(log.series["yaw_rate"].time_utc_ns, walk)}))
+    assert [x.faults for x in found.findings] in ([()], [])
+
+
+def test_a_mend_undoes_its_lie() -> None:
+    log = made.log()
+    for fault in (
+        Fault("sign", ("yaw_rate",)),
+        Fault("unit", ("yaw_rate",), 60.0),
+        Fault("latency", ("heading",), 2.5),
+    ):
+        back = replace(fault, value=1 / 60 if fault.kind == "unit" else -fault.value)
+        again = back.mended(fault.mended(log)).series[fault.channels[0]]
+        assert np.allclose(again.value, log.series[fault.channels[0]].value)
+        assert np.array_equal(again.time_utc_ns, log.series[fault.channels[0]].time_utc_ns)
+
+
+def test_every_unit_has_its_inverse() -> None:
+    for factors in UNITS.values():
+        for name, factor in factors.items():
+            unit, taken_for = name.split(" taken for ")
+            assert factors[f"{taken_for} taken for {unit}"] * factor == pytest.approx(1.0)
+
+
+def test_it_says_the_same_twice() -> None:
+    log = changed(made.log(), "heading", -1.0)
+    assert [o.figures for some in ask(log) for o in some] == [o.figures for some in ask(log) for o in some]

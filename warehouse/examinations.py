@@ -1,0 +1,93 @@
+"""What the channel doctor found in each ingest. Examining an ingest again replaces what was found in it before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from json import loads
+from typing import Any
+
+from warehouse import delta
+from warehouse.canonical import canonical_json, plain
+from warehouse.keys import one_of, vessel_key
+from warehouse.retry import with_retry
+from warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class StoredExamination:
+    """The doctor's verdict on one ingest.
+
+    Attributes
+    ----------
+    vessel, ingest_id, log_id, code_version : str
+    verdict : str
+        ``clean``, ``faults``, ``untested``, or ``failed``: the doctor himself failed.
+    findings : tuple of str
+        One sentence each.
+    content : mapping
+        JSON content.
+    """
+
+    vessel: str
+    ingest_id: str
+    log_id: str
+    code_version: str
+    verdict: str
+    findings: tuple[str, ...]
+    content: Mapping[str, Any] = field(default_factory=dict)
+
+
+def replace(warehouse: Warehouse, vessel: str, found: Sequence[StoredExamination]) -> tuple[str, ...]:
+    """Put examinations of a vessel's ingests in place of what is stored of these, in at most one commit.
+
+    Returns
+    -------
+    tuple of str
+        Ingests of which something changed, sorted.
+    """
+    key = vessel_key(vessel)
+    new = {one.ingest_id: _row(key, one) for one in found}
+
+    def attempt() -> tuple[str, ...]:
+        with delta.ensured(warehouse, "examinations") as table:
+            stored = delta.rows(table, "examinations", {"vessel_key": key, "ingest_id": sorted(new)}).rows(named=True)
+            held = {row["ingest_id"]: row for row in stored}
+            changed = sorted(one for one, row in new.items() if held.get(one) != row)
+            if changed:
+                predicate = f"{one_of('vessel_key', [key])} AND {one_of('ingest_id', changed)}"
+                delta.replace(table, "examinations", [new[one] for one in changed], predicate)
+            return tuple(changed)
+
+    return with_retry(attempt) if new else ()
+
+
+def _row(key: str, one: StoredExamination) -> dict[str, Any]:
+    return {
+        "vessel_key": key,
+        "vessel": one.vessel,
+        "ingest_id": one.ingest_id,
+        "log_id": one.log_id,
+        "verdict": one.verdict,
+        "findings": list(one.findings),
+        "content_json": canonical_json(plain(one.content)),
+        "code_version": one.code_version,
+    }
+
+
+def of_ingests(warehouse: Warehouse, ingest_ids: Iterable[str]) -> dict[str, StoredExamination]:
+    """Return the examinations of some ingests, by ingest id; an ingest from before there was a doctor has none."""
+    frame = delta.read(warehouse, "examinations", {"ingest_id": sorted(set(ingest_ids))})
+    return {row["ingest_id"]: _stored(row) for row in frame.sort("ingest_id").rows(named=True)}
+
+
+def _stored(row: Mapping[str, Any]) -> StoredExamination:
+    return StoredExamination(
+        row["vessel"],
+        row["ingest_id"],
+        row["log_id"],
+        row["code_version"],
+        row["verdict"],
+        tuple(row["findings"]),
+        loads(row["content_json"]),
+    )

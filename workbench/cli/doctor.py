@@ -1,0 +1,89 @@
+"""``kempf doctor``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from workbench.cli.options import json_option, profile_option, warehouse_option
+from workbench.terminal import number, one_line, print_json, print_table
+
+
+@click.command("doctor")
+@click.argument("path", metavar="PATH|LOG", type=click.Path(path_type=Path))
+@profile_option
+@click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help="Draw what disagrees, PNG, SVG or PDF.")
+@click.option("--all", "everything", is_flag=True, help="Show every check, not only those that disagree.")
+@warehouse_option
+@json_option
+def command(
+    path: Path, profiles: tuple[Path, ...], figure: Path | None, everything: bool, uri: str, as_json: bool
+) -> None:
+    """Find the channels of a log that lie: sign, unit, frame, swap, clock, delay, mounting.
+
+    PATH is a raw log, read with the profile; or the id or file name of a log in the warehouse. Instruments that see one
+    motion are held against each other; with three witnesses the odd one out is named, with two it is one of them.
+    """
+    from flows.examine_log import examine_file, examine_held
+    from flows.files import read_profiles
+    from schemas.profile import VesselProfile
+    from warehouse.store import Warehouse
+    from workbench.new_file import require_new
+
+    if figure is not None:
+        require_new(figure, "--figure")
+    if profiles or path.exists():
+        found = examine_file(path, read_profiles(profiles) if profiles else VesselProfile())
+    else:
+        found = examine_held(Warehouse(uri), str(path))
+    if figure is not None:
+        from workbench.figures.doctor import draw
+
+        draw(found, figure)
+    if as_json:
+        print_json({"log": found.file_name, "format": found.format, **found.content})
+        return
+    tell(found.file_name, found.content, everything=everything)
+    if figure is not None:
+        click.echo(f"{figure}: drawn", err=True)
+
+
+def tell(name: str, content: dict[str, Any], *, everything: bool) -> None:
+    """Print a verdict with its evidence and the lines that mend it."""
+    findings = content["findings"]
+    click.echo(f"{one_line(name)}: {_HEADS[content['verdict']].format(len(findings))}")
+    for k, finding in enumerate(findings, start=1):
+        click.echo(f"{k}. {finding['words']}")
+        for outcome in finding["evidence"]:
+            click.echo(f"   {outcome['check']}: {outcome['words']}")
+        for fault in finding["faults"]:
+            for line in fault["profile"]:
+                click.echo(f"   profile: {line}")
+            if not fault["profile"]:
+                click.echo(f"   profile: none mends it ({fault['words']}): mend it where the log is made")
+    if content.get("why"):
+        click.echo(one_line(content["why"])[:600])
+    if everything:
+        _table(content)
+    if content["untested"]:
+        click.echo(f"cannot be tested with these channels: {', '.join(content['untested'])}")
+
+
+_HEADS = {
+    "clean": "the channels agree",
+    "faults": "{} of its channels' stories cannot be true",
+    "untested": "nothing could be tested",
+    "failed": "the doctor failed",
+}
+
+
+def _table(content: dict[str, Any]) -> None:
+    rows = [
+        [check["check"], check["state"], f["name"], number(f["value"]), number(f["std"], 2),
+         f"{number(f['expected'][0])} .. {number(f['expected'][1])}", f["unit"]]
+        for check in content["checks"] for f in check["figures"]
+    ]  # fmt: skip
+    rows += [[c["check"], c["state"], c["words"], "", "", "", ""] for c in content["checks"] if not c["figures"]]
+    print_table(["check", "says", "figure", "value", "std", "expected", "unit"], rows)
