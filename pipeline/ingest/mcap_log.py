@@ -135,6 +135,7 @@ class _Job:
         self.time_field = time if time and time.column not in _TIMES else None
         self.asked: dict[str, tuple[str, str]] = {}
         self.routes: dict[int, Route | None] = {}
+        self.made: dict[Channel, Route | None] = {}
         self.refused: dict[str, str] = {}
         self.seen: dict[str, set[str]] = {}
         self.timed, self.untimed = False, set[str]()
@@ -190,8 +191,7 @@ class _Job:
         time = (batch.log_time if self.clock == _TIMES[0] else batch.publish_time).copy()
         topic, text = np.full(n, -1, dtype=np.int64), np.zeros(n, dtype=np.bool_)
         part = Part(batch, time, topic, np.zeros(n, dtype=np.int8), text, {})
-        for number in np.unique(batch.channel).tolist():
-            record = np.flatnonzero(batch.channel == number)
+        for number, record in _by_channel(batch.channel):
             channel = self.stream.channels.get(number)
             if channel is None:
                 part.reason[record], time[record] = CODE[Reason.MALFORMED], NO_TIME
@@ -227,7 +227,10 @@ class _Job:
     def _route(self, number: int, channel: Channel) -> Route | None:
         """Return the reader of a channel, None where nothing is asked of it or it cannot be read."""
         if number not in self.routes:
-            self.routes[number] = self._new_route(channel)
+            # channels that say the same have one reader, however many there are
+            if channel not in self.made:
+                self.made[channel] = self._new_route(channel)
+            self.routes[number] = self.made[channel]
         return self.routes[number]
 
     def _new_route(self, channel: Channel) -> Route | None:
@@ -324,6 +327,15 @@ def _lines(topic: str, fields: dict[str, ChannelMap]) -> str:
         )
         lines.append(f"'{topic}.{key}: {{channel: {one.channel}, unit: {one.unit}{extra}}}'")
     return ", ".join(lines)
+
+
+def _by_channel(channel: NDArray[np.int64]) -> Iterator[tuple[int, NDArray[np.int64]]]:
+    """Yield every channel with its messages, ascending."""
+    order = np.argsort(channel, kind="stable")
+    cuts = np.flatnonzero(np.diff(channel[order])) + 1
+    for record in np.split(order, cuts):
+        if record.size:
+            yield int(channel[record[0]]), record
 
 
 def _joined(parts: list[NDArray[T]], empty: NDArray[T]) -> NDArray[T]:
