@@ -24,12 +24,13 @@ _LARGEST = 1 << 24
 def vouched_times(data: bytes) -> set[int]:
     """Return the log times, ns, of the messages in chunks whose checksum is right, and of those outside any chunk.
 
-    A chunk that says that it has no checksum (zero) is taken at its word.
+    A chunk that says that it has no checksum (zero) has nothing to fail, and what lies in it may lie anywhere.
     """
     times: set[int] = set()
     inside = bytearray(len(data))
-    for at, stop, content in _chunks(data):
-        inside[at:stop] = b"\1" * (stop - at)
+    for at, stop, summed, content in _chunks(data):
+        if summed:
+            inside[at:stop] = b"\1" * (stop - at)
         if content is not None:
             times.update(_messages(content))
     at = data.find(_MESSAGE)
@@ -40,23 +41,25 @@ def vouched_times(data: bytes) -> set[int]:
     return times
 
 
-def _chunks(data: bytes) -> Iterator[tuple[int, int, bytes | None]]:
-    """Yield where chunks begin and end, and their content; None where it fails its checksum."""
+def _chunks(data: bytes) -> Iterator[tuple[int, int, bool, bytes | None]]:
+    """Yield where chunks begin and end, whether they have a checksum, and their content, None where it fails that.
+
+    The length in front of a chunk is not looked at: a chunk may be whole although it is wrong.
+    """
     at = data.find(_CHUNK)
     while at >= 0:
-        head = data[at + 1 : at + 9]
-        length = int.from_bytes(head, "little")
-        if len(head) == 8 and 40 <= length <= len(data) - at - 9:
-            yield at, at + 9 + length, _unpacked(data[at + 9 : at + 9 + length])
+        head = data[at + 9 : at + 41]
+        if len(head) == 32:
+            size, crc, name_length = struct.unpack_from("<QII", head, 16)
+            first = at + 41 + name_length + 8
+            length = int.from_bytes(data[first - 8 : first], "little")
+            if name_length <= 8 and first + length <= len(data) and size <= _LARGEST:
+                name = data[at + 41 : at + 41 + name_length]
+                yield at, first + length, crc != 0, _unpacked(name, data[first : first + length], size, crc)
         at = data.find(_CHUNK, at + 1)
 
 
-def _unpacked(chunk: bytes) -> bytes | None:
-    size, crc, name_length = struct.unpack_from("<QII", chunk, 16)
-    if size > _LARGEST or 32 + name_length + 8 > len(chunk):
-        return None
-    name, packed = chunk[32 : 32 + name_length], chunk[32 + name_length + 8 :]
-    packed = packed[: int.from_bytes(chunk[32 + name_length : 40 + name_length], "little")]
+def _unpacked(name: bytes, packed: bytes, size: int, crc: int) -> bytes | None:
     try:
         if name == b"zstd":
             content = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)

@@ -207,13 +207,13 @@ def _unquoted(cell: pl.Expr) -> pl.Expr:
 
 def _inside_quotes(quote: NDArray[np.bool_], rows: Spans) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
     """Tell which bytes stand between quotation marks, and which rows close all of theirs."""
-    count = np.concatenate(([0], np.cumsum(quote)))
-    base = np.zeros(quote.size, dtype=np.int64)
-    begin = count[rows.start]
-    if begin.size:
-        base[rows.start] = np.diff(begin, prepend=0)
-    inside = (count[1:] - np.cumsum(base)) % 2 == 1
-    return inside, (count[rows.stop] - begin) % 2 == 0
+    # whether the marks up to each byte are odd in number; a count of them would take eight times the memory
+    odd = np.logical_xor.accumulate(quote)
+    before = odd[rows.start - 1] & (rows.start > 0)
+    turn = np.zeros(quote.size, dtype=np.bool_)
+    if before.size:
+        turn[rows.start] = before ^ np.append([False], before[:-1])
+    return odd ^ np.logical_xor.accumulate(turn), (odd[rows.stop - 1] & (rows.stop > 0)) == before
 
 
 def _one_tab(buffer: Bytes, rows: Spans) -> tuple[Bytes, Spans]:

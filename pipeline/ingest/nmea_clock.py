@@ -207,16 +207,18 @@ def _without_brief_dates(offset: Nanoseconds, counted: Nanoseconds) -> tuple[Nan
 
 def _nearest_day(told: _Told, near: Nanoseconds, notes: list[str]) -> Nanoseconds:
     """Complete the times of day by their own date, else by the day that brings them nearest to other instants."""
-    known = told.timed & (near != NO_TIME)
-    anchor, of_day = np.where(known, near, 0), np.where(known, told.of_day, 0)
+    own = told.full.copy()
+    known = np.flatnonzero(told.timed & (near != NO_TIME))
     half = DAY_NS // 2
-    guess = anchor + (of_day - anchor % DAY_NS + half) % DAY_NS - half
-    at = np.flatnonzero(known & told.dated)
-    offset, brief = _without_brief_dates(told.full[at] - guess[at], guess[at])
-    guess[at] += offset
+    anchor, full = near[known], told.full[known]
+    guess = anchor + (told.of_day[known] - anchor % DAY_NS + half) % DAY_NS - half
+    dated = np.flatnonzero(full != NO_TIME)
+    offset, brief = _without_brief_dates(full[dated] - guess[dated], guess[dated])
+    guess[dated] += offset
     if brief:
         notes.append(f"{brief} dates that disagree with those around them were put right: told late at midnight.")
-    return np.where(known, guess, told.full)
+    own[known] = guess
+    return own
 
 
 def _latest(mark: Flag) -> Index:

@@ -58,7 +58,8 @@ class Fields:
         if self._fewest < place:
             there = self.count >= place
             start, end = np.where(there, start, stop), np.where(there, end, stop)
-        return Cells.of(self.frames.body.buffer, start, end)
+        made = Cells.of if self.frames.padded else Cells
+        return made(self.frames.body.buffer, start, end)
 
     @cached_property
     def _stop(self) -> Index:

@@ -17,9 +17,9 @@ from pipeline.ingest.decoded import CODE, NO_TIME, Code, Flag, Nanoseconds
 from pipeline.ingest.nmea_checksum import checksum_right
 from pipeline.ingest.nmea_tags import BACKSLASH, Tags, tags_of
 from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Bytes, Index, Spans, first_within, is_blank, last_within, trimmed
+from pipeline.ingest.spans import Bytes, Index, Spans, first_within, is_blank, trimmed
 
-_FEED, _RETURN, _DOLLAR, _BANG, _STAR, _COMMA = 10, 13, 36, 33, 42, 44
+_FEED, _RETURN, _BLANK, _DOLLAR, _BANG, _STAR, _COMMA = 10, 13, 32, 36, 33, 42, 44
 
 #: Bytes that are worked on at a time.
 _BLOCK = 1 << 20
@@ -62,6 +62,8 @@ class Frames:
         Whether every stamp names its zone.
     broken_tags : int
         Lines whose TAG block is not that of its checksum, so that what it says was left out.
+    padded : bool
+        Whether there are fields with blanks at their ends.
     """
 
     lines: Spans
@@ -76,6 +78,7 @@ class Frames:
     stamped: bool
     zoned: bool
     broken_tags: int
+    padded: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,6 +99,7 @@ class _Block:
     good: Flag  # a readable stamp
     zoned: Flag  # ... that names its zone
     bad_tag: Flag  # a TAG block without its own checksum
+    padded: bool  # blanks beside a comma or an asterisk
 
 
 def frames_of(buffer: Bytes) -> Frames:
@@ -143,6 +147,7 @@ def frames_of(buffer: Bytes) -> Frames:
         stamped=stamped,
         zoned=bool(np.all(whole("zoned")[good])) if stamped else True,
         broken_tags=int(np.sum(bad_tag)),
+        padded=any(block.padded for block in blocks),
     )
 
 
@@ -178,14 +183,21 @@ def _block(buffer: Bytes, at: int, before: int) -> _Block:
     strokes = np.flatnonzero(buffer == BACKSLASH)
     prefix = np.bitwise_xor.accumulate(buffer)
     tags = tags_of(buffer, prefix, openings, strokes, lines)
-    first = first_within(openings, tags.behind, lines.stop)
+    if strokes.size == 0 and openings.size == len(lines) and bool(np.all(openings >= lines.start)):
+        # as it should be: one sentence a line
+        first = np.where(openings < lines.stop, openings, -1)
+    else:
+        first = first_within(openings, tags.behind, lines.stop)
     has = first >= 0
     first = np.where(has, first, lines.start)
-    star = last_within(np.flatnonzero(buffer == _STAR), first, lines.stop)
-    summed = has & (star > 0) & (star + 3 == lines.stop) & checksum_right(buffer, prefix, first, star)
+    # another asterisk behind this one would be no digit of a checksum
+    star = np.maximum(lines.stop - 3, 0)
+    summed = has & (buffer[star] == _STAR) & checksum_right(buffer, prefix, first, star)
     start = np.where(has, first + 1, lines.start)
     stop = np.where(has, np.where(summed, star, lines.stop), start)
     comma = np.flatnonzero(buffer == _COMMA)
+    blank = np.flatnonzero(buffer == _BLANK)
+    beside = buffer[np.minimum(blank + 1, buffer.size - 1)]
     low, high = np.searchsorted(comma, start), np.searchsorted(comma, stop)
     address_stop = np.where(low < high, np.append(comma, 0)[np.minimum(low, comma.size)], stop)
     stamp, good, zoned = _stamps(lines, first, tags)
@@ -204,6 +216,7 @@ def _block(buffer: Bytes, at: int, before: int) -> _Block:
         good=good,
         zoned=zoned,
         bad_tag=tags.broken,
+        padded=bool(np.any((buffer[blank - 1] == _COMMA) | (beside == _COMMA) | (beside == _STAR))),
     )
 
 
@@ -231,10 +244,16 @@ def _stamps(lines: Spans, first: Index, tags: Tags) -> tuple[Nanoseconds, Flag, 
     stop = np.maximum(np.minimum(first, tags.start), lines.start)
     if not bool(np.any(stop > lines.start)):
         return tags.time_utc_ns, tags.timed, tags.timed
-    stamp = trimmed(Spans(buffer, lines.start, stop))
-    end = buffer[np.maximum(stamp.stop - 1, 0)]
-    cut = (stamp.stop > stamp.start) & ((end == _COMMA) | (end == ord(";")) | is_blank(end))
-    if cut.any():
-        stamp = trimmed(Spans(buffer, stamp.start, stamp.stop - cut))
+    start = lines.start
+    # most stamps are set off by one sign, some by a sign with blanks around it
+    for _ in range(2):
+        end = buffer[np.maximum(stop - 1, 0)]
+        cut = (stop > start) & ((end == _COMMA) | (end == ord(";")) | is_blank(end))
+        if not cut.any():
+            break
+        stop = stop - cut
+    else:
+        stop = trimmed(Spans(buffer, start, stop)).stop
+    stamp = Spans(buffer, start, stop)
     time, good, zoned = iso_time.parse(stamp)
     return np.where(good, time, tags.time_utc_ns), good | tags.timed, zoned | (tags.timed & ~good)

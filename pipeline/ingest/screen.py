@@ -107,14 +107,15 @@ def _first_of(decoded: Decoded, record: Index, content: pl.Series | None = None)
 def _check_values(name: str, values: Values, reason: Code, shared: Index, decoded: Decoded) -> Code:
     """Return the code of the refusal of each value, 0 for one that is kept or not there, shape (n,)."""
     refused = np.zeros(reason.shape, dtype=np.int8)
-    offered = values.present & (reason == 0)
+    # of many channels each record offers few
+    at = np.flatnonzero(values.present & (reason == 0))
     channel = CHANNELS[name]
-    value = values.value
-    refused[offered & ~np.isfinite(value)] = CODE[Reason.NOT_A_NUMBER]
+    value = values.value[at]
     with np.errstate(invalid="ignore"):
         outside = (value < channel.low) | (value > channel.high)
-    refused[offered & outside] = CODE[Reason.OUT_OF_RANGE]
-    standing = shared[offered[shared] & (refused[shared] == 0)]
+    refused[at[~np.isfinite(value)]] = CODE[Reason.NOT_A_NUMBER]
+    refused[at[outside]] = CODE[Reason.OUT_OF_RANGE]
+    standing = shared[values.present[shared] & (reason[shared] == 0) & (refused[shared] == 0)]
     if standing.size:
         refused[standing[~_first_of(decoded, standing)]] = CODE[Reason.SAME_INSTANT]
     return refused

@@ -144,15 +144,6 @@ def first_within(places: Index, start: Index, stop: Index) -> Index:
     return np.where((at < places.size) & (found < stop), found, -1)
 
 
-def last_within(places: Index, start: Index, stop: Index) -> Index:
-    """Return the last of the ascending places in each stretch, -1 for none."""
-    if places.size == 0:
-        return np.full(start.shape, -1, dtype=np.int64)
-    before = np.searchsorted(places, stop) - 1
-    found = places[np.maximum(before, 0)]
-    return np.where((before >= 0) & (found >= start), found, -1)
-
-
 def spans_of(column: pl.Series) -> Spans:
     """Return a column of text as stretches of its own UTF-8 buffer; null becomes empty."""
     array = column.fill_null("").cast(pl.Binary).rechunk().to_arrow()
