@@ -112,6 +112,13 @@ def joined(batches: list[Batch]) -> Batch:
     )
 
 
+def stretch(since_ns: int | None, until_ns: int | None, messages: int | None, why: str) -> LostStretch:
+    """Return a lost stretch; what damage made of its times, and no clock ever showed, is left out of it."""
+    since = since_ns if since_ns is not None and 0 < since_ns <= int(_LATEST) else None
+    until = until_ns if until_ns is not None and (since or 1) <= until_ns <= int(_LATEST) else None
+    return LostStretch(since, until, messages, why)
+
+
 def lost_chunk(log: LogFile, place: int, length: int, why: str) -> tuple[Batch, LostStretch]:
     """Stand in for a chunk that cannot be read: its messages by the index behind it, or one where there is none.
 
@@ -127,9 +134,9 @@ def lost_chunk(log: LogFile, place: int, length: int, why: str) -> tuple[Batch, 
     since = until = None
     if time.size:
         since, until = int(time.min()), int(time.max())
-    elif head is not None and 0 < head.since_ns <= head.until_ns <= int(_LATEST):
+    elif head is not None:
         since, until = head.since_ns, head.until_ns
-    lost = LostStretch(since, until, int(time.size) or None, why)
+    lost = stretch(since, until, int(time.size) or None, why)
     if time.size == 0:
         channel, time = np.full(1, -1, dtype=np.int64), np.zeros(1, dtype=np.int64)
     nothing = np.zeros(time.size, dtype=np.int64)

@@ -110,7 +110,12 @@ def _decompressed(head: ChunkHead, packed: memoryview) -> bytes:
         import lz4.frame
 
         try:
-            return bytes(lz4.frame.LZ4FrameDecompressor().decompress(packed, max_length=head.size + 1))
+            unpacker = lz4.frame.LZ4FrameDecompressor()
+            records = bytes(unpacker.decompress(packed, max_length=head.size + 1))
         except (RuntimeError, EOFError) as error:
             raise DamagedChunkError(f"lz4: {error}") from error
+        # where a CRC vouches for the records, nothing hangs on the frame's own end
+        if not unpacker.eof and not head.crc:
+            raise DamagedChunkError("lz4: its frame does not end")
+        return records
     raise DamagedChunkError(f"its compression {head.compression!r} is not known")

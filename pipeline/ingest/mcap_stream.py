@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap_batch import Batch, Piece, joined, lost_chunk, messages_of
+from pipeline.ingest.mcap_batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
 from pipeline.ingest.mcap_chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
 from pipeline.ingest.mcap_records import (
     CHANNEL,
@@ -143,13 +143,13 @@ class McapStream:
             raise too_large(self._name, allowance(self._log.size)[0])
         if self._records_left < 0:
             raise too_many(self._name, allowance(self._log.size)[1])
-        if batch.log_time.size:
+        if batch.log_time.size and not batch.lost:
             self._last_ns = int(batch.log_time.max())
 
     def _lose(self, lost: LostStretch, told: str = "") -> None:
         if len(self.lost) >= _MOST_STRETCHES:
             since = self.lost[-1].since_ns
-            self.lost[-1] = LostStretch(since, lost.until_ns, None, "the file is damaged in very many places")
+            self.lost[-1] = stretch(since, lost.until_ns, None, "the file is damaged in very many places")
             return
         self.lost.append(lost)
         span = _span(lost) or "at a time unknown"
@@ -252,7 +252,7 @@ class McapStream:
             head = head_of(content)
             until = head.until_ns if head else None
             self._note_chunk(
-                place, LostStretch(self._last_ns, until, None, f"its records are damaged from byte {reached} on")
+                place, stretch(self._last_ns, until, None, f"its records are damaged from byte {reached} on")
             )
 
     def _note_chunk(self, place: int, lost: LostStretch) -> None:
@@ -298,15 +298,13 @@ class McapStream:
         head = head_of(self._log.read(place + HEAD, 64))
         until = head.since_ns if head else None
         self._lose(
-            LostStretch(
-                self._last_ns, until, None, f"the file is damaged at byte {at}; reading goes on at byte {place}"
-            )
+            stretch(self._last_ns, until, None, f"the file is damaged at byte {at}; reading goes on at byte {place}")
         )
         return place
 
     def _cut(self, why: str) -> None:
         self._lose(
-            LostStretch(self._last_ns, None, None, why),
+            stretch(self._last_ns, None, None, why),
             f"The MCAP file is cut short or damaged at its end, all whole chunks were read: {why}.",
         )
 

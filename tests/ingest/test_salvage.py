@@ -244,3 +244,16 @@ def test_a_large_record_of_another_kind_is_stepped_over_and_a_garbled_one_is_not
     garbled = data[:at] + b"\x00" + struct.pack("<Q", len(data) - at - 100) + data[at + 9 :]
     readings, chunks, _ = kept(garbled)
     assert chunks == set(range(CHUNKS))
+
+
+@pytest.mark.parametrize("instant", [0, 2**63, 2**64 - 1])
+def test_times_that_damage_made_are_not_told(instant):
+    def wrong(out, places):
+        at, to = places[4]
+        struct.pack_into("<QQ", out, at + 9, instant, instant)
+        out[to - 20] ^= 1
+        return out
+
+    readings, chunks, _ = kept(log(index=False, closed=False, mend=wrong)[0])
+    assert chunks == set(range(CHUNKS)) - {4}
+    assert (readings.lost[0].since_ns, readings.lost[0].until_ns) == (None, None)
