@@ -151,7 +151,7 @@ def page(found: list[Told], verify_s: float) -> list[str]:
     most = max(found, key=lambda told: told.preview["moved"])
     if most.preview["parameters"]:
         lines += [f"The largest moves of *{most.change.words}*:", ""]
-        names = ["vessel", "parameter", "estimator", "sets", "largest", "median", "std ratio"]
+        names = ["vessel", "parameter", "estimator", "sets", "largest, standard errors", "median", "std ratio"]
         shown = [
             [
                 line["vessel"],

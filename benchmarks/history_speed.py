@@ -19,7 +19,7 @@ from hashlib import sha256
 from pathlib import Path
 from statistics import median
 from tempfile import TemporaryDirectory
-from time import perf_counter
+from time import perf_counter, process_time
 from typing import Any
 
 import numpy as np
@@ -146,22 +146,28 @@ def grow(warehouse: Warehouse, commits: int, vessels: int, seed: int = 7) -> lis
 
 
 def ask(warehouse: Warehouse, vessels: int, times: int) -> dict[str, float]:
-    """Ask for histories in this process, ms: the first, the median of those that follow, and as of now."""
+    """Ask for histories in this process, ms: the first, the medians of those that follow, and as of now.
 
-    def timed(vessel: int, as_of: datetime | None = None) -> float:
-        begin = perf_counter()
+    A busy machine lengthens the time on the clock; that of the processor, all threads together, is what an idle one
+    would need at most.
+    """
+
+    def timed(vessel: int, as_of: datetime | None = None) -> tuple[float, float]:
+        begin, worked = perf_counter(), process_time()
         history.of_vessel(warehouse, f"vessel {vessel % vessels}", as_of=as_of)
-        return 1e3 * (perf_counter() - begin)
+        return 1e3 * (perf_counter() - begin), 1e3 * (process_time() - worked)
 
     warehouse.exists()  # the libraries are imported before the clock runs
     pl.LazyFrame({"a": [1]}).filter(pl.col("a") == 1).collect()
     first = timed(17)
     then = [timed(37 * k) for k in range(times)]
     now = datetime.now(UTC)
+    earlier = [timed(37 * k, now) for k in range(max(3, times // 5))]
     return {
-        "first": first,
-        "then": median(then),
-        "as of": median(timed(37 * k, now) for k in range(max(3, times // 5))),
+        "first": first[0],
+        "then": median(wall for wall, _ in then),
+        "processor": median(cpu for _, cpu in then),
+        "as of": median(wall for wall, _ in earlier),
     }
 
 
@@ -198,7 +204,7 @@ def rivals(rows: pl.DataFrame, folder: Path) -> dict[str, Callable[[str], list[t
 
 
 def beside(warehouse: Warehouse, rows: pl.DataFrame, folder: Path, vessels: int, times: int) -> dict[str, float]:
-    """Time the rivals after they have given the very rows that the warehouse gives, ms."""
+    """Time the rivals after they have given the very rows that the warehouse gives, ms of the processor."""
     taken = {}
     for name, answer in rivals(rows, folder).items():
         ours = history.of_vessel(warehouse, "vessel 3").frame.select(_ASKED).rows()
@@ -206,9 +212,9 @@ def beside(warehouse: Warehouse, rows: pl.DataFrame, folder: Path, vessels: int,
             raise RuntimeError(f"{name} gives other rows")
         found = []
         for k in range(times):
-            begin = perf_counter()
+            begin = process_time()
             answer(f"vessel {37 * k % vessels}")
-            found.append(1e3 * (perf_counter() - begin))
+            found.append(1e3 * (process_time() - begin))
         taken[name] = median(found)
     return taken
 
@@ -229,12 +235,12 @@ def measure(folder: Path, vessels: int, each: int, commits: int, times: int) -> 
         opened = delta.open_table(warehouse, "parameter_sets")
         assert opened is not None
         counted = [str(opened.version()), str(len(opened.file_uris())), f"{_size_mb(place):.0f}"]
-        told.append([what, *counted, *(f"{found[k]:.0f}" for k in ("first", "then", "as of"))])
+        told.append([what, *counted, *(f"{found[k]:.0f}" for k in ("first", "then", "processor", "as of"))])
         return found
 
     before = state("as filled")
     compared = beside(warehouse, rows, folder, vessels, times)
-    ours = _asked_anew(place, vessels, times)["then"]
+    ours = _asked_anew(place, vessels, times)["processor"]
     taken = grow(warehouse, commits, vessels)
     after = state(f"after {commits} sets more, one a commit")
     compaction.compact(warehouse)
@@ -242,11 +248,11 @@ def measure(folder: Path, vessels: int, each: int, commits: int, times: int) -> 
     compaction.vacuum(warehouse, 0.0)
     last = state("vacuumed")
     tenth = max(1, commits // 10)
-    worst = max(one["then"] for one in (before, after, last))
+    worst = [max(one[k] for one in (before, after, last)) for k in ("then", "processor")]
     lines = [
         "",
-        f"Slowest median: {worst:.0f} ms (wanted: below {TARGET_MS:g}). The first question of a process opens the "
-        "tables, the others find them open.",
+        f"Slowest median: {worst[0]:.0f} ms on the clock, {worst[1]:.0f} ms of the processor (wanted: below "
+        f"{TARGET_MS:g}). The first question of a process opens the tables, the others find them open.",
         "",
         f"A set a commit, {commits} times one after the other: median {1e3 * median(taken[:tenth]):.0f} ms of the "
         f"first tenth, {1e3 * median(taken[-tenth:]):.0f} ms of the last.",
@@ -254,7 +260,10 @@ def measure(folder: Path, vessels: int, each: int, commits: int, times: int) -> 
         "What a user would pick instead, holding the same rows, as filled; none of these knows what was known at an "
         "earlier time, which sets are superseded, or where a value came from:",
         "",
-        *table(["instead", "ms", "its time / ours"], [[n, f"{t:.1f}", f"{t / ours:.2g}"] for n, t in compared.items()]),
+        *table(
+            ["instead", "ms of the processor", "its time / ours"],
+            [[n, f"{t:.1f}", f"{t / ours:.2g}"] for n, t in compared.items()],
+        ),
     ]
     return told, [f"{rows.height} parameter rows of {vessels} vessels, {each} sets each.", *lines]
 
@@ -272,16 +281,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     with TemporaryDirectory() as name:
         told, (first, *rest) = measure(Path(name), options.vessels, options.sets, options.commits, options.times)
-    head = ["state", "version", "files", "MB", "first question ms", "median of the next ms", "as of a time ms"]
+    head = [
+        "state",
+        "version",
+        "files",
+        "MB",
+        "first question ms",
+        "next, median ms",
+        "of the processor ms",
+        "as of a time ms",
+    ]
     lines = [
         f"{first} History of one vessel, medians of {options.times} vessels in one process.",
         "",
         *table(head, told),
     ]
     asked = f"--vessels {options.vessels} --sets {options.sets} --commits {options.commits}"
-    path = write(
-        "history_speed", "The history of one vessel among a million parameter rows", [*lines, *rest], options=asked
-    )
+    path = write("history_speed", "The history of one vessel among many", [*lines, *rest], options=asked)
     print(path.read_text(encoding="utf-8"))
 
 
