@@ -14,7 +14,7 @@ demo: $(RUNTIME)
 	@echo "  (first: source $(BIN)/activate)"
 
 test: check
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
 
 check: $(DEVELOP)
 	$(BIN)/ruff check .
