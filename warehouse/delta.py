@@ -113,7 +113,7 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
 
     table = open_table(warehouse, name)
     if table is not None:
-        return _with_every_column(warehouse, table, name)
+        return table
     warehouse.create()
     with refusals_told(warehouse.address(name)):
         try:
@@ -143,7 +143,8 @@ def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
     """
     with handles.borrowed(warehouse, name, ensure_table) as table:
         assert table is not None
-        yield table
+        # here, and not where it is opened: a handle that was lent for reading before may lack columns too
+        yield _with_every_column(warehouse, table, name)
 
 
 def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> DeltaTable:
