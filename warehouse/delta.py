@@ -113,10 +113,10 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
 
     table = open_table(warehouse, name)
     if table is not None:
-        return _with_every_column(warehouse, table, name)
+        return table
     warehouse.create()
-    try:
-        with writing(warehouse.address(name)):
+    with refusals_told(warehouse.address(name)):
+        try:
             DeltaTable.create(
                 warehouse.address(name),
                 schema=arrow_schema(TABLES[name]),
@@ -125,10 +125,10 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
                 configuration=_CONFIGURATION,
                 storage_options=warehouse.options,
             )
-    except DeltaError:  # another writer made it at the same moment
-        if open_table(warehouse, name) is None:
-            warehouse.reach()
-            raise
+        except DeltaError:  # another writer made it at the same moment
+            if open_table(warehouse, name) is None:
+                warehouse.reach()
+                raise
     made = open_table(warehouse, name)
     assert made is not None
     return made
@@ -138,11 +138,13 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
 def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
     """Lend a table for reading, deciding and writing; it is made, and the warehouse too, where it is not there.
 
-    What was lent is not to be used after. One over which a commit failed is opened anew the next time.
+    What was lent is not to be used after, nor by another thread. One over which something else than a lost race went
+    wrong is opened anew the next time.
     """
     with handles.borrowed(warehouse, name, ensure_table) as table:
         assert table is not None
-        yield table
+        # here, and not where it is opened: a handle that was lent for reading before may lack columns too
+        yield _with_every_column(warehouse, table, name)
 
 
 def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> DeltaTable:
@@ -154,7 +156,7 @@ def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> De
     missing = [field for field in wanted if field.name not in held]
     if not missing:
         return table
-    with writing(warehouse.address(name)):
+    with refusals_told(warehouse.address(name)):
         table.alter.add_columns(missing)
     altered = open_table(warehouse, name)
     assert altered is not None
@@ -196,7 +198,7 @@ def read(
         with reading(warehouse, name, version) as table:
             return rows(table, name, where, columns)
     except KempfError:
-        warehouse.reach()
+        warehouse.reach()  # a bucket that does not answer leaves the tables as they are: no copy need be restored
         raise
 
 
@@ -279,7 +281,7 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
         data = new.select(schema.names).to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema)
     else:
         data = pa.Table.from_pylist(list(new), schema=schema)
-    with writing(table.table_uri):
+    with refusals_told(table.table_uri):
         write_deltalake(
             table,
             data,
@@ -290,11 +292,13 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
 
 
 @contextmanager
-def writing(address: str) -> Iterator[None]:
+def refusals_told(address: str) -> Iterator[None]:
     """Tell what the storage refuses while something is written to an address as one clear error.
 
     Raises
     ------
+    deltalake.exceptions.CommitFailedError
+        A lost race, as it is.
     KempfError
         ``disk_full``, ``warehouse_not_writable``.
     """
@@ -305,12 +309,14 @@ def writing(address: str) -> Iterator[None]:
     except OSError as error:
         raise not_writable(address, error) from error
     except DeltaError as error:
+        told = not_writable(address, error)
         # a commit that the disk has no room for is no lost race: trying it again would not help
-        told = not_writable(address, OSError(str(error)))
-        away = "://" in address.removeprefix("file://") and not isinstance(error, CommitFailedError)
-        if told.code == "disk_full" or away:
+        if told.code == "disk_full":
             raise told from error
-        raise
+        # on a disk the rest is no matter of the connection
+        if isinstance(error, CommitFailedError) or "://" not in address.removeprefix("file://"):
+            raise
+        raise told from error
 
 
 def versions(warehouse: Warehouse) -> dict[str, int]:

@@ -28,7 +28,7 @@ _kept: list[tuple[tuple[object, ...], tuple[int, ...], DeltaTable]] = []
 def borrowed(
     warehouse: Warehouse, name: str, opened: Callable[[Warehouse, str], DeltaTable | None]
 ) -> Iterator[DeltaTable | None]:
-    """Lend a table at its newest version for reading, None where it was never written.
+    """Lend a table at its newest version to one thread, None where it was never written.
 
     Parameters
     ----------
@@ -36,16 +36,21 @@ def borrowed(
     name : str
         Of the table.
     opened : callable
-        Opens it where no handle is at hand.
+        Opens it where no handle is at hand; it says in words what is wrong where the storage does not answer.
     """
+    from deltalake.exceptions import CommitFailedError
+
     key = _key(warehouse, name)
     table = _taken(warehouse, name, key)
     if table is None:
         table = opened(warehouse, name)
-    yield table
-    # behind the yield: a handle over which something went wrong is not kept
-    if table is not None:
+    try:
+        yield table
+    except CommitFailedError:  # a lost race is no fault of the handle, and the next attempt wants it
         _keep(warehouse, name, key, table)
+        raise
+    # behind the yield: a handle over which something else went wrong is not kept
+    _keep(warehouse, name, key, table)
 
 
 def _key(warehouse: Warehouse, name: str) -> tuple[object, ...]:
@@ -61,19 +66,22 @@ def _taken(warehouse: Warehouse, name: str, key: tuple[object, ...]) -> DeltaTab
         if at is None:
             return None
         _, mark, table = _kept.pop(at)
-    if warehouse.mark_of(name, *_commit(table.version())) != mark:
-        return None
-    if warehouse.mark_of(name, *_commit(table.version() + 1)) is None:
-        return table
     with suppress(DeltaError, OSError, ValueError):
-        table.update_incremental()
+        if warehouse.mark_of(name, *_commit(table.version())) != mark:
+            return None
+        # in a bucket asking for a commit that is not there costs more than the update
+        if warehouse.folder is None or warehouse.mark_of(name, *_commit(table.version() + 1)) is not None:
+            table.update_incremental()
         return table
     return None
 
 
-def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: DeltaTable) -> None:
-    mark = warehouse.mark_of(name, *_commit(table.version()))
-    if mark is None:
+def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: DeltaTable | None) -> None:
+    mark = None
+    if table is not None:
+        with suppress(OSError):  # what was done with the table is done: a bucket that is gone now is told at the next
+            mark = warehouse.mark_of(name, *_commit(table.version()))
+    if table is None or mark is None:
         return
     with _lock:
         _kept.append((key, mark, table))

@@ -41,7 +41,12 @@ def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, Readings]]) -> N
         for number, one in enumerate(item.lost)
     ]
     predicate = one_of("ingest_id", {ingest for _, ingest, _ in damaged})
-    with_retry(lambda: delta.replace(delta.ensure_table(warehouse, "lost"), "lost", rows, predicate))
+
+    def attempt() -> None:
+        with delta.ensured(warehouse, "lost") as table:
+            delta.replace(table, "lost", rows, predicate)
+
+    with_retry(attempt)
 
 
 def of_ingests(warehouse: Warehouse, ingest_ids: Sequence[str]) -> dict[str, tuple[LostStretch, ...]]:

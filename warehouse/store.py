@@ -274,19 +274,20 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 _FULL_WORDS = ("no space left", "disk quota exceeded", "not enough space")
 
 
-def not_writable(where: str, error: OSError) -> KempfError:
+def not_writable(where: str, error: Exception) -> KempfError:
     """Return the error of a write that failed; a full disk has one of its own.
 
     Parameters
     ----------
     where : str
         Folder or address that was written to.
-    error : OSError
+    error : Exception
+        Of the system, or of the library that wrote.
     """
     if where.startswith("file://"):
         where = unquote(where.removeprefix("file://")).rstrip("/")
     told = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", str(error)).split())
-    if error.errno in _FULL or any(words in told.lower() for words in _FULL_WORDS):
+    if getattr(error, "errno", None) in _FULL or any(words in told.lower() for words in _FULL_WORDS):
         free = _free_bytes(where)
         return KempfError(
             "disk_full",

@@ -1,4 +1,4 @@
-"""Tables kept open: never stale, never shared, never of another folder."""
+"""Tables kept open: the newest version, one thread at a time, and never those of another folder."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
+from threading import Barrier, Thread
+from typing import Any
 
 import pytest
 
@@ -27,10 +29,14 @@ def stands(warehouse: Warehouse) -> dict[str, str]:
 def test_a_handle_is_used_again(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
     put(warehouse, "one")
     assert stands(warehouse) == {"run-1": "one"}
-    monkeypatch.setattr(delta, "open_table", lambda *_: pytest.fail("opened anew"))
-    assert stands(warehouse) == {"run-1": "one"}
-    put(warehouse, "two")
-    assert stands(warehouse) == {"run-1": "two"}
+    other = Warehouse(warehouse.uri)
+    with monkeypatch.context() as patched:
+        patched.setattr(delta, "open_table", lambda *_: pytest.fail("opened anew"))
+        assert stands(warehouse) == {"run-1": "one"}
+        for status in ("two", "three", "four"):
+            put(other, status)
+            assert stands(warehouse) == {"run-1": status}
+    assert delta.versions(warehouse) == {"runs": 4}
 
 
 def test_what_another_process_wrote_is_seen(warehouse: Warehouse) -> None:
@@ -60,6 +66,16 @@ def test_a_folder_that_was_replaced_is_opened_anew(warehouse: Warehouse, tmp_pat
     assert stands(warehouse) == {}
 
 
+def test_a_table_made_anew_at_the_same_place_is_another(warehouse: Warehouse) -> None:
+    put(warehouse, "done", "old")
+    put(warehouse, "done", "older")
+    assert stands(warehouse) == {"old": "done", "older": "done"}
+    assert warehouse.folder is not None
+    shutil.rmtree(warehouse.folder)
+    put(Warehouse(warehouse.uri), "done", "new")
+    assert stands(warehouse) == {"new": "done"} and delta.versions(warehouse) == {"runs": 1}
+
+
 def test_nobody_shares_a_handle(warehouse: Warehouse) -> None:
     put(warehouse, "one")
     with delta.reading(warehouse, "runs") as first, delta.reading(warehouse, "runs") as second:
@@ -71,6 +87,24 @@ def test_nobody_shares_a_handle(warehouse: Warehouse) -> None:
             assert third.version() == first.version() + 1 == second.version() + 1
 
 
+def test_two_threads_never_share_one(warehouse: Warehouse) -> None:
+    put(warehouse, "one")
+    seen: list[Any] = []
+    both = Barrier(2)
+
+    def hold() -> None:
+        with delta.ensured(warehouse, "runs") as table:
+            seen.append(table)
+            both.wait(timeout=60)
+
+    threads = [Thread(target=hold) for _ in range(2)]
+    for one in threads:
+        one.start()
+    for one in threads:
+        one.join()
+    assert len({id(table) for table in seen}) == 2
+
+
 def test_one_over_which_something_went_wrong_is_not_kept(warehouse: Warehouse) -> None:
     put(warehouse, "one")
     with delta.reading(warehouse, "runs") as held:
@@ -80,6 +114,20 @@ def test_one_over_which_something_went_wrong_is_not_kept(warehouse: Warehouse) -
     assert bad is held, "it was the one that was kept"
     with delta.reading(warehouse, "runs") as next_one:
         assert next_one is not bad
+
+
+def test_a_lost_race_is_noticed_by_a_handle_that_was_lent_before(warehouse: Warehouse) -> None:
+    from deltalake.exceptions import CommitFailedError
+
+    put(warehouse, "first")
+    with pytest.raises(CommitFailedError), delta.ensured(warehouse, "runs") as table:
+        rows = delta.rows(table, "runs").rows(named=True)
+        put(Warehouse(warehouse.uri), "second")
+        delta.replace(table, "runs", rows, "run_id = 'run-1'")
+    assert stands(warehouse) == {"run-1": "second"}
+    with delta.ensured(warehouse, "runs") as again:
+        assert again is table, "the next attempt has the same one, brought up to date"
+        assert [row["status"] for row in delta.rows(again, "runs").rows(named=True)] == ["second"]
 
 
 def test_many_threads_lose_nothing(warehouse: Warehouse) -> None:

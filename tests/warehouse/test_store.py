@@ -183,7 +183,11 @@ def test_a_table_from_before_a_column_was_known_gets_it(tmp_path: Path, monkeypa
     before = delta.ensure_table(place, "readings").schema().fields
     monkeypatch.setitem(TABLES, "readings", whole)
     assert delta.read(place, "readings").columns[-2:] == [column.name for column in whole.columns[-2:]]
-    after = delta.ensure_table(place, "readings").schema().fields
-    assert [field.name for field in after] == [column.name for column in whole.columns]
+    for _ in range(2):
+        with delta.ensured(place, "readings") as table:
+            after = table.schema().fields
+        assert [field.name for field in after] == [column.name for column in whole.columns]
+    with delta.reading(place, "readings") as held:
+        assert held is not None and held.version() == 1, "they are added once"
     assert len(after) == len(before) + 2
     assert after[-1].metadata["unit"] == "m/s"
