@@ -183,9 +183,10 @@ def _block(buffer: Bytes, at: int, before: int) -> _Block:
     strokes = np.flatnonzero(buffer == BACKSLASH)
     prefix = np.bitwise_xor.accumulate(buffer)
     tags = tags_of(buffer, prefix, openings, strokes, lines)
-    if strokes.size == 0 and openings.size == len(lines) and bool(np.all(openings >= lines.start)):
+    one_each = strokes.size == 0 and openings.size == len(lines)
+    if one_each and bool(np.all((openings >= lines.start) & (openings < lines.stop))):
         # as it should be: one sentence a line
-        first = np.where(openings < lines.stop, openings, -1)
+        first = openings
     else:
         first = first_within(openings, tags.behind, lines.stop)
     has = first >= 0

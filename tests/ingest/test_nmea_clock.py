@@ -181,3 +181,8 @@ def test_two_transducer_sentences_of_one_instant_stay_together():
 
 def test_a_log_of_carriage_returns_that_begins_in_the_middle_of_a_line_is_told_by_its_content():
     assert sniff(b"54.0,N,0\r" + b"\r".join(sentence(f"HEHDT,{k}.0,T").encode() for k in range(9))) == "nmea"
+
+
+def test_a_line_without_a_sentence_before_one_with_two_changes_nothing():
+    readings = screen(decode((rmc(START) + "\nnothing\n$HE" + sentence("HEHDT,1.0,T") + "\n").encode()), "nmea")
+    assert readings.tally.by_reason == {"checksum": 1, "malformed": 1}
