@@ -24,7 +24,7 @@ check: $(DEVELOP)
 # Every figure anew, each on its own page in benchmarks/results; needs the measured logs in ../shared. Minutes.
 bench: $(RIVALS)
 	for name in hsva hsva_held_out usv trials rerun_demo speed monte_carlo current_frame draw_paper course_keeping \
-		estimator_speed rivals vessel_models trials_diagnosis hsva_ladder diagnosis_speed mcap_speed; do $(BIN)/python -m benchmarks.$$name || exit 1; done
+		estimator_speed rivals vessel_models trials_diagnosis hsva_ladder diagnosis_speed doctor mcap_speed; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 # The long ones, half an hour and more each on two cores.
 bench-long: $(DEVELOP)
