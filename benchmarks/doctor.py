@@ -171,7 +171,7 @@ def draw(scores: dict[str, Score], sizes: dict[str, tuple[tuple[float, ...], lis
     left.barh(place - 0.2, eye, 0.3, color="0.7", label="by correlations: the pair looks wrong")
     left.set_yticks(place, list(scores), fontsize=8)
     left.set_xlabel("found, %")
-    left.legend(fontsize=7, loc="lower left")
+    left.legend(fontsize=7, loc="upper center", bbox_to_anchor=(0.4, -0.09), ncols=3)
     for panel, (what, (size, share)) in zip(right, sizes.items(), strict=True):
         panel.plot(size, 100 * np.array(share), "o-")
         panel.set_xlabel(what)

@@ -127,12 +127,16 @@ def _wrong(answers: list[list[Outcome]]) -> dict[str, Outcome]:
 
 @dataclass(frozen=True)
 class _Trial:
-    """What a mend does: checks it makes agree, what it leaves over, the answers behind it."""
+    """What a mend does: checks it makes agree, and the answers behind it."""
 
     fault: Fault
     mends: frozenset[str]
-    left_over: float
     after: list[list[Outcome]]
+
+    @property
+    def tested(self) -> dict[str, float]:
+        """What each check that could be made leaves over behind the mend."""
+        return {name: o.left_over for name, o in _by_name(self.after).items() if o.state != "untestable"}
 
 
 def _explained(
@@ -143,15 +147,17 @@ def _explained(
     trials = [trial for fault, by in suspects if (trial := _tried(log, fault, by, answers)) is not None]
     if not trials:
         return None
-    most = max(trials, key=lambda t: (len(t.mends), -t.fault.simplicity, -t.left_over))
+    most = max(trials, key=lambda t: (len(t.mends), -t.fault.simplicity))
     rivals = [t for t in trials if t.mends == most.mends]
-    least = min(t.left_over for t in rivals)
-    rivals = [t for t in rivals if t.left_over <= _WORSE * least + 0.005]
+    # over the checks that all of them can be held against
+    shared = set.intersection(*(set(t.tested) for t in rivals))
+    left = {t.fault.key: sum(t.tested[n] for n in sorted(shared)) / max(len(shared), 1) for t in rivals}
+    rivals = [t for t in rivals if left[t.fault.key] <= _WORSE * min(left.values()) + 0.005]
     # of one channel's explanations the simplest; of equally simple ones that which fits best
     best: dict[tuple[str, ...], _Trial] = {}
-    for trial in sorted(rivals, key=lambda t: (t.fault.simplicity, t.left_over)):
+    for trial in sorted(rivals, key=lambda t: (t.fault.simplicity, left[t.fault.key])):
         best.setdefault(trial.fault.channels, trial)
-    chosen = sorted(best.values(), key=lambda t: (t.fault.simplicity, t.left_over))
+    chosen = sorted(best.values(), key=lambda t: (t.fault.simplicity, left[t.fault.key]))
     kept = [t for t in chosen if t.fault.simplicity <= max(chosen[0].fault.simplicity, 2)]
     return tuple(t.fault for t in kept), tuple(sorted(kept[0].mends)), kept[0].after
 
@@ -182,8 +188,7 @@ def _tried(log: Log, fault: Fault, by: set[int], answers: list[list[Outcome]]) -
     # a check that is only silenced is not mended, unless it has gone with the channels it compared
     if not any(name in now and now[name].state == "agree" for name in mends) and fault.kind != "frame":
         return None
-    left = [o.left_over for o in now.values() if o.state != "untestable"]
-    return _Trial(fault, mends, sum(left) / max(len(left), 1), after)
+    return _Trial(fault, mends, after)
 
 
 def _touched(fault: Fault) -> set[str]:

@@ -26,6 +26,8 @@ _BODY_SLOPES = (-0.5, 0.5)
 #: Largest drift angle in a turn, rad: ships in their tightest circle make about 20 degrees.
 DRIFT_RAD = 0.45
 _LEAST_TURN = float(np.deg2rad(20.0))
+#: How far before the point about which the bow turns an antenna stands, in ship lengths.
+_LEADS = 0.25
 #: What is left over of two motions that go together.
 _TOGETHER = 0.6
 
@@ -72,7 +74,9 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> list[O
         return [untestable(name, channels, "the fixes are too coarse to show the turns") for name in names]
     own = _own_lag(log, fast, speed)
     late = 1.0 + heading.period_s + direction.period_s
-    both = align(heading, direction, (-late - 0.5 * own, late + own), circle=True)
+    # the antenna may stand before the point about which she turns: then the course leads
+    honest = (-late - _LEADS * own, late + own)
+    both = align(heading, direction, honest, circle=True)
     if both is None:
         return [untestable(name, channels, "too little of it overlaps") for name in names]
     std = float(np.hypot(both.slope_std, 0.5 * stream_std(speed) / speed))
@@ -85,7 +89,7 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> list[O
     turn = Outcome(names[0], channels, state, words, (figure,), both.left_over, _suspects(kind, velocity.channels))
     if kind == "body":
         return [turn]
-    figures = clock_figures(both, (-late - 0.5 * own, late + own), heading, own)
+    figures = clock_figures(both, honest, heading, own)
     return [turn, clock_outcome(names[1], (("heading",), velocity.channels), both, figures)]
 
 

@@ -46,9 +46,9 @@ def examine(log: Log) -> list[Outcome]:
             continue
         length_channels = channels if kind == "body" else ("latitude", "longitude", *speed)
         # in a turn to one side only, a fix that is late looks turned
-        late = 1.0 + (velocity.time_utc_ns[-1] - velocity.time_utc_ns[0]) / SECOND_NS / velocity.time_utc_ns.size
-        span = (velocity.time_utc_ns[-1] - velocity.time_utc_ns[0]) / SECOND_NS
-        one_sided = late * abs(float(velocity.direction[-1] - velocity.direction[0])) / max(span, 1.0)
+        step = np.diff(velocity.time_utc_ns) / SECOND_NS
+        late = 1.0 + float(np.median(step))
+        one_sided = late * abs(float(np.median(np.diff(velocity.direction) / step)))
         found += [_length(f"path_{kind}", length_channels, speed, ways), _direction(kind, channels, ways, one_sided)]
     if not found and "speed_over_ground" in log.series:
         found += _without_course(log, track)
