@@ -28,7 +28,7 @@ bench: $(RIVALS)
 
 # The long ones, half an hour and more each on two cores.
 bench-long: $(DEVELOP)
-	for name in information_limit changes no_log paper_map hidden_effects; do $(BIN)/python -m benchmarks.$$name || exit 1; done
+	for name in information_limit changes no_log paper_map hidden_effects fleet; do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 setup: $(DEVELOP)
 
