@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import re
 import subprocess
 from collections.abc import Iterator
+from contextlib import suppress
 from datetime import timedelta
 from pathlib import Path
 from shutil import copytree
@@ -12,7 +14,7 @@ from typing import Any
 
 import pytest
 
-from flows.fleet_plan import do_fleet
+from flows.fleet_plan import do_fleet, plan
 from tests.flows.content import seen
 from tests.scale.conftest import FLEET, Server, touch
 from tests.scale.servers import ROOT, environment, running, wait_for
@@ -69,9 +71,7 @@ def test_a_run_as_documented_reports_the_failed_and_does_the_rest(
     assert {one.expected_start_time.strftime("%H:%M") for one in planned if one.auto_scheduled} >= {"02:00"}
     sound, damaged = FLEET[:2], FLEET[2]
     touch(place, *FLEET)
-    assert place.folder is not None
-    (row,) = logs.current(place, damaged)
-    kept = place.folder / "raw" / row.log_id[:2] / row.log_id
+    kept = raw_file(place, damaged)
     whole = kept.read_bytes()
     kept.write_bytes(whole[:-10])
     try:
@@ -88,20 +88,64 @@ def test_a_run_as_documented_reports_the_failed_and_does_the_rest(
 
 
 def test_a_cancelled_run_goes_on_where_it_stopped(deployed: dict[str, str], place: Warehouse, on_server: None) -> None:
+    assert documented("prefect flow-run cancel") == ["prefect", "flow-run", "cancel", "ID"]
     touch(place, *FLEET)
     alone = Warehouse(str(copytree(str(place.folder), f"{place.uri}-alone")))
-    started = tell(["prefect", "--no-prompt", "deployment", "run", "reprocess/nightly"], deployed)
-    assert started.returncode == 0, started
-    wait_for(lambda: flow_runs("RUNNING"), 300.0)
-    (one,) = flow_runs("RUNNING")
-    command = documented("prefect flow-run cancel")
-    assert tell([*command[:-1], str(one.id)], deployed).returncode == 0
-    wait_for(lambda: not flow_runs("RUNNING", "CANCELLING"), 300.0, every_s=0.5)
-    assert flow_runs()[0].state.type.value in ("CANCELLED", "COMPLETED")  # it may have been faster
+    kept = raw_file(place, FLEET[0])  # the one that is begun last
+    whole = kept.read_bytes()
+    kept.unlink()
+    os.mkfifo(kept)  # whoever reads it waits: a storage that hangs
+    states = {run.vessel: run.message.get("state") for run in runs.all_runs(place, "reprocess")}
+    try:
+        start("reprocess/nightly")
+        wait_for(lambda: finished(place, states) == set(FLEET[1:]), 300.0, every_s=0.2)
+        (one,) = flow_runs("RUNNING")
+        cancel(one.id)
+        wait_for(lambda: let_go(kept) or not flow_runs("RUNNING", "CANCELLING"), 300.0, every_s=0.2)
+    finally:
+        kept.unlink()
+        kept.write_bytes(whole)
+    assert [r.state.type.value for r in flow_runs() if r.id == one.id] == ["CANCELLED"]
+    assert [name for name, _ in plan(place).due] == [FLEET[0]]
     for warehouse in (place, alone):
         assert not any(report["failures"] for report in do_fleet(warehouse))
     assert ids(place) == ids(alone)
     assert {report["status"] for report in do_fleet(place)} == {"unchanged"}
+
+
+def raw_file(warehouse: Warehouse, vessel: str) -> Path:
+    assert warehouse.folder is not None
+    (row,) = logs.current(warehouse, vessel)
+    return warehouse.folder / "raw" / row.log_id[:2] / row.log_id
+
+
+def finished(warehouse: Warehouse, before: dict[Any, Any]) -> set[Any]:
+    """The vessels whose last run has left another state than before."""
+    told = {run.vessel: run.message.get("state") for run in runs.all_runs(warehouse, "reprocess")}
+    return {vessel for vessel, state in told.items() if state and state != before.get(vessel)}
+
+
+def let_go(pipe: Path) -> bool:
+    """Give whoever waits at a pipe its end; always False."""
+    with suppress(OSError):
+        os.close(os.open(pipe, os.O_WRONLY | os.O_NONBLOCK))
+    return False
+
+
+def start(deployment: str) -> None:
+    """What `prefect deployment run` does, without the seconds that the program takes to begin."""
+    from prefect.deployments import run_deployment
+
+    run_deployment(deployment, timeout=0)
+
+
+def cancel(flow_run: Any) -> None:
+    """What `prefect flow-run cancel` does, without the seconds that the program takes to begin."""
+    from prefect.client.orchestration import get_client
+    from prefect.client.schemas.objects import State, StateType
+
+    with get_client(sync_client=True) as client:
+        client.set_flow_run_state(flow_run, State(type=StateType.CANCELLING))
 
 
 def ids(warehouse: Warehouse) -> dict[str, list[Any]]:
