@@ -133,8 +133,8 @@ def page(found: list[Measured], lines: int) -> list[str]:
     least = min(m.ratio(m.reading, 1) for m in large)
     return [
         "Thousand sentences per second of the processor (on all cores together), medians of the rounds; ratios are "
-        f"medians of the rounds' own ratios. Over the logs of {lines} lines and more, reading takes at most a "
-        f"{least:.1f}th of the time of pynmea2 with its fields read (wanted: {TARGET:g}).",
+        f"medians of the rounds' own ratios. Over the logs of {lines} lines and more, reading is at least "
+        f"{least:.1f} times as fast as pynmea2 with its fields read (wanted: {TARGET:g}).",
         "",
         *table(head, rows),
         "",

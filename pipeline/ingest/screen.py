@@ -172,8 +172,12 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
     parts: list[tuple[Index, str | None, Code]] = [(np.flatnonzero(reason != 0), None, reason)]
     for name, code in refused.items():
         parts.append((np.flatnonzero((reason == 0) & (code != 0)), name, code))
+    # most channels have nothing refused
+    parts = [part for part in parts if part[0].size] or parts[:1]
     record = np.concatenate([where for where, _, _ in parts])
-    distinct = np.unique(record)
+    named = np.zeros(len(decoded), dtype=np.bool_)
+    named[record] = True
+    distinct = np.flatnonzero(named)
     text = decoded.raw.take(distinct).text()
     time = decoded.time_utc_ns[record]
     words = pl.Series([None, *(str(r) for r in REASONS)], dtype=pl.String)
