@@ -11,7 +11,8 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 from flows.cores import usable
-from flows.ingest_logs import ingest_bytes
+from flows.ingest_logs import ingest_log
+from pipeline.ingest.log_file import LogFile
 from pipeline.simulate.csv_log import to_csv
 from pipeline.simulate.logger_profile import logger_profile
 from pipeline.simulate.trial import simulate_trial, zigzag_settings
@@ -70,7 +71,7 @@ def _one(warehouse: Warehouse, voyages: Voyages, number: int, day: int) -> None:
     hull, name = HULLS[number % len(HULLS)], name_of(number)
     data = gzip.compress(voyages.rows[hull][day], mtime=number + 1)
     profile = voyages.profiles[hull].model_copy(update={"vessel": name})
-    outcome = ingest_bytes(warehouse, name, f"day{day}.csv.gz", data, profile, name)
+    outcome = ingest_log(warehouse, name, f"day{day}.csv.gz", LogFile(data), profile, name)
     assert outcome.outcome == "new" and len(outcome.segments) == 1, outcome
 
 

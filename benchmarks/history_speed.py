@@ -125,18 +125,14 @@ def _long(sets: pl.DataFrame) -> pl.DataFrame:
 
 
 def grow(warehouse: Warehouse, commits: int, vessels: int, seed: int = 7) -> list[float]:
-    """Add sets one a commit, their logs ten a commit, as single runs do; return how long each set took, s."""
-    held: list[logs.LogRow] = []
+    """Add sets and their logs one a commit, as single runs do; return how long each set took, s."""
     random, taken = np.random.default_rng(seed), []
     one = parameter_sets.get_all(warehouse, "vessel 0")[0]
     row = logs.all_ingests(warehouse, "vessel 0")[0]
     for i in range(commits):
         vessel = f"vessel {random.integers(vessels)}"
         name = sha256(f"later {seed} {i}".encode()).hexdigest()
-        held.append(replace(row, log_id=name, ingest_id=name[16:32], vessel=vessel))
-        if len(held) == 10 or i + 1 == commits:
-            logs.record(warehouse, held)
-            held = []
+        logs.record(warehouse, [replace(row, log_id=name, ingest_id=name[16:32], vessel=vessel)])
         provenance = {**one.provenance, "ingest_ids": [name[16:32]]}
         made = replace(one, parameter_set_id=f"ps-{name[:16]}", vessel=vessel, provenance=provenance)
         begin = perf_counter()

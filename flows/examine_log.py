@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from flows.files import read_bytes
+from flows.files import opened_log
 from pipeline.ingest.read import read_log
 from pipeline.normalise.doctor.examine import Examination, examine
 from pipeline.normalise.doctor.log import Log
@@ -70,7 +70,8 @@ def examine_file(path: Path, profile: VesselProfile) -> Examined:
     KempfError
         The log cannot be read.
     """
-    read = read_log(path.name, read_bytes(path, "raw log"), profile)
+    with opened_log(path) as log:
+        read = read_log(path.name, log, profile)
     return examine_frame(read.frame, profile, path.name, read.format)
 
 

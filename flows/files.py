@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import stat
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 import yaml
 from pydantic import ValidationError
 
+from pipeline.ingest.log_file import LogFile
 from schemas import profile as profiles
 from schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from schemas.model_spec import ModelSpec
@@ -19,8 +21,8 @@ from schemas.profile import VesselProfile
 _MOST_NODES = 100_000
 
 
-#: Largest file of each kind that is read, bytes.
-LARGEST_BYTES = {"raw log": 2 << 30, "vessel profile": 1 << 20, "model specification": 1 << 20}
+#: Largest file of a kind that is read whole, bytes; a raw log is opened, and its reader says what is too much.
+LARGEST_BYTES = {"vessel profile": 1 << 20, "model specification": 1 << 20}
 
 
 def read_bytes(path: Path, what: str) -> bytes:
@@ -28,14 +30,48 @@ def read_bytes(path: Path, what: str) -> bytes:
 
     Raises
     ------
+    KempfError
+        What `_opened` raises.
+    DataRejected
+        ``file_too_large``.
+    """
+    with _opened(path, what) as stream:
+        file = LogFile(stream)
+        if file.size > LARGEST_BYTES[what]:
+            raise DataRejected(
+                "file_too_large",
+                f"{path} has {file.size} bytes; a {what} of more than {LARGEST_BYTES[what]} is not read.",
+                "Shorten it.",
+                {"path": str(path), "bytes": file.size},
+            )
+        return file.whole()
+
+
+@contextmanager
+def opened_log(path: Path) -> Iterator[LogFile]:
+    """Open a raw log; its reader takes of it what it needs at a time.
+
+    Raises
+    ------
+    KempfError
+        What `_opened` raises.
+    """
+    with _opened(path, "raw log") as stream:
+        yield LogFile(stream)
+
+
+@contextmanager
+def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
+    """Open a file.
+
+    Raises
+    ------
     NotFound
         ``no_such_file``.
     UsageError
         ``path_is_directory``, ``not_a_file``: a folder, a device or a pipe was given where a file is expected.
-    DataRejected
-        ``file_too_large``.
     KempfError
-        ``file_unreadable``: it is there but cannot be read.
+        ``file_unreadable``: it is there but cannot be opened.
     """
     try:
         found = path.stat()
@@ -48,14 +84,7 @@ def read_bytes(path: Path, what: str) -> bytes:
                 "Write it to a file first and give that.",
                 {"path": str(path)},
             )
-        if found.st_size > LARGEST_BYTES[what]:
-            raise DataRejected(
-                "file_too_large",
-                f"{path} has {found.st_size} bytes; a {what} of more than {LARGEST_BYTES[what]} is not read.",
-                "Split the log into shorter ones, a day each for example." if what == "raw log" else "Shorten it.",
-                {"path": str(path), "bytes": found.st_size},
-            )
-        return path.read_bytes()
+        stream = path.open("rb")
     except FileNotFoundError as error:
         beside = sorted(p.name for p in path.parent.iterdir())[:5] if path.parent.is_dir() else []
         raise NotFound(
@@ -78,6 +107,8 @@ def read_bytes(path: Path, what: str) -> bytes:
             "Look at the path and at the file's permissions.",
             {"path": str(path)},
         ) from error
+    with stream:
+        yield stream
 
 
 def read_yaml(path: Path, what: str) -> Any:

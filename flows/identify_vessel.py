@@ -23,6 +23,7 @@ from schemas.profile import VesselProfile
 from warehouse import aliases, code_version, delta, logs, parameter_sets, provenance, readings, segments, vessels
 from warehouse.keys import vessel_key
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
+from warehouse.scan import Where
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
 
@@ -198,7 +199,7 @@ def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
 
 def _missing(warehouse: Warehouse, vessel: str, wanted: Sequence[Inputs]) -> set[str]:
     names = {parameter_set_id(inputs) for inputs in wanted}
-    where: delta.Where = {"vessel_key": vessel_key(vessel), "parameter_set_id": sorted(names)}
+    where: Where = {"vessel_key": vessel_key(vessel), "parameter_set_id": sorted(names)}
     stored = delta.read(warehouse, "parameter_sets", where, ("parameter_set_id",))
     return names - set(stored["parameter_set_id"].to_list())
 

@@ -8,16 +8,17 @@ from pathlib import Path
 from typing import Any
 
 from flows.examine_log import examine_frame
-from flows.files import read_bytes
+from flows.files import opened_log
 from flows.find_segments import Ingest, find_segments
 from flows.lost import as_json
 from flows.progress import Progress, silent
 from flows.unforeseen import as_told
+from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.read import read_log
 from pipeline.ingest.readings import LostStretch, Readings, Tally
 from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
-from warehouse import code_version, examinations, logs, lost, raw, segments, vessels
+from warehouse import code_version, examinations, logs, lost, segments, vessels
 from warehouse.deposit import Delivery, Deposit, deposit, held
 from warehouse.examinations import StoredExamination
 from warehouse.keys import ingest_id, vessel_key
@@ -160,15 +161,16 @@ def ingest(
     for done, path in enumerate(paths):
         progress(done, len(paths), f"reading {path.name}")
         try:
-            outcomes.append(ingest_bytes(warehouse, name, path.name, read_bytes(path, "raw log"), profile, str(path)))
+            with opened_log(path) as log:
+                outcomes.append(ingest_log(warehouse, name, path.name, log, profile, str(path)))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
             outcomes.append(IngestOutcome(str(path), "failed", error=as_told(error)))
     progress(len(paths), len(paths), "done")
     return outcomes
 
 
-def ingest_bytes(
-    warehouse: Warehouse, vessel: str, file_name: str, data: bytes, profile: VesselProfile, path: str
+def ingest_log(
+    warehouse: Warehouse, vessel: str, file_name: str, log: LogFile, profile: VesselProfile, path: str
 ) -> IngestOutcome:
     """Take one log in.
 
@@ -178,7 +180,7 @@ def ingest_bytes(
         The log cannot be read, or is another vessel's; nothing of it was stored.
     """
     code = code_version.fingerprint()
-    there = held(warehouse, vessel, file_name, data, profile_sha256=profile.sha256, code_version=code)
+    there = held(warehouse, vessel, file_name, log, profile_sha256=profile.sha256, code_version=code)
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
         found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
@@ -187,7 +189,7 @@ def ingest_bytes(
         return IngestOutcome(
             path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, lost=gone, examination=seen
         )
-    read = read_one(vessel, file_name, data, profile)
+    read = read_one(vessel, file_name, log, profile)
     (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
     return IngestOutcome(
@@ -217,7 +219,7 @@ class ReadLog:
     examination: StoredExamination
 
 
-def read_one(vessel: str, file_name: str, data: bytes, profile: VesselProfile) -> ReadLog:
+def read_one(vessel: str, file_name: str, log: LogFile, profile: VesselProfile) -> ReadLog:
     """Read a log, find its zigzags and compare its channels.
 
     Raises
@@ -226,13 +228,13 @@ def read_one(vessel: str, file_name: str, data: bytes, profile: VesselProfile) -
         It cannot be read.
     """
     code = code_version.fingerprint()
-    readings = read_log(file_name, data, profile)
-    log = raw.log_id(data)
-    one = Ingest(vessel, log, ingest_id(log, profile.sha256, code))
+    name = log.sha256  # before it is read: what is stored is known by the bytes that were read
+    readings = read_log(file_name, log, profile)
+    one = Ingest(vessel, name, ingest_id(name, profile.sha256, code))
     zigzags, notes = find_segments(one, profile, readings.frame)
     seen = _examined(one, profile, file_name, readings, code)
     noted = replace(readings, notes=(*readings.notes, *notes))
-    return ReadLog(Delivery(vessel, file_name, data, profile, noted, code), one.ingest_id, tuple(zigzags), seen)
+    return ReadLog(Delivery(vessel, file_name, log, profile, noted, code), one.ingest_id, tuple(zigzags), seen)
 
 
 def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:

@@ -162,7 +162,8 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str, old: Sequence[P
     kept = []
     for row in logs.current(warehouse, vessel):
         try:
-            raw.put(scratch, raw.get(warehouse, row.log_id))
+            with raw.opened(warehouse, row.log_id) as log:
+                raw.put(scratch, log)
             kept.append(row)
         except KempfError as error:
             failures.append(_failure(row.file_name, error))

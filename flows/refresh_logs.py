@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass
 
 from flows.ingest_logs import ReadLog, read_one, store
@@ -51,14 +52,16 @@ def refresh_logs(warehouse: Warehouse, vessel: str, progress: Progress = silent)
     done = 0
     for chunk in _chunks(stale):
         read: dict[str, ReadLog] = {}
-        for row in chunk:
-            progress(done, len(stale), f"reading {row.file_name}")
-            done += 1
-            try:
-                read[row.ingest_id] = read_one(vessel, row.file_name, raw.get(warehouse, row.log_id), profile)
-            except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
-                failed[row.ingest_id] = as_told(error)
-        failed |= _stored(warehouse, read)
+        with ExitStack() as until_stored:
+            for row in chunk:
+                progress(done, len(stale), f"reading {row.file_name}")
+                done += 1
+                try:
+                    log = until_stored.enter_context(raw.opened(warehouse, row.log_id))
+                    read[row.ingest_id] = read_one(vessel, row.file_name, log, profile)
+                except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
+                    failed[row.ingest_id] = as_told(error)
+            failed |= _stored(warehouse, read)
     return Refreshed(len(hers), len(stale) - len(failed), failed)
 
 

@@ -118,7 +118,8 @@ def read_again(warehouse: Warehouse, row: LogRow, profile: VesselProfile) -> Ins
     KempfError
         ``raw_bytes_damaged``.
     """
-    return from_readings(read_log(row.file_name, raw.get(warehouse, row.log_id), profile).frame)
+    with raw.opened(warehouse, row.log_id) as log:
+        return from_readings(read_log(row.file_name, log, profile).frame)
 
 
 def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profile: VesselProfile) -> ParameterSet:

@@ -19,7 +19,7 @@ BELOW = {
     "workbench": {"workbench", "flows", "warehouse", "pipeline", "schemas"},
 }
 #: What the warehouse may know of the pipeline: the types that it stores.
-STORED = ("pipeline.ingest.readings.",)
+STORED = ("pipeline.ingest.readings.", "pipeline.ingest.log_file.")
 #: Libraries with one door, and the files that are it.
 DOORS = {
     "prefect": ("flows/engine.py", "flows/fleet.py"),

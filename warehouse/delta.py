@@ -7,7 +7,7 @@ under `warehouse.retry.with_retry`. (Merges lose the units in the field metadata
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from itertools import accumulate
@@ -17,14 +17,12 @@ from urllib.parse import unquote
 from schemas.errors import KempfError, NotFound
 from schemas.tables import TABLES, arrow_schema
 from warehouse import handles
+from warehouse.scan import Where, scanned
 from warehouse.store import Warehouse, not_writable
 
 if TYPE_CHECKING:
     import polars as pl
     from deltalake import DeltaTable
-
-#: Values that a column may have, by column.
-Where = Mapping[str, str | list[str]]
 
 #: The past is kept: history as of a time and reruns read old versions.
 _CONFIGURATION = {
@@ -224,22 +222,7 @@ def rows(table: DeltaTable | None, name: str, where: Where | None = None, column
     """Return rows of an open table, see `read`."""
     import polars as pl
 
-    if table is None:
-        empty = pl.from_arrow(arrow_schema(TABLES[name]).empty_table())
-        assert isinstance(empty, pl.DataFrame)
-        lazy = empty.lazy()
-    else:
-        lazy = pl.scan_delta(table)
-        held = {field.name for field in table.schema().fields}
-        if any(column.name not in held for column in TABLES[name].columns):
-            empty = pl.from_arrow(arrow_schema(TABLES[name]).empty_table())
-            assert isinstance(empty, pl.DataFrame)
-            absent = {column: kind for column, kind in empty.schema.items() if column not in held}
-            lazy = lazy.with_columns(pl.lit(None, dtype=kind).alias(column) for column, kind in absent.items())
-    for column, value in (where or {}).items():
-        # one value prunes files by their statistics
-        one = value if isinstance(value, str) else value[0] if len(value) == 1 else None
-        lazy = lazy.filter(pl.col(column) == one if one is not None else pl.col(column).is_in(value))
+    lazy = scanned(table, name, where)
     try:
         return (lazy.select(columns) if columns else lazy).collect()
     except (OSError, pl.exceptions.ComputeError, pl.exceptions.PanicException) as error:

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.readings import Readings
 from schemas.profile import VesselProfile
 from warehouse import logs, lost, raw, readings, vessels
@@ -28,8 +29,8 @@ class Delivery:
         Her name.
     file_name : str
         As delivered, without its folder.
-    data : bytes
-        The log as delivered.
+    log : LogFile
+        As delivered.
     profile : VesselProfile
         What it was read with.
     readings : Readings
@@ -40,7 +41,7 @@ class Delivery:
 
     vessel: str
     file_name: str
-    data: bytes
+    log: LogFile
     profile: VesselProfile
     readings: Readings
     code_version: str
@@ -56,7 +57,7 @@ class Deposit:
 
 
 def held(
-    warehouse: Warehouse, vessel: str, file_name: str, data: bytes, *, profile_sha256: str, code_version: str
+    warehouse: Warehouse, vessel: str, file_name: str, log: LogFile, *, profile_sha256: str, code_version: str
 ) -> Deposit | None:
     """Return the deposit of a log that is there already as read with this profile and code; ask before reading it.
 
@@ -67,12 +68,12 @@ def held(
     DataRejected
         ``log_of_another_vessel``.
     """
-    name = raw.log_id(data)
+    name = log.sha256
     row = logs.find(warehouse, [name]).get(name)
     logs.refuse_other_vessel(row, vessel, file_name)
     if row is None or row.ingest_id != ingest_id(name, profile_sha256, code_version):
         return None
-    raw.put(warehouse, data)
+    raw.put(warehouse, log)
     return Deposit(name, row.ingest_id, "unchanged")
 
 
@@ -109,7 +110,7 @@ def deposit(warehouse: Warehouse, deliveries: Sequence[Delivery]) -> list[Deposi
         if row.log_id not in known or known[row.log_id].ingest_id != row.ingest_id:
             fresh.setdefault(row.log_id, (delivery, row))
     for delivery in deliveries:
-        raw.put(warehouse, delivery.data)  # mends a damaged copy of a log that is there, too
+        raw.put(warehouse, delivery.log)  # mends a damaged copy of a log that is there, too
     recorded = {row.log_id: row.revision for row in _store(warehouse, list(fresh.values()))}
     return [Deposit(row.log_id, row.ingest_id, _outcome(recorded.pop(row.log_id, None))) for row in rows]
 
@@ -133,7 +134,7 @@ def _outcome(revision: int | None) -> Outcome:
 
 def _row(delivery: Delivery) -> logs.LogRow:
     vessel_key(delivery.vessel)  # refuses a name that is none before anything is written
-    name = raw.log_id(delivery.data)
+    name = delivery.log.sha256
     instants = delivery.readings.frame["time_utc_ns"].to_numpy()
     if instants.size == 0:
         raise ValueError(f"{delivery.file_name} has no reading: the reader should have refused it")
@@ -143,7 +144,7 @@ def _row(delivery: Delivery) -> logs.LogRow:
         vessel=delivery.vessel,
         file_name=delivery.file_name.encode("utf-8", "replace").decode(),
         format=delivery.readings.format,
-        size_bytes=len(delivery.data),
+        size_bytes=delivery.log.size,
         profile_sha256=delivery.profile.sha256,
         code_version=delivery.code_version,
         start_utc_ns=int(instants.min()),

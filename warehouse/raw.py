@@ -3,46 +3,69 @@
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Iterator
+from contextlib import contextmanager
 
-from schemas.errors import KempfError, NotFound
+from pipeline.ingest.log_file import LogFile
+from schemas.errors import DataRejected, KempfError, NotFound
 from warehouse.store import Warehouse
 
-
-def log_id(data: bytes) -> str:
-    """Return the id of a log: the SHA-256 of its bytes, 64 hex digits."""
-    return hashlib.sha256(data).hexdigest()
+#: A log that is shorter is fetched once, and held; a longer one is read again where it lies. Bytes.
+_SHORT = 32 << 20
 
 
-def put(warehouse: Warehouse, data: bytes) -> str:
+def put(warehouse: Warehouse, log: LogFile) -> str:
     """Keep a log; keeping it twice changes nothing.
 
     Parameters
     ----------
     warehouse : Warehouse
         Made where there is none.
-    data : bytes
-        The log as delivered.
+    log : LogFile
+        As delivered.
 
     Returns
     -------
     str
-        Its `log_id`.
+        Its id: the SHA-256 of its bytes, 64 hex digits.
 
     Raises
     ------
+    DataRejected
+        ``log_changed``: its bytes are others than when its hash was first taken; nothing is kept.
     KempfError
-        ``warehouse_not_writable``.
+        ``warehouse_not_writable``, ``disk_full``.
     """
-    name = log_id(data)
+    name = log.sha256
     warehouse.create()
-    kept = warehouse.read_bytes(*_place(name))
-    if kept is None or log_id(kept) != name:  # a damaged copy is mended by a whole one
-        warehouse.write_bytes(data, *_place(name))
+    with warehouse.opened(*_place(name)) as kept:
+        is_whole = kept is not None and LogFile(kept).sha256 == name
+    if is_whole:
+        for _ in _unchanged(log):
+            pass
+    else:  # a damaged copy is mended by a whole one
+        warehouse.write(_unchanged(log), *_place(name))
     return name
 
 
-def get(warehouse: Warehouse, name: str) -> bytes:
-    """Return a log as delivered.
+def _unchanged(log: LogFile) -> Iterator[bytes]:
+    """Yield the bytes of a log, and fail at their end where they are no longer those that it is known by."""
+    found = hashlib.sha256()
+    for piece in log.pieces():
+        found.update(piece)
+        yield piece
+    if found.hexdigest() != log.sha256:
+        raise DataRejected(
+            "log_changed",
+            f"The log changed while it was read: its hash was {log.sha256}, and is {found.hexdigest()}.",
+            "Wait until nothing writes to it any more, or copy it; then ingest it again.",
+            {"before": log.sha256, "after": found.hexdigest()},
+        )
+
+
+@contextmanager
+def opened(warehouse: Warehouse, name: str) -> Iterator[LogFile]:
+    """Open a log as delivered; its bytes were checked.
 
     Raises
     ------
@@ -52,25 +75,33 @@ def get(warehouse: Warehouse, name: str) -> bytes:
         ``raw_bytes_damaged``: what is kept no longer has the hash it is kept under.
     """
     warehouse.require()
-    is_hash = len(name) == 64 and set(name) <= set("0123456789abcdef")
-    data = warehouse.read_bytes(*_place(name)) if is_hash else None
-    if data is None:
-        raise NotFound(
-            "no_raw_log",
-            f"The warehouse {warehouse.uri} keeps no raw log {name!r}.",
-            "Ingest the file again with `kempf ingest`; `kempf segments` lists the logs that are kept.",
-            {"log_id": name},
-        )
-    found = log_id(data)
-    if found != name:
-        raise KempfError(
-            "raw_bytes_damaged",
-            f"The raw log {name} is damaged: its {len(data)} bytes have the hash {found}.",
-            "Ingest the original file again: it replaces the damaged copy.",
-            {"log_id": name, "found": found, "size_bytes": len(data)},
-        )
-    return data
+    with warehouse.opened(*_place(name)) as kept:
+        if kept is None:
+            raise NotFound(
+                "no_raw_log",
+                f"The warehouse {warehouse.uri} keeps no raw log {name!r}.",
+                "Ingest the file again with `kempf ingest`; `kempf segments` lists the logs that are kept.",
+                {"log_id": name},
+            )
+        log = LogFile(kept)
+        if log.size < _SHORT:
+            log = LogFile(log.whole())
+        if log.sha256 != name:
+            raise KempfError(
+                "raw_bytes_damaged",
+                f"The raw log {name} is damaged: its {log.size} bytes have the hash {log.sha256}.",
+                "Ingest the original file again: it replaces the damaged copy.",
+                {"log_id": name, "found": log.sha256, "size_bytes": log.size},
+            )
+        yield log
+
+
+def get(warehouse: Warehouse, name: str) -> bytes:
+    """Return the bytes of a log as delivered; raises what `opened` raises."""
+    with opened(warehouse, name) as log:
+        return log.whole()
 
 
 def _place(name: str) -> tuple[str, ...]:
-    return ("raw", name[:2], name)
+    is_hash = len(name) == 64 and set(name) <= set("0123456789abcdef")
+    return ("raw", name[:2], name) if is_hash else ("raw", "none")

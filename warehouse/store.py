@@ -13,11 +13,12 @@ import os
 import re
 import secrets
 import shutil
-from collections.abc import Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 from urllib.parse import unquote
 
 from schemas.errors import KempfError, NotFound, UsageError
@@ -110,7 +111,16 @@ class Warehouse:
         return files, str(inside)
 
     def read_bytes(self, *parts: str) -> bytes | None:
-        """Return the content of a file inside, None where there is none.
+        """Return the content of a file inside, None where there is none; raises what `opened` raises."""
+        with self.opened(*parts) as stream:
+            try:
+                return None if stream is None else stream.read()
+            except OSError as error:
+                raise self._unreachable("/".join(parts), error) from error
+
+    @contextmanager
+    def opened(self, *parts: str) -> Iterator[BinaryIO | None]:
+        """Open a file inside to be read anywhere in it, None where there is none.
 
         Raises
         ------
@@ -119,12 +129,14 @@ class Warehouse:
         """
         files, root = self._files
         try:
-            with files.open_input_file("/".join((root, *parts))) as stream:
-                return bytes(stream.readall())
+            stream = files.open_input_file("/".join((root, *parts)))
         except (FileNotFoundError, NotADirectoryError):
-            return None
+            yield None
+            return
         except OSError as error:
             raise self._unreachable("/".join(parts), error) from error
+        with stream:
+            yield stream
 
     def _unreachable(self, what: str, why: object) -> KempfError:
         return KempfError(
@@ -152,7 +164,11 @@ class Warehouse:
         return None if told.mtime_ns is None else (told.mtime_ns, told.size or 0)
 
     def write_bytes(self, data: bytes, *parts: str) -> None:
-        """Write a file inside, all of it or nothing: a reader never sees a part.
+        """Write a file inside, all of it or nothing; raises what `write` raises."""
+        self.write([data], *parts)
+
+    def write(self, pieces: Iterable[bytes], *parts: str) -> None:
+        """Write a file inside, all of it or nothing: a reader never sees a part, and an error on the way leaves none.
 
         Raises
         ------
@@ -163,21 +179,32 @@ class Warehouse:
         target = "/".join((root, *parts))
         try:
             if self.folder is None:  # an object appears only when it is whole
-                with files.open_output_stream(target) as stream:
-                    stream.write(data)
+                self._send(pieces, target)
                 return
             folder, _, name = target.rpartition("/")
             files.create_dir(folder, recursive=True)
             passing = f"{folder}/.{name}.{secrets.token_hex(8)}"
             try:
                 with files.open_output_stream(passing) as stream:
-                    stream.write(data)
+                    for piece in pieces:
+                        stream.write(piece)
                 files.move(passing, target)
             except BaseException:
                 Path(passing).unlink(missing_ok=True)
                 raise
         except OSError as error:
             raise not_writable(self.uri, error) from error
+
+    def _send(self, pieces: Iterable[bytes], target: str) -> None:
+        files, _ = self._files
+        try:
+            with files.open_output_stream(target) as stream:
+                for piece in pieces:
+                    stream.write(piece)
+        except BaseException:
+            with contextlib.suppress(OSError):  # closing it made an object of what had been sent
+                files.delete_file(target)
+            raise
 
     def exists(self) -> bool:
         """Return whether a warehouse is there.

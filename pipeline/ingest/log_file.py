@@ -5,8 +5,15 @@ Opening files is not done here; who opened one hands it in.
 
 from __future__ import annotations
 
+import hashlib
+from collections.abc import Iterator
+from functools import cached_property
 from io import BytesIO
 from typing import BinaryIO
+
+from schemas.errors import KempfError
+
+_PIECE = 4 << 20
 
 
 class LogFile:
@@ -15,7 +22,8 @@ class LogFile:
     Parameters
     ----------
     log : bytes or binary file
-        A file must be able to seek; it stays open, and whoever opened it closes it.
+        A file must be able to seek; it stays open, and whoever opened it closes it. What is written behind its end
+        from now on is not seen.
     """
 
     def __init__(self, log: bytes | BinaryIO) -> None:
@@ -23,12 +31,39 @@ class LogFile:
         self.size = self._stream.seek(0, 2)
 
     def read(self, at: int, length: int) -> bytes:
-        """Return ``length`` bytes from place ``at`` on, fewer where the log ends before."""
+        """Return ``length`` bytes from place ``at`` on, fewer where the log ends before.
+
+        Raises
+        ------
+        KempfError
+            ``log_unreadable``: the disk, or the store behind it, does not give them.
+        """
         if at >= self.size or length <= 0:
             return b""
-        self._stream.seek(at)
-        return self._stream.read(min(length, self.size - at))
+        try:
+            self._stream.seek(at)
+            return self._stream.read(min(length, self.size - at))
+        except OSError as error:
+            raise KempfError(
+                "log_unreadable",
+                f"Reading the log failed at byte {at} of {self.size}: {error.strerror or error}.",
+                "Copy the file from the logger again, to another disk.",
+                {"at": at, "size_bytes": self.size},
+            ) from error
 
     def whole(self) -> bytes:
         """Return all bytes."""
         return self.read(0, self.size)
+
+    def pieces(self) -> Iterator[bytes]:
+        """Yield all bytes, a few megabytes at a time."""
+        for at in range(0, self.size, _PIECE):
+            yield self.read(at, _PIECE)
+
+    @cached_property
+    def sha256(self) -> str:
+        """SHA-256 of the bytes as they were when it was first asked for, 64 hex digits."""
+        found = hashlib.sha256()
+        for piece in self.pieces():
+            found.update(piece)
+        return found.hexdigest()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import BinaryIO
 
 from pipeline.ingest import sniff
 from pipeline.ingest.decoded import Decoded
@@ -15,22 +14,25 @@ from pipeline.ingest.unpack import unpack
 from schemas.errors import DataRejected, UsageError
 from schemas.profile import Source, VesselProfile
 
+#: Longest log that is read whole, bytes; MCAP is read by the chunk and may be longer.
+MOST_TEXT_BYTES = 2 << 30
+
 #: Notes that a refusal repeats, at most.
 _NOTES = 3
 
 _TOLD = "See docs/profile.md for how to describe a log."
 
 
-def read_log(name: str, log: bytes | BinaryIO, profile: VesselProfile) -> Readings:
+def read_log(name: str, log: bytes | LogFile, profile: VesselProfile) -> Readings:
     """Read one log.
 
     Parameters
     ----------
     name : str
         Name of the file without its folder: chooses the profile's source and stands in messages.
-    log : bytes or binary file
-        The file as delivered, perhaps compressed with gzip or zstd; of a file that is open an MCAP log is read a few
-        megabytes at a time, any other one whole.
+    log : bytes or LogFile
+        The file as delivered, perhaps compressed with gzip or zstd; an MCAP log is read a few megabytes at a time, any
+        other one whole.
     profile : VesselProfile
 
     Returns
@@ -45,13 +47,13 @@ def read_log(name: str, log: bytes | BinaryIO, profile: VesselProfile) -> Readin
     UsageError
         The profile does not say how the file is to be read.
     """
-    file = LogFile(log)
+    file = log if isinstance(log, LogFile) else LogFile(log)
     if file.size == 0:
         raise DataRejected("empty_log", f"{name} is empty.", "Copy the file again from the logger.", {"name": name})
     notes: list[str] = []
     packed = False
     if file.read(0, len(sniff.MCAP_MAGIC)) != sniff.MCAP_MAGIC:
-        data = file.whole()
+        data = _whole(name, file)
         content, notes = unpack(name, data)
         packed = content is not data
         file = LogFile(content)
@@ -78,14 +80,14 @@ def _decode(log_format: str, name: str, log: LogFile, profile: VesselProfile, so
     if log_format == "nmea":
         from pipeline.ingest import nmea
 
-        return nmea.decode(log.whole(), name, source)
+        return nmea.decode(_whole(name, log), name, source)
     if log_format == "mcap":
         from pipeline.ingest import mcap_log
 
         return mcap_log.decode(name, log, source, [s.match for s in profile.sources])
     from pipeline.ingest import delimited
 
-    data = log.whole()
+    data = _whole(name, log)
     if source is None or source.time is None or not source.channels:
         found = delimited.columns_found(data, source)
         lacks = "no source" if source is None else "a source without time or channels"
@@ -97,6 +99,17 @@ def _decode(log_format: str, name: str, log: LogFile, profile: VesselProfile, so
             {"name": name, "columns": found, "patterns": [s.match for s in profile.sources]},
         )
     return delimited.decode(name, data, source)
+
+
+def _whole(name: str, log: LogFile) -> bytes:
+    if log.size > MOST_TEXT_BYTES:
+        raise DataRejected(
+            "file_too_large",
+            f"{name} has {log.size} bytes; text, or a packed log, of more than {MOST_TEXT_BYTES} is not read.",
+            "Split the log into shorter ones, a day each for example.",
+            {"name": name, "bytes": log.size},
+        )
+    return log.whole()
 
 
 def _nothing(name: str, readings: Readings) -> DataRejected:

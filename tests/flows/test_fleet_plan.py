@@ -12,8 +12,9 @@ from flows import fleet_plan, fleet_report, fleet_state
 from flows.fleet_plan import Plan, do_batch, do_fleet, lost, plan, to_try_again, together
 from flows.fleet_state import fleet_state as state_of
 from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest_bytes
+from flows.ingest_logs import ingest_log
 from flows.vessel_report import VesselReport, run_id_of
+from pipeline.ingest.log_file import LogFile
 from schemas.errors import DataRejected, KempfError
 from schemas.profile import VesselProfile
 from tests.conftest import Ship
@@ -29,7 +30,7 @@ def settled(ferry: Ship, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two vessels that are up to date: one with a log, one without any."""
     warehouse = fresh(tmp_path_factory.mktemp("plan") / "w")
     profile = VesselProfile.model_validate(ferry.profile)
-    assert ingest_bytes(warehouse, "ferry", "day.csv.gz", ferry.csv, profile, "day").outcome == "new"
+    assert ingest_log(warehouse, "ferry", "day.csv.gz", LogFile(ferry.csv), profile, "day").outcome == "new"
     identify_vessel(warehouse, "ferry", QUICK)
     vessels.register(warehouse, "idle", VesselProfile(vessel="idle", length_m=10.0))
     assert [name for name, _ in plan(warehouse).due] == ["ferry", "idle"]
@@ -69,7 +70,7 @@ def test_everything_that_a_result_rests_on_makes_her_due(own: Warehouse, ferry: 
     assert due(own) == ["ferry"]
     do_fleet(own)
     assert due(own) == []
-    ingest_bytes(own, "ferry", "other.nmea.gz", ferry.nmea, vessels.current(own, "ferry"), "x")
+    ingest_log(own, "ferry", "other.nmea.gz", LogFile(ferry.nmea), vessels.current(own, "ferry"), "x")
     assert due(own) == ["ferry"]
     do_fleet(own)
     vessels.register(own, "idle", VesselProfile(vessel="idle", length_m=11.0))
@@ -89,7 +90,7 @@ def test_a_log_that_comes_while_she_is_worked_on_leaves_her_due(own: Warehouse, 
 
     def meanwhile(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
         real(warehouse, vessel, report)
-        ingest_bytes(own, "ferry", "late.nmea.gz", ferry.nmea, vessels.current(own, "ferry"), "late")
+        ingest_log(own, "ferry", "late.nmea.gz", LogFile(ferry.nmea), vessels.current(own, "ferry"), "late")
 
     vessels.register(own, "ferry", vessels.current(own, "ferry").model_copy(update={"wind_arm_per_m": 0.009}))
     with monkeypatch.context() as patched:

@@ -5,17 +5,19 @@ from __future__ import annotations
 import gzip
 import os
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import polars as pl
 import pytest
 import zstandard
 
-from flows.files import read_bytes, read_profiles
+from flows.files import opened_log, read_bytes, read_profiles
 from pipeline.ingest.decimal_time import to_ns
+from pipeline.ingest.read import read_log
 from pipeline.ingest.unpack import unpack
 from schemas.errors import DataRejected, UsageError
-from schemas.profile import parse
+from schemas.profile import VesselProfile, parse
 
 HALF = b"2025-05-03T07:47:01.147Z $HEHDT,11.37,T*2B\n"
 
@@ -39,13 +41,18 @@ def test_zeros_between_gzip_members_hide_nothing() -> None:
     assert unpack("log.gz", gzip.compress(HALF) + b"\0" * 512 + gzip.compress(HALF)) == (HALF * 2, [])
 
 
-@pytest.mark.parametrize("what", ["raw log", "vessel profile"])
-def test_a_pipe_and_a_device_are_no_files(tmp_path: Path, what: str) -> None:
+def open_log(path: Path) -> None:
+    with opened_log(path):
+        pass
+
+
+@pytest.mark.parametrize("take", [open_log, lambda path: read_bytes(path, "vessel profile")])
+def test_a_pipe_and_a_device_are_no_files(tmp_path: Path, take: Callable[[Path], object]) -> None:
     pipe = tmp_path / "pipe.csv"
     os.mkfifo(pipe)
     for path in (pipe, Path("/dev/zero")):
         with pytest.raises(UsageError) as caught:
-            read_bytes(path, what)
+            take(path)
         assert caught.value.code == "not_a_file"
 
 
@@ -54,7 +61,10 @@ def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
     with huge.open("wb") as stream:
         stream.truncate(1 << 40)
     with pytest.raises(DataRejected) as caught:
-        read_bytes(huge, "raw log")
+        read_bytes(huge, "vessel profile")
+    assert caught.value.code == "file_too_large"
+    with opened_log(huge) as log, pytest.raises(DataRejected) as caught:
+        read_log("huge.log", log, VesselProfile())
     assert caught.value.code == "file_too_large"
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 import pytest
 
 from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest_bytes
+from flows.ingest_logs import ingest_log
+from pipeline.ingest.log_file import LogFile
 from schemas.profile import VesselProfile
 from tests.conftest import Ship
 from tests.scale.servers import environment, free_port, running
@@ -60,7 +61,7 @@ def stocked(ferry: Ship, tmp_path_factory: pytest.TempPathFactory) -> Path:
     for k, name in enumerate(FLEET):
         profile = VesselProfile.model_validate({**ferry.profile, "vessel": name})
         data = gzip.compress(rows, compresslevel=k + 1, mtime=0)  # other bytes, so another log
-        outcome = ingest_bytes(Warehouse(str(place)), name, f"{name}.csv.gz", data, profile, name)
+        outcome = ingest_log(Warehouse(str(place)), name, f"{name}.csv.gz", LogFile(data), profile, name)
         assert outcome.outcome == "new"
         (found,) = identify_vessel(Warehouse(str(place)), name, Request(estimator="least-squares"))
         assert found.parameter_set is not None

@@ -12,6 +12,7 @@ from flows.identify_vessel import Request, identify_vessel
 from flows.ingest_logs import ingest
 from flows.reprocess_vessel import reprocess_vessel
 from flows.rerun_set import rerun
+from pipeline.ingest.log_file import LogFile
 from schemas.errors import KempfError, NotFound
 from schemas.profile import VesselProfile
 from tests.conftest import Ship
@@ -99,7 +100,7 @@ def test_a_damaged_object_is_told_and_mended(stored: Warehouse, ferry: Ship) -> 
     stored.write_bytes(ferry.csv[:-1], "raw", row.log_id[:2], row.log_id)
     with pytest.raises(KempfError, match="is damaged"):
         raw.get(stored, row.log_id)
-    raw.put(stored, ferry.csv)
+    raw.put(stored, LogFile(ferry.csv))
     assert raw.get(stored, row.log_id) == ferry.csv
 
 

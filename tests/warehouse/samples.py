@@ -6,6 +6,7 @@ from typing import Any
 
 import polars as pl
 
+from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
 from schemas.profile import VesselProfile
 from warehouse.deposit import Delivery
@@ -47,7 +48,7 @@ def delivery(vessel: str = "aurora", data: bytes = b"log one", length_m: float =
     values: dict[str, Any] = {
         "vessel": vessel,
         "file_name": "day1.nmea.gz",
-        "data": data,
+        "log": LogFile(data),
         "profile": VesselProfile(vessel="aurora", length_m=length_m),
         "readings": readings(),
         "code_version": CODE,

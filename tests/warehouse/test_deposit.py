@@ -53,7 +53,7 @@ def test_the_same_again_changes_nothing_anywhere(warehouse: Warehouse) -> None:
 
 def test_asking_first_saves_the_reading(warehouse: Warehouse) -> None:
     given = delivery()
-    asked = ("aurora", "day1.nmea.gz", given.data)
+    asked = ("aurora", "day1.nmea.gz", given.log)
     key = {"profile_sha256": given.profile.sha256, "code_version": CODE}
     assert held(warehouse, *asked, **key) is None  # not even a warehouse
     (done,) = deposit(warehouse, [given])

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from pipeline.ingest.log_file import LogFile
 from schemas.errors import KempfError, NotFound, UsageError
 from schemas.tables import TABLES
 from warehouse import aliases, compaction, delta, history, logs, parameter_sets, raw, runs, segments, vessels
@@ -65,7 +66,7 @@ def test_a_place_with_other_things_is_not_taken(tmp_path: Path, there: str) -> N
         place.mkdir()
         (place / "letter.txt").write_text("x")
     with pytest.raises(UsageError) as caught:
-        raw.put(Warehouse(str(place)), b"log")
+        raw.put(Warehouse(str(place)), LogFile(b"log"))
     assert caught.value.code == "not_a_warehouse"
     assert not (place / MARKER).exists()
 

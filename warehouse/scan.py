@@ -1,0 +1,81 @@
+"""What is read of an open table: the files that a question cannot do without, and every column that there should be.
+
+A table has a file for nearly every commit. polars' own reader of such tables looks into the statistics of them all,
+which takes longer than reading the few that count; the table format picks those out first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING
+
+from schemas.tables import TABLES, arrow_schema
+
+if TYPE_CHECKING:
+    import polars as pl
+    from deltalake import DeltaTable
+
+#: Values that a column may have, by column.
+Where = Mapping[str, str | list[str]]
+
+
+def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> pl.LazyFrame:
+    """Return the rows of a table that have some values; a table that was never written has none.
+
+    Parameters
+    ----------
+    table : DeltaTable or None
+        Open.
+    name : str
+        Key of `schemas.tables.TABLES`; a column of it that the table lacks is null.
+    where : mapping of str to str or list of str, optional
+
+    Returns
+    -------
+    polars.LazyFrame
+        Not collected: the files are read, and may be missing, when it is.
+    """
+    import polars as pl
+
+    asked = {c: v[0] if not isinstance(v, str) and len(v) == 1 else v for c, v in (where or {}).items()}
+    single = {column: value for column, value in asked.items() if isinstance(value, str)}
+    empty = _empty(name)
+    if table is None:
+        lazy = empty.lazy()
+    elif _local(table) and single and single.keys() >= set(table.metadata().partition_columns):
+        lazy = _of_few_files(table, empty, single)
+    else:
+        held = {field.name for field in table.schema().fields}
+        absent = {column: kind for column, kind in empty.schema.items() if column not in held}
+        lazy = pl.scan_delta(table).with_columns(pl.lit(None, dtype=kind).alias(c) for c, kind in absent.items())
+    for column, value in asked.items():
+        lazy = lazy.filter(pl.col(column) == value if isinstance(value, str) else pl.col(column).is_in(value))
+    return lazy
+
+
+def _local(table: DeltaTable) -> bool:
+    # a bucket needs the credentials that polars takes from the table itself
+    return table.table_uri.startswith(("file://", "/"))
+
+
+def _of_few_files(table: DeltaTable, empty: pl.DataFrame, single: Mapping[str, str]) -> pl.LazyFrame:
+    """Return the rows of the files that may hold these values, by their folder or their statistics."""
+    import polars as pl
+
+    files = table.file_uris(file_pruning_predicate=[(column, "=", value) for column, value in single.items()])
+    if not files:
+        return empty.lazy()
+    folders = table.metadata().partition_columns  # what a folder is named by does not stand in its files
+    inside = {column: kind for column, kind in empty.schema.items() if column not in folders}
+    lazy = pl.scan_parquet(
+        files, schema=inside, missing_columns="insert", extra_columns="ignore", glob=False, hive_partitioning=False
+    )
+    return lazy.with_columns(pl.lit(single[column]).alias(column) for column in folders).select(empty.columns)
+
+
+def _empty(name: str) -> pl.DataFrame:
+    import polars as pl
+
+    empty = pl.from_arrow(arrow_schema(TABLES[name]).empty_table())
+    assert isinstance(empty, pl.DataFrame)
+    return empty
