@@ -24,8 +24,8 @@ LARGE_BYTES = 1_000_000_000
 
 def ours(path: Path) -> int:
     """Decode every message to canonical channels, a few megabytes at a time."""
-    from pipeline.ingest import mcap_log
     from pipeline.ingest.log_file import LogFile
+    from pipeline.ingest.mcap import decode as mcap_log
     from schemas.profile import Source
 
     count = values = 0
@@ -46,7 +46,7 @@ def ours(path: Path) -> int:
 def raw(path: Path) -> int:
     """Find every message, unpacked and checked, without looking into it."""
     from pipeline.ingest.log_file import LogFile
-    from pipeline.ingest.mcap_stream import McapStream
+    from pipeline.ingest.mcap.stream import McapStream
 
     with path.open("rb") as stream:
         return sum(batch.first.size for batch in McapStream(path.name, LogFile(stream)).batches())

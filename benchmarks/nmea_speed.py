@@ -19,7 +19,7 @@ import zstandard
 
 from benchmarks.mixed_nmea import DRESSES, mixed_log
 from benchmarks.result_page import DATA, RESULTS, table, write
-from pipeline.ingest.nmea import decode
+from pipeline.ingest.nmea.decode import decode
 from pipeline.ingest.read import read_log
 from schemas.profile import VesselProfile
 

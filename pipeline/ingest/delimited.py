@@ -9,13 +9,13 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.ingest import decimal_time, iso_time
 from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Nanoseconds, Values
 from pipeline.ingest.mapping import check_once
-from pipeline.ingest.numerals import number
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.sniff import separator_of
 from pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, spans_of, trimmed
+from pipeline.ingest.text import decimal_time, iso_time
+from pipeline.ingest.text.numerals import number
 from schemas.errors import DataRejected, UsageError
 from schemas.profile import Source, TimeColumn, start_ns
 

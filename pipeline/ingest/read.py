@@ -78,13 +78,13 @@ def read_log(name: str, log: bytes | LogFile, profile: VesselProfile) -> Reading
 def _decode(log_format: str, name: str, log: LogFile, profile: VesselProfile, source: Source | None) -> Decoded:
     """Call the reader of the format; each is imported where it is used, `kempf --help` pays for none."""
     if log_format == "nmea":
-        from pipeline.ingest import nmea
+        from pipeline.ingest.nmea.decode import decode as nmea
 
-        return nmea.decode(_whole(name, log), name, source)
+        return nmea(_whole(name, log), name, source)
     if log_format == "mcap":
-        from pipeline.ingest import mcap_log
+        from pipeline.ingest.mcap.decode import decode as mcap
 
-        return mcap_log.decode(name, log, source, [s.match for s in profile.sources])
+        return mcap(name, log, source, [s.match for s in profile.sources])
     from pipeline.ingest import delimited
 
     data = _whole(name, log)

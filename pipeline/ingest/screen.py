@@ -12,9 +12,9 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Values
-from pipeline.ingest.iso_time import DAY_NS, SECOND_NS, days_since_1970
 from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Reason, Tally
 from pipeline.ingest.spans import Index
+from pipeline.ingest.text.iso_time import DAY_NS, SECOND_NS, days_since_1970
 from schemas.channels import CHANNELS
 
 Code = NDArray[np.int8]

@@ -17,7 +17,7 @@ def test_damaged_inputs_crash_nothing_and_no_failed_checksum_is_accepted(reader)
 
 
 def test_a_reader_that_accepts_any_checksum_is_found_out(monkeypatch):
-    from pipeline.ingest import nmea_frames
+    from pipeline.ingest.nmea import frames as nmea_frames
 
     monkeypatch.setattr(nmea_frames, "checksum_right", lambda buffer, prefix, first, star: star > first)
     with pytest.raises(AssertionError, match="kept under a wrong checksum"):

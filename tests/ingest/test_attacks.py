@@ -13,8 +13,8 @@ import pytest
 import zstandard
 
 from flows.files import opened_log, read_bytes, read_profiles
-from pipeline.ingest.decimal_time import to_ns
 from pipeline.ingest.read import read_log
+from pipeline.ingest.text.decimal_time import to_ns
 from pipeline.ingest.unpack import unpack
 from schemas.errors import DataRejected, UsageError
 from schemas.profile import VesselProfile, parse

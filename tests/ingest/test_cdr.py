@@ -9,9 +9,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 
-from pipeline.ingest.cdr_definition import types_of
-from pipeline.ingest.cdr_reader import CdrReader
-from pipeline.ingest.message_columns import NoReaderError
+from pipeline.ingest.messages.cdr_definition import types_of
+from pipeline.ingest.messages.cdr_reader import CdrReader
+from pipeline.ingest.messages.columns import NoReaderError
 from pipeline.ingest.spans import Spans, as_bytes
 from tests.ingest.ros_definitions import DEFINITIONS, joined
 

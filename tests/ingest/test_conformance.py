@@ -8,7 +8,7 @@ import pytest
 from mcap.stream_reader import StreamReader
 
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap_stream import McapStream
+from pipeline.ingest.mcap.stream import McapStream
 from pipeline.ingest.read import read_log
 from schemas.errors import KempfError
 from schemas.profile import VesselProfile

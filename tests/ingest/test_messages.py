@@ -5,7 +5,7 @@ from pathlib import Path
 
 import yaml
 
-from pipeline.ingest.cdr_definition import types_of
+from pipeline.ingest.messages.cdr_definition import types_of
 from schemas.known_messages import TAKEN
 from schemas.profile import parse
 

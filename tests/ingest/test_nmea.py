@@ -5,9 +5,9 @@ from datetime import UTC, datetime
 
 import pytest
 
-from pipeline.ingest import nmea_frames
-from pipeline.ingest.nmea import decode
-from pipeline.ingest.nmea_frames import frames_of
+from pipeline.ingest.nmea import frames as nmea_frames
+from pipeline.ingest.nmea.decode import decode
+from pipeline.ingest.nmea.frames import frames_of
 from pipeline.ingest.readings import Readings
 from pipeline.ingest.screen import screen
 from pipeline.ingest.spans import as_bytes

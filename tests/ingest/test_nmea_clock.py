@@ -4,7 +4,7 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from pipeline.ingest.nmea import decode
+from pipeline.ingest.nmea.decode import decode
 from pipeline.ingest.screen import screen
 from pipeline.ingest.sniff import sniff
 

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.ingest.decoded import CODE
-from pipeline.ingest.nmea import decode
+from pipeline.ingest.nmea.decode import decode
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.screen import screen
 

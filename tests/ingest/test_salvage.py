@@ -11,7 +11,8 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.ingest import mcap_chunk, unpack
+from pipeline.ingest import unpack
+from pipeline.ingest.mcap import chunk as mcap_chunk
 from pipeline.ingest.read import read_log
 from schemas.errors import DataRejected, KempfError
 from schemas.profile import VesselProfile

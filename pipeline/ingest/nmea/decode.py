@@ -7,11 +7,11 @@ from itertools import pairwise
 import numpy as np
 
 from pipeline.ingest.decoded import CODE, NO_TIME, Code, Decoded, Values
-from pipeline.ingest.nmea_clock import clock_of
-from pipeline.ingest.nmea_fields import Said, read_type
-from pipeline.ingest.nmea_frames import Frames, frames_of
-from pipeline.ingest.nmea_magnetic import make_true
-from pipeline.ingest.nmea_rudders import both_rudders
+from pipeline.ingest.nmea.clock import clock_of
+from pipeline.ingest.nmea.fields import Said, read_type
+from pipeline.ingest.nmea.frames import Frames, frames_of
+from pipeline.ingest.nmea.magnetic import make_true
+from pipeline.ingest.nmea.rudders import both_rudders
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.spans import Bytes, Index, as_bytes
 from schemas.channels import CHANNELS

@@ -14,9 +14,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap_chunk import CHUNK_LIMIT, head_of, unpacked
-from pipeline.ingest.mcap_records import MESSAGE_INDEX
-from pipeline.ingest.mcap_walk import HEAD, heads
+from pipeline.ingest.mcap.chunk import CHUNK_LIMIT, head_of, unpacked
+from pipeline.ingest.mcap.records import MESSAGE_INDEX
+from pipeline.ingest.mcap.walk import HEAD, heads
 from pipeline.ingest.readings import LostStretch
 from pipeline.ingest.spans import Bytes, Index, as_bytes
 

@@ -1,8 +1,8 @@
 """Short texts within one byte buffer read as numbers, words and digits: eight bytes of every text at a time.
 
 A text of up to eight characters is one 64-bit word, so a whole column is checked and converted by a few operations on
-arrays of words. What is too long or too odd for that goes the way of `pipeline.ingest.numerals`, which decides what a
-number is; both ways give the same bits.
+arrays of words. What is too long or too odd for that goes the way of `numerals`, which decides what a number is; both
+ways give the same bits.
 """
 
 from __future__ import annotations
@@ -13,8 +13,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.ingest.decoded import Flag, Float
-from pipeline.ingest.numerals import number
 from pipeline.ingest.spans import Bytes, Index, Spans, is_blank, trimmed
+from pipeline.ingest.text.numerals import number
 
 Word = NDArray[np.uint64]
 
@@ -186,7 +186,7 @@ class Cells:
         Returns
         -------
         ndarray of float64, shape (n,)
-            The bits that `pipeline.ingest.numerals.number` gives.
+            The bits that `pipeline.ingest.text.numerals.number` gives.
         """
         buffer, stop, length = self.buffer, self.stop, self.stop - self.start
         if buffer.size == 0 or length.size == 0:

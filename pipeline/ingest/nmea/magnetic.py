@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.ingest.decoded import CODE, Flag, Float
-from pipeline.ingest.nmea_fields import Fields, Said, east
-from pipeline.ingest.nmea_frames import Frames
+from pipeline.ingest.nmea.fields import Fields, Said, east
+from pipeline.ingest.nmea.frames import Frames
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.spans import Index
 

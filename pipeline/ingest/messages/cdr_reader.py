@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.ingest.cdr_definition import full_name, types_of
-from pipeline.ingest.cdr_program import program_for
-from pipeline.ingest.cdr_walk import walk
-from pipeline.ingest.message_columns import Columns, NoReaderError
+from pipeline.ingest.messages.cdr_definition import full_name, types_of
+from pipeline.ingest.messages.cdr_program import program_for
+from pipeline.ingest.messages.cdr_walk import walk
+from pipeline.ingest.messages.columns import Columns, NoReaderError
 from pipeline.ingest.spans import Spans
 
 

@@ -1,6 +1,6 @@
 """From the bytes of an NMEA log to its sentences: stamp, address, checksum, by columns over the whole buffer.
 
-What a sentence says is read in `nmea_fields`, what a TAG block in front of it says in `nmea_tags`.
+What a sentence says is read in `fields`, what a TAG block in front of it says in `tags`.
 """
 
 from __future__ import annotations
@@ -11,13 +11,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest import iso_time
-from pipeline.ingest.cells import words
 from pipeline.ingest.decoded import CODE, NO_TIME, Code, Flag, Nanoseconds
-from pipeline.ingest.nmea_checksum import checksum_right
-from pipeline.ingest.nmea_tags import BACKSLASH, Tags, tags_of
+from pipeline.ingest.nmea.checksum import checksum_right
+from pipeline.ingest.nmea.tags import BACKSLASH, Tags, tags_of
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.spans import Bytes, Index, Spans, first_within, is_blank, trimmed
+from pipeline.ingest.text import iso_time
+from pipeline.ingest.text.cells import words
 
 _FEED, _RETURN, _BLANK, _DOLLAR, _BANG, _STAR, _COMMA = 10, 13, 32, 36, 33, 42, 44
 

@@ -12,7 +12,7 @@ import zlib
 from dataclasses import dataclass, field
 
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap_records import (
+from pipeline.ingest.mcap.records import (
     CHANNEL,
     CHUNK_INDEX,
     DATA_END,
@@ -29,7 +29,7 @@ from pipeline.ingest.mcap_records import (
     parse_message_count,
     parse_schema,
 )
-from pipeline.ingest.mcap_walk import HEAD, walk
+from pipeline.ingest.mcap.walk import HEAD, walk
 from pipeline.ingest.sniff import MCAP_MAGIC
 from pipeline.ingest.spans import as_bytes
 

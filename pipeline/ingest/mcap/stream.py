@@ -2,7 +2,7 @@
 
 The file is read in the order it was written, so that one that was never closed, one without an index and one that
 lost its end are read the same way as a whole one. The summary tells where to go on behind damage; where it is gone
-too, the next chunk is looked for. What the messages say is read in `mcap_log`.
+too, the next chunk is looked for. What the messages say is read in `decode`.
 
 References
 ----------
@@ -18,9 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap_batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
-from pipeline.ingest.mcap_chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
-from pipeline.ingest.mcap_records import (
+from pipeline.ingest.mcap.batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
+from pipeline.ingest.mcap.chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
+from pipeline.ingest.mcap.records import (
     CHANNEL,
     CHUNK,
     DATA_END,
@@ -33,8 +33,8 @@ from pipeline.ingest.mcap_records import (
     parse_channel,
     parse_schema,
 )
-from pipeline.ingest.mcap_summary import read_summary
-from pipeline.ingest.mcap_walk import HEAD, chunk_after, walk
+from pipeline.ingest.mcap.summary import read_summary
+from pipeline.ingest.mcap.walk import HEAD, chunk_after, walk
 from pipeline.ingest.readings import LostStretch
 from pipeline.ingest.sniff import MCAP_MAGIC
 from pipeline.ingest.spans import Index, as_bytes

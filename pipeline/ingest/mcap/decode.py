@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 
 from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap_batch import Batch, joined
-from pipeline.ingest.mcap_payloads import PayloadsBuilder
-from pipeline.ingest.mcap_records import Channel
-from pipeline.ingest.mcap_stream import McapStream
-from pipeline.ingest.mcap_topics import Route
-from pipeline.ingest.message_columns import NoReaderError
+from pipeline.ingest.mcap.batch import Batch, joined
+from pipeline.ingest.mcap.payloads import PayloadsBuilder
+from pipeline.ingest.mcap.records import Channel
+from pipeline.ingest.mcap.stream import McapStream
+from pipeline.ingest.mcap.topics import Route
+from pipeline.ingest.messages.columns import NoReaderError
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.spans import Spans
 from schemas.errors import DataRejected, UsageError

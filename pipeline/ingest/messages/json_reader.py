@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.json_walk import ABSENT, NUMBER, OTHER, TEXT, walk
-from pipeline.ingest.message_columns import Columns
-from pipeline.ingest.numerals import number
+from pipeline.ingest.messages.columns import Columns
+from pipeline.ingest.messages.json_walk import ABSENT, NUMBER, OTHER, TEXT, walk
 from pipeline.ingest.spans import Spans
+from pipeline.ingest.text.numerals import number
 
 #: A tree of field names; the leaves are empty.
 Tree = dict[str, "Tree"]
@@ -92,7 +92,7 @@ def _leaf(value: Any, path: list[str]) -> tuple[int, float]:
 
 
 def _flat(tree: Tree, paths: list[list[str]]) -> tuple[NDArray[np.int64], NDArray[np.uint8]]:
-    """Lay a tree out as `pipeline.ingest.json_walk.walk` wants it: the children of a node stand behind each other."""
+    """Lay a tree out as `json_walk.walk` wants it: the children of a node stand behind each other."""
     nodes: list[tuple[Tree, bytes, tuple[str, ...]]] = [(tree, b"", ())]
     slots = {tuple(path): slot for slot, path in enumerate(paths)}
     rows, at = [], 0

@@ -1,7 +1,7 @@
 """What NMEA sentences say: fields by the table in `schemas.nmea`, in columns, one sentence type at a time.
 
-When they say it is settled in `nmea_clock`; which of two rudders and which magnetic variation holds, by looking at the
-whole log, in `nmea_rudders` and `nmea_magnetic`.
+When they say it is settled in `clock`; which of two rudders and which magnetic variation holds, by looking at the
+whole log, in `rudders` and `magnetic`.
 """
 
 from __future__ import annotations
@@ -13,11 +13,11 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.cells import Cells
 from pipeline.ingest.decoded import CODE, Flag, Float
-from pipeline.ingest.nmea_frames import Frames
+from pipeline.ingest.nmea.frames import Frames
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.spans import Index
+from pipeline.ingest.text.cells import Cells
 from schemas.channels import CHANNELS
 from schemas.nmea import SENTENCES, SILENT, XDR_ANGLES, NmeaField, Sentence
 from schemas.units import factor_to_si
@@ -169,7 +169,7 @@ def east(letter: Cells) -> Float:
 
 
 def _read_magnetic(said: Said) -> None:
-    """Read the magnetic heading with its deviation, east positive, rad; the variation is added in `nmea_magnetic`."""
+    """Read the magnetic heading with its deviation, east positive, rad; the variation is added in `magnetic`."""
     heading = said.fields.at(1)
     value = heading.number()
     if bool(np.any(said.fields.count >= 3)):
@@ -179,7 +179,7 @@ def _read_magnetic(said: Said) -> None:
 
 
 def _read_starboard(said: Said) -> None:
-    """Read the rudder of a ship with one; `nmea_rudders` looks for a second one."""
+    """Read the rudder of a ship with one; `rudders` looks for a second one."""
     angle, status = said.fields.at(1), said.fields.at(2)
     void = ~status.is_one_of(("A",)) & (said.fields.count >= 2)
     said.values["rudder_angle"] = (angle.number() * _DEGREE, angle.there() & ~void)

@@ -10,7 +10,7 @@ import polars as pl
 from numpy.typing import NDArray
 
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap_batch import Batch, Piece
+from pipeline.ingest.mcap.batch import Batch, Piece
 from pipeline.ingest.spans import RAW_LIMIT, Bytes, Index, Spans
 
 #: Bytes of a payload that is no text which are shown, in hexadecimal digits.

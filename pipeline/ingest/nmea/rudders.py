@@ -9,8 +9,8 @@ from __future__ import annotations
 import numpy as np
 
 from pipeline.ingest.decoded import CODE, Flag, Float
-from pipeline.ingest.nmea_fields import Said
-from pipeline.ingest.nmea_frames import Frames
+from pipeline.ingest.nmea.fields import Said
+from pipeline.ingest.nmea.frames import Frames
 from pipeline.ingest.readings import Reason
 
 _DEGREE = np.pi / 180.0

@@ -1,0 +1,1 @@
+"""MCAP: chunks, records, topics, and the way from messages to channels."""

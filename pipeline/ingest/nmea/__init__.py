@@ -1,0 +1,1 @@
+"""NMEA 0183: sentences, their clock, fields to channels in SI."""

@@ -1,0 +1,1 @@
+"""Numbers, words and times in text, many at once."""
