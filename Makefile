@@ -29,7 +29,8 @@ bench: $(RIVALS)
 
 # The long ones, half an hour and more each on two cores.
 bench-long: $(DEVELOP)
-	for name in information_limit changes no_log paper_map hidden_effects doctor fleet history_speed kill fuzz; \
+	for name in information_limit changes no_log paper_map hidden_effects doctor fleet history_speed kill kill_dask \
+		fuzz; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 setup: $(DEVELOP)

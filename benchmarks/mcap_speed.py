@@ -88,12 +88,13 @@ def mcap_ros2(path: Path) -> int:
 
 def whole_reading(path: Path) -> int:
     """Read a log as `kempf ingest` does: decoded, checked, as a table, with its ledger."""
+    from pipeline.ingest.log_file import LogFile
     from pipeline.ingest.read import read_log
     from schemas.profile import VesselProfile
 
     profile = VesselProfile.model_validate({"sources": [{"match": "*", "channels": CHANNELS}]})
     with path.open("rb") as stream:
-        return read_log(path.name, stream, profile).tally.records_kept
+        return read_log(path.name, LogFile(stream), profile).tally.records_kept
 
 
 JOBS: dict[str, Callable[[Path], int]] = {
