@@ -10,8 +10,9 @@ from typing import Any
 import yaml
 
 from benchmarks import measured_ships
-from flows.examine_log import Examined, examine_frame
+from flows.examine_log import Examined, examine_instruments
 from pipeline.ingest.read import read_log
+from pipeline.normalise.instruments import from_readings
 from schemas.profile import VesselProfile, parse
 
 
@@ -55,7 +56,7 @@ def traps(data: Path) -> list[Trap]:
 def examined(path: Path, profile: VesselProfile) -> Examined:
     """One log as it is read with a profile."""
     read = read_log(path.name, path.read_bytes(), profile)
-    return examine_frame(read.frame, profile, path.name, read.format)
+    return examine_instruments(from_readings(read.frame), profile, path.name, read.format)
 
 
 def _spoilt(path: Path, spoil: Callable[[dict[str, Any]], None]) -> VesselProfile:

@@ -113,7 +113,7 @@ def fill(warehouse: Warehouse, template: Template, vessels: int, each: int) -> p
         for name, frames in (("logs", [b for _, b in batch]), ("parameter_sets", [a for a, _ in batch])):
             frame = pl.concat(frames)
             with delta.ensured(warehouse, name) as opened:
-                delta.replace(opened, name, frame, one_of("vessel_key", frame["vessel_key"].unique().to_list()))
+                delta.replace(opened, name, iter([frame]), one_of("vessel_key", frame["vessel_key"].unique().to_list()))
         rows.append(_long(pl.concat([a for a, _ in batch])))
     return pl.concat(rows)
 

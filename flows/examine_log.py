@@ -4,21 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+from flows.channels import channels_of
 from flows.files import opened_log
-from pipeline.ingest.read import read_log
+from flows.spool import spooled
 from pipeline.normalise.doctor.examine import Examination, examine
 from pipeline.normalise.doctor.log import Log
 from pipeline.normalise.doctor.mend import entries
 from pipeline.normalise.doctor.verdict import told
-from pipeline.normalise.instruments import from_readings
+from pipeline.normalise.instruments import Instruments, from_readings
 from schemas.profile import VesselProfile
-from warehouse import logs, readings, vessels
+from warehouse import logs, vessels
 from warehouse.store import Warehouse
-
-if TYPE_CHECKING:
-    import polars as pl
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,19 +40,17 @@ class Examined:
     content: dict[str, Any]
 
 
-def examine_frame(frame: pl.DataFrame, profile: VesselProfile, file_name: str, log_format: str) -> Examined:
-    """Examine the readings of one log; nothing is stored.
+def examine_instruments(instruments: Instruments, profile: VesselProfile, file_name: str, log_format: str) -> Examined:
+    """Examine the channels of one log; nothing is stored.
 
     Parameters
     ----------
-    frame : polars.DataFrame
-        Readings, schema `pipeline.ingest.readings.READING_SCHEMA`.
+    instruments : Instruments
     profile : VesselProfile
         With which they were read.
     file_name : str
     log_format : {"delimited", "mcap", "nmea"}
     """
-    instruments = from_readings(frame)
     known = entries(profile.source_for(file_name), log_format, instruments.sources)
     units = {channel: mapped.unit for channel, (_, mapped) in known.items()}
     log = Log.of(instruments, profile.length_m, units)
@@ -70,9 +66,8 @@ def examine_file(path: Path, profile: VesselProfile) -> Examined:
     KempfError
         The log cannot be read.
     """
-    with opened_log(path) as log:
-        read = read_log(path.name, log, profile)
-    return examine_frame(read.frame, profile, path.name, read.format)
+    with opened_log(path) as log, spooled(path.name, log, profile) as read:
+        return examine_instruments(from_readings(read.lazy()), profile, path.name, read.format)
 
 
 def examine_held(warehouse: Warehouse, name: str) -> Examined:
@@ -87,4 +82,5 @@ def examine_held(warehouse: Warehouse, name: str) -> Examined:
     """
     row = logs.by_prefix(warehouse, name)
     profile = vessels.get(warehouse, row.profile_sha256)
-    return examine_frame(readings.read(warehouse, row.ingest_id), profile, row.file_name, row.format)
+    channels = channels_of(warehouse, row.ingest_id)
+    return examine_instruments(channels, profile, row.file_name, row.format)

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pipeline.identify.companions import has_log, shaft_speed
-from pipeline.normalise.instruments import Instruments, from_readings
+from pipeline.normalise.instruments import Instruments
 from pipeline.segment.find import find_manoeuvres
 from pipeline.segment.imo import judge
 from pipeline.segment.lateral import lateral_summary
@@ -14,9 +14,6 @@ from pipeline.segment.zigzag import Zigzag
 from schemas.profile import VesselProfile
 from warehouse.code_version import fingerprint
 from warehouse.segments import Segment, segment_id
-
-if TYPE_CHECKING:
-    import polars as pl
 
 
 @dataclass(frozen=True)
@@ -28,15 +25,17 @@ class Ingest:
     ingest_id: str
 
 
-def find_segments(ingest: Ingest, profile: VesselProfile, frame: pl.DataFrame) -> tuple[list[Segment], tuple[str, ...]]:
+def find_segments(
+    ingest: Ingest, profile: VesselProfile, instruments: Instruments
+) -> tuple[list[Segment], tuple[str, ...]]:
     """Find the zigzags of one ingest; nothing is stored.
 
     Parameters
     ----------
     ingest : Ingest
     profile : VesselProfile
-    frame : polars.DataFrame
-        Its readings.
+    instruments : Instruments
+        Its channels.
 
     Returns
     -------
@@ -44,7 +43,6 @@ def find_segments(ingest: Ingest, profile: VesselProfile, frame: pl.DataFrame) -
     tuple of str
         What a person should know: choices made in normalising, or the channel whose absence forbids the search.
     """
-    instruments = from_readings(frame)
     heading, rudder = instruments.get("heading"), instruments.get("rudder_angle")
     absent = [name for name, series in (("heading", heading), ("rudder_angle", rudder)) if series is None]
     if heading is None or rudder is None:

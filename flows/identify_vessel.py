@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+from flows.channels import channels_of
 from flows.cores import usable
 from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
@@ -16,11 +17,11 @@ from flows.unforeseen import as_told
 from flows.without_log import CAN, KEY, companions_of, estimate_of, no_log_settings, without_log
 from pipeline.identify.estimators import default_settings, estimate
 from pipeline.identify.record import make_record
-from pipeline.normalise.instruments import Instruments, from_readings
+from pipeline.normalise.instruments import Instruments
 from schemas.errors import KempfError, NotFound, UsageError
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
-from warehouse import aliases, code_version, delta, logs, parameter_sets, provenance, readings, segments, vessels
+from warehouse import aliases, code_version, delta, logs, parameter_sets, provenance, segments, vessels
 from warehouse.keys import vessel_key
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from warehouse.scan import Where
@@ -170,7 +171,7 @@ def _identify_log(
     missing = _missing(warehouse, row.vessel, wanted)
     asked = [c for c, inputs in zip(companions, wanted, strict=True) if parameter_set_id(inputs) in missing]
     ingests = {row.ingest_id, *(s.ingest_id for c in asked for s in c)} if missing else set()
-    held = {job.by_ingest[i].log_id: from_readings(readings.read(warehouse, i)) for i in sorted(ingests)}
+    held = {job.by_ingest[i].log_id: channels_of(warehouse, i) for i in sorted(ingests)}
 
     def one(segment: Segment, inputs: Inputs, others: tuple[Segment, ...]) -> IdentifyOutcome:
         name = parameter_set_id(inputs)

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from flows.examine_log import examine_frame
+from flows.examine_log import examine_instruments
 from flows.files import opened_log
 from flows.find_segments import Ingest, find_segments
 from flows.lost import as_json
 from flows.progress import Progress, silent
+from flows.spool import spooled
 from flows.unforeseen import as_told
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.read import read_log
-from pipeline.ingest.readings import LostStretch, Readings, Tally
+from pipeline.ingest.readings import LogReadings, LostStretch, Tally
+from pipeline.normalise.instruments import Instruments, from_readings
 from schemas.errors import KempfError, UsageError
 from schemas.profile import VesselProfile, overlay
 from warehouse import code_version, examinations, logs, lost, segments, vessels
@@ -189,8 +190,9 @@ def ingest_log(
         return IngestOutcome(
             path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, lost=gone, examination=seen
         )
-    read = read_one(vessel, file_name, log, profile)
-    (stored,) = store(warehouse, [read])
+    with spooled(file_name, log, profile) as readings:
+        read = look_through(vessel, file_name, log, profile, readings)
+        (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
     return IngestOutcome(
         path,
@@ -219,22 +221,15 @@ class ReadLog:
     examination: StoredExamination
 
 
-def read_one(vessel: str, file_name: str, log: LogFile, profile: VesselProfile) -> ReadLog:
-    """Read a log, find its zigzags and compare its channels.
-
-    Raises
-    ------
-    KempfError
-        It cannot be read.
-    """
+def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfile, readings: LogReadings) -> ReadLog:
+    """Find the zigzags of a log that was read, and compare its channels."""
     code = code_version.fingerprint()
-    name = log.sha256  # before it is read: what is stored is known by the bytes that were read
-    readings = read_log(file_name, log, profile)
-    one = Ingest(vessel, name, ingest_id(name, profile.sha256, code))
-    zigzags, notes = find_segments(one, profile, readings.frame)
-    seen = _examined(one, profile, file_name, readings, code)
-    noted = replace(readings, notes=(*readings.notes, *notes))
-    return ReadLog(Delivery(vessel, file_name, log, profile, noted, code), one.ingest_id, tuple(zigzags), seen)
+    one = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code))
+    instruments = from_readings(readings.lazy())
+    zigzags, notes = find_segments(one, profile, instruments)
+    seen = _examined(one, profile, file_name, instruments, readings.format)
+    delivery = Delivery(vessel, file_name, log, profile, readings, code, notes)
+    return ReadLog(delivery, one.ingest_id, tuple(zigzags), seen)
 
 
 def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
@@ -254,11 +249,14 @@ def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
     return deposit(warehouse, [one.delivery for one in read])
 
 
-def _examined(one: Ingest, profile: VesselProfile, file_name: str, read: Readings, code: str) -> StoredExamination:
+def _examined(
+    one: Ingest, profile: VesselProfile, file_name: str, instruments: Instruments, log_format: str
+) -> StoredExamination:
     """Examine a log; should the doctor fail, that is the verdict, and the log is in all the same."""
     try:
-        content = examine_frame(read.frame, profile, file_name, read.format).content
+        content = examine_instruments(instruments, profile, file_name, log_format).content
     except Exception as error:  # noqa: BLE001 - a log is not lost because its channels could not be compared
         content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(as_told(error))}
     findings = tuple(finding["words"] for finding in content["findings"])
+    code = code_version.fingerprint()
     return StoredExamination(one.vessel, one.ingest_id, one.log_id, code, content["verdict"], findings, content)

@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from flows.channels import channels_of
 from flows.cores import usable
 from flows.identify_vessel import IdentifyOutcome, Request
 from flows.manoeuvres import once, overlap
@@ -17,10 +18,10 @@ from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.pooling import Member
 from pipeline.identify.record import make_record
 from pipeline.identify.rudder_inflow import with_rudder_inflow
-from pipeline.normalise.instruments import Instruments, from_readings
+from pipeline.normalise.instruments import Instruments
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
-from warehouse import aliases, code_version, logs, parameter_sets, provenance, readings, vessels
+from warehouse import aliases, code_version, logs, parameter_sets, provenance, vessels
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from warehouse.store import Warehouse
 
@@ -100,7 +101,7 @@ def pool_vessel(
         instruments = {}
         for done, (log_id, ingest_id) in enumerate(ingests.items()):
             progress(done, len(ingests), f"pooling {len(chosen)} segments: reading {rows[ingest_id].file_name}")
-            instruments[log_id] = from_readings(readings.read(warehouse, ingest_id))
+            instruments[log_id] = channels_of(warehouse, ingest_id)
         progress(len(ingests), len(ingests), f"pooling {len(chosen)} segments")
         told = provenance.collect(warehouse, inputs, list(ingests.values()), flow_run)
         profile = vessels.get(warehouse, profile_sha256)

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 
-from flows.ingest_logs import ReadLog, read_one, store
+from flows.ingest_logs import ReadLog, look_through, store
 from flows.progress import Progress, silent
+from flows.spool import spooled
 from flows.unforeseen import as_told
 from schemas.errors import KempfError
 from warehouse import code_version, logs, raw, vessels
@@ -58,7 +59,8 @@ def refresh_logs(warehouse: Warehouse, vessel: str, progress: Progress = silent)
                 done += 1
                 try:
                     log = until_stored.enter_context(raw.opened(warehouse, row.log_id))
-                    read[row.ingest_id] = read_one(vessel, row.file_name, log, profile)
+                    readings = until_stored.enter_context(spooled(row.file_name, log, profile))
+                    read[row.ingest_id] = look_through(vessel, row.file_name, log, profile, readings)
                 except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                     failed[row.ingest_id] = as_told(error)
             failed |= _stored(warehouse, read)

@@ -8,8 +8,8 @@ from typing import Any
 
 from flows.identify_vessel import build
 from flows.pool_vessel import POOLED, build_pooled
+from flows.spool import spooled
 from flows.vessel_model import ESTIMATOR, build_model
-from pipeline.ingest.read import read_log
 from pipeline.normalise.instruments import Instruments, from_readings
 from schemas.profile import VesselProfile
 from warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
@@ -118,8 +118,8 @@ def read_again(warehouse: Warehouse, row: LogRow, profile: VesselProfile) -> Ins
     KempfError
         ``raw_bytes_damaged``.
     """
-    with raw.opened(warehouse, row.log_id) as log:
-        return from_readings(read_log(row.file_name, log, profile).frame)
+    with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as readings:
+        return from_readings(readings.lazy())
 
 
 def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profile: VesselProfile) -> ParameterSet:

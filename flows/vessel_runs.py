@@ -7,6 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
+from flows.channels import channels_of
 from flows.cores import usable
 from flows.manoeuvres import once, same
 from flows.parameter_set_of import arm_of
@@ -16,11 +17,11 @@ from pipeline.diagnose.run import Run, Ship, make_run, step_of
 from pipeline.diagnose.split import split
 from pipeline.diagnose.start import Start, start_of
 from pipeline.identify.record import Record, make_record
-from pipeline.normalise.instruments import Instruments, from_readings
+from pipeline.normalise.instruments import Instruments
 from schemas.errors import KempfError, NotFound
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
-from warehouse import logs, readings, segments, vessels
+from warehouse import logs, segments, vessels
 from warehouse.parameter_set import Bounds
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
@@ -149,7 +150,7 @@ def assembled(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: P
     instruments = {}
     for done, (log_id, ingest_id) in enumerate(chosen.ingests.items()):
         progress(done, len(chosen.ingests), f"reading {chosen.file_names[log_id]}")
-        instruments[log_id] = from_readings(readings.read(warehouse, ingest_id))
+        instruments[log_id] = channels_of(warehouse, ingest_id)
     progress(len(chosen.ingests), len(chosen.ingests), "laying the manoeuvres out")
     profile = vessels.get(warehouse, chosen.profile_sha256)
     bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]

@@ -22,6 +22,7 @@ from warehouse.store import Warehouse, not_writable
 
 if TYPE_CHECKING:
     import polars as pl
+    import pyarrow as pa
     from deltalake import DeltaTable
 
 #: The past is kept: history as of a time and reruns read old versions.
@@ -234,7 +235,9 @@ def rows(table: DeltaTable | None, name: str, where: Where | None = None, column
         ) from error
 
 
-def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.DataFrame, predicate: str) -> None:
+def replace(
+    table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | Iterator[pl.DataFrame], predicate: str
+) -> None:
     """Exchange the rows that ``predicate`` names for ``new``, in one commit on the version that is open.
 
     Parameters
@@ -243,8 +246,8 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
         Lent by `ensured`; what was read from it is what the commit rests on.
     name : str
         Its name.
-    new : sequence of dict, or polars.DataFrame
-        New rows, with every column of the table. All satisfy the predicate.
+    new : sequence of dict, or iterator of polars.DataFrame
+        New rows, with every column of the table; frames are written one after the other. All satisfy the predicate.
     predicate : str
         SQL; texts in it through `warehouse.keys.quoted`.
 
@@ -255,15 +258,14 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
     KempfError
         ``disk_full``, ``warehouse_not_writable``.
     """
-    import polars as pl
     import pyarrow as pa
     from deltalake import WriterProperties, write_deltalake
 
     schema = arrow_schema(TABLES[name])
-    if isinstance(new, pl.DataFrame):
-        data = new.select(schema.names).to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema)
-    else:
+    if isinstance(new, Sequence):
         data = pa.Table.from_pylist(list(new), schema=schema)
+    else:
+        data = pa.RecordBatchReader.from_batches(schema, _batches(new, schema))
     with refusals_told(table.table_uri):
         write_deltalake(
             table,
@@ -272,6 +274,13 @@ def replace(table: DeltaTable, name: str, new: Sequence[dict[str, Any]] | pl.Dat
             predicate=predicate,
             writer_properties=WriterProperties(compression="ZSTD"),
         )
+
+
+def _batches(frames: Iterator[pl.DataFrame], schema: pa.Schema) -> Iterator[pa.RecordBatch]:
+    import polars as pl
+
+    for frame in frames:
+        yield from frame.select(schema.names).to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema).to_batches()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.readings import Readings
+from pipeline.ingest.readings import LogReadings
 from schemas.profile import VesselProfile
 from warehouse import logs, lost, raw, readings, vessels
 from warehouse.keys import ingest_id, vessel_key
@@ -33,18 +33,21 @@ class Delivery:
         As delivered.
     profile : VesselProfile
         What it was read with.
-    readings : Readings
+    readings : LogReadings
         What the reader returned.
     code_version : str
         Of the code that read it, see `warehouse.code_version.fingerprint`.
+    notes : tuple of str
+        What a person should know besides what the reader says.
     """
 
     vessel: str
     file_name: str
     log: LogFile
     profile: VesselProfile
-    readings: Readings
+    readings: LogReadings
     code_version: str
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -135,8 +138,8 @@ def _outcome(revision: int | None) -> Outcome:
 def _row(delivery: Delivery) -> logs.LogRow:
     vessel_key(delivery.vessel)  # refuses a name that is none before anything is written
     name = delivery.log.sha256
-    instants = delivery.readings.frame["time_utc_ns"].to_numpy()
-    if instants.size == 0:
+    since, until = _span(delivery.readings)
+    if since is None or until is None:
         raise ValueError(f"{delivery.file_name} has no reading: the reader should have refused it")
     return logs.LogRow(
         log_id=name,
@@ -147,8 +150,17 @@ def _row(delivery: Delivery) -> logs.LogRow:
         size_bytes=delivery.log.size,
         profile_sha256=delivery.profile.sha256,
         code_version=delivery.code_version,
-        start_utc_ns=int(instants.min()),
-        end_utc_ns=int(instants.max()),
+        start_utc_ns=since,
+        end_utc_ns=until,
         tally=delivery.readings.tally,
-        notes=delivery.readings.notes,
+        notes=(*delivery.readings.notes, *delivery.notes),
     )
+
+
+def _span(readings: LogReadings) -> tuple[int | None, int | None]:
+    """Return the first and the last instant, nothing where there is none."""
+    import polars as pl
+
+    time = pl.col("time_utc_ns")
+    since, until = readings.lazy().select(time.min().alias("since"), time.max().alias("until")).collect().row(0)
+    return since, until

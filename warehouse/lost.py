@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.ingest.readings import LostStretch, Readings
+from pipeline.ingest.readings import LogReadings, LostStretch
 from warehouse import delta
 from warehouse.keys import one_of, vessel_key
 from warehouse.retry import with_retry
 from warehouse.store import Warehouse
 
 
-def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, Readings]]) -> None:
+def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, LogReadings]]) -> None:
     """Put the lost stretches of several ingests in place of what is there of them, in one commit.
 
     Nothing is written where all logs are whole.
@@ -20,7 +20,7 @@ def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, Readings]]) -> N
     ----------
     warehouse : Warehouse
         Made where there is none.
-    batch : sequence of (str, str, Readings)
+    batch : sequence of (str, str, LogReadings)
         Vessel, ingest id, readings.
     """
     damaged = [(vessel, ingest, item) for vessel, ingest, item in batch if item.lost]

@@ -2,35 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings
+from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, LogReadings
 from warehouse import delta, logs
 from warehouse.keys import one_of, vessel_key
 from warehouse.retry import with_retry
+from warehouse.scan import scanned
 from warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     import polars as pl
 
 
-def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, Readings]]) -> None:
+def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, LogReadings]]) -> None:
     """Put the readings of several ingests in place of what is there of them, in one commit.
 
     Parameters
     ----------
     warehouse : Warehouse
         Made where there is none.
-    batch : sequence of (str, str, Readings)
+    batch : sequence of (str, str, LogReadings)
         Vessel, ingest id, readings.
     """
-    _write(warehouse, "readings", [(vessel, ingest, item.frame) for vessel, ingest, item in batch])
+    _write(warehouse, "readings", [(vessel, ingest, item.frames) for vessel, ingest, item in batch])
 
 
-def write_rejected(warehouse: Warehouse, batch: Sequence[tuple[str, str, Readings]]) -> None:
+def write_rejected(warehouse: Warehouse, batch: Sequence[tuple[str, str, LogReadings]]) -> None:
     """Put what was refused in several ingests in place of what is there of them, in one commit."""
-    _write(warehouse, "rejected", [(vessel, ingest, item.rejected) for vessel, ingest, item in batch])
+    _write(warehouse, "rejected", [(vessel, ingest, item.rejections) for vessel, ingest, item in batch])
 
 
 def read(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
@@ -56,6 +58,33 @@ def read(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
     return _read(warehouse, "readings", ingest_id).select(list(READING_SCHEMA)).sort("record", "source", "time_utc_ns")
 
 
+@contextmanager
+def lent(warehouse: Warehouse, ingest_id: str) -> Iterator[pl.LazyFrame]:
+    """Lend the readings of one ingest, for those who want some columns of them; not to be used after the ``with``.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Where they are.
+    ingest_id : str
+        From a row of ``logs``.
+
+    Yields
+    ------
+    polars.LazyFrame
+        As `read` gives them.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_ingest``.
+    """
+    row = logs.of_ingest(warehouse, ingest_id)
+    where = {"vessel_key": vessel_key(row.vessel), "ingest_id": row.ingest_id}
+    with delta.reading(warehouse, "readings") as table:
+        yield scanned(table, "readings", where).select(list(READING_SCHEMA)).sort("record", "source", "time_utc_ns")
+
+
 def read_rejected(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
     """Return what was refused in one ingest, columns `REJECTED_SCHEMA`, sorted by record then channel.
 
@@ -74,25 +103,24 @@ def _read(warehouse: Warehouse, name: str, ingest_id: str) -> pl.DataFrame:
     return delta.read(warehouse, name, {"vessel_key": vessel_key(row.vessel), "ingest_id": row.ingest_id})
 
 
-def _write(warehouse: Warehouse, name: str, batch: Sequence[tuple[str, str, pl.DataFrame]]) -> None:
-    import polars as pl
-
+def _write(
+    warehouse: Warehouse, name: str, batch: Sequence[tuple[str, str, Callable[[], Iterator[pl.DataFrame]]]]
+) -> None:
     if not batch:
         return
-    frames = [
-        frame.with_columns(
-            pl.lit(vessel_key(vessel)).alias("vessel_key"),
-            pl.lit(vessel).alias("vessel"),
-            pl.lit(ingest).alias("ingest_id"),
-        )
-        for vessel, ingest, frame in batch
-    ]
-    rows = pl.concat(frames)
     vessels, ingests = ({vessel_key(v) for v, _, _ in batch}, {ingest for _, ingest, _ in batch})
     predicate = f"{one_of('vessel_key', vessels)} AND {one_of('ingest_id', ingests)}"
 
+    def rows() -> Iterator[pl.DataFrame]:
+        import polars as pl
+
+        for vessel, ingest, frames in batch:
+            told = {"vessel_key": vessel_key(vessel), "vessel": vessel, "ingest_id": ingest}
+            for frame in frames():
+                yield frame.with_columns(pl.lit(value).alias(column) for column, value in told.items())
+
     def attempt() -> None:
         with delta.ensured(warehouse, name) as table:
-            delta.replace(table, name, rows, predicate)
+            delta.replace(table, name, rows(), predicate)
 
     with_retry(attempt)

@@ -1,8 +1,8 @@
-"""What a format's reader hands to the screen: every record of the log, decoded or refused, before the common checks."""
+"""What a format's reader hands to the screen: the records of a log, decoded or refused, before the common checks."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol, Self
 
 import numpy as np
@@ -45,8 +45,33 @@ class Pieces(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
+class Chained:
+    """Records whose bytes lie in two places, one behind the other."""
+
+    first: Pieces
+    second: Pieces
+
+    def __len__(self) -> int:
+        return len(self.first) + len(self.second)
+
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Chained:
+        """Return some of them, chosen by mask or by ascending index."""
+        index = np.flatnonzero(chosen) if chosen.dtype == np.bool_ else chosen
+        here = index < len(self.first)
+        return Chained(self.first.take(index[here]), self.second.take(index[~here] - len(self.first)))
+
+    def binary(self) -> pl.Series:
+        """Return them as a column of bytes."""
+        return pl.concat([self.first.binary(), self.second.binary()])
+
+    def text(self) -> pl.Series:
+        """Return them as a column of text, the long ones cut."""
+        return pl.concat([self.first.text(), self.second.text()])
+
+
+@dataclass(frozen=True, eq=False)
 class Values:
-    """One canonical channel over all records of a log.
+    """One canonical channel over some records of a log.
 
     Attributes
     ----------
@@ -72,10 +97,12 @@ class Values:
 
 @dataclass(frozen=True, eq=False)
 class Decoded:
-    """All records of one log.
+    """Records of one log that follow each other: all of them, or a part.
 
     Attributes
     ----------
+    record : ndarray of int64, shape (n,)
+        Their numbers in the log, from 0 on, ascending.
     raw : Pieces
         Each record as it stands in the file, shape (n,).
     content : Pieces
@@ -85,17 +112,20 @@ class Decoded:
     source : ndarray of int64, shape (n,)
         Index into ``source_names``; -1 where it cannot be told.
     source_names : tuple of str
-        Talker and sentence, topic, or ``row``.
+        Talker and sentence, topic, or ``row``; a later part of the same log may have more, behind these.
     reason : ndarray of int8, shape (n,)
         Code of the reason for which the reader refused the record, 0 for none.
     channels : dict of str to Values
         By name of the channel.
     notes : list of str
-        What a person should know.
+        What a person should know; of the last part.
     lost : tuple of LostStretch
-        What of the log could not be read.
+        What of the log could not be read; of the last part.
+    ends : bool
+        Whether no record of the log comes behind these.
     """
 
+    record: NDArray[np.int64]
     raw: Pieces
     content: Pieces
     time_utc_ns: Nanoseconds
@@ -105,6 +135,39 @@ class Decoded:
     channels: dict[str, Values]
     notes: list[str] = field(default_factory=list)
     lost: tuple[LostStretch, ...] = ()
+    ends: bool = True
 
     def __len__(self) -> int:
-        return len(self.raw)
+        return int(self.record.size)
+
+    def take(self, chosen: NDArray[np.int64]) -> Decoded:
+        """Return some of the records, by ascending index."""
+        return replace(
+            self,
+            record=self.record[chosen],
+            raw=self.raw.take(chosen),
+            content=self.content.take(chosen),
+            time_utc_ns=self.time_utc_ns[chosen],
+            source=self.source[chosen],
+            reason=self.reason[chosen],
+            channels={name: Values(v.value[chosen], v.present[chosen]) for name, v in self.channels.items()},
+        )
+
+    def behind(self, first: Decoded) -> Decoded:
+        """Return records of an earlier part, and these behind them; notes and the rest are those of this part."""
+        if not len(first):
+            return self
+        channels = {}
+        for name in (*first.channels, *(name for name in self.channels if name not in first.channels)):
+            a, b = (part.channels.get(name) or Values.empty(len(part)) for part in (first, self))
+            channels[name] = Values(np.concatenate([a.value, b.value]), np.concatenate([a.present, b.present]))
+        return replace(
+            self,
+            record=np.concatenate([first.record, self.record]),
+            raw=Chained(first.raw, self.raw),
+            content=Chained(first.content, self.content),
+            time_utc_ns=np.concatenate([first.time_utc_ns, self.time_utc_ns]),
+            source=np.concatenate([first.source, self.source]),
+            reason=np.concatenate([first.reason, self.reason]),
+            channels=channels,
+        )

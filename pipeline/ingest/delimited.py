@@ -95,7 +95,8 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
         there = value.is_not_null().to_numpy()
         values = channels.setdefault(mapped.channel, Values.empty(n))
         values.put(record[there], (number(value) * mapped.factor + mapped.offset_si)[there])
-    return Decoded(layout.rows, layout.rows, time, np.zeros(n, dtype=np.int64), ("row",), reason, channels, notes)
+    rows, sources = np.arange(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
+    return Decoded(rows, layout.rows, layout.rows, time, sources, ("row",), reason, channels, notes)
 
 
 def columns_found(data: bytes, source: Source | None) -> list[str]:

@@ -1,15 +1,18 @@
-"""The one way in: a log's bytes and its vessel's profile, out come its readings."""
+"""The one way in: a log's bytes and its vessel's profile, out come its readings, at once or part by part."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+
+import polars as pl
 
 from pipeline.ingest import sniff
 from pipeline.ingest.decoded import Decoded
 from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.own_clocks import set_right
-from pipeline.ingest.readings import Readings
-from pipeline.ingest.screen import screen
+from pipeline.ingest.own_clocks import OwnClocks
+from pipeline.ingest.readings import Readings, Tally, joined
+from pipeline.ingest.screen import Screen
 from pipeline.ingest.unpack import unpack
 from schemas.errors import DataRejected, UsageError
 from schemas.profile import Source, VesselProfile
@@ -24,7 +27,18 @@ _TOLD = "See docs/profile.md for how to describe a log."
 
 
 def read_log(name: str, log: bytes | LogFile, profile: VesselProfile) -> Readings:
-    """Read one log.
+    """Read one log and hold all of it; arguments and errors as in `read_parts`.
+
+    Returns
+    -------
+    Readings
+        In canonical channels, SI and UTC, with everything that was refused and why.
+    """
+    return joined(list(read_parts(name, log, profile)))
+
+
+def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Iterator[Readings]:
+    """Read one log, some ten thousand messages at a time where the format allows it (MCAP), else in one part.
 
     Parameters
     ----------
@@ -35,10 +49,11 @@ def read_log(name: str, log: bytes | LogFile, profile: VesselProfile) -> Reading
         other one whole.
     profile : VesselProfile
 
-    Returns
-    -------
+    Yields
+    ------
     Readings
-        In canonical channels, SI and UTC, with everything that was refused and why.
+        In the order of the log, but that of each source some records may come with the part behind their own; notes and
+        what is lost with the last part. See `pipeline.ingest.readings.joined`.
 
     Raises
     ------
@@ -66,25 +81,51 @@ def read_log(name: str, log: bytes | LogFile, profile: VesselProfile) -> Reading
             "Export the log as one of these; " + _TOLD,
             {"name": name},
         )
-    decoded = _decode(log_format, name, file, profile, source)
-    readings = set_right(screen(decoded, log_format), source)
-    if readings.frame.height == 0:
-        raise _nothing(name, readings)
-    if notes:
-        readings = replace(readings, notes=(*notes, *readings.notes))
-    return readings
+    screen, clocks, found = Screen(log_format), OwnClocks(source), _Found()
+    for decoded in _decode(log_format, name, file, profile, source):
+        checked = screen.part(decoded)
+        found.add(checked)
+        if not decoded.ends:
+            yield clocks.set_right(checked)
+            continue
+        if found.tally.records_kept == 0:
+            raise _nothing(name, checked, found)
+        yield replace(clocks.set_right(checked), notes=(*notes, *checked.notes, *clocks.notes()))
 
 
-def _decode(log_format: str, name: str, log: LogFile, profile: VesselProfile, source: Source | None) -> Decoded:
+class _Found:
+    """What all parts of a log together say, for the message where it is nothing."""
+
+    def __init__(self) -> None:
+        self.tally = Tally(0, 0, 0, 0, 0, 0)
+        self.unset: tuple[int, int] | None = None
+
+    def add(self, part: Readings) -> None:
+        """Take note of one part."""
+        self.tally += part.tally
+        unset = part.rejected.filter(pl.col("reason") == "clock_unset")["time_utc_ns"].drop_nulls()
+        if unset.len():
+            times = [*(self.unset or ()), *unset.to_list()]
+            self.unset = min(times), max(times)
+
+
+def _decode(
+    log_format: str, name: str, log: LogFile, profile: VesselProfile, source: Source | None
+) -> Iterator[Decoded]:
     """Call the reader of the format; each is imported where it is used, `kempf --help` pays for none."""
     if log_format == "nmea":
         from pipeline.ingest.nmea.decode import decode as nmea
 
-        return nmea(_whole(name, log), name, source)
-    if log_format == "mcap":
+        yield nmea(_whole(name, log), name, source)
+    elif log_format == "mcap":
         from pipeline.ingest.mcap.decode import decode as mcap
 
-        return mcap(name, log, source, [s.match for s in profile.sources])
+        yield from mcap(name, log, source, [s.match for s in profile.sources])
+    else:
+        yield _delimited(name, log, profile, source)
+
+
+def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source | None) -> Decoded:
     from pipeline.ingest import delimited
 
     data = _whole(name, log)
@@ -112,15 +153,13 @@ def _whole(name: str, log: LogFile) -> bytes:
     return log.whole()
 
 
-def _nothing(name: str, readings: Readings) -> DataRejected:
-    counts = readings.tally.by_reason
+def _nothing(name: str, last: Readings, found: _Found) -> DataRejected:
+    counts = found.tally.by_reason
     listed = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items(), key=lambda c: (-c[1], c[0])))
     years = ""
-    if "clock_unset" in counts:
-        unset = readings.rejected.filter(readings.rejected["reason"] == "clock_unset")["time_utc_ns"].to_list()
-        if unset:
-            first, last = _year(min(unset)), _year(max(unset))
-            years = f" Its times lie in {first}." if first == last else f" Its times lie between {first} and {last}."
+    if found.unset:
+        since, until = map(_year, found.unset)
+        years = f" Its times lie in {since}." if since == until else f" Its times lie between {since} and {until}."
     step = {
         "clock_unset": "The logger's clock was not set: correct the times in a copy of the log, or ingest another log.",
         "no_time": "No sentence tells the time: log RMC or ZDA too, or let the logger stamp the lines.",
@@ -130,14 +169,14 @@ def _nothing(name: str, readings: Readings) -> DataRejected:
     most = max(sorted(counts), key=lambda reason: counts[reason]) if counts else ""
     return DataRejected(
         "no_valid_reading",
-        f"{name} holds no valid reading: {readings.tally.records_read} records, "
-        f"of them {listed or 'none usable'}.{years}{''.join(f' {note}' for note in readings.notes[:_NOTES])}",
+        f"{name} holds no valid reading: {found.tally.records_read} records, "
+        f"of them {listed or 'none usable'}.{years}{''.join(f' {note}' for note in last.notes[:_NOTES])}",
         step.get(most, "Look at the reasons; most often the profile does not fit the log."),
         {
             "name": name,
-            "records_read": readings.tally.records_read,
+            "records_read": found.tally.records_read,
             "by_reason": counts,
-            "notes": list(readings.notes),
+            "notes": list(last.notes),
         },
     )
 

@@ -8,8 +8,10 @@ Both ledgers close: read = kept + rejected.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
+from typing import Protocol
 
 import polars as pl
 
@@ -65,6 +67,19 @@ class Tally:
     #: number of rejected records and values by reason, sorted by reason
     by_reason: dict[str, int] = field(default_factory=dict)
 
+    def __add__(self, other: Tally) -> Tally:
+        """Return the ledger of two parts of a log."""
+        reasons = sorted({*self.by_reason, *other.by_reason})
+        return Tally(
+            self.records_read + other.records_read,
+            self.records_kept + other.records_kept,
+            self.records_rejected + other.records_rejected,
+            self.values_read + other.values_read,
+            self.values_kept + other.values_kept,
+            self.values_rejected + other.values_rejected,
+            {reason: self.by_reason.get(reason, 0) + other.by_reason.get(reason, 0) for reason in reasons},
+        )
+
 
 @dataclass(frozen=True)
 class LostStretch:
@@ -85,9 +100,45 @@ class LostStretch:
     why: str
 
 
+class LogReadings(Protocol):
+    """What was read of one log, wherever its rows are kept: `Readings`, or more of them than memory should hold."""
+
+    @property
+    def tally(self) -> Tally:
+        """Closes against all rows."""
+        ...
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What a person should know."""
+        ...
+
+    @property
+    def format(self) -> str:
+        """How the file was read."""
+        ...
+
+    @property
+    def lost(self) -> tuple[LostStretch, ...]:
+        """What could not be read."""
+        ...
+
+    def lazy(self) -> pl.LazyFrame:
+        """Return the readings, for those who want some columns of them."""
+        ...
+
+    def frames(self) -> Iterator[pl.DataFrame]:
+        """Yield the readings, part by part."""
+        ...
+
+    def rejections(self) -> Iterator[pl.DataFrame]:
+        """Yield what was refused, part by part."""
+        ...
+
+
 @dataclass(frozen=True)
 class Readings:
-    """The readings of one log.
+    """The readings of one log, or of a part of it.
 
     Attributes
     ----------
@@ -116,3 +167,35 @@ class Readings:
     def partial(self) -> bool:
         """Whether something of the log is lost."""
         return bool(self.lost)
+
+    def lazy(self) -> pl.LazyFrame:
+        """Return the readings, for those who want some columns of them."""
+        return self.frame.lazy()
+
+    def frames(self) -> Iterator[pl.DataFrame]:
+        """Yield the readings."""
+        yield self.frame
+
+    def rejections(self) -> Iterator[pl.DataFrame]:
+        """Yield what was refused."""
+        yield self.rejected
+
+
+def joined(parts: Sequence[Readings]) -> Readings:
+    """Return the parts of a log as one; notes and what is lost are those of the last."""
+    if len(parts) == 1:
+        return parts[0]
+    return replace(
+        parts[-1],
+        # a part may hold back records for the next one
+        frame=pl.concat([part.frame for part in parts]).sort("record", maintain_order=True),
+        rejected=pl.concat([part.rejected for part in parts]).sort(
+            "record", "channel", nulls_last=False, maintain_order=True
+        ),
+        tally=tally_of(parts),
+    )
+
+
+def tally_of(parts: Sequence[Readings]) -> Tally:
+    """Return the ledger of the parts of a log together."""
+    return sum((part.tally for part in parts), Tally(0, 0, 0, 0, 0, 0))

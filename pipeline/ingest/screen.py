@@ -11,39 +11,92 @@ import polars as pl
 import pyarrow as pa
 from numpy.typing import NDArray
 
+from pipeline.ingest.clock import Clock
 from pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Values
 from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Reason, Tally
 from pipeline.ingest.spans import Index
-from pipeline.ingest.text.iso_time import DAY_NS, SECOND_NS, days_since_1970
+from pipeline.ingest.text.iso_time import DAY_NS, days_since_1970
 from schemas.channels import CHANNELS
 
 Code = NDArray[np.int8]
+Flag = NDArray[np.bool_]
 
 _YEARS, _ = days_since_1970(np.array([2000, 2100]), np.array([1, 1]), np.array([1, 1]))
 
 #: No clock was set before the first of these instants or after the second.
 CLOCK_FIRST_NS, CLOCK_LAST_NS = (int(day) * DAY_NS for day in _YEARS)
 
-#: A record this far ahead of both its neighbours has a damaged time, ns; without this rule it would make every record
-#: behind it look late.
-SPIKE_NS = 10 * SECOND_NS
 
+class Screen:
+    """The checks of one log, which comes in one part or in several; what they find does not depend on where it is cut.
 
-def screen(decoded: Decoded, log_format: str) -> Readings:
-    """Check all records of a log and split them into readings and refusals.
+    What a record that comes later can still decide is held back, and comes out with the next part: of each source the
+    last record, and those that share the latest instant.
 
     Parameters
     ----------
-    decoded : Decoded
     log_format : {"delimited", "mcap", "nmea"}
-
-    Returns
-    -------
-    Readings
-        With both ledgers closed.
     """
-    reason = decoded.reason.copy()
-    _check_clock(decoded, reason)
+
+    def __init__(self, log_format: str) -> None:
+        self._format = log_format
+        self._clocks: dict[int, Clock] = {}
+        self._held: Decoded | None = None
+        self._settled = np.empty(0, dtype=np.bool_)
+
+    def part(self, decoded: Decoded) -> Readings:
+        """Check records and split them into readings and refusals.
+
+        Parameters
+        ----------
+        decoded : Decoded
+            What follows on the part before; nothing may follow on one that ends the log.
+
+        Returns
+        -------
+        Readings
+            With both ledgers closed: over this part, and what was held back of the one before, less what is held back
+            now.
+        """
+        work = decoded if self._held is None else decoded.behind(self._held)
+        settled = np.concatenate([self._settled, np.zeros(len(decoded), dtype=np.bool_)])
+        reason = work.reason.copy()
+        held, settled = self._check_clocks(work, reason, settled)
+        if held.any():
+            self._held, self._settled = work.take(np.flatnonzero(held)), settled[held]
+            left = np.flatnonzero(~held)
+            work, reason = work.take(left), reason[left]
+        else:
+            self._held, self._settled = None, settled[:0]
+        return _checked(work, reason, self._format)
+
+    def _check_clocks(self, work: Decoded, reason: Code, settled: Flag) -> tuple[Flag, Flag]:
+        """Refuse what the clock forbids; return which records are held back, and of which the clock is settled."""
+        time = work.time_utc_ns
+        reason[(reason == 0) & (time == NO_TIME)] = CODE[Reason.NO_TIME]
+        unset = (time < CLOCK_FIRST_NS) | (time >= CLOCK_LAST_NS)
+        reason[(reason == 0) & unset] = CODE[Reason.CLOCK_UNSET]
+        held = np.zeros(reason.shape, dtype=np.bool_)
+        for own in _by_source(work, reason):
+            clock = self._clocks.setdefault(int(work.source[own[0]]), Clock())
+            fresh = own[~settled[own]]
+            back = clock.goes_back(time[fresh], ends=work.ends)
+            known = fresh[: back.size]
+            reason[known[back]] = CODE[Reason.CLOCK_BACK]
+            settled[known] = True
+            if not work.ends:
+                held[fresh[back.size :]] = True
+                held[own[settled[own] & (reason[own] == 0) & (time[own] == clock.latest)]] = True
+        return held, settled
+
+
+def screen(decoded: Decoded, log_format: str) -> Readings:
+    """Check all records of a log that came in one part, see `Screen`."""
+    return Screen(log_format).part(decoded)
+
+
+def _checked(decoded: Decoded, reason: Code, log_format: str) -> Readings:
+    """Check everything but the clocks."""
     shared = _sharing_an_instant(decoded, reason)
     if shared.size:
         content = decoded.content.take(shared).binary()
@@ -53,25 +106,6 @@ def screen(decoded: Decoded, log_format: str) -> Readings:
     refused = {name: _check_values(name, v, reason, shared, decoded) for name, v in decoded.channels.items()}
     _refuse_emptied(decoded, reason, refused)
     return _readings(decoded, reason, refused, log_format)
-
-
-def _check_clock(decoded: Decoded, reason: Code) -> None:
-    time = decoded.time_utc_ns
-    reason[(reason == 0) & (time == NO_TIME)] = CODE[Reason.NO_TIME]
-    unset = (time < CLOCK_FIRST_NS) | (time >= CLOCK_LAST_NS)
-    reason[(reason == 0) & unset] = CODE[Reason.CLOCK_UNSET]
-    for own in _by_source(decoded, reason):
-        at = time[own]
-        spike = np.zeros(at.size, dtype=np.bool_)
-        spike[1:-1] = (at[1:-1] > at[2:] + SPIKE_NS) & (at[2:] >= at[:-2]) & (at[1:-1] > at[:-2] + SPIKE_NS)
-        # the first record has no neighbour before it, but the two behind it may agree against it
-        if at.size > 2:
-            spike[0] = at[0] > at[1] + SPIKE_NS and at[2] >= at[1] and at[0] > at[2]
-        reason[own[spike]] = CODE[Reason.CLOCK_BACK]
-        record, at = own[~spike], at[~spike]
-        if at.size:
-            late = at < np.maximum.accumulate(at)
-            reason[record[late]] = CODE[Reason.CLOCK_BACK]
 
 
 def _by_source(decoded: Decoded, reason: Code) -> list[Index]:
@@ -136,7 +170,7 @@ def _refuse_emptied(decoded: Decoded, reason: Code, refused: dict[str, Code]) ->
 def _readings(decoded: Decoded, reason: Code, refused: dict[str, Code], log_format: str) -> Readings:
     kept = np.flatnonzero(reason == 0)
     columns: dict[str, pl.Series] = {
-        "record": pl.Series(kept, dtype=pl.Int64),
+        "record": pl.Series(decoded.record[kept], dtype=pl.Int64),
         "time_utc_ns": pl.Series(decoded.time_utc_ns[kept], dtype=pl.Int64),
         "source": _source_names(decoded, kept),
     }
@@ -184,7 +218,7 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
     codes = np.concatenate([code[where] for where, _, code in parts])
     table = pl.DataFrame(
         {
-            "record": record,
+            "record": decoded.record[record],
             "time_utc_ns": pl.Series(time).set(pl.Series(time == NO_TIME), None),
             "source": _source_names(decoded, record),
             "channel": pl.concat(

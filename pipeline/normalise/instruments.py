@@ -54,18 +54,21 @@ class Instruments:
         return self.series.get(channel)
 
 
-def from_readings(frame: pl.DataFrame) -> Instruments:
+def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     """Build the series of every channel from the readings of one log.
 
     Parameters
     ----------
-    frame : polars.DataFrame
-        Readings of one log, schema `pipeline.ingest.readings.READING_SCHEMA`.
+    readings : polars.DataFrame or polars.LazyFrame
+        Of one log, sorted by record, schema `pipeline.ingest.readings.READING_SCHEMA`; of a lazy one a few columns are
+        held at a time.
 
     Returns
     -------
     Instruments
     """
+    frame = readings.lazy()
+    there = set(frame.collect_schema().names())
     grouped = {name for group in _TOGETHER for name in group}
     groups = [*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped)]
     series: dict[str, Series] = {}
@@ -73,9 +76,9 @@ def from_readings(frame: pl.DataFrame) -> Instruments:
     notes: list[str] = []
     for group in groups:
         columns = [CHANNELS[name].column for name in group]
-        if any(column not in frame.columns for column in columns):
+        if not there.issuperset(columns):
             continue
-        rows = frame.select("time_utc_ns", "source", *columns).drop_nulls()
+        rows = frame.select("time_utc_ns", "source", *columns).drop_nulls().collect()
         if rows.is_empty():
             # messages of their own, such as a topic for the speed and one for the course
             groups += [(name,) for name in group if len(group) > 1]

@@ -75,7 +75,7 @@ def test_a_doctor_who_fails_costs_no_log(folder: Path, monkeypatch: pytest.Monke
     def broken(*_: object) -> None:
         raise ZeroDivisionError("nothing to divide by")
 
-    monkeypatch.setattr("flows.ingest_logs.examine_frame", broken)
+    monkeypatch.setattr("flows.ingest_logs.examine_instruments", broken)
     place = Warehouse(str(folder / "warehouse"))
     from flows.files import read_profiles
 

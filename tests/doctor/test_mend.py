@@ -7,16 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flows.examine_log import Examined, examine_frame
+from flows.examine_log import Examined, examine_instruments
 from pipeline.ingest.read import read_log
 from pipeline.normalise.doctor.mend import Mend, put_into
+from pipeline.normalise.instruments import from_readings
 from schemas.profile import ChannelMap, VesselProfile
 from tests.doctor import made
 
 
 def look(data: bytes, profile: VesselProfile) -> Examined:
     read = read_log("made.csv", data, profile)
-    return examine_frame(read.frame, profile, "made.csv", read.format)
+    return examine_instruments(from_readings(read.frame), profile, "made.csv", read.format)
 
 
 def mended(profile: VesselProfile, content: dict[str, Any]) -> VesselProfile:

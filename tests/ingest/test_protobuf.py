@@ -121,6 +121,27 @@ def test_a_message_that_comes_in_two_parts_is_merged_and_the_last_number_counts(
     assert found.value[:, 0].tolist() == [2.0, 7.0, 3.0, 4.0]
 
 
+def test_a_number_too_long_for_its_kind_is_cut_as_the_library_cuts_it():
+    schema, made = described()
+    numbers = {field.name: field.number for field in made.DESCRIPTOR.fields}
+    paths = ["f_bool", "f_int32", "f_uint32", "f_sint32"]
+    long = [2, 2**31, 2**32 + 5, 2**35 + 7, 2**63 + 1, 2**64 - 1]
+    payloads = [b"".join(varint(numbers[p] << 3) + varint(value) for p in paths) for value in long]
+    found = ProtobufReader("yard.Part", schema, paths).read(spans(payloads))
+    assert found.good.all()
+    for i, payload in enumerate(payloads):
+        read = made.FromString(payload)
+        assert found.value[:, i].tolist() == [float(getattr(read, p)) for p in paths]
+
+
+def varint(value):
+    out = bytearray()
+    while value > 0x7F:
+        out.append(value & 0x7F | 0x80)
+        value >>= 7
+    return bytes([*out, value])
+
+
 @settings(max_examples=150, deadline=None)
 @given(st.binary(max_size=60), st.integers(0, 2**32), st.integers(0, 400))
 def test_any_bytes_are_read_as_the_library_reads_them_or_refused(tail, seed, cut):

@@ -60,6 +60,39 @@ class Part:
 
 _NO_BATCH = joined([])
 
+#: Messages that are checked and handed on together.
+_TOGETHER = 1 << 16
+
+
+class _Waiting:
+    """Parts that become one."""
+
+    def __init__(self) -> None:
+        self._places, self._parts = PayloadsBuilder(), list[Part]()
+        self.size = 0
+
+    def add(self, part: Part) -> None:
+        """Take one more; of its bytes only where they stand."""
+        self._places.add(part.batch)
+        self._parts.append(replace(part, batch=_NO_BATCH))
+        self.size += part.time_ns.size
+
+    def decoded(self, log: LogFile, first: int, topics: tuple[str, ...]) -> Decoded:
+        """Return them as one, the first record of which has the number ``first``; more of the log follows."""
+        parts = self._parts
+        payloads = self._places.build(log, _joined([part.text for part in parts], np.empty(0, np.bool_)))
+        return Decoded(
+            np.arange(first, first + self.size, dtype=np.int64),
+            payloads,
+            payloads,
+            _joined([part.time_ns for part in parts], np.empty(0, np.int64)),
+            _joined([part.topic for part in parts], np.empty(0, np.int64)),
+            topics,
+            _joined([part.reason for part in parts], np.empty(0, np.int8)),
+            _dense(parts),
+            ends=False,
+        )
+
 
 def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
     """Decode an MCAP log a few megabytes at a time, for those who keep less of it than `decode` does.
@@ -79,18 +112,18 @@ def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
     UsageError, DataRejected
         See `decode`, but for what can be told only at the end of the file.
     """
-    return _Job(name, log, source, set()).parts()
+    return _Job(name, log, source).parts()
 
 
-def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) -> Decoded:
-    """Decode an MCAP log as the profile's source describes it.
+def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) -> Iterator[Decoded]:
+    """Decode an MCAP log as the profile's source describes it, some ten thousand messages at a time.
 
     Parameters
     ----------
     name : str
         Name of the file, for messages.
     log : LogFile
-        Must stay open as long as the result is used.
+        Must stay open as long as a part is used.
     source : Source or None
         Its keys are ``<topic>.<field>``, nested fields with dots; its time, where given, names ``log_time`` (also taken
         where nothing is given), ``publish_time`` or a field of the messages. Without channels the messages are read
@@ -98,9 +131,10 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
     patterns : list of str
         File patterns of the profile, for the message where none fits.
 
-    Returns
-    -------
+    Yields
+    ------
     Decoded
+        Parts of the log, in the order of the file.
 
     Raises
     ------
@@ -111,29 +145,34 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
         A topic that the profile maps is not in the file (``topics_missing``), or it unpacks to far more than a log of
         its size holds.
     """
-    job = _Job(name, log, source, set())
-    found = job.run()
-    if job.misled():
-        # a topic that came late owns a key of one that came before it: /a.b behind /a
-        job = _Job(name, log, source, {channel.topic for channel in job.stream.channels.values()})
-        found = job.run()
-    job.require_something(patterns)
-    return found
+    yield from _Job(name, log, source).run(patterns)
+
+
+def _topics(name: str, log: LogFile, source: Source | None) -> set[str]:
+    """Return the topics of a file, as far as they decide to which of them a key of the profile belongs.
+
+    The key /a.b.c may be the field c of /a.b or the field b.c of /a. Where the summary does not tell the topics, the
+    file is read through for them first.
+    """
+    stream = McapStream(name, log)
+    if not stream.channels and any(key.count(".") > 1 for key in (source.channels if source else ())):
+        for _ in stream.batches():
+            pass
+    return {channel.topic for channel in stream.channels.values()}
 
 
 class _Job:
     """One pass over the file."""
 
-    def __init__(self, name: str, log: LogFile, source: Source | None, topics: set[str]) -> None:
+    def __init__(self, name: str, log: LogFile, source: Source | None) -> None:
         self.name, self.log, self.source = name, log, source
         self.stream = McapStream(name, log)
-        self.topics = topics | {channel.topic for channel in self.stream.channels.values()}
+        self.topics = _topics(name, log, source)
         self.keys = dict(source.channels) if source else {}
         self.owners = self._owners()
         time = source.time if source else None
         self.clock = time.column if time and time.column in _TIMES else _TIMES[0]
         self.time_field = time if time and time.column not in _TIMES else None
-        self.asked: dict[str, tuple[str, str]] = {}
         self.routes: dict[int, Route | None] = {}
         self.made: dict[Channel, Route | None] = {}
         self.refused: dict[str, str] = {}
@@ -142,12 +181,6 @@ class _Job:
         self.places: dict[str, int] = {}
         self.taken: list[str] = []
         self.offered: dict[str, str] = {}
-
-    def misled(self) -> bool:
-        """Whether a topic that came late owns a key that was asked of another one."""
-        self.topics |= {channel.topic for channel in self.stream.channels.values()}
-        last = self._owners()
-        return any(last[key] != owner for key, owner in self.asked.items())
 
     def _owners(self) -> dict[str, tuple[str, str]]:
         """Split the profile's keys into topic and field: the longest topic that fits."""
@@ -159,27 +192,17 @@ class _Job:
                 owners[key] = (topic, key[len(topic) + 1 :])
         return owners
 
-    def run(self) -> Decoded:
+    def run(self, patterns: list[str]) -> Iterator[Decoded]:
         """Read the file through."""
-        places = PayloadsBuilder()
-        parts: list[Part] = []
+        first, waiting = 0, _Waiting()
         for part in self.parts():
-            places.add(part.batch)
-            parts.append(replace(part, batch=_NO_BATCH))
-        topics = tuple(sorted(self.places))
-        order = np.array([topics.index(name) for name in self.places] + [-1], dtype=np.int64)
-        payloads = places.build(self.log, _joined([part.text for part in parts], np.empty(0, np.bool_)))
-        return Decoded(
-            payloads,
-            payloads,
-            _joined([part.time_ns for part in parts], np.empty(0, np.int64)),
-            order[_joined([part.topic for part in parts], np.empty(0, np.int64))],
-            topics,
-            _joined([part.reason for part in parts], np.empty(0, np.int8)),
-            _dense(parts),
-            [*self.stream.notes, *self._notes()],
-            tuple(self.stream.lost),
-        )
+            waiting.add(part)
+            if waiting.size >= _TOGETHER:
+                yield waiting.decoded(self.log, first, tuple(self.places))
+                first, waiting = first + waiting.size, _Waiting()
+        self.require_something(patterns)
+        last = waiting.decoded(self.log, first, tuple(self.places))
+        yield replace(last, notes=[*self.stream.notes, *self._notes()], lost=tuple(self.stream.lost), ends=True)
 
     def parts(self) -> Iterator[Part]:
         """Read the file a few megabytes at a time; no more than that is held."""
@@ -236,8 +259,10 @@ class _Job:
     def _new_route(self, channel: Channel) -> Route | None:
         schema = self.stream.schemas.get(channel.schema)
         if channel.topic not in self.topics:
+            before = self.owners
             self.topics.add(channel.topic)
             self.owners = self._owners()
+            self._refuse_late_owner(before, channel.topic)
         own = {key: owner for key, owner in self.owners.items() if owner[0] == channel.topic}
         mapped = {field: self.keys[key] for key, (_, field) in own.items()}
         kind = plain_name(schema.name) if schema else ""
@@ -248,13 +273,23 @@ class _Job:
             self.offered[channel.topic] = _lines(channel.topic, OFFERED[kind])
         if not mapped:
             return None
-        for key, owner in own.items():
-            self.asked.setdefault(key, owner)
         try:
             return Route(channel, schema, mapped, self.time_field)
         except NoReaderError as why:
             self.refused[channel.topic] = str(why)
             return None
+
+    def _refuse_late_owner(self, before: dict[str, tuple[str, str]], topic: str) -> None:
+        """Refuse a file whose summary leaves out a topic to which a key belongs that was read from another one."""
+        misread = [key for key, owner in before.items() if self.owners[key] != owner and owner[0] in self.seen]
+        if misread:
+            raise DataRejected(
+                "summary_incomplete",
+                f"{self.name} has the topic {topic!r}, which its summary does not list; {misread[0]!r} was taken for a "
+                f"field of {before[misread[0]][0]!r} until then.",
+                "Write the file's summary anew, with `mcap recover` for example.",
+                {"name": self.name, "topic": topic, "keys": misread},
+            )
 
     def _notes(self) -> list[str]:
         """Say what a person should know of the topics."""

@@ -110,12 +110,17 @@ class ProtobufReader:
 
 
 def _numbers(bits: NDArray[np.uint64], kind: str) -> NDArray[np.float64]:
-    """Return wire values as numbers."""
-    if kind == "uint":
+    """Return wire values as numbers; of one too long for its kind the lower bits count, and any bit makes a truth."""
+    if kind == "bool":
+        return np.where(bits != 0, 1.0, 0.0)
+    if kind in ("uint32", "int32", "zigzag32"):
+        low = bits.astype(np.uint32)
+        bits = low.view(np.int32).astype(np.int64).view(np.uint64) if kind == "int32" else low.astype(np.uint64)
+    if kind in ("uint", "uint32"):
         return bits.astype(np.float64)
-    if kind == "int":
+    if kind in ("int", "int32"):
         return bits.view(np.int64).astype(np.float64)
-    if kind == "zigzag":
+    if kind in ("zigzag", "zigzag32"):
         half = (bits >> np.uint64(1)).view(np.int64)
         return np.where(bits & np.uint64(1) == 1, ~half, half).astype(np.float64)
     dtype = np.dtype(kind)

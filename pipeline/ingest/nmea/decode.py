@@ -77,7 +77,8 @@ def decode(data: bytes, name: str = "log", source: Source | None = None) -> Deco
     unread = (frames.reason == CODE[Reason.CHECKSUM]) | (frames.reason == CODE[Reason.MALFORMED])
     time = np.where(unread, NO_TIME, clock.time_utc_ns)
     notes = [*clock.notes, *notes, *_notes(frames, kind, reason)]
-    return Decoded(frames.lines, frames.body, time, frames.address, frames.names, reason, channels, notes)
+    lines = np.arange(time.size, dtype=np.int64)
+    return Decoded(lines, frames.lines, frames.body, time, frames.address, frames.names, reason, channels, notes)
 
 
 def _mended(name: str, source: Source | None, frames: Frames) -> dict[str, dict[int, tuple[float, float]]]:

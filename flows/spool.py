@@ -1,0 +1,114 @@
+"""What was read of one log until it is stored: in memory where it came in one part, else in files beside."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING
+
+from pipeline.ingest.log_file import LogFile
+from pipeline.ingest.read import read_parts
+from pipeline.ingest.readings import LogReadings, LostStretch, Readings, Tally
+from schemas.profile import VesselProfile
+from warehouse.store import not_writable
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+@dataclass(frozen=True)
+class Spooled:
+    """A log in files, a pair of them for each part; `pipeline.ingest.readings.LogReadings`."""
+
+    tally: Tally
+    notes: tuple[str, ...]
+    format: str
+    lost: tuple[LostStretch, ...]
+    readings: tuple[Path, ...]
+    rejected: tuple[Path, ...]
+
+    def lazy(self) -> pl.LazyFrame:
+        """Return the readings, for those who want some columns of them."""
+        import polars as pl
+
+        return pl.scan_parquet(list(self.readings), glob=False)
+
+    def frames(self) -> Iterator[pl.DataFrame]:
+        """Yield the readings, part by part."""
+        return _each(self.readings)
+
+    def rejections(self) -> Iterator[pl.DataFrame]:
+        """Yield what was refused, part by part."""
+        return _each(self.rejected)
+
+
+def _each(paths: tuple[Path, ...]) -> Iterator[pl.DataFrame]:
+    import polars as pl
+
+    for path in paths:
+        yield pl.read_parquet(path, glob=False)
+
+
+@contextmanager
+def spooled(name: str, log: LogFile, profile: VesselProfile) -> Iterator[LogReadings]:
+    """Read a log, and hold no more of a long one in memory than a part.
+
+    Parameters
+    ----------
+    name, log, profile
+        See `pipeline.ingest.read.read_parts`.
+
+    Yields
+    ------
+    LogReadings
+        Until the end of the ``with``.
+
+    Raises
+    ------
+    KempfError
+        The log cannot be read (`pipeline.ingest.read.read_parts`), or there is no room beside it (``disk_full``).
+    """
+    parts = read_parts(name, log, profile)
+    first = next(parts)
+    second = next(parts, None)
+    if second is None:
+        yield first
+        return
+    with TemporaryDirectory(prefix="kempf-log-", ignore_cleanup_errors=True) as folder:
+        spool = _Spool(Path(folder))
+        spool.add(first)
+        spool.add(second)
+        del first, second
+        for part in parts:
+            spool.add(part)
+        yield spool.spooled()
+
+
+class _Spool:
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._tally = Tally(0, 0, 0, 0, 0, 0)
+        self._readings, self._rejected = list[Path](), list[Path]()
+        self._last: tuple[tuple[str, ...], str, tuple[LostStretch, ...]] = ((), "", ())
+
+    def add(self, part: Readings) -> None:
+        """Write one part down."""
+        self._tally += part.tally
+        self._last = part.notes, part.format, part.lost
+        for frame, paths, what in (
+            (part.frame, self._readings, "readings"),
+            (part.rejected, self._rejected, "rejected"),
+        ):
+            path = self._folder / f"{what}-{len(paths):06d}.parquet"
+            try:
+                frame.write_parquet(path)
+            except OSError as error:
+                raise not_writable(str(self._folder), error) from error
+            paths.append(path)
+
+    def spooled(self) -> Spooled:
+        """Return all of it."""
+        return Spooled(self._tally, *self._last, tuple(self._readings), tuple(self._rejected))
