@@ -14,7 +14,9 @@ from flows.identify_vessel import Request, build, identify_vessel
 from flows.ingest_logs import ingest
 from flows.moves import Move
 from flows.preview_code import VesselPreview, preview_all
+from flows.reprocess_vessel import reprocess_vessel
 from flows.rerun_all import verify_all
+from pipeline.ingest.log_file import LogFile
 from schemas.errors import NotFound
 from schemas.profile import VesselProfile
 from tests.flows.content import fresh, seen
@@ -137,6 +139,30 @@ def test_code_that_changes_nothing_moves_nothing(own: Warehouse, monkeypatch: py
     assert (found.sets, found.up_to_date, found.identical) == (2, 0, 2)
     assert (found.moves, found.new, found.gone, found.failures) == ((), (), (), ())
     assert tree(own.folder) == before, "nothing is stored"
+
+
+def test_a_log_that_the_present_code_has_read_already_is_in_the_preview_too(
+    own: Warehouse, harbour: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Pooled sets and models rest on all logs: one left out would make them others than reprocessing makes them."""
+    other_code(monkeypatch)
+    ingest(own, [harbour / "mariner.mcap"], vessel="mariner")
+    assert len({row.code_version for row in logs.current(own)}) == 2
+    reports: list[Any] = []
+    real = reprocess_vessel
+    monkeypatch.setattr(preview_code, "reprocess_vessel", lambda *a, **k: reports.append(real(*a, **k)) or reports[-1])
+    (found,) = preview_all(own)
+    done = real(own, "mariner")
+    (tried,) = reports
+    assert (tried.logs, tried.segments, tried.failures) == (done.logs, done.segments, done.failures) == (3, 3, [])
+    assert tried.new_sets == done.new_sets == 3
+    assert (found.sets, found.up_to_date, found.identical, found.gone) == (2, 0, 2, ())
+    (new,) = found.new
+    assert parameter_sets.get(own, new.parameter_set_id).log_ids == (
+        LogFile((harbour / "mariner.mcap").read_bytes()).sha256,
+    )
+    (after,) = preview_all(own)
+    assert (after.sets, after.up_to_date, len(reports)) == (3, 3, 1), "nothing is left to try"
 
 
 def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
