@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ import yaml
 from flows import preview_code, rerun_all
 from flows.identify_vessel import Request, build, identify_vessel
 from flows.ingest_logs import ingest
-from flows.moves import Move
+from flows.moves import Move, paired
 from flows.preview_code import VesselPreview, preview_all
 from flows.reprocess_vessel import reprocess_vessel
 from flows.rerun_all import verify_all
@@ -20,9 +21,10 @@ from pipeline.ingest.log_file import LogFile
 from schemas.errors import NotFound
 from schemas.profile import VesselProfile
 from tests.flows.content import fresh, seen
+from tests.warehouse.samples import parameter_set
 from tests.workbench.driving import kempf, refused, tree
 from warehouse import code_version, compaction, delta, logs, parameter_sets, runs
-from warehouse.parameter_set import ParameterSet
+from warehouse.parameter_set import Estimate, ParameterSet
 from warehouse.store import Warehouse
 
 LEAST_SQUARES = Request(estimator="least-squares")
@@ -198,6 +200,16 @@ def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeyp
     shown = kempf("rerun", "--all", "--preview", "--fail-above", 1.6, "--warehouse", own.uri)
     assert shown.code == 0 and "1 would say the same bit for bit, 1 would move" in shown.out
     assert shown.out.splitlines()[2].split()[:3] == ["mariner", "a12", "-1.5"]
+
+
+@pytest.mark.parametrize(
+    ("after", "std"), [(float("nan"), 0.1), (float("nan"), None), (2.0, None), (float("inf"), 0.1)]
+)
+def test_a_value_that_is_none_has_moved_beyond_any_limit(after: float, std: float | None):
+    estimates = [Estimate("a11", value, std, "1/m") for value in (1.0, after)]
+    sets = [parameter_set(parameters=(e,), parameter_set_id=f"ps-{k}") for k, e in enumerate(estimates)]
+    (move,) = paired(sets[:1], sets[1:]).moves
+    assert move.size == inf
 
 
 def test_a_vessel_that_cannot_be_previewed_stops_no_other(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
