@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import inf
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
@@ -202,9 +202,7 @@ def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeyp
     assert shown.out.splitlines()[2].split()[:3] == ["mariner", "a12", "-1.5"]
 
 
-@pytest.mark.parametrize(
-    ("after", "std"), [(float("nan"), 0.1), (float("nan"), None), (2.0, None), (float("inf"), 0.1)]
-)
+@pytest.mark.parametrize(("after", "std"), [(nan, 0.1), (nan, None), (2.0, None), (inf, 0.1)])
 def test_a_value_that_is_none_has_moved_beyond_any_limit(after: float, std: float | None):
     estimates = [Estimate("a11", value, std, "1/m") for value in (1.0, after)]
     sets = [parameter_set(parameters=(e,), parameter_set_id=f"ps-{k}") for k, e in enumerate(estimates)]
