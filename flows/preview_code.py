@@ -17,7 +17,7 @@ from flows.moves import Move, NewSet, paired
 from flows.progress import Progress, silent
 from flows.reprocess_vessel import reprocess_vessel
 from flows.unforeseen import as_told
-from flows.vessel_model import ALIAS, chain, standing
+from flows.vessel_model import ALIAS, standing
 from schemas.errors import KempfError
 from warehouse import aliases, code_version, logs, parameter_sets, raw
 from warehouse import vessels as vessel_table
@@ -124,9 +124,9 @@ def preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
     if not old and all(row.code_version == code for row in logs.current(warehouse, vessel)):
         return VesselPreview(vessel, ready, ready)
     with _scratch() as scratch:
-        failures = _seed(warehouse, scratch, vessel, stand)
+        failures = _seed(warehouse, scratch, vessel)
         report = reprocess_vessel(scratch, vessel)
-        now = [one for one in parameter_sets.get_all(scratch, vessel) if one.provenance["code_version"] == code]
+        now = [one for one in standing_sets(scratch, vessel) if one.provenance["code_version"] == code]
     there = {one.parameter_set_id for one in parameter_sets.get_all(warehouse, vessel)}
     found = paired(old, now)
     return VesselPreview(
@@ -156,7 +156,7 @@ def _scratch() -> Iterator[Warehouse]:
         yield scratch
 
 
-def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str, sets: Sequence[ParameterSet]) -> list[dict[str, Any]]:
+def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[str, Any]]:
     """Put into an empty warehouse what reprocessing starts from: profiles, logs, sets, models, aliases."""
     failures = []
     versions = vessel_table.versions(warehouse, vessel)
@@ -171,16 +171,12 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str, sets: Sequence[
         except KempfError as error:
             failures.append(_failure(row.file_name, error))
     logs.record(scratch, kept)
+    # those that no longer stand, too: their models are brought up to date with the others
+    parameter_sets.insert(scratch, parameter_sets.get_all(warehouse, vessel))
     model = standing(warehouse, vessel)
-    way = chain(warehouse, model) if model is not None else []
-    parameter_sets.insert(scratch, [*sets, *(one for one in way if one.parameter_set_id not in _ids(sets))])
     if model is not None:
         aliases.point(scratch, vessel, model.parameter_set_id, alias=ALIAS)
     return failures
-
-
-def _ids(sets: Sequence[ParameterSet]) -> set[str]:
-    return {one.parameter_set_id for one in sets}
 
 
 def _failure(what: str, error: KempfError) -> dict[str, Any]:

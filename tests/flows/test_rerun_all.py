@@ -14,11 +14,12 @@ from flows import preview_code, rerun_all
 from flows.identify_vessel import Request, build, identify_vessel
 from flows.ingest_logs import ingest
 from flows.moves import Move, paired
-from flows.preview_code import VesselPreview, preview_all
+from flows.preview_code import VesselPreview, preview_all, standing_sets
 from flows.reprocess_vessel import reprocess_vessel
 from flows.rerun_all import verify_all
 from pipeline.ingest.log_file import LogFile
 from schemas.errors import NotFound
+from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 from tests.flows.content import fresh, seen
 from tests.warehouse.samples import parameter_set
@@ -48,10 +49,10 @@ def own(_identified: Path, tmp_path: Path) -> Warehouse:
     return fresh(copytree(_identified, tmp_path / "w"))
 
 
-def other_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(code_version, "fingerprint", lambda: "f" * 16)
+def other_code(monkeypatch: pytest.MonkeyPatch, letter: str = "f") -> None:
+    monkeypatch.setattr(code_version, "fingerprint", lambda: letter * 16)
     for module in ("flows.find_segments",):  # has it by name
-        monkeypatch.setattr(f"{module}.fingerprint", lambda: "f" * 16)
+        monkeypatch.setattr(f"{module}.fingerprint", lambda: letter * 16)
 
 
 def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -165,6 +166,18 @@ def test_a_log_that_the_present_code_has_read_already_is_in_the_preview_too(
     )
     (after,) = preview_all(own)
     assert (after.sets, after.up_to_date, len(reports)) == (3, 3, 1), "nothing is left to try"
+
+
+def test_a_model_of_which_no_set_stands_is_in_the_preview_too(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    """Reprocessing brings every model up to date that she was ever identified with."""
+    other_code(monkeypatch)
+    identify_vessel(own, "mariner", replace(LEAST_SQUARES, spec=ModelSpec(name="tank", current="none")))
+    other_code(monkeypatch, "e")
+    (found,) = preview_all(own)
+    assert (found.sets, found.up_to_date, found.identical, found.moves, found.gone) == (2, 0, 2, (), ())
+    assert [one.model for one in found.new] == ["linear"] * 2
+    assert reprocess_vessel(own, "mariner").new_sets == 4
+    assert {one.parameter_set_id for one in found.new} < {s.parameter_set_id for s in standing_sets(own, "mariner")}
 
 
 def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
