@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import yaml
 
-from flows import preview_code, rerun_all
+from flows import fleet_state, preview_code, rerun_all
 from flows.identify_vessel import Request, build, identify_vessel
 from flows.ingest_logs import ingest
 from flows.moves import Move, paired
@@ -68,6 +68,17 @@ def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehous
     assert (again.counts(), again.show()["known_before"]) == (found.counts(), 2)
     assert delta.versions(own)["runs"] == version
     assert verify_all(own, ["mariner"], afresh=False).counts() == found.counts()
+
+
+def test_a_verdict_of_other_flows_is_not_taken_over(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    """What the flows put beside an estimate, such as warnings, is compared too; their code is no part of a set's id."""
+    assert verify_all(own).counts() == {**NONE, "bit-identical": 2}
+    monkeypatch.setattr(code_version, "fingerprint_of_packages", lambda *_: "f" * 16)
+    fleet_state.responsible_code.cache_clear()
+    try:
+        assert verify_all(own).show()["known_before"] == 0
+    finally:
+        fleet_state.responsible_code.cache_clear()
 
 
 def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
