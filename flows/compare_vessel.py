@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from flows.manoeuvres import once, same
 from flows.pool_vessel import ALIAS as POOLED_ALIAS
 from flows.progress import Progress, silent
 from flows.vessel_model import ALIAS, Own, known_effects, named
@@ -29,6 +28,7 @@ from pipeline.normalise.series import SECOND_NS, Float
 from schemas.errors import DataRejected, NotFound, UsageError
 from schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from warehouse import aliases, parameter_sets, segments, vessels
+from warehouse.manoeuvres import once, same
 from warehouse.parameter_set import ParameterSet
 from warehouse.segments import Segment
 from warehouse.store import Warehouse

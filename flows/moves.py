@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
-from math import inf, isfinite
+from math import inf, isfinite, isnan
 from typing import Any
 
 from schemas.model_spec import ModelSpec
@@ -51,10 +51,10 @@ class Move:
 
     @property
     def size(self) -> float:
-        """Magnitude of the move in standard errors; infinite where it moved and has none."""
-        if self.in_std is not None:
+        """Magnitude of the move in standard errors; infinite where it moved and has none, or became no number."""
+        if self.in_std is not None and isfinite(self.in_std):
             return abs(self.in_std)
-        return 0.0 if self.before == self.after else inf
+        return 0.0 if self.before == self.after or (isnan(self.before) and isnan(self.after)) else inf
 
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""

@@ -9,7 +9,6 @@ from typing import Any
 from flows.channels import channels_of
 from flows.cores import usable
 from flows.identify_vessel import IdentifyOutcome, Request
-from flows.manoeuvres import once, overlap
 from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
 from flows.without_log import without_log
@@ -22,6 +21,7 @@ from pipeline.normalise.instruments import Instruments
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 from warehouse import aliases, code_version, logs, parameter_sets, provenance, vessels
+from warehouse.manoeuvres import once, overlap
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from warehouse.store import Warehouse
 

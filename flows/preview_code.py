@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -17,10 +17,11 @@ from flows.moves import Move, NewSet, paired
 from flows.progress import Progress, silent
 from flows.reprocess_vessel import reprocess_vessel
 from flows.unforeseen import as_told
-from flows.vessel_model import ALIAS, chain, standing
+from flows.vessel_model import ALIAS, standing
 from schemas.errors import KempfError
 from warehouse import aliases, code_version, logs, parameter_sets, raw
 from warehouse import vessels as vessel_table
+from warehouse.keys import ingest_id
 from warehouse.parameter_set import ParameterSet
 from warehouse.store import Warehouse
 
@@ -117,14 +118,15 @@ def preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
     """
     vessel_table.require(warehouse, vessel)
     code = code_version.fingerprint()
-    old = [one for one in standing_sets(warehouse, vessel) if one.provenance["code_version"] != code]
-    ready = len(standing_sets(warehouse, vessel)) - len(old)
+    stand = standing_sets(warehouse, vessel)
+    old = [one for one in stand if one.provenance["code_version"] != code]
+    ready = len(stand) - len(old)
     if not old and all(row.code_version == code for row in logs.current(warehouse, vessel)):
         return VesselPreview(vessel, ready, ready)
     with _scratch() as scratch:
-        failures = _seed(warehouse, scratch, vessel, old)
+        failures = _seed(warehouse, scratch, vessel)
         report = reprocess_vessel(scratch, vessel)
-        now = [one for one in parameter_sets.get_all(scratch, vessel) if one.provenance["code_version"] == code]
+        now = [one for one in standing_sets(scratch, vessel) if one.provenance["code_version"] == code]
     there = {one.parameter_set_id for one in parameter_sets.get_all(warehouse, vessel)}
     found = paired(old, now)
     return VesselPreview(
@@ -154,8 +156,8 @@ def _scratch() -> Iterator[Warehouse]:
         yield scratch
 
 
-def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str, old: Sequence[ParameterSet]) -> list[dict[str, Any]]:
-    """Put into an empty warehouse what reprocessing starts from: profiles, logs, models, aliases."""
+def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[str, Any]]:
+    """Put into an empty warehouse what reprocessing starts from: profiles, logs, sets, models, aliases."""
     failures = []
     versions = vessel_table.versions(warehouse, vessel)
     vessel_table.register_all(scratch, [(vessel, one.profile) for one in versions])
@@ -164,20 +166,17 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str, old: Sequence[P
         try:
             with raw.opened(warehouse, row.log_id) as log:
                 raw.put(scratch, log)
-            kept.append(row)
+            # as read by no code: what the present one has read there has no readings here
+            kept.append(replace(row, ingest_id=ingest_id(row.log_id, row.profile_sha256, ""), code_version=""))
         except KempfError as error:
             failures.append(_failure(row.file_name, error))
     logs.record(scratch, kept)
+    # those that no longer stand, too: their models are brought up to date with the others
+    parameter_sets.insert(scratch, parameter_sets.get_all(warehouse, vessel))
     model = standing(warehouse, vessel)
-    way = chain(warehouse, model) if model is not None else []
-    parameter_sets.insert(scratch, [*old, *(one for one in way if one.parameter_set_id not in _ids(old))])
     if model is not None:
         aliases.point(scratch, vessel, model.parameter_set_id, alias=ALIAS)
     return failures
-
-
-def _ids(sets: Sequence[ParameterSet]) -> set[str]:
-    return {one.parameter_set_id for one in sets}
 
 
 def _failure(what: str, error: KempfError) -> dict[str, Any]:

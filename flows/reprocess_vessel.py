@@ -78,7 +78,7 @@ def _bring_up_to_date(
     refreshed = refresh_logs(warehouse, vessel, progress)
     report.logs, report.reread = refreshed.logs, refreshed.reread
     for ingest, error in refreshed.failed.items():
-        report.fail(names[ingest], error)
+        report.fail(names.get(ingest, ingest), error)  # another process may have added it in between
     report.segments = len(segments.current(warehouse, vessel))
     for one in requests if report.segments else ():
         outcomes = identify_vessel(

@@ -14,6 +14,7 @@ from itertools import groupby
 from os import cpu_count
 from typing import Any
 
+from flows.fleet_state import responsible_code
 from flows.progress import Progress, silent
 from flows.rerun_set import Rerun, inputs_of, judged, raw_inputs, rebuilt
 from flows.unforeseen import as_told
@@ -212,7 +213,7 @@ def _failed(one: ParameterSet, error: KempfError) -> Verdict:
 def _run_id(parameter_set_id: str, tolerance: float) -> str:
     """Return the id of the run that judges a set with the present code and packages."""
     what = {"parameter_set_id": parameter_set_id, "tolerance": tolerance}
-    return runs.run_id(FLOW, {**what, "code": code_version.fingerprint(), "packages": code_version.packages()})
+    return runs.run_id(FLOW, {**what, "code": responsible_code(), "packages": code_version.packages()})
 
 
 def _as_run(one: Verdict, tolerance: float) -> runs.Run:

@@ -9,7 +9,6 @@ from functools import cached_property
 
 from flows.channels import channels_of
 from flows.cores import usable
-from flows.manoeuvres import once, same
 from flows.parameter_set_of import arm_of
 from flows.progress import Progress, silent
 from flows.refresh_logs import refresh_logs
@@ -22,6 +21,7 @@ from schemas.errors import KempfError, NotFound
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 from warehouse import logs, segments, vessels
+from warehouse.manoeuvres import once, same
 from warehouse.parameter_set import Bounds
 from warehouse.segments import Segment
 from warehouse.store import Warehouse

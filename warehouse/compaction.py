@@ -6,6 +6,7 @@ What the tables say stays the same, now and as of any time; what a parameter set
 from __future__ import annotations
 
 import json
+from bisect import bisect_right
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime, timedelta
 from functools import partial
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
     from deltalake import DeltaTable
 
 #: Tables that grow by single rows; readings come in whole files and are left alone.
-_SMALL = ("vessels", "logs", "segments", "examinations", "parameter_sets", "diagnoses", "aliases", "runs")
+_SMALL = ("vessels", "logs", "lost", "segments", "examinations", "parameter_sets", "diagnoses", "aliases", "runs")
 #: Rows that are read or skipped together.
 _ROW_GROUP = 8192
 #: Tables that ``history --as-of`` reads at any time there ever was: every version of them is kept.
@@ -124,9 +125,9 @@ def vacuum(
 ) -> tuple[Cleared, ...]:
     """Delete the files that no version that is kept needs, and what writers that died left behind.
 
-    Kept are the newest version of every table, every one that a parameter set's provenance names, every one committed
-    within the last ``older_than_hours``, and of `ALWAYS` every one there ever was. Files younger than that are never
-    deleted, whoever they belong to.
+    Kept are the newest version of every table, every one that a parameter set's provenance names, every one that was
+    the newest at some moment of the last ``older_than_hours``, and of `ALWAYS` every one there ever was. Files younger
+    than that are never deleted, whoever they belong to.
 
     Parameters
     ----------
@@ -200,6 +201,8 @@ def _kept(table: DeltaTable, name: str, named: tuple[int, ...], older_than_hours
         )
     if name in ALWAYS:
         return tuple(range(newest + 1))
+    times = delta.commit_times(table)
     since = (datetime.now(UTC) - timedelta(hours=older_than_hours)).timestamp() * 1000.0
-    young = [entry["version"] for entry in table.history() if entry["timestamp"] >= since]
-    return tuple(sorted({newest, *young, *named}))
+    # also the one that was the newest when that time began: work that began then rests on it, and may not have said so
+    first = max(bisect_right(times, since) - 1, 0)
+    return tuple(sorted({*range(first, newest + 1), *named}))

@@ -7,6 +7,7 @@ under `warehouse.retry.with_retry`. (Merges lose the units in the field metadata
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -321,26 +322,36 @@ def versions(warehouse: Warehouse) -> dict[str, int]:
     return found
 
 
-def _commit_times(table: DeltaTable) -> list[tuple[int, int]]:
-    """Return version and time of every commit, ms; those that an open table knows are not read again."""
-    known: dict[int, int] = vars(table).setdefault("kempf_commit_times", {})
+def commit_times(table: DeltaTable) -> list[int]:
+    """Return the time of every commit of an open table, ms since 1970, by version.
+
+    Times are those written into the commits, which copying a warehouse keeps; where clocks of two writers disagree a
+    version counts as no older than the one before it.
+
+    Parameters
+    ----------
+    table : DeltaTable
+        Open; commits that it knows from an earlier call are not read again.
+    """
+    known: list[int] = vars(table).setdefault("kempf_commit_times", [])
     missing = table.version() + 1 - len(known)
     if missing > 0:
-        known.update((entry["version"], entry["timestamp"]) for entry in table.history(missing))
-    return sorted(known.items())
+        # the newest first, and before them those of other writers since the table was opened; these are numbered as if
+        # they were this table's, which makes the numbers wrong: counted from the oldest they are right
+        told = [int(entry["timestamp"]) for entry in table.history(missing)][::-1]
+        known += told[:missing]
+    return list(accumulate(known, max))
 
 
 def version_as_of(warehouse: Warehouse, name: str, instant: datetime) -> int | None:
     """Return the newest version of a table that was committed by ``instant``; None before the first.
 
-    Commit times are those written into the commits, which copying a warehouse keeps; where clocks of two writers
-    disagree a version counts as no older than the one before it.
+    Times are those of `commit_times`.
     """
     with reading(warehouse, name) as table:
         if table is None:
             return None
-        commits = _commit_times(table)
+        commits = commit_times(table)
     limit_ms = instant.astimezone(UTC).timestamp() * 1000.0
-    known = list(accumulate((stamp for _, stamp in commits), max))
-    held = [version for (version, _), stamp in zip(commits, known, strict=True) if stamp <= limit_ms]
-    return held[-1] if held else None
+    # they never decrease
+    return bisect_right(commits, limit_ms) - 1 if commits and commits[0] <= limit_ms else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -13,10 +13,12 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import UsageError
-from warehouse import delta, vessels
+from warehouse import delta, segments, vessels
 from warehouse.canonical import plain
 from warehouse.instant import iso_utc
 from warehouse.keys import vessel_key
+from warehouse.manoeuvres import once, same
+from warehouse.segments import Segment
 from warehouse.store import Warehouse
 
 if TYPE_CHECKING:
@@ -170,7 +172,9 @@ def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None)
     for row in found.rows(named=True):
         if not row["superseded"]:
             kinds.setdefault((row["estimator"], row["model_sha256"], row["settings_json"]), []).append(row)
-    return [_compared(kinds[kind]) for kind in sorted(kinds)]
+    single = {row["segment_ids"][0] for rows in kinds.values() for row in rows if len(row["segment_ids"]) == 1}
+    known = segments.by_ids(warehouse, vessel, single) if single else {}
+    return [_compared(kinds[kind], known) for kind in sorted(kinds)]
 
 
 _COMPARED = (
@@ -179,8 +183,8 @@ _COMPARED = (
 )
 
 
-def _compared(rows: list[dict[str, Any]]) -> Comparable:
-    """Keep of sets of one kind those that stand for themselves and can be weighed."""
+def _compared(rows: list[dict[str, Any]], found: Mapping[str, Segment]) -> Comparable:
+    """Keep of sets of one kind those that stand for themselves and can be weighed, each manoeuvre once."""
     names = {name: unit for row in rows for name, unit in _known(row).items()}
     left_out: Counter[str] = Counter()
     kept: list[dict[str, Any]] = []
@@ -192,6 +196,10 @@ def _compared(rows: list[dict[str, Any]]) -> Comparable:
         else:
             kept.append(row)
             seen.add(row["segment_ids"][0])
+    _, twins = once([found[name] for name in sorted(seen) if name in found], same)
+    if twins:
+        left_out["of a manoeuvre that another log holds"] = len(twins)
+        kept = [row for row in kept if row["segment_ids"][0] not in twins]
     places = [[row["covariance_names"].index(name) for name in names] for row in kept]
     values = [{e["name"]: e["value"] for e in row["parameters"]} for row in kept]
     return Comparable(

@@ -42,7 +42,8 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     empty = _empty(name)
     if table is None:
         lazy = empty.lazy()
-    elif _local(table) and single and single.keys() >= set(table.metadata().partition_columns):
+    # the table format takes a blank value for a null one
+    elif _local(table) and single and all(single.values()) and single.keys() >= set(table.metadata().partition_columns):
         lazy = _of_few_files(table, empty, single)
     else:
         held = {field.name for field in table.schema().fields}

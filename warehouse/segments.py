@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from json import loads
 from typing import Any
@@ -164,6 +164,18 @@ def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
     hers = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
     frame = delta.read(warehouse, "segments", {**hers, "ingest_id": ingests})
     return _sorted([_segment(row) for row in frame.rows(named=True)])
+
+
+def by_ids(warehouse: Warehouse, vessel: str, names: Collection[str]) -> dict[str, Segment]:
+    """Return some segments of a vessel by id, whatever ingest they were found in; one that is not stored is left out.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    frame = delta.read(warehouse, "segments", {"vessel_key": vessel_key(vessel), "segment_id": sorted(set(names))})
+    return {one.segment_id: one for one in map(_segment, frame.sort("segment_id", "ingest_id").rows(named=True))}
 
 
 def get(warehouse: Warehouse, name: str) -> Segment:

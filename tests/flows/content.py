@@ -20,7 +20,7 @@ def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
     """The rows of every table that can be reached from a recorded ingest, sorted; the raw logs by their hash."""
     content: dict[str, list[dict[str, Any]]] = {name: delta.read(warehouse, name).rows(named=True) for name in TOLD}
     ingests = {row["ingest_id"] for row in content["logs"]}
-    for name in ("readings", "rejected", "segments"):
+    for name in ("readings", "rejected", "lost", "examinations", "segments"):
         content[name] = [row for row in content[name] if row["ingest_id"] in ingests]
     for row in content["parameter_sets"]:
         told = json.loads(row["provenance_json"])

@@ -63,7 +63,7 @@ def at_write(monkeypatch: pytest.MonkeyPatch) -> Callable[[int], None]:
 
     monkeypatch.setattr(delta, "replace", dying(delta.replace))
     monkeypatch.setattr(delta, "ensured", dying(delta.ensured))
-    monkeypatch.setattr(Warehouse, "write_bytes", dying(Warehouse.write_bytes))
+    monkeypatch.setattr(Warehouse, "write", dying(Warehouse.write))
     return lambda number: left.__setitem__(0, number)
 
 
@@ -81,7 +81,7 @@ def whole(warehouse: Warehouse) -> None:
     assert len(segments.current(warehouse)) == len(content["logs"]) == len(logs.current(warehouse))
 
 
-@pytest.mark.parametrize("number", range(1, 15))
+@pytest.mark.parametrize("number", range(1, 16))
 def test_ingest_may_die_at_any_write(
     harbour: Path,
     tmp_path: Path,
@@ -97,7 +97,7 @@ def test_ingest_may_die_at_any_write(
     whole(warehouse)
     take_in(warehouse, harbour)
     content = seen(warehouse)
-    ingested = ("vessels", "logs", "readings", "rejected", "segments", "raw")
+    ingested = ("vessels", "logs", "readings", "rejected", "lost", "examinations", "segments", "raw")
     assert {name: content[name] for name in ingested} == {name: undisturbed[name] for name in ingested}
 
 

@@ -3,24 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import inf, nan
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
 
-from flows import preview_code, rerun_all
+from flows import fleet_state, preview_code, rerun_all
 from flows.identify_vessel import Request, build, identify_vessel
 from flows.ingest_logs import ingest
-from flows.moves import Move
-from flows.preview_code import VesselPreview, preview_all
+from flows.moves import Move, paired
+from flows.preview_code import VesselPreview, preview_all, standing_sets
+from flows.reprocess_vessel import reprocess_vessel
 from flows.rerun_all import verify_all
+from pipeline.ingest.log_file import LogFile
 from schemas.errors import NotFound
+from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
 from tests.flows.content import fresh, seen
+from tests.warehouse.samples import parameter_set
 from tests.workbench.driving import kempf, refused, tree
 from warehouse import code_version, compaction, delta, logs, parameter_sets, runs
-from warehouse.parameter_set import ParameterSet
+from warehouse.parameter_set import Estimate, ParameterSet
 from warehouse.store import Warehouse
 
 LEAST_SQUARES = Request(estimator="least-squares")
@@ -44,10 +49,10 @@ def own(_identified: Path, tmp_path: Path) -> Warehouse:
     return fresh(copytree(_identified, tmp_path / "w"))
 
 
-def other_code(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(code_version, "fingerprint", lambda: "f" * 16)
+def other_code(monkeypatch: pytest.MonkeyPatch, letter: str = "f") -> None:
+    monkeypatch.setattr(code_version, "fingerprint", lambda: letter * 16)
     for module in ("flows.find_segments",):  # has it by name
-        monkeypatch.setattr(f"{module}.fingerprint", lambda: "f" * 16)
+        monkeypatch.setattr(f"{module}.fingerprint", lambda: letter * 16)
 
 
 def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -63,6 +68,17 @@ def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehous
     assert (again.counts(), again.show()["known_before"]) == (found.counts(), 2)
     assert delta.versions(own)["runs"] == version
     assert verify_all(own, ["mariner"], afresh=False).counts() == found.counts()
+
+
+def test_a_verdict_of_other_flows_is_not_taken_over(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    """What the flows put beside an estimate, such as warnings, is compared too; their code is no part of a set's id."""
+    assert verify_all(own).counts() == {**NONE, "bit-identical": 2}
+    monkeypatch.setattr(code_version, "fingerprint_of_packages", lambda *_: "f" * 16)
+    fleet_state.responsible_code.cache_clear()
+    try:
+        assert verify_all(own).show()["known_before"] == 0
+    finally:
+        fleet_state.responsible_code.cache_clear()
 
 
 def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -139,6 +155,42 @@ def test_code_that_changes_nothing_moves_nothing(own: Warehouse, monkeypatch: py
     assert tree(own.folder) == before, "nothing is stored"
 
 
+def test_a_log_that_the_present_code_has_read_already_is_in_the_preview_too(
+    own: Warehouse, harbour: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """Pooled sets and models rest on all logs: one left out would make them others than reprocessing makes them."""
+    other_code(monkeypatch)
+    ingest(own, [harbour / "mariner.mcap"], vessel="mariner")
+    assert len({row.code_version for row in logs.current(own)}) == 2
+    reports: list[Any] = []
+    real = reprocess_vessel
+    monkeypatch.setattr(preview_code, "reprocess_vessel", lambda *a, **k: reports.append(real(*a, **k)) or reports[-1])
+    (found,) = preview_all(own)
+    done = real(own, "mariner")
+    (tried,) = reports
+    assert (tried.logs, tried.segments, tried.failures) == (done.logs, done.segments, done.failures) == (3, 3, [])
+    assert tried.new_sets == done.new_sets == 3
+    assert (found.sets, found.up_to_date, found.identical, found.gone) == (2, 0, 2, ())
+    (new,) = found.new
+    assert parameter_sets.get(own, new.parameter_set_id).log_ids == (
+        LogFile((harbour / "mariner.mcap").read_bytes()).sha256,
+    )
+    (after,) = preview_all(own)
+    assert (after.sets, after.up_to_date, len(reports)) == (3, 3, 1), "nothing is left to try"
+
+
+def test_a_model_of_which_no_set_stands_is_in_the_preview_too(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    """Reprocessing brings every model up to date that she was ever identified with."""
+    other_code(monkeypatch)
+    identify_vessel(own, "mariner", replace(LEAST_SQUARES, spec=ModelSpec(name="tank", current="none")))
+    other_code(monkeypatch, "e")
+    (found,) = preview_all(own)
+    assert (found.sets, found.up_to_date, found.identical, found.moves, found.gone) == (2, 0, 2, (), ())
+    assert [one.model for one in found.new] == ["linear"] * 2
+    assert reprocess_vessel(own, "mariner").new_sets == 4
+    assert {one.parameter_set_id for one in found.new} < {s.parameter_set_id for s in standing_sets(own, "mariner")}
+
+
 def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
     other_code(monkeypatch)
     (bent, other) = (row.log_id for row in logs.current(own))
@@ -172,6 +224,14 @@ def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeyp
     shown = kempf("rerun", "--all", "--preview", "--fail-above", 1.6, "--warehouse", own.uri)
     assert shown.code == 0 and "1 would say the same bit for bit, 1 would move" in shown.out
     assert shown.out.splitlines()[2].split()[:3] == ["mariner", "a12", "-1.5"]
+
+
+@pytest.mark.parametrize(("after", "std"), [(nan, 0.1), (nan, None), (2.0, None), (inf, 0.1)])
+def test_a_value_that_is_none_has_moved_beyond_any_limit(after: float, std: float | None):
+    estimates = [Estimate("a11", value, std, "1/m") for value in (1.0, after)]
+    sets = [parameter_set(parameters=(e,), parameter_set_id=f"ps-{k}") for k, e in enumerate(estimates)]
+    (move,) = paired(sets[:1], sets[1:]).moves
+    assert move.size == inf
 
 
 def test_a_vessel_that_cannot_be_previewed_stops_no_other(own: Warehouse, monkeypatch: pytest.MonkeyPatch):

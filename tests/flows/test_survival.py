@@ -112,7 +112,7 @@ def test_a_signal_at_any_moment_leaves_what_the_next_run_completes(
     harbour: Path, tmp_path: Path, one_log: dict[str, Any]
 ):
     """The moment is that of a write, in a process that sends the signal to itself: some of the writes in their turn."""
-    moments = [(2, int(signal.SIGTERM)), (4, int(signal.SIGINT)), (6, int(signal.SIGTERM)), (7, int(signal.SIGINT))]
+    moments = [(2, int(signal.SIGTERM)), (4, int(signal.SIGINT)), (6, int(signal.SIGTERM)), (8, int(signal.SIGINT))]
     code = (
         "import os, sys\n"
         "import deltalake, polars, pyarrow.fs, flows.ingest_logs, workbench.cli.ingest\n"
@@ -128,7 +128,7 @@ def test_a_signal_at_any_moment_leaves_what_the_next_run_completes(
         "        return write(*arguments, **named)\n"
         "    return wrapped\n"
         "delta.replace = dying(delta.replace)\n"
-        "Warehouse.write_bytes = dying(Warehouse.write_bytes)\n"
+        "Warehouse.write = dying(Warehouse.write)\n"
         f"for (number, sent), place in zip({moments}, sys.argv[2:]):\n"
         "    pid = os.fork()\n"
         "    if pid == 0:\n"

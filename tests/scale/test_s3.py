@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import time
 from concurrent.futures import ThreadPoolExecutor
+from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
@@ -18,8 +20,9 @@ from schemas.profile import VesselProfile
 from tests.conftest import Ship
 from tests.flows.content import seen
 from tests.scale.conftest import Bucket
+from tests.warehouse.samples import START_NS, inputs, parameter_set
 from tests.workbench.driving import kempf
-from warehouse import aliases, delta, logs, parameter_sets, raw, runs, segments, vessels
+from warehouse import aliases, compaction, delta, logs, parameter_sets, raw, runs, segments, vessels
 from warehouse.store import Warehouse
 
 QUICK = Request(estimator="least-squares")
@@ -114,3 +117,33 @@ def test_what_cannot_be_reached_is_one_clear_error_that_may_pass(bucket: Bucket)
         assert "testing" not in json.dumps(caught.value.to_json())
     with pytest.raises(NotFound, match="no warehouse"):
         vessels.names(Warehouse(f"{bucket.uri}/empty", bucket.settings))
+
+
+def test_compaction_and_vacuum_keep_in_a_bucket_what_they_keep_in_a_folder(bucket: Bucket) -> None:
+    warehouse = Warehouse(f"{bucket.uri}/compacted", bucket.settings)
+    moments = []
+    for i in range(3):
+        asked = inputs(start_utc_ns=START_NS + i)
+        told = {"table_versions": delta.versions(warehouse) if i else {}}
+        parameter_sets.insert(warehouse, [parameter_set("aurora", asked, provenance=told)])
+        runs.record(warehouse, runs.Run("run-1", "test", None, str(i)))
+        moments.append(datetime.now(UTC))
+    pins = compaction.pinned(warehouse)["runs"]
+    then = [delta.read(warehouse, "runs", version=v).rows() for v in pins]
+    assert len(then) == 2 and "runs" in delta.versions(warehouse)
+    assert compaction.compact(warehouse, more_files_than=1) == ("parameter_sets",)
+    for i in range(2):
+        runs.record(warehouse, runs.Run("run-1", "test", None, f"later {i}"))
+    time.sleep(1.1)  # a bucket tells the age of an object in whole seconds
+    said = {one.table: one.files for one in compaction.vacuum(warehouse, 0.0, dry_run=True)}
+    done = {one.table: one.files for one in compaction.vacuum(warehouse, 0.0)}
+    assert done == said == {"parameter_sets": 0, "runs": 2, "raw": 0}
+    assert [delta.read(warehouse, "runs", version=v).rows() for v in pins] == then
+    assert [run.status for run in runs.all_runs(warehouse)] == ["later 1"]
+    found = [sets_by(warehouse, moment) for moment in moments]
+    assert found == [1, 2, 3]
+
+
+def sets_by(warehouse: Warehouse, moment: datetime) -> int:
+    version = delta.version_as_of(warehouse, "parameter_sets", moment)
+    return delta.read(warehouse, "parameter_sets", version=version).height

@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import os
 import time
-from datetime import UTC, datetime
+from dataclasses import replace
+from datetime import UTC, datetime, tzinfo
 from pathlib import Path
 
 import polars as pl
 import pytest
 
+from pipeline.ingest.readings import LostStretch
 from schemas.errors import KempfError, NotFound
 from schemas.tables import TABLES, arrow_schema
 from tests.warehouse.samples import START_NS, delivery, inputs, parameter_set, segment
+from tests.warehouse.samples import readings as readings_of
 from warehouse import aliases, compaction, delta, history, logs, parameter_sets, readings, runs, segments
 from warehouse.deposit import deposit
 from warehouse.provenance import collect
@@ -97,6 +100,34 @@ def test_every_moment_of_the_history_survives(warehouse: Warehouse) -> None:
     assert known == [1, 2, 3, 4, 5]
 
 
+def test_work_that_began_before_keeps_the_versions_it_began_with(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A set names versions that were taken when its work began; compaction and vacuum came before it was stored."""
+    for i in range(3):
+        (stored,) = deposit(warehouse, [delivery("aurora", f"log {i}".encode())])
+        found = [segment("aurora", stored.log_id, stored.ingest_id)]
+        segments.replace(warehouse, "aurora", {stored.ingest_id: found})
+    time.sleep(0.02)
+    began, began_with = datetime.now(UTC), delta.versions(warehouse)
+    then = content(warehouse, began_with)
+    time.sleep(0.02)
+    assert "segments" in compaction.compact(warehouse, more_files_than=1)
+    aged(warehouse)
+
+    class AtThatTime(datetime):
+        @classmethod
+        def now(cls, tz: tzinfo | None = None) -> datetime:
+            return began
+
+    monkeypatch.setattr(compaction, "datetime", AtThatTime)  # so that what is kept goes back to when the work began
+    compaction.vacuum(warehouse, 0.0)
+    asked = inputs(stored.log_id)
+    told = collect(warehouse, asked, [stored.ingest_id], table_versions=began_with)
+    parameter_sets.insert(warehouse, [parameter_set("aurora", asked, provenance=told)])
+    assert content(warehouse, began_with) == then
+
+
 def test_young_files_are_left_to_their_writers(warehouse: Warehouse) -> None:
     lived_in(warehouse)
     young = Path(str(warehouse.folder)) / "logs" / "part-of-a-writer-at-work.parquet"
@@ -145,3 +176,14 @@ def test_nothing_to_compact(warehouse: Warehouse) -> None:
     warehouse.create()
     assert compaction.compact(warehouse) == ()
     assert [one.table for one in compaction.vacuum(warehouse)] == ["raw"]
+
+
+def test_lost_stretches_are_put_together_too(warehouse: Warehouse) -> None:
+    for i in range(3):
+        damaged = replace(readings_of(), lost=(LostStretch(None, START_NS + i, None, "a rotten chunk"),))
+        deposit(warehouse, [delivery("aurora", f"log {i}".encode(), readings=damaged)])
+    before = content(warehouse)
+    assert "lost" in compaction.compact(warehouse, more_files_than=1)
+    assert content(warehouse) == before
+    table = delta.open_table(warehouse, "lost")
+    assert table is not None and len(table.file_uris()) == 1

@@ -2,8 +2,10 @@ from __future__ import annotations
 
 import time
 from datetime import UTC, datetime, timedelta, timezone
+from typing import Any
 
 import pytest
+from deltalake import DeltaTable
 
 from schemas.errors import NotFound, UsageError
 from schemas.profile import VesselProfile
@@ -98,9 +100,8 @@ def test_wrong_questions_are_answered_with_the_right_ones(warehouse: Warehouse) 
 
 
 def test_clocks_that_disagree_do_not_reorder_versions(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
-    from deltalake import DeltaTable
-
-    put(warehouse, "a", START_NS)
+    for letter in "abc":  # and the commit that made the table
+        put(warehouse, letter, START_NS)
     stamps = [(0, 1000), (1, 5000), (2, 3000), (3, 6000)]
     entries = [{"version": v, "timestamp": t} for v, t in reversed(stamps)]
     monkeypatch.setattr(DeltaTable, "history", lambda self, limit=None: entries)
@@ -124,3 +125,23 @@ def test_a_hundred_thousand_rows_are_quick(warehouse: Warehouse) -> None:
     found = history.of_vessel(warehouse, "v1", parameter="p7")
     assert time.perf_counter() - started < 0.5  # 10 to 20 ms on an idle machine
     assert found.frame.height == 500
+
+
+def test_a_commit_of_that_very_moment_does_not_shift_the_others(warehouse: Warehouse, monkeypatch: Any) -> None:
+    """Commits are listed after the table was opened: one that came meanwhile must not push the others down by one."""
+    moments = []
+    for i, letter in enumerate("abc"):
+        put(warehouse, letter, START_NS + i)
+        moments.append(after_a_while())
+    listed, late = DeltaTable.history, ["d", "e"]
+
+    def while_another_writes(table: DeltaTable, limit: int | None = None) -> list[dict[str, Any]]:
+        if late and table.table_uri.rstrip("/").endswith("parameter_sets"):
+            put(Warehouse(warehouse.uri), late.pop(), START_NS + 9)
+        return listed(table, limit)
+
+    monkeypatch.setattr(DeltaTable, "history", while_another_writes)
+    for _ in range(2):  # what was listed is kept with the table
+        known = [history.of_vessel(warehouse, "aurora", as_of=m).frame["parameter_set_id"].n_unique() for m in moments]
+        assert known == [1, 2, 3]
+    assert history.of_vessel(warehouse, "aurora", as_of=after_a_while()).frame["parameter_set_id"].n_unique() == 5

@@ -11,9 +11,9 @@ import pytest
 
 from schemas.profile import VesselProfile
 from tests.history.made import NAMES, UNITS, history, step
-from tests.warehouse.samples import inputs, parameter_set
+from tests.warehouse.samples import inputs, parameter_set, segment
 from tests.workbench.driving import Ran, kempf, refused
-from warehouse import parameter_sets, vessels
+from warehouse import parameter_sets, segments, vessels
 from warehouse.parameter_set import Estimate, ParameterSet
 from warehouse.store import Warehouse
 
@@ -106,6 +106,21 @@ def test_what_cannot_be_compared_is_left_out_and_counted(place: Path) -> None:
         "without standard errors": 1,
     }
     assert "left out: 1 made of several segments" in asked(place).out
+
+
+def test_a_voyage_that_two_logs_hold_counts_once(place: Path) -> None:
+    """Two logs hold the same noise of the sea: their sets say the same, and twice is not two."""
+    ours, theirs = made_sets(4), made_sets(4, estimator="ml", log_ids=("b" * 64,))
+    put(place, *ours, *(replace(s, segment_ids=(f"twin-{i}",)) for i, s in enumerate(theirs)))
+    for log, letter in (("a" * 64, "seg"), ("b" * 64, "twin")):
+        found = [
+            replace(segment(VESSEL, log, letter, s.start_utc_ns), segment_id=f"{letter}-{i}")
+            for i, s in enumerate(ours)
+        ]
+        segments.replace(Warehouse(str(place)), VESSEL, {letter: found})
+    (one,) = asked(place, "--json").json["changes"]
+    assert one["parameter_set_ids"] == [s.parameter_set_id for s in ours] and one["sets"] == 4
+    assert one["left_out"] == {"of a manoeuvre that another log holds": 4}
 
 
 def test_only_one_model_and_estimator_are_compared(place: Path) -> None:
