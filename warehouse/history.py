@@ -13,17 +13,17 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from schemas.errors import UsageError
-from warehouse import delta, segments, vessels
+from warehouse import delta, vessels
 from warehouse.canonical import plain
 from warehouse.instant import iso_utc
 from warehouse.keys import vessel_key
-from warehouse.manoeuvres import once, same
-from warehouse.segments import Segment
 from warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     import polars as pl
     from deltalake import DeltaTable
+
+    from warehouse.segments import Segment
 
 
 #: Half a 95 % interval, in standard errors.
@@ -165,6 +165,8 @@ def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None)
     UsageError
         ``as_of_without_zone``.
     """
+    from warehouse import segments
+
     warehouse.require()
     with _sets_as_of(warehouse, as_of) as table:
         found = _marked(table, vessel, _past_ingests(warehouse, vessel, as_of), _COMPARED)
@@ -185,6 +187,8 @@ _COMPARED = (
 
 def _compared(rows: list[dict[str, Any]], found: Mapping[str, Segment]) -> Comparable:
     """Keep of sets of one kind those that stand for themselves and can be weighed, each manoeuvre once."""
+    from warehouse.manoeuvres import once, same
+
     names = {name: unit for row in rows for name, unit in _known(row).items()}
     left_out: Counter[str] = Counter()
     kept: list[dict[str, Any]] = []
