@@ -220,13 +220,39 @@ def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iter
     yield open_table(warehouse, name, version)
 
 
+@contextmanager
+def lent(warehouse: Warehouse, name: str, where: Where | None = None) -> Iterator[pl.LazyFrame]:
+    """Lend rows of a table that are not read yet, for those who want some columns; not to be used after the ``with``.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    KempfError
+        ``table_unreadable``.
+    """
+    warehouse.require()
+    try:
+        with _unreadable_told(name), reading(warehouse, name) as table:
+            yield scanned(table, name, where)
+    except KempfError:
+        warehouse.reach()
+        raise
+
+
 def rows(table: DeltaTable | None, name: str, where: Where | None = None, columns: Sequence[str] = ()) -> pl.DataFrame:
     """Return rows of an open table, see `read`."""
+    lazy = scanned(table, name, where)
+    with _unreadable_told(name):
+        return (lazy.select(columns) if columns else lazy).collect()
+
+
+@contextmanager
+def _unreadable_told(name: str) -> Iterator[None]:
     import polars as pl
 
-    lazy = scanned(table, name, where)
     try:
-        return (lazy.select(columns) if columns else lazy).collect()
+        yield
     except (OSError, pl.exceptions.ComputeError, pl.exceptions.PanicException) as error:
         raise KempfError(
             "table_unreadable",

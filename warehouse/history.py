@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     from warehouse.segments import Segment
 
+
 #: Half a 95 % interval, in standard errors.
 _HALF_WIDTH = NormalDist().inv_cdf(0.975)
 
@@ -164,7 +165,7 @@ def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None)
     UsageError
         ``as_of_without_zone``.
     """
-    from warehouse import segments  # which needs the libraries that a plain history does without
+    from warehouse import segments
 
     warehouse.require()
     with _sets_as_of(warehouse, as_of) as table:

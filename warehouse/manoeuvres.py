@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
-import numpy as np
-
 from warehouse.segments import Segment
 
 #: executes this close in two logs are one
@@ -46,6 +44,5 @@ def same(one: Segment, other: Segment) -> bool:
     """
     if not overlap(one, other):
         return False
-    theirs = np.array(other.executes_utc_ns)
-    late = [float(np.min(np.abs(theirs - ns))) * 1e-9 for ns in one.executes_utc_ns]
+    late = [float(min(abs(theirs - ns) for theirs in other.executes_utc_ns)) * 1e-9 for ns in one.executes_utc_ns]
     return one.first_side == other.first_side and max(late, default=0.0) < _SAME_INSTANT_S

@@ -10,7 +10,6 @@ from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, LogReading
 from warehouse import delta, logs
 from warehouse.keys import one_of, vessel_key
 from warehouse.retry import with_retry
-from warehouse.scan import scanned
 from warehouse.store import Warehouse
 
 if TYPE_CHECKING:
@@ -78,11 +77,13 @@ def lent(warehouse: Warehouse, ingest_id: str) -> Iterator[pl.LazyFrame]:
     ------
     NotFound
         ``no_warehouse``, ``no_ingest``.
+    KempfError
+        ``table_unreadable``.
     """
     row = logs.of_ingest(warehouse, ingest_id)
     where = {"vessel_key": vessel_key(row.vessel), "ingest_id": row.ingest_id}
-    with delta.reading(warehouse, "readings") as table:
-        yield scanned(table, "readings", where).select(list(READING_SCHEMA)).sort("record", "source", "time_utc_ns")
+    with delta.lent(warehouse, "readings", where) as rows:
+        yield rows.select(list(READING_SCHEMA)).sort("record", "source", "time_utc_ns")
 
 
 def read_rejected(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:

@@ -9,7 +9,21 @@ import pytest
 from pipeline.ingest.log_file import LogFile
 from schemas.errors import KempfError, NotFound, UsageError
 from schemas.tables import TABLES
-from warehouse import aliases, compaction, delta, history, logs, parameter_sets, raw, runs, segments, vessels
+from tests.warehouse.samples import delivery
+from warehouse import (
+    aliases,
+    compaction,
+    delta,
+    history,
+    logs,
+    parameter_sets,
+    raw,
+    readings,
+    runs,
+    segments,
+    vessels,
+)
+from warehouse.deposit import deposit
 from warehouse.store import MARKER, Warehouse
 
 READERS = {
@@ -159,6 +173,15 @@ def test_a_missing_table_file_is_one_clear_error(warehouse: Warehouse) -> None:
         path.unlink()
     with pytest.raises(KempfError) as caught:
         runs.all_runs(warehouse)
+    assert caught.value.code == "table_unreadable"
+
+
+def test_readings_that_are_lent_and_missing_are_one_clear_error(warehouse: Warehouse) -> None:
+    (stored,) = deposit(warehouse, [delivery()])
+    for path in Path(str(warehouse.folder)).glob("readings/*/*/*.parquet"):
+        path.unlink()
+    with pytest.raises(KempfError) as caught, readings.lent(warehouse, stored.ingest_id) as rows:
+        rows.collect()
     assert caught.value.code == "table_unreadable"
 
 
