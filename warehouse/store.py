@@ -177,34 +177,25 @@ class Warehouse:
         """
         files, root = self._files
         target = "/".join((root, *parts))
+        folder, _, name = target.rpartition("/")
+        # in a bucket, too: what is cut off there becomes an object all the same, and would stand in a whole one's place
+        passing = f"{folder}/.{name}.{secrets.token_hex(8)}"
         try:
-            if self.folder is None:  # an object appears only when it is whole
-                self._send(pieces, target)
-                return
-            folder, _, name = target.rpartition("/")
-            files.create_dir(folder, recursive=True)
-            passing = f"{folder}/.{name}.{secrets.token_hex(8)}"
+            if self.folder is not None:
+                files.create_dir(folder, recursive=True)
             try:
                 with files.open_output_stream(passing) as stream:
                     for piece in pieces:
                         stream.write(piece)
+                if self.folder is not None:
+                    _write_through(passing)
                 files.move(passing, target)
             except BaseException:
-                Path(passing).unlink(missing_ok=True)
+                with contextlib.suppress(OSError):
+                    files.delete_file(passing)
                 raise
         except OSError as error:
             raise not_writable(self.uri, error) from error
-
-    def _send(self, pieces: Iterable[bytes], target: str) -> None:
-        files, _ = self._files
-        try:
-            with files.open_output_stream(target) as stream:
-                for piece in pieces:
-                    stream.write(piece)
-        except BaseException:
-            with contextlib.suppress(OSError):  # closing it made an object of what had been sent
-                files.delete_file(target)
-            raise
 
     def exists(self) -> bool:
         """Return whether a warehouse is there.
@@ -294,6 +285,15 @@ class Warehouse:
                     {"uri": self.uri},
                 )
         self.write_bytes(json.dumps({"layout": LAYOUT}).encode() + b"\n", MARKER)
+
+
+def _write_through(path: str) -> None:
+    """Wait until a file is on the disk: its name must not come before its bytes where the power fails."""
+    handle = os.open(path, os.O_RDWR)
+    try:
+        os.fsync(handle)
+    finally:
+        os.close(handle)
 
 
 #: What the system calls a disk, or a share of one, that has no room left.
