@@ -229,7 +229,7 @@ def _without(
         if step.added is None or step.added.name == idle.name:
             continue
         base = made[-1].fit
-        candidate = score(base, step.added)
+        candidate = score(base, step.added, workers)
         one = confirm(base, _unseen(made[-1], held, workers), candidate, held, workers)
         others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
         screened = screen(one.fit, effects, workers)

@@ -16,7 +16,8 @@ import numpy as np
 
 from pipeline.diagnose.formula import Term, search
 from pipeline.diagnose.pooled_fit import Fit
-from pipeline.diagnose.screen import Nuisance, candidate_columns, nuisance
+from pipeline.diagnose.response import Trial, responses
+from pipeline.diagnose.screen import Nuisance, nuisance
 from pipeline.diagnose.sensitivity import N_HULL
 from pipeline.model.terms.effect import Effect, Parameter
 from pipeline.normalise.series import Float
@@ -120,7 +121,7 @@ def flexible(base: Fit, workers: Executor) -> Flexible:
         At least two runs.
     workers : Executor
     """
-    found = list(workers.map(lambda effect: candidate_columns(base, effect, (_SIZE,)), TERMS))
+    found = responses(base, [Trial(effect, (_SIZE,)) for effect in TERMS], workers)
     X = np.column_stack([c if c is not None else np.zeros((2 * base.count, 1)) for c in found])
     known = nuisance(base.linearised, N_HULL + len(base.model.names))
     return _cross_validated(known, X, [line.u.size for line in base.linearised])

@@ -18,10 +18,9 @@ from itertools import product
 import numpy as np
 from scipy.stats import chi2
 
-from pipeline.diagnose import sensitivity
-from pipeline.diagnose.filtered import Filtered
 from pipeline.diagnose.pooled_fit import Fit, Linearised
-from pipeline.diagnose.sensitivity import N_HULL, Point
+from pipeline.diagnose.response import Trial, responses
+from pipeline.diagnose.sensitivity import N_HULL
 from pipeline.model.terms.effect import Effect
 from pipeline.normalise.series import Float
 
@@ -138,7 +137,7 @@ def screen(base: Fit, effects: Mapping[str, Effect], workers: Executor) -> list[
     present = {effect.name for effect in base.model.effects}
     chosen = [effect for effect in effects.values() if effect.name not in present]
     known = nuisance(base.linearised, N_HULL + len(base.model.names))
-    found = list(workers.map(lambda effect: _scored(base, known, effect), chosen))
+    found = _scored(base, known, chosen, workers)
     adjusted = _adjusted([one.p_value for one in found])
     found = [replace(one, p_adjusted=p) for one, p in zip(found, adjusted, strict=True)]
     return sorted(found, key=lambda one: (-np.nan_to_num(one.score, nan=-1.0), one.effect.name))
@@ -154,29 +153,39 @@ def telling_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
     return tuple(c for c in effect.told_by if all(c in one.run.channels for one in base.runs))
 
 
-def score(base: Fit, effect: Effect) -> Candidate:
+def score(base: Fit, effect: Effect, workers: Executor) -> Candidate:
     """Score one effect beside a fitted model; its p-value is adjusted for its own grid alone."""
-    one = _scored(base, nuisance(base.linearised, N_HULL + len(base.model.names)), effect)
+    (one,) = _scored(base, nuisance(base.linearised, N_HULL + len(base.model.names)), [effect], workers)
     return replace(one, p_adjusted=one.p_value)
 
 
-def _scored(base: Fit, known: Nuisance, effect: Effect) -> Candidate:
-    missing, told_by = missing_channels(base, effect), telling_channels(base, effect)
-    size = len(effect.parameters)
-    nothing = Candidate(
-        *(effect, np.nan, 1.0, 1.0, np.full(size, np.nan), np.full(size, np.nan), np.nan, missing),
-        *(np.zeros(0), (), told_by),
-    )
+def _scored(base: Fit, known: Nuisance, effects: Sequence[Effect], workers: Executor) -> list[Candidate]:
+    nothing = [_untested(base, effect) for effect in effects]
     # what a channel shows already is in the inputs: scored beside them it would stand in for something else
-    if missing or told_by:
-        return nothing
+    tried = [one.effect for one in nothing if not (one.missing or one.told_by)]
+    trials = [Trial(effect, steps) for effect in tried for steps in _grid(effect)]
+    columns = responses(base, trials, workers)
+    moved = {(trial.effect.name, trial.steps): one for trial, one in zip(trials, columns, strict=True)}
+    return list(workers.map(lambda one: _best(known, one, moved), nothing))
+
+
+def _untested(base: Fit, effect: Effect) -> Candidate:
+    unknown = np.full(len(effect.parameters), np.nan)
+    missing, told_by = missing_channels(base, effect), telling_channels(base, effect)
+    return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, np.nan, missing, np.zeros(0), (), told_by)
+
+
+def _best(
+    known: Nuisance, nothing: Candidate, moved: Mapping[tuple[str, tuple[float, ...]], Float | None]
+) -> Candidate:
+    """Return an effect at the point of its grid where it tells most, or untested where there is none."""
     best, tries = nothing, 0
-    for steps in _grid(effect):
-        columns = candidate_columns(base, effect, steps)
+    for steps in _grid(nothing.effect):
+        columns = moved.get((nothing.effect.name, steps))
         if columns is None:
             continue
         tries += 1
-        one = _tested(known, columns, effect, steps)
+        one = _tested(known, columns, nothing.effect, steps)
         if best is nothing or one.p_value < best.p_value or np.isnan(best.score):
             best = one
     # the largest of several tries is larger than any one of them: Bonferroni
@@ -187,35 +196,6 @@ def _grid(effect: Effect) -> list[tuple[float, ...]]:
     """Return the points at which an effect is tried: its first parameter and those of shape over all their steps."""
     choices = [p.steps if k == 0 or p.shapes else p.steps[:1] for k, p in enumerate(effect.parameters)]
     return list(product(*choices))
-
-
-def candidate_columns(base: Fit, effect: Effect, steps: Sequence[float]) -> Float | None:
-    """Return the columns of J of an effect at a step, one for every parameter that is not one of shape.
-
-    Returns
-    -------
-    ndarray, shape (N, c), or None
-        None where the filter runs away.
-    """
-    model = base.model.with_effect(effect)
-    at = base.values.size
-    shape = np.array([step if p.shapes else 0.0 for p, step in zip(effect.parameters, steps, strict=True)])
-    columns = []
-    for k, (parameter, step) in enumerate(zip(effect.parameters, steps, strict=True)):
-        if parameter.shapes:
-            continue
-        parts = []
-        for number, (filtered, line) in enumerate(zip(base.runs, base.linearised, strict=True)):
-            values = np.concatenate([base.values, shape])
-            values[at + k] = step
-            point = Point(base.hull, values, base.levels[number])
-            other = sensitivity.passed(Filtered(filtered.run, model, filtered.spec), point)
-            if not np.isfinite(other.log_likelihood):
-                return None
-            parts.append(sensitivity.difference(line.passed, other, step))
-        columns.append(np.concatenate(parts))
-    result: Float = np.column_stack(columns)
-    return result if np.all(np.isfinite(result)) else None
 
 
 def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float, ...]) -> Candidate:

@@ -171,7 +171,7 @@ def staged(
     first, gross = plain(runs, spec, start, workers)
     fits = [first]
     for effect in effects:
-        candidate = score(fits[-1], effect)
+        candidate = score(fits[-1], effect, workers)
         if candidate.missing:
             raise DataRejected(
                 "effect_not_testable",

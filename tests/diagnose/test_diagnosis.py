@@ -78,7 +78,7 @@ def test_a_lag_that_leaves_no_ship_without_it_is_found_with_its_size() -> None:
     chosen, _ = split(ship.runs)
     bent, _ = plain([ship.runs[i] for i in chosen], ship.spec, ship.start.of(chosen), WORKERS)
     assert not is_ship(bent.hull)
-    found = added(bent, score(bent, effects.get("rudder_lag")), WORKERS)
+    found = added(bent, score(bent, effects.get("rudder_lag"), WORKERS), WORKERS)
     assert is_ship(found.hull)
     assert found.log_likelihood > bent.log_likelihood + 300.0
     assert abs(found.values[0] - ship.c) < 3.0 * found.std[6]
@@ -144,7 +144,7 @@ def test_what_the_reference_should_see_and_does_not_is_no_effect(
     assert verdict(unseen) == "unexplained"
     # a bias of the gyro does nothing that drift, turn, rudder or heading do
     _, quiet = calm
-    bias = score(quiet.steps[0].fit, effects.get("gyro_bias")).direction
+    bias = score(quiet.steps[0].fit, effects.get("gyro_bias"), WORKERS).direction
     assert quiet.before is not None and quiet.before.foreseen(bias) < 0.05 * float(bias @ bias)
 
 

@@ -79,7 +79,7 @@ def test_the_gains_of_a_candidate_are_those_over_what_was_asked_of_the_base_befo
     ship = sailed("none")
     base, held = plain_of(ship, 40), ship.runs[2:3]
     before = unseen(base, held, WORKERS)
-    one = confirm(base, before, score(base, get("sway_quadratic")), held, WORKERS)
+    one = confirm(base, before, score(base, get("sway_quadratic"), WORKERS), held, WORKERS)
     after = unseen(one.fit, held, WORKERS)
     assert np.array_equal(one.fold_gains, after.folds - before.folds)
     assert np.array_equal(one.held_out_gains, after.held - before.held)

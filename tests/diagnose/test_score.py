@@ -45,7 +45,7 @@ def scored(run: Run, truth: np.ndarray, seed: int, name: str) -> Candidate:
         *(Augmented(), (filtered,), hull, np.zeros(0), LEVELS[None, :], line.passed.log_likelihood),
         *(np.full((6, 6), np.nan), (line,), True, 0),
     )
-    return score(base, catalogue()[name])
+    return score(base, catalogue()[name], WORKERS)
 
 
 def test_the_score_of_what_is_not_there_is_chi_squared(quiet: Run) -> None:

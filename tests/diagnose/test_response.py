@@ -1,0 +1,73 @@
+"""Effects that go through the filter together do what each of them does alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from pipeline.diagnose import response
+from pipeline.diagnose.filtered import Filtered
+from pipeline.diagnose.flexible import TERMS
+from pipeline.diagnose.pooled_fit import Fit, linearise
+from pipeline.diagnose.response import Trial, responses
+from pipeline.diagnose.screen import _grid
+from pipeline.diagnose.sensitivity import Point, passed
+from pipeline.model.augmented import Augmented
+from pipeline.model.effects import catalogue
+from pipeline.model.lanes import MOST
+from pipeline.model.ship import mariner_like
+from pipeline.model.terms.effect import Effect, Parameter
+from schemas.model_spec import ModelSpec
+from tests.diagnose.sailing import WORKERS, sailed
+
+LEVELS = np.log(np.array([2e-3, 1e-5, 2e-2, 0.05, 6e-4, 2e-3]))
+
+
+@pytest.fixture(scope="module")
+def base() -> Fit:
+    """A model with one effect already, at parameters near the truth, beside a short run."""
+    model, spec = Augmented((catalogue()["sway_quadratic"],)), ModelSpec()
+    runs = tuple(Filtered(run, model, spec) for run in sailed("none").runs[:2])
+    hull, values = mariner_like(runs[0].run.ship.length_m).array(), np.array([-0.01])
+    points = [Point(hull, values, LEVELS) for _ in runs]
+    lines = linearise(runs, points, [passed(run, point) for run, point in zip(runs, points, strict=True)], WORKERS)
+    levels = np.stack([LEVELS, LEVELS])
+    told = (0.0, np.full((7, 7), np.nan), tuple(lines), True, 0)
+    return Fit(model, runs, hull, values, levels, *told)
+
+
+def alone(base: Fit, trial: Trial) -> np.ndarray | None:
+    return response._passed(base, [trial])[0]
+
+
+def test_together_is_as_alone(base: Fit) -> None:
+    chosen = [effect for effect in catalogue().values() if effect.name != "sway_quadratic"]
+    trials = [Trial(effect, steps) for effect in [*chosen[::3], *TERMS[:9]] for steps in _grid(effect)]
+    found = responses(base, trials, WORKERS)
+    assert max(map(len, response._bundles(trials))) > 5
+    for trial, together in zip(trials, found, strict=True):
+        single = alone(base, trial)
+        if single is None:
+            assert together is None
+            continue
+        assert together is not None and together.shape == (2 * base.count, len(trial.making))
+        np.testing.assert_allclose(
+            together, single, rtol=1e-5, atol=1e-6 * np.abs(single).max(), err_msg=trial.effect.name
+        )
+
+
+def test_no_bundle_is_wider_than_the_lanes_and_none_is_lost() -> None:
+    trials = [Trial(effect, steps) for effect in catalogue().values() for steps in _grid(effect)]
+    bundles = response._bundles(trials)
+    assert sorted(i for bundle in bundles for i in bundle) == list(range(len(trials)))
+    for bundle in bundles:
+        assert sum(len(trials[i].making) for i in bundle) <= MOST or len(bundle) == 1
+
+
+def test_one_that_is_no_number_takes_no_other_with_it(base: Fit) -> None:
+    size = Parameter("c", "1", -1.0, 1.0, (0.01,), "size")
+    wild = Effect("wild", "wild", "own", "wild", "wild", "", (size,), {"yaw": "c/(r-r)"})
+    tame = catalogue()["yaw_quadratic"]
+    trials = [Trial(effect, steps) for effect in (wild, tame) for steps in _grid(effect)]
+    first, *others = responses(base, trials, WORKERS)
+    assert first is None and all(one is not None for one in others)
