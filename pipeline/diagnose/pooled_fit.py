@@ -220,12 +220,16 @@ class _Layout:
         if value <= self.highest:
             return value, score, information
         lines = self._linearised(theta, bases)
-        self.highest, self.top, self.lines = value, theta.copy(), lines
         for run, line in enumerate(lines):
             at = [i if i < self.shared else i + N_LEVELS * run for i in line.index]
             J = line.J * self.scale[[min(i, self.shared) for i in line.index]]
-            score[at] += J.T @ line.u
-            information[np.ix_(at, at)] += J.T @ J
+            with np.errstate(over="ignore", invalid="ignore"):
+                score[at] += J.T @ line.u
+                information[np.ix_(at, at)] += J.T @ J
+        if not (np.all(np.isfinite(score)) and np.all(np.isfinite(information))):
+            # a step beside it the filter runs away: from there no way leads on
+            return -np.inf, np.zeros(n), np.zeros((n, n))
+        self.highest, self.top, self.lines = value, theta.copy(), lines
         return value, score, information
 
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,7 +13,7 @@ from pipeline.diagnose import pooled_fit, sensitivity
 from pipeline.diagnose.confirm import confirm, unseen
 from pipeline.diagnose.diagnosis import step_of
 from pipeline.diagnose.filtered import Filtered, Passed
-from pipeline.diagnose.pooled_fit import Fit, linearise
+from pipeline.diagnose.pooled_fit import Fit, Linearised, linearise
 from pipeline.diagnose.screen import score
 from pipeline.diagnose.sensitivity import Point
 from pipeline.model.augmented import Augmented
@@ -64,6 +66,26 @@ def test_derivatives_are_asked_for_only_where_the_search_goes_on(counted: Counte
     there, slope, _ = layout.full(lower)
     assert there < value and not slope.any()
     assert counted.passes == two
+
+
+def test_a_point_beside_which_the_filter_runs_away_is_no_place_to_go_on_from(monkeypatch: pytest.MonkeyPatch) -> None:
+    beginning = plain_of(sailed("none"), 0)
+    real = pooled_fit.linearise
+
+    def away(*given: Any) -> tuple[Linearised, ...]:
+        first, *others = real(*given)
+        J = first.J.copy()
+        J[3, 1] = 1e200
+        return (replace(first, J=J), *others)
+
+    layout = pooled_fit._Layout(beginning.runs, WORKERS)
+    theta = np.concatenate([beginning.hull, beginning.values, beginning.levels.ravel()])
+    with monkeypatch.context() as patched:
+        patched.setattr(pooled_fit, "linearise", away)
+        value, slope, _ = layout.full(theta)
+    assert value == -np.inf and not slope.any()
+    # and nothing of it is kept
+    assert layout.full(theta)[0] == beginning.log_likelihood
 
 
 def test_a_run_by_itself_and_runs_together_are_linearised_to_the_same_bits() -> None:
