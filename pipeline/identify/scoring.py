@@ -33,8 +33,10 @@ def bfgs(curvature: Float, step: Float, fall: Float, free: Mask) -> Float:
     Bs = curvature @ s
     if s @ y <= 1e-10 * np.linalg.norm(s) * np.linalg.norm(y) or s @ Bs <= 0.0:
         return curvature
-    updated: Float = curvature - np.outer(Bs, Bs) / (s @ Bs) + np.outer(y, y) / (s @ y)
-    return updated
+    # beside a filter that all but runs away derivatives are finite, and their squares are not
+    with np.errstate(over="ignore", invalid="ignore"):
+        updated: Float = curvature - np.outer(Bs, Bs) / (s @ Bs) + np.outer(y, y) / (s @ y)
+    return updated if np.all(np.isfinite(updated)) else curvature
 
 
 def damped_step(score: Float, information: Float, free: Mask, damping: float) -> Float:

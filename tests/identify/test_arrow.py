@@ -110,3 +110,9 @@ def test_cost_is_linear_in_members() -> None:
 
     # sixteen times the members: sixteen times the time and not 4096, with room for a busy machine
     assert fastest(of(3200)) < 100.0 * fastest(of(200))
+
+
+def test_a_step_whose_curvature_is_beyond_numbers_corrects_nothing() -> None:
+    huge = np.diag([1e200, 1.0])
+    step, fall = np.array([1.0, 1e-3]), np.array([1e-3, 1e-3])
+    assert np.array_equal(bfgs(huge, step, fall, np.ones(2, dtype=np.bool_)), huge)
