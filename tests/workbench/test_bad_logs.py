@@ -197,13 +197,13 @@ def test_the_worst_fault_gives_the_exit_code(mariner: Ship, tmp_path: Path):
 def test_a_fault_of_our_own_on_one_log_stops_no_other(mariner: Ship, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     from flows import ingest_logs
 
-    def read(name: str, data: bytes, profile: Any) -> Any:
+    def read(name: str, log: Any, profile: Any) -> Any:
         if name.endswith("mcap"):
             raise ZeroDivisionError("division by zero")
-        return real(name, data, profile)
+        return real(name, log, profile)
 
-    real = ingest_logs.read_log
-    monkeypatch.setattr(ingest_logs, "read_log", read)
+    real = ingest_logs.spooled
+    monkeypatch.setattr(ingest_logs, "spooled", read)
     folder = mariner.write(tmp_path / "logs")
     paths = [folder / name for name in ("mariner.mcap", "mariner.nmea.gz")]
     told = kempf("ingest", *paths, "--profile", folder / "profile.yaml", "--warehouse", tmp_path / "w", "--json")
