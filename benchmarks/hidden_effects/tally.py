@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from math import sqrt
+from math import inf, sqrt
 from typing import Any
 
 #: expected score from which an effect must be named, as `DIAGNOSIS` sets it
@@ -69,20 +69,23 @@ class Judged:
         return self.sets[0][0] if self.sets and len(self.sets[0]) == 1 else None
 
     @property
+    def held_out(self) -> tuple[float | None, float | None]:
+        """Held-out errors of the plain and of the last model; infinite for one whose free run runs away."""
+        found = self.said.get("diagnosis")
+        first, last = (found["ladder"][k]["held_out_error"] for k in (0, -1)) if found else (None, None)
+        return first, inf if first is not None and last is None else last
+
+    @property
     def against_oracle(self) -> float | None:
         """Held-out error of the program's last model over that of the true structure."""
-        found = self.said.get("diagnosis")
-        best = self.oracle.get("held_out")
-        last = found["ladder"][-1]["held_out_error"] if found else None
+        best, (_, last) = self.oracle.get("held_out"), self.held_out
         return float(last / best) if last is not None and best else None
 
     @property
     def against_plain(self) -> float | None:
         """Held-out error of the program's last model over that of the plain one."""
-        found = self.said.get("diagnosis")
-        if not found or found["ladder"][0]["held_out_error"] is None:
-            return None
-        return float(found["ladder"][-1]["held_out_error"] / found["ladder"][0]["held_out_error"])
+        first, last = self.held_out
+        return float(last / first) if last is not None and first else None
 
     @property
     def covered(self) -> bool | None:
