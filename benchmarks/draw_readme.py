@@ -15,11 +15,10 @@ import numpy as np
 mpl.use("Agg")
 import matplotlib.pyplot as plt
 
+from flows.channels import channels_of
 from flows.demonstrate import Demonstration, demonstrate
 from flows.identify_vessel import IdentifyOutcome
-from pipeline.normalise.instruments import from_readings
 from schemas.model_spec import HULL_PARAMETERS
-from warehouse import readings
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
 
@@ -31,7 +30,7 @@ BLUE, ORANGE, GREEN = "#1f5fa8", "#d1731f", "#2c7d46"
 
 
 def draw_zigzag(axes, warehouse: Warehouse, segment: Segment) -> None:  # type: ignore[no-untyped-def]
-    instruments = from_readings(readings.read(warehouse, segment.ingest_id))
+    instruments = channels_of(warehouse, segment.ingest_id)
     origin = segment.executes_utc_ns[0]
     begin, end = max(segment.start_utc_ns, origin - int(BEFORE_S * SECOND_NS)), segment.end_utc_ns
     heading = instruments.series["heading"].between(begin, end)

@@ -16,13 +16,12 @@ import numpy as np
 from benchmarks import measured_ships, plausibility, result_page
 from benchmarks.draw_parameters import Cloud, draw_parameters
 from benchmarks.measured_ships import Run, ordered
+from flows.channels import channels_of
 from flows.files import read_model
 from flows.identify_vessel import IdentifyOutcome, Request, identify_vessel
 from pipeline.identify.kernel import FASTEST_PER_S
 from pipeline.identify.record import make_record
-from pipeline.normalise.instruments import from_readings
 from schemas.model_spec import HULL_PARAMETERS
-from warehouse import readings
 from warehouse.parameter_set import ParameterSet
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
@@ -56,7 +55,7 @@ class Found:
 
 
 def _size(warehouse: Warehouse, segment: Segment, made: ParameterSet) -> float:
-    instruments = from_readings(readings.read(warehouse, segment.ingest_id))
+    instruments = channels_of(warehouse, segment.ingest_id)
     record = make_record(instruments, segment.start_utc_ns, segment.end_utc_ns)
     return plausibility.size_per_s(plausibility.values(made)[0], record.speed_m_s)
 

@@ -17,6 +17,7 @@ import numpy as np
 from benchmarks import measured_ships, plausibility, result_page
 from benchmarks.draw_held_out import draw_held_out
 from benchmarks.measured_ships import ordered
+from flows.channels import channels_of
 from flows.files import read_model
 from pipeline.compare.free_run import FreeRun, free_run
 from pipeline.identify import pooling
@@ -25,9 +26,7 @@ from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
 from pipeline.identify.pooling import Member
 from pipeline.identify.record import Record, make_record
 from pipeline.identify.rudder_inflow import with_rudder_inflow
-from pipeline.normalise.instruments import from_readings
 from schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from warehouse import readings
 from warehouse.store import Warehouse
 
 TRAINING = ("Z_20_10_P", "Z_20_10_S")
@@ -61,7 +60,7 @@ def records(data: Path) -> dict[str, Record]:
         warehouse = Warehouse(folder)
         for path, outcome in zip(ship.logs, measured_ships.take_in(warehouse, ship), strict=True):
             (segment,) = outcome.segments
-            instruments = from_readings(readings.read(warehouse, segment.ingest_id))
+            instruments = channels_of(warehouse, segment.ingest_id)
             found[ordered(path.stem).name] = make_record(instruments, segment.start_utc_ns, segment.end_utc_ns)
     return found
 

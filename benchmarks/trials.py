@@ -16,15 +16,14 @@ import numpy as np
 from benchmarks import measured_ships, plausibility, result_page
 from benchmarks.draw_ship import Day, draw_ship
 from benchmarks.measured_ships import Ship
+from flows.channels import channels_of
 from flows.files import read_profiles
 from flows.identify_vessel import IdentifyOutcome, identify_vessel
 from flows.ingest_logs import IngestOutcome
 from flows.rerun_set import Rerun, rerun
-from pipeline.normalise.instruments import from_readings
 from schemas.model_spec import HULL_PARAMETERS
 from tests.segment import loading
 from tests.segment.test_measured import independent_start
-from warehouse import readings
 from warehouse.parameter_set import ParameterSet
 from warehouse.store import Warehouse
 
@@ -54,7 +53,7 @@ def sail(warehouse: Warehouse, ship: Ship, data: Path, pictures: Path | None = N
             errors[segment.segment_id] = float(np.max(np.abs(late)))
     if pictures is not None:
         days = [
-            Day(path.name, from_readings(readings.read(warehouse, str(outcome.ingest_id))), outcome.segments)
+            Day(path.name, channels_of(warehouse, str(outcome.ingest_id)), outcome.segments)
             for path, outcome in zip(ship.logs, taken, strict=True)
         ]
         draw_ship(ship.name, days, pictures / f"{ship.name}.png")

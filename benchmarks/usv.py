@@ -16,15 +16,15 @@ import matplotlib.pyplot as plt
 
 from benchmarks import measured_ships, plausibility, result_page
 from benchmarks.draw_predicted import draw_predicted
+from flows.channels import channels_of
 from flows.identify_vessel import IdentifyOutcome, identify_vessel
 from flows.ingest_logs import IngestOutcome
 from flows.rerun_set import rerun
 from pipeline.compare.ahead import predict_ahead
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings, search
 from pipeline.identify.record import Record, make_record
-from pipeline.normalise.instruments import Instruments, from_readings
+from pipeline.normalise.instruments import Instruments
 from schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from warehouse import readings
 from warehouse.parameter_set import ParameterSet
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
@@ -216,7 +216,7 @@ def main() -> None:
         for outcome in identified:
             made, segment = outcome.parameter_set, outcome.segment
             verdicts.append(rerun(warehouse, made.parameter_set_id).verdict if made else "nothing to rebuild")
-            instruments = from_readings(readings.read(warehouse, segment.ingest_id))
+            instruments = channels_of(warehouse, segment.ingest_id)
             record = make_record(instruments, segment.start_utc_ns, segment.end_utc_ns)
             records[segment.segment_id], series[segment.segment_id] = record, instruments
             draw(instruments, record, segment, result_page.RESULTS / "usv.png")

@@ -21,8 +21,8 @@ from schemas.profile import VesselProfile
 _MOST_NODES = 100_000
 
 
-#: Largest file of a kind that is read whole, bytes; a raw log is opened, and its reader says what is too much.
-LARGEST_BYTES = {"vessel profile": 1 << 20, "model specification": 1 << 20}
+#: Largest file that is read whole, bytes; a raw log is opened, and its reader says what is too much.
+LARGEST_BYTES = 1 << 20
 
 
 def read_bytes(path: Path, what: str) -> bytes:
@@ -37,10 +37,10 @@ def read_bytes(path: Path, what: str) -> bytes:
     """
     with _opened(path, what) as stream:
         file = LogFile(stream)
-        if file.size > LARGEST_BYTES[what]:
+        if file.size > LARGEST_BYTES:
             raise DataRejected(
                 "file_too_large",
-                f"{path} has {file.size} bytes; a {what} of more than {LARGEST_BYTES[what]} is not read.",
+                f"{path} has {file.size} bytes; a {what} of more than {LARGEST_BYTES} is not read.",
                 "Shorten it.",
                 {"path": str(path), "bytes": file.size},
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
@@ -78,37 +79,21 @@ def spooled(name: str, log: LogFile, profile: VesselProfile) -> Iterator[LogRead
         yield first
         return
     with TemporaryDirectory(prefix="kempf-log-", ignore_cleanup_errors=True) as folder:
-        spool = _Spool(Path(folder))
-        spool.add(first)
-        spool.add(second)
+        parts = chain([first, second], parts)
         del first, second
-        for part in parts:
-            spool.add(part)
-        yield spool.spooled()
+        yield _written(parts, Path(folder))
 
 
-class _Spool:
-    def __init__(self, folder: Path) -> None:
-        self._folder = folder
-        self._tally = Tally(0, 0, 0, 0, 0, 0)
-        self._readings, self._rejected = list[Path](), list[Path]()
-        self._last: tuple[tuple[str, ...], str, tuple[LostStretch, ...]] = ((), "", ())
-
-    def add(self, part: Readings) -> None:
-        """Write one part down."""
-        self._tally += part.tally
-        self._last = part.notes, part.format, part.lost
-        for frame, paths, what in (
-            (part.frame, self._readings, "readings"),
-            (part.rejected, self._rejected, "rejected"),
-        ):
-            path = self._folder / f"{what}-{len(paths):06d}.parquet"
+def _written(parts: Iterator[Readings], folder: Path) -> Spooled:
+    """Write parts down, and hold none of them."""
+    tally, readings, rejected = Tally(), list[Path](), list[Path]()
+    for part in parts:
+        tally += part.tally
+        for paths, frame, what in ((readings, part.frame, "readings"), (rejected, part.rejected, "rejected")):
+            paths.append(folder / f"{what}-{len(paths):06d}.parquet")
             try:
-                frame.write_parquet(path)
+                frame.write_parquet(paths[-1])
             except OSError as error:
-                raise not_writable(str(self._folder), error) from error
-            paths.append(path)
-
-    def spooled(self) -> Spooled:
-        """Return all of it."""
-        return Spooled(self._tally, *self._last, tuple(self._readings), tuple(self._rejected))
+                raise not_writable(str(folder), error) from error
+    # what is known at the end of the log stands in its last part
+    return Spooled(tally, part.notes, part.format, part.lost, tuple(readings), tuple(rejected))

@@ -193,13 +193,8 @@ def read(
     KempfError
         ``table_unreadable``.
     """
-    warehouse.require()
-    try:
-        with reading(warehouse, name, version) as table:
-            return rows(table, name, where, columns)
-    except KempfError:
-        warehouse.reach()  # a bucket that does not answer leaves the tables as they are: no copy need be restored
-        raise
+    with lent(warehouse, name, where, version) as lazy:
+        return (lazy.select(columns) if columns else lazy).collect()
 
 
 @contextmanager
@@ -221,22 +216,24 @@ def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iter
 
 
 @contextmanager
-def lent(warehouse: Warehouse, name: str, where: Where | None = None) -> Iterator[pl.LazyFrame]:
+def lent(
+    warehouse: Warehouse, name: str, where: Where | None = None, version: int | None = None
+) -> Iterator[pl.LazyFrame]:
     """Lend rows of a table that are not read yet, for those who want some columns; not to be used after the ``with``.
 
     Raises
     ------
     NotFound
-        ``no_warehouse``.
+        ``no_warehouse``, ``no_table_version``.
     KempfError
         ``table_unreadable``.
     """
     warehouse.require()
     try:
-        with _unreadable_told(name), reading(warehouse, name) as table:
+        with _unreadable_told(name), reading(warehouse, name, version) as table:
             yield scanned(table, name, where)
     except KempfError:
-        warehouse.reach()
+        warehouse.reach()  # a bucket that does not answer leaves the tables as they are: no copy need be restored
         raise
 
 

@@ -54,7 +54,8 @@ def read(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
     NotFound
         ``no_warehouse``, ``no_ingest``.
     """
-    return _read(warehouse, "readings", ingest_id).select(list(READING_SCHEMA)).sort("record", "source", "time_utc_ns")
+    with lent(warehouse, ingest_id) as rows:
+        return rows.collect()
 
 
 @contextmanager
@@ -80,9 +81,7 @@ def lent(warehouse: Warehouse, ingest_id: str) -> Iterator[pl.LazyFrame]:
     KempfError
         ``table_unreadable``.
     """
-    row = logs.of_ingest(warehouse, ingest_id)
-    where = {"vessel_key": vessel_key(row.vessel), "ingest_id": row.ingest_id}
-    with delta.lent(warehouse, "readings", where) as rows:
+    with delta.lent(warehouse, "readings", _of_ingest(warehouse, ingest_id)) as rows:
         yield rows.select(list(READING_SCHEMA)).sort("record", "source", "time_utc_ns")
 
 
@@ -94,14 +93,13 @@ def read_rejected(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
     NotFound
         ``no_warehouse``, ``no_ingest``.
     """
-    return (
-        _read(warehouse, "rejected", ingest_id).select(list(REJECTED_SCHEMA)).sort("record", "channel", "reason", "raw")
-    )
+    found = delta.read(warehouse, "rejected", _of_ingest(warehouse, ingest_id))
+    return found.select(list(REJECTED_SCHEMA)).sort("record", "channel", "reason", "raw")
 
 
-def _read(warehouse: Warehouse, name: str, ingest_id: str) -> pl.DataFrame:
+def _of_ingest(warehouse: Warehouse, ingest_id: str) -> dict[str, str]:
     row = logs.of_ingest(warehouse, ingest_id)
-    return delta.read(warehouse, name, {"vessel_key": vessel_key(row.vessel), "ingest_id": row.ingest_id})
+    return {"vessel_key": vessel_key(row.vessel), "ingest_id": row.ingest_id}
 
 
 def _write(

@@ -56,7 +56,7 @@ def responses(base: Fit, trials: Sequence[Trial], workers: Executor) -> list[Flo
         for i, columns in zip(bundle, made, strict=True):
             found[i] = columns
     # what one effect makes of a state may be no number for another one that is not there: only alone it is told
-    astray = [i for i, columns in enumerate(found) if columns is None]
+    astray = [i for bundle in bundles if len(bundle) > 1 for i in bundle if found[i] is None]
     for i, (columns,) in zip(astray, workers.map(lambda i: _passed(base, [trials[i]]), astray), strict=True):
         found[i] = columns
     return found

@@ -97,15 +97,15 @@ class _Found:
     """What all parts of a log together say, for the message where it is nothing."""
 
     def __init__(self) -> None:
-        self.tally = Tally(0, 0, 0, 0, 0, 0)
+        self.tally = Tally()
         self.unset: tuple[int, int] | None = None
 
     def add(self, part: Readings) -> None:
         """Take note of one part."""
         self.tally += part.tally
-        unset = part.rejected.filter(pl.col("reason") == "clock_unset")["time_utc_ns"].drop_nulls()
-        if unset.len():
-            times = [*(self.unset or ()), *unset.to_list()]
+        if "clock_unset" in part.tally.by_reason:
+            unset = part.rejected.filter(pl.col("reason") == "clock_unset")["time_utc_ns"].to_list()
+            times = [*(self.unset or ()), *unset]
             self.unset = min(times), max(times)
 
 

@@ -58,12 +58,12 @@ class Reason(StrEnum):
 class Tally:
     """The ledger of one log."""
 
-    records_read: int
-    records_kept: int
-    records_rejected: int
-    values_read: int
-    values_kept: int
-    values_rejected: int
+    records_read: int = 0
+    records_kept: int = 0
+    records_rejected: int = 0
+    values_read: int = 0
+    values_kept: int = 0
+    values_rejected: int = 0
     #: number of rejected records and values by reason, sorted by reason
     by_reason: dict[str, int] = field(default_factory=dict)
 
@@ -192,10 +192,5 @@ def joined(parts: Sequence[Readings]) -> Readings:
         rejected=pl.concat([part.rejected for part in parts]).sort(
             "record", "channel", nulls_last=False, maintain_order=True
         ),
-        tally=tally_of(parts),
+        tally=sum((part.tally for part in parts), Tally()),
     )
-
-
-def tally_of(parts: Sequence[Readings]) -> Tally:
-    """Return the ledger of the parts of a log together."""
-    return sum((part.tally for part in parts), Tally(0, 0, 0, 0, 0, 0))

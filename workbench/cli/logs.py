@@ -13,6 +13,7 @@ from workbench.terminal import one_line, print_json, print_table
 if TYPE_CHECKING:
     from pipeline.ingest.readings import LostStretch
     from warehouse.examinations import StoredExamination
+    from warehouse.logs import LogRow
 
 
 @click.group("logs")
@@ -28,7 +29,6 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers: records read = kept + rejected, and what the channel doctor says of each."""
     from flows.lost import as_json as lost_as_json
     from warehouse import examinations, logs, lost, vessels
-    from warehouse.instant import iso_utc
     from warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
@@ -40,17 +40,7 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
     found = [
         {
-            "log_id": row.log_id,
-            "ingest_id": row.ingest_id,
-            "vessel": row.vessel,
-            "file_name": row.file_name,
-            "format": row.format,
-            "start": iso_utc(row.start_utc_ns),
-            "end": iso_utc(row.end_utc_ns),
-            "records_read": row.tally.records_read,
-            "records_kept": row.tally.records_kept,
-            "records_rejected": row.tally.records_rejected,
-            "rejected_by_reason": dict(row.tally.by_reason),
+            **_facts(row),
             "partial": row.ingest_id in gone,
             "lost": lost_as_json(gone.get(row.ingest_id, ())),
             "notes": list(row.notes),
@@ -70,6 +60,25 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
         head.append("damage")
         rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, rows_of_logs, strict=True)]
     print_table([name.replace("_", " ") for name in head], rows)
+
+
+def _facts(row: LogRow) -> dict[str, Any]:
+    """Return what is told of every log."""
+    from warehouse.instant import iso_utc
+
+    return {
+        "log_id": row.log_id,
+        "ingest_id": row.ingest_id,
+        "vessel": row.vessel,
+        "file_name": row.file_name,
+        "format": row.format,
+        "start": iso_utc(row.start_utc_ns),
+        "end": iso_utc(row.end_utc_ns),
+        "records_read": row.tally.records_read,
+        "records_kept": row.tally.records_kept,
+        "records_rejected": row.tally.records_rejected,
+        "rejected_by_reason": dict(row.tally.by_reason),
+    }
 
 
 def _verdict(examination: StoredExamination | None) -> dict[str, Any] | None:
@@ -93,27 +102,13 @@ def _brief(channels: Any) -> str:
 def show(log_id: str, uri: str, as_json: bool) -> None:
     """Show one log: how it was read, and what the channel doctor found in it."""
     from warehouse import examinations, logs
-    from warehouse.instant import iso_utc
     from warehouse.store import Warehouse
     from workbench.cli.doctor import tell
 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
     seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
-    facts = {
-        "log_id": row.log_id,
-        "ingest_id": row.ingest_id,
-        "vessel": row.vessel,
-        "file_name": row.file_name,
-        "format": row.format,
-        "start": iso_utc(row.start_utc_ns),
-        "end": iso_utc(row.end_utc_ns),
-        "records_read": row.tally.records_read,
-        "records_kept": row.tally.records_kept,
-        "records_rejected": row.tally.records_rejected,
-        "rejected_by_reason": dict(row.tally.by_reason),
-        "notes": list(row.notes),
-    }
+    facts = {**_facts(row), "notes": list(row.notes)}
     if as_json:
         print_json({**facts, "channels": dict(seen.content) if seen else None})
         return

@@ -148,17 +148,19 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
     yield from _Job(name, log, source).run(patterns)
 
 
-def _topics(name: str, log: LogFile, source: Source | None) -> set[str]:
+def _topics(name: str, log: LogFile, source: Source | None, known: McapStream) -> set[str]:
     """Return the topics of a file, as far as they decide to which of them a key of the profile belongs.
 
     The key /a.b.c may be the field c of /a.b or the field b.c of /a. Where the summary does not tell the topics, the
     file is read through for them first.
     """
-    stream = McapStream(name, log)
-    if not stream.channels and any(key.count(".") > 1 for key in (source.channels if source else ())):
+    channels = known.channels
+    if not channels and any(key.count(".") > 1 for key in (source.channels if source else ())):
+        stream = McapStream(name, log)
         for _ in stream.batches():
             pass
-    return {channel.topic for channel in stream.channels.values()}
+        channels = stream.channels
+    return {channel.topic for channel in channels.values()}
 
 
 class _Job:
@@ -167,7 +169,7 @@ class _Job:
     def __init__(self, name: str, log: LogFile, source: Source | None) -> None:
         self.name, self.log, self.source = name, log, source
         self.stream = McapStream(name, log)
-        self.topics = _topics(name, log, source)
+        self.topics = _topics(name, log, source, self.stream)
         self.keys = dict(source.channels) if source else {}
         self.owners = self._owners()
         time = source.time if source else None
