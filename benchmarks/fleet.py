@@ -20,18 +20,14 @@ from typing import Any
 
 from benchmarks import fleet_logs, fleet_page, fleet_run
 from flows.cores import usable
-from tests.scale.servers import environment, free_port, running, wait_for
+from tests.scale.cluster import Cluster
+from tests.scale.servers import environment, free_port, running
 from warehouse.store import Warehouse
 
 #: The fleet grows in these steps: what a vessel costs is measured at each.
 STEPS = (0.125, 0.25, 0.5, 1.0)
 #: Vessels of the comparisons that have to do everything twice.
 SUBSET = 24
-
-_PINNED = (
-    "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); "
-    "sys.argv = ['dask', *sys.argv[2:]]; from dask.cli import run_cli; run_cli()"
-)
 
 
 @contextmanager
@@ -54,29 +50,13 @@ def prefect_server(folder: Path) -> Iterator[dict[str, str]]:
 @contextmanager
 def dask_cluster(folder: Path, n_workers: int, settings: dict[str, str]) -> Iterator[str]:
     """Start a scheduler and workers, the k-th on the k-th core alone, as if each were a machine."""
-    port = free_port()
-    address, env = f"tcp://127.0.0.1:{port}", environment(**settings, PREFECT_LOGGING_LEVEL="WARNING")
-    scheduler = [
-        sys.executable,
-        "-m",
-        "dask",
-        "scheduler",
-        "--host",
-        "127.0.0.1",
-        "--port",
-        str(port),
-        "--no-dashboard",
-    ]
     cores = sorted(os.sched_getaffinity(0))
     with ExitStack() as stack:
-        stack.enter_context(running(scheduler, env, folder / f"scheduler{port}", port=port))
-        logs = [folder / f"worker{port}-{k}" for k in range(n_workers)]
-        for k, log in enumerate(logs):
-            worker = ["worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard", "--local-directory"]
-            command = [sys.executable, "-c", _PINNED, str(cores[k % len(cores)]), *worker, f"{log}.d"]
-            stack.enter_context(running(command, env, log))
-        wait_for(lambda: all("Registered to" in log.read_text() for log in logs), 300.0)
-        yield address
+        env = environment(**settings, PREFECT_LOGGING_LEVEL="WARNING")
+        cluster = Cluster(folder / f"dask{n_workers}", env, stack)
+        for k in range(n_workers):
+            cluster.worker(cores[k % len(cores)])
+        yield cluster.address
 
 
 def grow(warehouse: Warehouse, voyages: fleet_logs.Voyages, n_vessels: int) -> list[dict[str, Any]]:

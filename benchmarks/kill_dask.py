@@ -8,42 +8,28 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
-import sys
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Protocol
+from typing import Protocol
 
 from benchmarks import fleet, fleet_logs, kill
 from benchmarks.result_page import write
-from tests.scale.servers import environment, free_port, running, wait_for
+from tests.scale.cluster import Cluster
+from tests.scale.servers import environment
 from warehouse import vessels
 from warehouse.store import Warehouse
 
 FLEET, WORKERS = 4, 2
 
 
-class Cluster:
-    """A scheduler and its workers, each of which can die and come back."""
+class Mortal:
+    """A cluster of which each worker can die and come back."""
 
     def __init__(self, folder: Path, settings: dict[str, str], stack: ExitStack) -> None:
-        self.folder, self.env, self.stack = folder, environment(**settings, PREFECT_LOGGING_LEVEL="WARNING"), stack
-        port = free_port()
-        self.address = f"tcp://127.0.0.1:{port}"
-        scheduler = [sys.executable, "-m", "dask", "scheduler", "--host", "127.0.0.1", "--port", str(port)]
-        stack.enter_context(running([*scheduler, "--no-dashboard"], self.env, folder / "scheduler", port=port))
-        self.started = 0
-        self.workers = [self._worker() for _ in range(WORKERS)]
-
-    def _worker(self) -> Any:
-        self.started += 1
-        log = self.folder / f"worker{self.started}"
-        command = [sys.executable, "-m", "dask", "worker", self.address, "--nthreads", "1", "--no-nanny"]
-        command += ["--no-dashboard", "--local-directory", f"{log}.d"]
-        process = self.stack.enter_context(running(command, self.env, log))
-        wait_for(lambda: "Registered to" in log.read_text(), 300.0)
-        return process
+        self.cluster = Cluster(folder / "dask", environment(**settings, PREFECT_LOGGING_LEVEL="WARNING"), stack)
+        self.workers = [self.cluster.worker().process for _ in range(WORKERS)]
 
     def kill(self, number: int) -> None:
         """Kill one worker."""
@@ -54,8 +40,8 @@ class Cluster:
         """Start what died, and wait until nobody works any more for a run that is gone."""
         from distributed import Client
 
-        self.workers = [self._worker() if one.poll() is not None else one for one in self.workers]
-        with Client(self.address) as client:  # a worker has one thread: this waits behind what it does
+        self.workers = [self.cluster.worker().process if one.poll() is not None else one for one in self.workers]
+        with Client(self.cluster.address) as client:  # a worker has one thread: this waits behind what it does
             there = list(client.scheduler_info(n_workers=-1)["workers"])
             client.gather([client.submit(abs, k, workers=[one], pure=False) for k, one in enumerate(there)])
 
@@ -73,11 +59,11 @@ class Process(Protocol):
 class Run:
     """One run of the fleet; to kill it is to kill its own process, or a worker below it, in turn."""
 
-    def __init__(self, cluster: Cluster, kills: list[str], job: str, place: Path, logs: Path) -> None:
-        self.cluster, self.kills = cluster, kills
-        cluster.mend()
+    def __init__(self, mortal: Mortal, kills: list[str], job: str, place: Path, logs: Path) -> None:
+        self.mortal, self.kills = mortal, kills
+        mortal.mend()
         self.process: Process = multiprocessing.get_context("spawn").Process(
-            target=bring_up_to_date, args=(cluster.address, str(place))
+            target=bring_up_to_date, args=(mortal.cluster.address, str(place))
         )
         self.process.start()
 
@@ -94,11 +80,11 @@ class Run:
         if victim == WORKERS:
             self.process.kill()
         else:
-            self.cluster.kill(victim)
+            self.mortal.kill(victim)
 
     def join(self) -> None:
         self.process.join()
-        self.cluster.mend()
+        self.mortal.mend()
 
 
 def bring_up_to_date(address: str, place: str) -> None:
@@ -131,8 +117,8 @@ def main() -> None:
     with TemporaryDirectory(ignore_cleanup_errors=True) as name, ExitStack() as stack:
         folder = Path(name)
         settings = stack.enter_context(fleet.prefect_server(folder))
-        cluster, victims = Cluster(folder, settings, stack), list[str]()
-        launch = partial(Run, cluster, victims)
+        mortal, victims = Mortal(folder, settings, stack), list[str]()
+        launch = partial(Run, mortal, victims)
         found = kill.measure(
             folder, options.kills, options.seed, launch, jobs=("reprocess",), begin=stocked(folder / "stocked")
         )

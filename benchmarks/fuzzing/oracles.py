@@ -24,8 +24,8 @@ from schemas.profile import VesselProfile
 #: What came of one input, in few words: equal words mean that the reader did the same.
 Outcome = tuple[str, ...]
 
-#: What stands in front of a sentence, with the sign that opens it: a stamp, a TAG block.
-_FRONT = re.compile(rb"^[^$!\\]*(?:\\[^\\]*\\[^$!]*)?[$!]")
+#: What stands in front of a sentence, with the sign that opens it: a stamp, a TAG block, one that lost a backslash.
+_FRONT = re.compile(rb"^[^$!\\]*(?:\\[^\\]*\\[^$!]*|\\[^\\$!]*)?[$!]")
 _BLANKS = b" \t\r\v\f\n"
 
 

@@ -137,6 +137,23 @@ def test_a_tag_block_under_a_wrong_checksum_is_not_believed():
     assert "1 TAG blocks have a wrong checksum" in readings.notes[0]
 
 
+def test_a_tag_block_that_lost_a_backslash_is_told_and_its_line_refused():
+    good = [tag(f"c:{1746295200 + k}") + sentence(f"HEHDT,{k}.0,T") for k in range(4)]
+    no_end, no_beginning = good[2].replace("\\$", "-$"), good[3].replace("\\c", "c")
+    readings = read(*good[:2], no_end, no_beginning)
+    assert readings.tally.by_reason == {"checksum": 2}
+    assert readings.rejected["raw"].to_list() == [no_end, no_beginning]
+    assert "2 TAG blocks have a wrong checksum or no end" in readings.notes[0]
+
+
+def test_the_stamp_in_front_of_a_tag_block_without_an_end_counts():
+    when = [START + timedelta(seconds=k) for k in range(2)]
+    lines = [f"{t.isoformat()} {tag('s:GP0001')}{sentence('HEHDT,1.0,T')}" for t in when]
+    readings = read(lines[0], lines[1].replace("\\$", "-$"))
+    assert times(readings) == when
+    assert "1 TAG blocks" in readings.notes[0]
+
+
 def test_a_plain_log_keeps_the_sentence_behind_a_broken_tag_block():
     readings = read(rmc(START), "\\c:1746295302*00\\" + sentence("HEHDT,1.0,T"))
     assert times(readings) == [START, START]

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import json
 import signal
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -18,8 +16,9 @@ import pytest
 
 from flows.fleet_plan import do_fleet
 from tests.flows.content import seen
+from tests.scale.cluster import Cluster, Worker
 from tests.scale.conftest import FLEET, Bucket, Server, touch
-from tests.scale.servers import environment, free_port, running, wait_for
+from tests.scale.servers import environment, wait_for
 from warehouse import runs
 from warehouse.store import Warehouse
 
@@ -27,27 +26,16 @@ pytest.importorskip("prefect_dask", reason="kempf[dask] is not installed")
 
 
 @dataclass(frozen=True)
-class Cluster:
+class Two:
     address: str
-    workers: list[subprocess.Popen[bytes]]
-    logs: list[Path]
+    workers: list[Worker]
 
 
 @pytest.fixture(scope="module")
-def cluster(bucket: Bucket, server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    folder, port = tmp_path_factory.mktemp("dask"), free_port()
-    address, env = f"tcp://127.0.0.1:{port}", environment(**bucket.settings, **server.settings)
-    scheduler = ["dask", "scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-    worker = ["dask", "worker", address, "--nthreads", "1", "--no-nanny", "--no-dashboard"]
+def cluster(bucket: Bucket, server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Two]:
     with ExitStack() as stack:
-        stack.enter_context(running([sys.executable, "-m", *scheduler], env, folder / "scheduler", port=port))
-        logs = [folder / f"worker{k}" for k in range(2)]
-        started = [
-            stack.enter_context(running([sys.executable, "-m", *worker, "--local-directory", f"{log}.d"], env, log))
-            for log in logs
-        ]
-        wait_for(lambda: all("Registered to" in log.read_text() for log in logs))
-        yield Cluster(address, started, logs)
+        started = Cluster(tmp_path_factory.mktemp("dask"), environment(**bucket.settings, **server.settings), stack)
+        yield Two(started.address, [started.worker(), started.worker()])
 
 
 @pytest.fixture
@@ -61,7 +49,7 @@ def fleet(bucket: Bucket, stocked: Path, tmp_path: Path) -> Warehouse:
     return warehouse
 
 
-def run(cluster: Cluster, warehouse: Warehouse, bucket: Bucket, **options: Any) -> list[dict[str, Any]]:
+def run(cluster: Two, warehouse: Warehouse, bucket: Bucket, **options: Any) -> list[dict[str, Any]]:
     """Run the flow in this process on the cluster's workers."""
     from flows.engine import task_runner
     from flows.fleet import reprocess
@@ -75,7 +63,7 @@ def run(cluster: Cluster, warehouse: Warehouse, bucket: Bucket, **options: Any) 
 
 
 def test_two_workers_do_what_one_process_does(
-    cluster: Cluster, fleet: Warehouse, bucket: Bucket, stocked: Path, tmp_path: Path, on_server: None
+    cluster: Two, fleet: Warehouse, bucket: Bucket, stocked: Path, tmp_path: Path, on_server: None
 ) -> None:
     alone = Warehouse(str(copytree(stocked, tmp_path / "alone")))
     for warehouse in (fleet, alone):
@@ -84,7 +72,7 @@ def test_two_workers_do_what_one_process_does(
     assert [(r["vessel"], r["status"], r["reread"], r["new_sets"]) for r in reports] == [
         (name, "changed", 1, 1) for name in FLEET
     ]
-    did = [log.read_text() for log in cluster.logs]
+    did = [worker.log.read_text() for worker in cluster.workers]
     assert all(any(f"{name}: changed" in text for name in FLEET) for text in did), "each of the two had a share"
     do_fleet(alone)
     there, here = seen(fleet), seen(alone)
@@ -100,10 +88,10 @@ def without_run(text: str) -> str:
 
 
 def test_a_worker_that_dies_takes_nothing_with_it(
-    cluster: Cluster, fleet: Warehouse, bucket: Bucket, on_server: None
+    cluster: Two, fleet: Warehouse, bucket: Bucket, on_server: None
 ) -> None:
     touch(fleet, *FLEET)
-    victim, log = cluster.workers[1], cluster.logs[1]
+    victim, log = cluster.workers[1].process, cluster.workers[1].log
     before = len(log.read_text())
 
     def kill_at_work() -> None:

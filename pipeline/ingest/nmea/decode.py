@@ -128,7 +128,7 @@ def _notes(frames: Frames, kind: Index, reason: Code) -> list[str]:
     if not frames.zoned:
         notes.append("Stamps without a zone are taken as UTC.")
     if frames.broken_tags:
-        notes.append(f"{frames.broken_tags} TAG blocks have a wrong checksum: what they say was left out.")
+        notes.append(f"{frames.broken_tags} TAG blocks have a wrong checksum or no end: what they say was left out.")
     without = (frames.address >= 0) & (kind < 0) & (reason == CODE[Reason.NO_CHANNEL])
     if without.any():
         count = np.bincount(frames.address[without], minlength=len(frames.names))

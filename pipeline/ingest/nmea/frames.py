@@ -61,7 +61,7 @@ class Frames:
     zoned : bool
         Whether every stamp names its zone.
     broken_tags : int
-        Lines whose TAG block is not that of its checksum, so that what it says was left out.
+        Lines whose TAG block is not that of its checksum or has no end, so that what it says was left out.
     padded : bool
         Whether there are fields with blanks at their ends.
     """

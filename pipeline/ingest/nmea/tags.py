@@ -40,7 +40,7 @@ class Tags:
     timed : ndarray of bool, shape (n,)
         Whether it tells one, under the right checksum.
     broken : ndarray of bool, shape (n,)
-        Whether there is a block without its own checksum.
+        Whether there is a block without its own checksum, or without its end.
     """
 
     start: Index
@@ -66,20 +66,19 @@ def tags_of(buffer: Bytes, prefix: Bytes, openings: Index, strokes: Index, lines
     Tags
     """
     n = len(lines)
-    none = np.zeros(n, dtype=np.bool_)
-    tags = Tags(lines.stop, lines.start, np.zeros(n, dtype=np.int64), none, none.copy())
     if strokes.size == 0:
-        return tags
+        none = np.zeros(n, dtype=np.bool_)
+        return Tags(lines.stop, lines.start, np.zeros(n, dtype=np.int64), none, none.copy())
     opening = first_within(strokes, lines.start, lines.stop)
     sentence = first_within(openings, lines.start, lines.stop)
     tagged = (opening >= 0) & ((sentence < 0) | (opening < sentence))
     closing = first_within(strokes, np.where(tagged, opening + 1, lines.stop), lines.stop)
-    tagged &= closing >= 0
-    at = np.flatnonzero(tagged)
+    open_ended = tagged & (closing < 0)  # one of its backslashes is lost: where it ended only the sentence tells
+    at = np.flatnonzero(tagged & ~open_ended)
+    start, behind, broken = np.where(open_ended, opening, lines.stop), lines.start.copy(), open_ended
     opening, closing = opening[at], closing[at]
     star = closing - 3
     right = (star > opening) & (buffer[star] == _STAR) & checksum_right(buffer, prefix, opening, star)
-    start, behind, broken = lines.stop.copy(), lines.start.copy(), none
     start[at], behind[at] = opening, closing + 1
     broken[at] = ~right
     time, timed = np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.bool_)
