@@ -158,17 +158,18 @@ def main() -> None:
         return
     kept = RESULTS / "fuzz.json"
     latest: dict[str, dict[str, Any]] = json.loads(kept.read_text(encoding="utf-8")) if kept.is_file() else {}
+    RESULTS.mkdir(exist_ok=True)
     for reader in readers:
         latest[reader] = fuzz(reader, options.minutes, options.seed)
         for finding in latest[reader]["findings"]:
             print(f"{reader}: {finding['what']}\n  {finding['name']} {finding['data'][:_SHOWN]}", file=sys.stderr)
             finding["data"] = finding["data"][:_SHOWN]
-    RESULTS.mkdir(exist_ok=True)
-    ordered = {reader: latest[reader] for reader in READERS if reader in latest}
-    kept.write_text(json.dumps(ordered, indent=1) + "\n", encoding="utf-8")
-    path = write(
-        "fuzz", "Fuzzing of the readers", page(list(ordered.values())), options=f"--minutes {options.minutes:g}"
-    )
+        # after every reader: a campaign that is interrupted keeps what it has found
+        latest = {reader: latest[reader] for reader in READERS if reader in latest}
+        kept.write_text(json.dumps(latest, indent=1) + "\n", encoding="utf-8")
+        path = write(
+            "fuzz", "Fuzzing of the readers", page(list(latest.values())), options=f"--minutes {options.minutes:g}"
+        )
     print(path.read_text(encoding="utf-8"))
 
 

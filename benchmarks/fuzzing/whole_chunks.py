@@ -64,10 +64,14 @@ def _unpacked(name: bytes, packed: bytes, size: int, crc: int) -> bytes | None:
         if name == b"zstd":
             content = zstandard.ZstdDecompressor().decompress(packed, max_output_size=size)
         elif name == b"lz4":
-            content = lz4.frame.decompress(packed)
+            # a frame that lost its end may hold all of the records: the chunk's own checksum is what counts
+            unpacker = lz4.frame.LZ4FrameDecompressor()
+            content = unpacker.decompress(packed, max_length=size)
+            if not unpacker.eof and not crc:
+                return None
         else:
             content = packed
-    except (zstandard.ZstdError, RuntimeError, MemoryError):
+    except (zstandard.ZstdError, RuntimeError, EOFError, MemoryError):
         return None
     return content if crc in (0, zlib.crc32(content)) else None
 
