@@ -10,7 +10,7 @@ from typing import Any
 from flows.cores import usable
 from flows.fleet_state import VesselState, fleet_state, responsible_code
 from flows.progress import Progress, silent
-from flows.reprocess_vessel import reprocess_vessel
+from flows.reprocess_vessel import reprocess_vessels
 from flows.unforeseen import as_told
 from flows.vessel_report import FLOW, PASSING, VesselReport, from_run, run_id_of
 from schemas.errors import KempfError
@@ -18,9 +18,9 @@ from warehouse import runs, vessels
 from warehouse.runs import Run
 from warehouse.store import Warehouse
 
-#: A batch holds about so many logs: a minute of work, beside which what an engine asks for a task is small, and little
-#: enough that a lost worker costs a minute and progress is seen.
-LOGS_A_BATCH = 20
+#: A batch holds about so many logs: a minute or two of work, beside which what an engine asks for a task and the tables
+#: for a commit is small, and little enough that a lost worker costs no more and progress is seen.
+LOGS_A_BATCH = 60
 #: Batches a worker where the fleet is small: more than one evens out vessels of different size.
 BATCHES_A_WORKER = 2
 
@@ -114,7 +114,7 @@ def do_batch(
     code: Sequence[str] | None = None,
     tell: Callable[[str, str], None] = lambda vessel, status: None,
 ) -> list[Report]:
-    """Bring a batch of vessels up to date; one that fails is reported, the others are done.
+    """Bring a batch of vessels up to date, in common commits; one that fails is reported, the others are done.
 
     Parameters
     ----------
@@ -125,24 +125,23 @@ def do_batch(
     code : sequence of str, optional
         `responsible_code` of the machine that asks; where it is not that of this one, nothing is done.
     tell : callable, optional
-        Called with name and status after every vessel.
+        Called with name and status of every vessel once they are done.
 
     Returns
     -------
     list of dict
         One report a vessel.
     """
-    reports = []
-    for vessel in batch:
-        try:
-            _refuse_other_code(code)
-            report = reprocess_vessel(warehouse, vessel, changed_only=changed_only, flow_run=flow_run)
-        except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
-            report = VesselReport(vessel)
-            report.fail(vessel, as_told(error))
-        tell(vessel, report.status)
-        reports.append(report.show())
-    return reports
+    try:
+        _refuse_other_code(code)
+        reports = reprocess_vessels(warehouse, batch, changed_only=changed_only, flow_run=flow_run)
+    except Exception as error:  # noqa: BLE001 - whatever it is, the next batch must not pay for it
+        reports = [VesselReport(vessel) for vessel in batch]
+        for report in reports:
+            report.fail(report.vessel, as_told(error))
+    for report in reports:
+        tell(report.vessel, report.status)
+    return [report.show() for report in reports]
 
 
 def _refuse_other_code(code: Sequence[str] | None) -> None:
@@ -199,7 +198,7 @@ def together(first: Report, second: Report) -> Report:
 def do_fleet(
     warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_only: bool = True, progress: Progress = silent
 ) -> list[Report]:
-    """Bring the fleet up to date in this process, a vessel a thread and a thread a core; no engine, no server.
+    """Bring the fleet up to date in this process, a batch a thread and a thread a core; no engine, no server.
 
     Parameters
     ----------
@@ -209,7 +208,7 @@ def do_fleet(
     changed_only : bool, optional
         False also verifies every kept parameter set from the raw bytes.
     progress : Progress, optional
-        Told after every vessel.
+        Told after every batch.
 
     Returns
     -------
@@ -225,12 +224,13 @@ def do_fleet(
     reports = {report["vessel"]: report for report in todo.kept}
     progress(len(reports), todo.vessels, "reprocessing")
     with ThreadPoolExecutor(max_workers=usable()) as pool:
-        futures = [pool.submit(do_batch, warehouse, [name], changed_only=changed_only) for name, _ in todo.due]
+        batches = todo.batches(usable())
+        futures = [pool.submit(do_batch, warehouse, batch, changed_only=changed_only) for batch in batches]
         try:
             for future in as_completed(futures):
-                (report,) = future.result()
-                reports[report["vessel"]] = report
-                progress(len(reports), todo.vessels, f"{report['vessel']}: {report['status']}")
+                for report in future.result():
+                    reports[report["vessel"]] = report
+                    progress(len(reports), todo.vessels, f"{report['vessel']}: {report['status']}")
         except BaseException:  # interrupted: what has begun is finished, the rest is left for the next run
             pool.shutdown(wait=False, cancel_futures=True)
             raise

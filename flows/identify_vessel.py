@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -14,6 +13,7 @@ from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
 from flows.refresh_logs import Refreshed, refresh_logs
 from flows.unforeseen import as_told
+from flows.waiting import Waiting, waiting
 from flows.without_log import CAN, KEY, companions_of, estimate_of, no_log_settings, without_log
 from pipeline.identify.estimators import default_settings, estimate
 from pipeline.identify.record import make_record
@@ -21,15 +21,12 @@ from pipeline.normalise.instruments import Instruments
 from schemas.errors import KempfError, NotFound, UsageError
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
-from warehouse import aliases, code_version, delta, logs, parameter_sets, provenance, segments, vessels
+from warehouse import code_version, delta, logs, parameter_sets, provenance, segments, vessels
 from warehouse.keys import vessel_key
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from warehouse.scan import Where
 from warehouse.segments import Segment
 from warehouse.store import Warehouse
-
-#: New sets that wait for one commit: less than a minute of work, which is what a crash may cost.
-_SETS_A_COMMIT = 8
 
 
 @dataclass(frozen=True)
@@ -64,8 +61,6 @@ def identify_vessel(
     vessel: str,
     request: Request = Request(),
     *,
-    refreshed: Refreshed | None = None,
-    adopt: bool = True,
     flow_run: str | None = None,
     progress: Progress = silent,
 ) -> list[IdentifyOutcome]:
@@ -80,10 +75,6 @@ def identify_vessel(
     warehouse : Warehouse
     vessel : str
     request : Request, optional
-    refreshed : Refreshed, optional
-        What came of reading the logs anew, where the caller has just done it; else it is done here.
-    adopt : bool, optional
-        Whether ``current`` may move to this model from another one.
     flow_run : str, optional
         Run that asks, for the provenance.
     progress : Progress, optional
@@ -98,7 +89,47 @@ def identify_vessel(
     NotFound
         ``no_warehouse``, ``no_vessel``, ``no_segments``: nothing to identify from.
     """
-    refreshed = refreshed or refresh_logs(warehouse, vessel, progress)
+    refreshed = refresh_logs(warehouse, vessel, progress)
+    with waiting(warehouse, vessel) as new:
+        return identify_segments(warehouse, vessel, request, refreshed, new, flow_run=flow_run, progress=progress)
+
+
+def identify_segments(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request,
+    refreshed: Refreshed,
+    new: Waiting,
+    *,
+    adopt: bool = True,
+    flow_run: str | None = None,
+    progress: Progress = silent,
+) -> list[IdentifyOutcome]:
+    """Do as `identify_vessel` where the logs have just been read anew, and the caller stores what is new.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    request : Request
+    refreshed : Refreshed
+        What came of reading the logs anew.
+    new : Waiting
+        Takes the new sets, and where ``current`` shall point.
+    adopt : bool, optional
+        Whether ``current`` may move to this model from another one.
+    flow_run : str, optional
+    progress : Progress, optional
+
+    Returns
+    -------
+    list of IdentifyOutcome
+
+    Raises
+    ------
+    NotFound
+        ``no_segments``.
+    """
     by_ingest = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
     # of the logs just listed only: another process may read one anew at any moment
     found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in by_ingest]
@@ -108,7 +139,7 @@ def identify_vessel(
     outcomes: list[IdentifyOutcome] = []
     readable = [segment for segment in found if segment.ingest_id not in refreshed.failed]
     ingests = list(dict.fromkeys(segment.ingest_id for segment in found))
-    with ThreadPoolExecutor(max_workers=usable()) as pool, _stored_together(warehouse) as keep:
+    with ThreadPoolExecutor(max_workers=usable()) as pool:
         for done, ingest in enumerate(ingests):
             hers = [segment for segment in found if segment.ingest_id == ingest]
             progress(done, len(ingests), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
@@ -118,31 +149,11 @@ def identify_vessel(
                 beside = {s.segment_id: companions_of(s, readable, by_ingest) for s in hers if without_log(s)}
                 job = _Job(warehouse, request, pool, flow_run, table_versions, by_ingest)
                 outcomes += _identify_log(job, by_ingest[ingest], hers, beside)
-                keep([o.parameter_set for o in outcomes[-len(hers) :] if o.new and o.parameter_set])
+                new.keep([o.parameter_set for o in outcomes[-len(hers) :] if o.new and o.parameter_set])
     progress(len(ingests), len(ingests), "done")
     outcomes.sort(key=lambda o: (o.segment.start_utc_ns, o.segment.segment_id))
-    _point_to_current(warehouse, vessel, outcomes, request.spec, adopt=adopt)
+    _point_to_current(new, outcomes, request.spec, adopt=adopt)
     return outcomes
-
-
-@contextmanager
-def _stored_together(warehouse: Warehouse) -> Iterator[Callable[[Sequence[ParameterSet]], None]]:
-    """Give a function that stores new sets, some in one commit; what waits is stored also when the block is left."""
-    waiting: list[ParameterSet] = []
-
-    def store() -> None:
-        made, waiting[:] = list(waiting), []  # what could not be stored is not tried again on the way out
-        parameter_sets.insert(warehouse, made)
-
-    def keep(made: Sequence[ParameterSet]) -> None:
-        waiting.extend(made)
-        if len(waiting) >= _SETS_A_COMMIT:
-            store()
-
-    try:
-        yield keep
-    finally:
-        store()
 
 
 @dataclass(frozen=True)
@@ -205,9 +216,7 @@ def _missing(warehouse: Warehouse, vessel: str, wanted: Sequence[Inputs]) -> set
     return names - set(stored["parameter_set_id"].to_list())
 
 
-def _point_to_current(
-    warehouse: Warehouse, vessel: str, outcomes: Sequence[IdentifyOutcome], spec: ModelSpec, *, adopt: bool
-) -> None:
+def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], spec: ModelSpec, *, adopt: bool) -> None:
     """Let ``current`` point to the latest whole zigzag whose maximum-likelihood identification converged."""
     whole = [
         o.parameter_set
@@ -219,13 +228,9 @@ def _point_to_current(
     ]
     if not whole:
         return
-    pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
-    if (
-        adopt
-        or pointed is None
-        or ModelSpec.model_validate(dict(parameter_sets.get(warehouse, pointed).model_spec)) == spec
-    ):
-        aliases.point(warehouse, vessel, whole[-1].parameter_set_id)
+    pointed = None if adopt else new.standing()
+    if pointed is None or ModelSpec.model_validate(dict(pointed.model_spec)) == spec:
+        new.point(whole[-1].parameter_set_id)
 
 
 def inputs_of(segment: Segment, profile_sha256: str, request: Request, companions: Sequence[Segment] = ()) -> Inputs:

@@ -233,7 +233,7 @@ def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfi
 
 
 def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
-    """Store logs of one vessel that were read, all of them in one commit a table.
+    """Store logs that were read, all of them in one commit a table.
 
     Raises
     ------
@@ -242,10 +242,8 @@ def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
     """
     # zigzags and verdicts before the rows that make the logs count: what a crash leaves in between is not seen, and not
     # missed
-    for vessel in sorted({one.delivery.vessel for one in read}):
-        hers = {one.ingest_id: one.segments for one in read if one.delivery.vessel == vessel}
-        segments.replace(warehouse, vessel, hers)
-        examinations.replace(warehouse, vessel, [one.examination for one in read if one.delivery.vessel == vessel])
+    segments.replace_all(warehouse, {(one.delivery.vessel, one.ingest_id): one.segments for one in read})
+    examinations.replace(warehouse, [one.examination for one in read])
     return deposit(warehouse, [one.delivery for one in read])
 
 

@@ -11,6 +11,7 @@ from flows.cores import usable
 from flows.identify_vessel import IdentifyOutcome, Request
 from flows.parameter_set_of import arm_of, as_parameter_set, without_arm
 from flows.progress import Progress, silent
+from flows.waiting import Waiting, waiting
 from flows.without_log import without_log
 from pipeline.identify import pooling
 from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings
@@ -20,7 +21,7 @@ from pipeline.identify.rudder_inflow import with_rudder_inflow
 from pipeline.normalise.instruments import Instruments
 from schemas.model_spec import ModelSpec
 from schemas.profile import VesselProfile
-from warehouse import aliases, code_version, logs, parameter_sets, provenance, vessels
+from warehouse import code_version, logs, parameter_sets, provenance, vessels
 from warehouse.manoeuvres import once, overlap
 from warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from warehouse.store import Warehouse
@@ -40,6 +41,24 @@ def pool_vessel(
     flow_run: str | None = None,
     progress: Progress = silent,
 ) -> tuple[ParameterSet, bool] | None:
+    """Identify one hull from the segments that maximum likelihood could identify one by one, and store it.
+
+    Parameters, results and errors are those of `pool_segments`, which leaves the storing to its caller.
+    """
+    with waiting(warehouse, vessel) as new:
+        return pool_segments(warehouse, vessel, request, outcomes, new, flow_run=flow_run, progress=progress)
+
+
+def pool_segments(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request,
+    outcomes: Sequence[IdentifyOutcome],
+    new: Waiting,
+    *,
+    flow_run: str | None = None,
+    progress: Progress = silent,
+) -> tuple[ParameterSet, bool] | None:
     """Identify one hull from the segments that maximum likelihood could identify one by one.
 
     Parameters
@@ -50,6 +69,8 @@ def pool_vessel(
         What the segments were identified with.
     outcomes : sequence of IdentifyOutcome
         Of that job.
+    new : Waiting
+        Takes the set where it is new, and where the alias shall point.
     flow_run : str, optional
     progress : Progress, optional
 
@@ -106,9 +127,9 @@ def pool_vessel(
         told = provenance.collect(warehouse, inputs, list(ingests.values()), flow_run)
         profile = vessels.get(warehouse, profile_sha256)
         made = build_pooled(instruments, profile, inputs, vessel, tuple(s.segment_id for s in chosen), told)
-        parameter_sets.insert(warehouse, [made])
+        new.keep([made])
     if made.convergence.get("converged"):
-        aliases.point(warehouse, vessel, made.parameter_set_id, alias=ALIAS)
+        new.point(made.parameter_set_id, ALIAS)
     return made, not known
 
 

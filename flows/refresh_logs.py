@@ -1,4 +1,4 @@
-"""The job that reads a vessel's logs anew where her profile or the code has changed since they were read."""
+"""The job that reads vessels' logs anew where a profile or the code has changed since they were read."""
 
 from __future__ import annotations
 
@@ -11,12 +11,13 @@ from flows.progress import Progress, silent
 from flows.spool import spooled
 from flows.unforeseen import as_told
 from schemas.errors import KempfError
+from schemas.profile import VesselProfile
 from warehouse import code_version, logs, raw, vessels
 from warehouse.logs import LogRow
 from warehouse.store import Warehouse
 
 #: Logs that are stored together, at most; and their bytes as delivered, which compression may hide twentyfold.
-_MOST_LOGS, _MOST_BYTES = 20, 8 << 20
+_MOST_LOGS, _MOST_BYTES = 60, 8 << 20
 
 
 @dataclass(frozen=True)
@@ -36,6 +37,38 @@ class Refreshed:
     failed: dict[str, KempfError]
 
 
+@dataclass(frozen=True)
+class Stale:
+    """Logs of a vessel that were read with another profile or other code than the present.
+
+    Attributes
+    ----------
+    profile : VesselProfile
+        The present one.
+    logs : int
+        Of hers in all.
+    rows : tuple of LogRow
+    """
+
+    profile: VesselProfile
+    logs: int
+    rows: tuple[LogRow, ...]
+
+
+def stale_logs(warehouse: Warehouse, vessel: str) -> Stale:
+    """Find the logs of a vessel that are to be read anew.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    profile = vessels.current(warehouse, vessel)
+    hers, code = logs.current(warehouse, vessel), code_version.fingerprint()
+    stale = [row for row in hers if (row.profile_sha256, row.code_version) != (profile.sha256, code)]
+    return Stale(profile, len(hers), tuple(stale))
+
+
 def refresh_logs(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Refreshed:
     """Read anew, from the raw bytes, every log that was read with another profile or other code than the present.
 
@@ -46,25 +79,47 @@ def refresh_logs(warehouse: Warehouse, vessel: str, progress: Progress = silent)
     NotFound
         ``no_warehouse``, ``no_vessel``.
     """
-    profile = vessels.current(warehouse, vessel)
-    hers, code = logs.current(warehouse, vessel), code_version.fingerprint()
-    stale = [row for row in hers if (row.profile_sha256, row.code_version) != (profile.sha256, code)]
+    return read_anew(warehouse, {vessel: stale_logs(warehouse, vessel)}, progress)[vessel]
+
+
+def read_anew(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Progress = silent) -> dict[str, Refreshed]:
+    """Read the logs of several vessels anew; many short ones are stored in one commit a table.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    stale : mapping of str to Stale
+        By vessel.
+    progress : Progress, optional
+
+    Returns
+    -------
+    dict of str to Refreshed
+        By vessel.
+    """
+    rows = [row for hers in stale.values() for row in hers.rows]
     failed: dict[str, KempfError] = {}
     done = 0
-    for chunk in _chunks(stale):
+    for chunk in _chunks(rows):
         read: dict[str, ReadLog] = {}
         with ExitStack() as until_stored:
             for row in chunk:
-                progress(done, len(stale), f"reading {row.file_name}")
+                progress(done, len(rows), f"reading {row.file_name}")
                 done += 1
+                profile = stale[row.vessel].profile
                 try:
                     log = until_stored.enter_context(raw.opened(warehouse, row.log_id))
                     readings = until_stored.enter_context(spooled(row.file_name, log, profile))
-                    read[row.ingest_id] = look_through(vessel, row.file_name, log, profile, readings)
+                    read[row.ingest_id] = look_through(row.vessel, row.file_name, log, profile, readings)
                 except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                     failed[row.ingest_id] = as_told(error)
             failed |= _stored(warehouse, read)
-    return Refreshed(len(hers), len(stale) - len(failed), failed)
+    return {vessel: _refreshed(hers, failed) for vessel, hers in stale.items()}
+
+
+def _refreshed(stale: Stale, failed: Mapping[str, KempfError]) -> Refreshed:
+    own = {row.ingest_id: failed[row.ingest_id] for row in stale.rows if row.ingest_id in failed}
+    return Refreshed(stale.logs, len(stale.rows) - len(own), own)
 
 
 def _chunks(stale: Sequence[LogRow]) -> list[list[LogRow]]:

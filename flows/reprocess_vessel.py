@@ -1,17 +1,25 @@
-"""The job that brings one vessel up to date: logs read anew, zigzags found anew, parameter sets identified."""
+"""The job that brings vessels up to date: logs read anew, zigzags found anew, parameter sets identified.
+
+What is new of several vessels is stored in one commit a table: a table of a large fleet has a file for every vessel,
+and each commit looks at all of them.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
 from flows.fleet_state import VesselState, fleet_state
-from flows.identify_vessel import IdentifyOutcome, Request, identify_vessel
-from flows.pool_vessel import POOLED, pool_vessel
+from flows.identify_vessel import IdentifyOutcome, Request, identify_segments
+from flows.pool_vessel import POOLED, pool_segments
 from flows.progress import Progress, silent
-from flows.refresh_logs import refresh_logs
+from flows.refresh_logs import Refreshed, Stale, read_anew, stale_logs
 from flows.rerun_set import rerun
 from flows.unforeseen import as_told
 from flows.vessel_model import ALIAS, ESTIMATOR, model_of, point, standing, store_model
-from flows.vessel_report import VesselReport, remember
+from flows.vessel_report import VesselReport, remember_all
 from flows.vessel_runs import choose
+from flows.waiting import Waiting, store_together
 from schemas.errors import KempfError
 from schemas.model_spec import ModelSpec
 from warehouse import aliases, code_version, logs, parameter_sets, segments
@@ -24,87 +32,229 @@ def reprocess_vessel(
     request: Request | None = None,
     *,
     changed_only: bool = True,
-    before: VesselState | None = None,
     flow_run: str | None = None,
     progress: Progress = silent,
 ) -> VesselReport:
-    """Bring one vessel up to date with her profile and the code.
+    """Bring one vessel up to date; parameters and result are those of `reprocess_vessels`."""
+    (report,) = reprocess_vessels(
+        warehouse, [vessel], request, changed_only=changed_only, flow_run=flow_run, progress=progress
+    )
+    return report
+
+
+def reprocess_vessels(
+    warehouse: Warehouse,
+    vessels: Sequence[str],
+    request: Request | None = None,
+    *,
+    changed_only: bool = True,
+    flow_run: str | None = None,
+    progress: Progress = silent,
+) -> list[VesselReport]:
+    """Bring vessels up to date with their profiles and the code.
 
     A log read with the current profile and code is not read again, a set that is there is not identified again.
 
     Parameters
     ----------
     warehouse : Warehouse
-    vessel : str
+    vessels : sequence of str
+        Their logs and sets are held in memory together until they are stored: some, not a fleet.
     request : Request, optional
-        Only this model and estimator; by default every one that she was identified with before.
+        Only this model and estimator; by default every one that a vessel was identified with before.
     changed_only : bool, optional
         False also builds every kept set again from the raw bytes and counts the verdicts.
-    before : VesselState, optional
-        Her state where the caller has just read it; else it is read here.
     flow_run : str, optional
     progress : Progress, optional
 
     Returns
     -------
-    VesselReport
-        Failures are in it; one bad log stops nothing.
+    list of VesselReport
+        One a vessel, in the order given. Failures are in them: one bad log stops nothing, one bad vessel no other.
     """
-    report, left = VesselReport(vessel), None
+    job = _Job(warehouse, request, flow_run, progress)
+    works = {vessel: _Work(VesselReport(vessel), Waiting(warehouse, vessel)) for vessel in vessels}
+    all_of_them = list(works.values())
+
+    def begin() -> None:
+        for vessel, state in fleet_state(warehouse, vessels).items():
+            works[vessel].before = state
+
+    def read() -> None:
+        stale = {w.vessel: w.stale for w in _going(all_of_them) if w.stale is not None}
+        for vessel, refreshed in read_anew(warehouse, stale, progress).items():
+            works[vessel].refreshed = refreshed
+
+    _together(all_of_them, begin)
+    _each(all_of_them, job.look)
+    _together(all_of_them, read)
     try:
-        before = before or fleet_state(warehouse, [vessel])[vessel]
-        _bring_up_to_date(warehouse, vessel, request, report, flow_run, progress)
-        if not changed_only:
-            _verify(warehouse, vessel, report)
-        if request is None:
-            left = _left(warehouse, before, report)
-    except Exception as error:  # noqa: BLE001 - whatever it is, it is reported and the fleet goes on
-        report.fail(vessel, as_told(error))
+        _each(all_of_them, job.identify)
+    finally:  # also where it is interrupted: what was identified need not be so again
+        for vessel, error in store_together(warehouse, {w.vessel: w.new for w in all_of_them}).items():
+            works[vessel].report.new_sets -= len(works[vessel].new.sets)
+            works[vessel].stop(error)
+    _each(all_of_them, job.finish)
+    if not changed_only:
+        _each(all_of_them, lambda work: _verify(warehouse, work.vessel, work.report))
+    if request is None:
+        _together(all_of_them, lambda: _leave(warehouse, list(_going(all_of_them))))
     estimator = request.estimator if request else None
-    remember(warehouse, report, report.as_run(left, changed_only=changed_only, estimator=estimator))
-    return report
+    runs = [(w.report, w.report.as_run(w.left, changed_only=changed_only, estimator=estimator)) for w in all_of_them]
+    _together(all_of_them, lambda: remember_all(warehouse, runs))
+    return [work.report for work in all_of_them]
 
 
-def _bring_up_to_date(
-    warehouse: Warehouse,
-    vessel: str,
-    request: Request | None,
-    report: VesselReport,
-    flow_run: str | None,
-    progress: Progress,
-) -> None:
-    requests = _requests(warehouse, vessel, request)
-    names = {row.ingest_id: row.file_name for row in logs.current(warehouse, vessel)}
-    refreshed = refresh_logs(warehouse, vessel, progress)
-    report.logs, report.reread = refreshed.logs, refreshed.reread
-    for ingest, error in refreshed.failed.items():
-        report.fail(names.get(ingest, ingest), error)  # another process may have added it in between
-    report.segments = len(segments.current(warehouse, vessel))
-    for one in requests if report.segments else ():
-        outcomes = identify_vessel(
-            warehouse, vessel, one, refreshed=refreshed, adopt=False, flow_run=flow_run, progress=progress
-        )
-        for outcome in outcomes:
-            if outcome.error is not None and outcome.segment.ingest_id not in refreshed.failed:
-                report.fail(outcome.segment.segment_id, outcome.error)
-            report.new_sets += outcome.new
-            report.kept_sets += outcome.parameter_set is not None and not outcome.new
-        _pool(warehouse, vessel, one, outcomes, report, flow_run, progress)
-    if report.segments and request is None:
-        _model(warehouse, vessel, report, flow_run, progress)
-    _withdraw(warehouse, vessel, report)
+@dataclass
+class _Work:
+    """What is known of one vessel while she is brought up to date.
+
+    Attributes
+    ----------
+    left : str or None
+        Digest of the state in which nothing is left to do.
+    over : bool
+        Whether something failed after which there is nothing more to do for her.
+    """
+
+    report: VesselReport
+    new: Waiting
+    before: VesselState | None = None
+    requests: Sequence[Request] = ()
+    names: Mapping[str, str] = field(default_factory=dict)
+    stale: Stale | None = None
+    refreshed: Refreshed | None = None
+    left: str | None = None
+    over: bool = False
+
+    @property
+    def vessel(self) -> str:
+        return self.report.vessel
+
+    def stop(self, error: Exception) -> None:
+        """Write a failure down after which the others go on without her."""
+        self.report.fail(self.vessel, as_told(error))
+        self.over = True
 
 
-def _left(warehouse: Warehouse, before: VesselState, report: VesselReport) -> str | None:
-    """Return the digest of the state in which nothing is left to do, None where that is not sure.
+def _going(works: Iterable[_Work]) -> list[_Work]:
+    return [work for work in works if not work.over]
+
+
+def _each(works: Iterable[_Work], step: Callable[[_Work], None]) -> None:
+    """Take a step for every vessel; where it fails the others go on."""
+    for work in _going(works):
+        try:
+            step(work)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is reported and the fleet goes on
+            work.stop(error)
+
+
+def _together(works: Sequence[_Work], step: Callable[[], None]) -> None:
+    """Take a step for all vessels at once; where it fails it has failed for each."""
+    try:
+        step()
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is reported
+        for work in _going(works):
+            work.stop(error)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What is the same for every vessel."""
+
+    warehouse: Warehouse
+    request: Request | None
+    flow_run: str | None
+    progress: Progress
+
+    def look(self, work: _Work) -> None:
+        """See what there is to do."""
+        work.requests = _requests(self.warehouse, work.vessel, self.request)
+        work.names = {row.ingest_id: row.file_name for row in logs.current(self.warehouse, work.vessel)}
+        work.stale = stale_logs(self.warehouse, work.vessel)
+
+    def identify(self, work: _Work) -> None:
+        """Identify what is not identified yet, every segment and all of them together."""
+        report, refreshed = work.report, work.refreshed
+        assert refreshed is not None
+        report.logs, report.reread = refreshed.logs, refreshed.reread
+        for ingest, error in refreshed.failed.items():
+            report.fail(work.names.get(ingest, ingest), error)  # another process may have added it in between
+        report.segments = len(segments.current(self.warehouse, work.vessel))
+        for one in work.requests if report.segments else ():
+            outcomes = identify_segments(
+                self.warehouse,
+                work.vessel,
+                one,
+                refreshed,
+                work.new,
+                adopt=False,
+                flow_run=self.flow_run,
+                progress=self.progress,
+            )
+            for outcome in outcomes:
+                if outcome.error is not None and outcome.segment.ingest_id not in refreshed.failed:
+                    report.fail(outcome.segment.segment_id, outcome.error)
+                report.new_sets += outcome.new
+                report.kept_sets += outcome.parameter_set is not None and not outcome.new
+            self._pool(work, one, outcomes)
+
+    def _pool(self, work: _Work, request: Request, outcomes: list[IdentifyOutcome]) -> None:
+        """Pool what was identified; that segments have nothing in common is no failure of the separate ones."""
+        try:
+            pooled = pool_segments(
+                self.warehouse,
+                work.vessel,
+                request,
+                outcomes,
+                work.new,
+                flow_run=self.flow_run,
+                progress=self.progress,
+            )
+        except KempfError as error:
+            work.report.fail(POOLED, error)
+            return
+        if pooled is not None:
+            work.report.new_sets += pooled[1]
+            work.report.kept_sets += not pooled[1]
+
+    def finish(self, work: _Work) -> None:
+        """Bring up to date what rests on the sets that are stored now."""
+        if work.report.segments and self.request is None:
+            self._model(work)
+        _withdraw(self.warehouse, work.vessel, work.report)
+
+    def _model(self, work: _Work) -> None:
+        """Bring the model with effects that she stands at up to date; where that fails she stands where she was."""
+        now = standing(self.warehouse, work.vessel)
+        if now is None:
+            return
+        spec, own = model_of(now)
+        try:
+            chosen = choose(self.warehouse, work.vessel)
+            made, new = store_model(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
+        except KempfError as error:
+            work.report.fail(ALIAS, error)
+            return
+        point(self.warehouse, made)
+        work.report.new_sets += new
+        work.report.kept_sets += not new
+
+
+def _leave(warehouse: Warehouse, works: Sequence[_Work]) -> None:
+    """Note the digest of the state in which nothing is left to do, where that is sure.
 
     Not sure: a failure that another attempt may mend; a log, a profile or a set that somebody else added meanwhile.
     """
-    if not all(failure["lasting"] for failure in report.failures):
-        return None
-    after = fleet_state(warehouse, [report.vessel])[report.vessel]
-    made = len(set(after.set_ids) - set(before.set_ids))
-    return after.digest if after.inputs == before.inputs and made == report.new_sets else None
+    sure = [work for work in works if all(failure["lasting"] for failure in work.report.failures)]
+    after = fleet_state(warehouse, [work.vessel for work in sure]) if sure else {}
+    for work in sure:
+        assert work.before is not None
+        now = after[work.vessel]
+        made = len(set(now.set_ids) - set(work.before.set_ids))
+        if now.inputs == work.before.inputs and made == work.report.new_sets:
+            work.left = now.digest
 
 
 def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> list[Request]:
@@ -119,42 +269,6 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
         request = Request(ModelSpec.model_validate(spec), estimator)
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
     return [asked[key] for key in sorted(asked)] if known else [Request()]
-
-
-def _pool(
-    warehouse: Warehouse,
-    vessel: str,
-    request: Request,
-    outcomes: list[IdentifyOutcome],
-    report: VesselReport,
-    flow_run: str | None,
-    progress: Progress,
-) -> None:
-    """Pool what was identified; that segments have nothing in common is no failure of the separate ones."""
-    try:
-        pooled = pool_vessel(warehouse, vessel, request, outcomes, flow_run=flow_run, progress=progress)
-    except KempfError as error:
-        report.fail(POOLED, error)
-        return
-    if pooled is not None:
-        report.new_sets += pooled[1]
-        report.kept_sets += not pooled[1]
-
-
-def _model(warehouse: Warehouse, vessel: str, report: VesselReport, flow_run: str | None, progress: Progress) -> None:
-    """Bring the model with effects that the vessel stands at up to date; where that fails she stands where she was."""
-    now = standing(warehouse, vessel)
-    if now is None:
-        return
-    spec, own = model_of(now)
-    try:
-        made, new = store_model(warehouse, choose(warehouse, vessel), spec, own, progress, flow_run)
-    except KempfError as error:
-        report.fail(ALIAS, error)
-        return
-    point(warehouse, made)
-    report.new_sets += new
-    report.kept_sets += not new
 
 
 def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -88,31 +88,40 @@ def run_id_of(vessel: str, *, changed_only: bool, estimator: str | None = None) 
     return runs.run_id(FLOW, {"vessel": vessel, "changed_only": changed_only, "estimator": estimator})
 
 
-def remember(warehouse: Warehouse, report: VesselReport, run: Run) -> None:
-    """Store a run; failures that stood there before are marked as known in the report and in what is stored.
+def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, Run]]) -> None:
+    """Store runs in one commit; failures that stood there before are marked as known in the reports and in the runs.
 
     Parameters
     ----------
     warehouse : Warehouse
-    report : VesselReport
-    run : Run
-        Of `VesselReport.as_run`.
+    found : sequence of (VesselReport, Run)
+        Each with the run of its `VesselReport.as_run`.
     """
-    if report.failures:
-        before = {_what(f) for earlier in runs.some(warehouse, [run.run_id]) for f in earlier.message["failures"]}
+    every = [
+        run_id_of(report.vessel, changed_only=changed_only) for report, _ in found for changed_only in (True, False)
+    ]
+    stored = {run.run_id: run for run in runs.some(warehouse, [*every, *(run.run_id for _, run in found)])}
+    told = []
+    for report, run in found:
+        before = {_what(f) for f in stored[run.run_id].message["failures"]} if run.run_id in stored else set()
         for failure in report.failures:
             failure["known"] = _what(failure) in before
-    told = replace(run, message={**run.message, "failures": report.failures})
-    runs.record_all(warehouse, [told, *_forgotten(warehouse, run)])
+        told.append(replace(run, message={**run.message, "failures": report.failures}))
+        told += _forgotten(run, stored)
+    runs.record_all(warehouse, told)
 
 
-def _forgotten(warehouse: Warehouse, run: Run) -> list[Run]:
+def _forgotten(run: Run, stored: Mapping[str, Run]) -> list[Run]:
     """Return the runs of the same vessel whose state no longer tells that nothing is left to do."""
     if "state" in run.message:
         return []
     names = [run_id_of(str(run.vessel), changed_only=changed_only) for changed_only in (True, False)]
-    stale = [one for one in runs.some(warehouse, names) if "state" in one.message and one.run_id != run.run_id]
-    return [replace(one, message={k: v for k, v in one.message.items() if k != "state"}) for one in stale]
+    stale = [stored[name] for name in names if name in stored and name != run.run_id]
+    return [
+        replace(one, message={k: v for k, v in one.message.items() if k != "state"})
+        for one in stale
+        if "state" in one.message
+    ]
 
 
 def from_run(run: Run) -> VesselReport:

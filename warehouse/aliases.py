@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from schemas.errors import UsageError
 from warehouse import delta, parameter_sets
-from warehouse.keys import quoted, vessel_key
+from warehouse.keys import one_of, quoted, vessel_key
 from warehouse.retry import with_retry
 from warehouse.store import Warehouse
 
@@ -34,19 +36,44 @@ def point(warehouse: Warehouse, vessel: str, parameter_set_id: str, alias: str =
             f"List hers with `kempf params list --vessel {vessel!r}`.",
             {"parameter_set_id": found.parameter_set_id, "vessel": found.vessel},
         )
-    key = vessel_key(vessel)
-    row = {"vessel_key": key, "vessel": vessel, "alias": alias, "parameter_set_id": found.parameter_set_id}
+    return bool(point_all(warehouse, {(vessel, alias): found.parameter_set_id}))
 
-    def attempt() -> bool:
+
+def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tuple[tuple[str, str], ...]:
+    """Let aliases of several vessels point to sets that are stored, in at most one commit.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    wanted : mapping of (str, str) to str
+        Whole ids of the vessels' own parameter sets, by vessel and alias.
+
+    Returns
+    -------
+    tuple of (str, str)
+        Those that pointed elsewhere before, sorted.
+    """
+    rows = {
+        (vessel, alias): {"vessel_key": vessel_key(vessel), "vessel": vessel, "alias": alias, "parameter_set_id": name}
+        for (vessel, alias), name in sorted(wanted.items())
+    }
+
+    def attempt() -> tuple[tuple[str, str], ...]:
         with delta.ensured(warehouse, "aliases") as table:
-            stored = delta.rows(table, "aliases", {"vessel_key": key, "alias": alias})
-            if stored["parameter_set_id"].to_list() == [found.parameter_set_id]:
-                return False
-            predicate = f"vessel_key = {quoted(key)} AND alias = {quoted(alias)}"
-            delta.replace(table, "aliases", [row], predicate)
-            return True
+            keys = sorted({row["vessel_key"] for row in rows.values()})
+            known = delta.rows(table, "aliases", {"vessel_key": keys}).rows(named=True)
+            stored = {(row["vessel"], row["alias"]): row["parameter_set_id"] for row in known}
+            changed = tuple(key for key in rows if stored.get(key) != wanted[key])
+            if changed:
+                # of one name only: several would also name what is not among them
+                of = {alias: [rows[key]["vessel_key"] for key in changed if key[1] == alias] for _, alias in changed}
+                predicate = " OR ".join(
+                    f"({one_of('vessel_key', whose)} AND alias = {quoted(alias)})" for alias, whose in of.items()
+                )
+                delta.replace(table, "aliases", [rows[key] for key in changed], predicate)
+            return changed
 
-    return with_retry(attempt)
+    return with_retry(attempt) if rows else ()
 
 
 def of_vessel(warehouse: Warehouse, vessel: str) -> dict[str, str]:

@@ -38,33 +38,34 @@ class StoredExamination:
     content: Mapping[str, Any] = field(default_factory=dict)
 
 
-def replace(warehouse: Warehouse, vessel: str, found: Sequence[StoredExamination]) -> tuple[str, ...]:
-    """Put examinations of a vessel's ingests in place of what is stored of these, in at most one commit.
+def replace(warehouse: Warehouse, found: Sequence[StoredExamination]) -> tuple[str, ...]:
+    """Put examinations of some ingests, of any vessels, in place of what is stored of these, in at most one commit.
 
     Returns
     -------
     tuple of str
         Ingests of which something changed, sorted.
     """
-    key = vessel_key(vessel)
-    new = {one.ingest_id: _row(key, one) for one in found}
+    new = {one.ingest_id: _row(one) for one in found}
+    keys = sorted({row["vessel_key"] for row in new.values()})
 
     def attempt() -> tuple[str, ...]:
         with delta.ensured(warehouse, "examinations") as table:
-            stored = delta.rows(table, "examinations", {"vessel_key": key, "ingest_id": sorted(new)}).rows(named=True)
+            stored = delta.rows(table, "examinations", {"vessel_key": keys, "ingest_id": sorted(new)}).rows(named=True)
             held = {row["ingest_id"]: row for row in stored}
             changed = sorted(one for one, row in new.items() if held.get(one) != row)
             if changed:
-                predicate = f"{one_of('vessel_key', [key])} AND {one_of('ingest_id', changed)}"
+                whose = {new[one]["vessel_key"] for one in changed}
+                predicate = f"{one_of('vessel_key', whose)} AND {one_of('ingest_id', changed)}"
                 delta.replace(table, "examinations", [new[one] for one in changed], predicate)
             return tuple(changed)
 
     return with_retry(attempt) if new else ()
 
 
-def _row(key: str, one: StoredExamination) -> dict[str, Any]:
+def _row(one: StoredExamination) -> dict[str, Any]:
     return {
-        "vessel_key": key,
+        "vessel_key": vessel_key(one.vessel),
         "vessel": one.vessel,
         "ingest_id": one.ingest_id,
         "log_id": one.log_id,

@@ -13,6 +13,7 @@ from warehouse.canonical import canonical_json, plain, sha256
 from warehouse.instant import iso_utc
 from warehouse.keys import one_of, vessel_key
 from warehouse.retry import with_retry
+from warehouse.scan import Where
 from warehouse.store import Warehouse
 
 _JSON = ("imo", "quality", "detail")
@@ -118,29 +119,55 @@ def replace(warehouse: Warehouse, vessel: str, found: Mapping[str, Sequence[Segm
     ValueError
         A segment names another vessel or ingest than it is given for.
     """
-    key = vessel_key(vessel)
-    for ingest, segments in found.items():
+    return replace_all(warehouse, {(vessel, ingest): segments for ingest, segments in found.items()})
+
+
+def replace_all(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segment]]) -> tuple[str, ...]:
+    """Do as `replace` for ingests of several vessels, all in at most one commit.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none.
+    found : mapping of (str, str) to sequence of Segment
+        By vessel and ingest id.
+
+    Returns
+    -------
+    tuple of str
+        Ingests whose segments changed, sorted.
+
+    Raises
+    ------
+    ValueError
+        See `replace`.
+    """
+    keys = {vessel: vessel_key(vessel) for vessel, _ in found}
+    for (vessel, ingest), segments in found.items():
         for segment in segments:
             if (segment.vessel, segment.ingest_id) != (vessel, ingest):
                 raise ValueError(f"{segment.segment_id} is of {segment.vessel!r}, {segment.ingest_id}: not {ingest}")
+    of_ingest = {ingest: (keys[vessel], segments) for (vessel, ingest), segments in found.items()}
 
     def attempt() -> tuple[str, ...]:
         with delta.ensured(warehouse, "segments") as table:
-            known = delta.rows(table, "segments", {"vessel_key": key, "ingest_id": sorted(found)})
-            stored = [_segment(row) for row in known.rows(named=True)]
+            hers: Where = {"vessel_key": sorted(keys.values()), "ingest_id": sorted(of_ingest)}
+            known: dict[str, list[Segment]] = {}
+            for row in delta.rows(table, "segments", hers).rows(named=True):
+                known.setdefault(row["ingest_id"], []).append(_segment(row))
             changed = tuple(
                 ingest
-                for ingest in sorted(found)
-                if _text(found[ingest]) != _text([s for s in stored if s.ingest_id == ingest])
+                for ingest, (_, segments) in sorted(of_ingest.items())
+                if _text(segments) != _text(known.get(ingest, ()))
             )
             if changed:
-                rows = [_as_columns(segment) for ingest in changed for segment in _sorted(found[ingest])]
-                delta.replace(
-                    table, "segments", rows, f"{one_of('vessel_key', [key])} AND {one_of('ingest_id', changed)}"
-                )
+                rows = [_as_columns(segment) for ingest in changed for segment in _sorted(of_ingest[ingest][1])]
+                whose = {of_ingest[ingest][0] for ingest in changed}
+                predicate = f"{one_of('vessel_key', whose)} AND {one_of('ingest_id', changed)}"
+                delta.replace(table, "segments", rows, predicate)
             return changed
 
-    return with_retry(attempt)
+    return with_retry(attempt) if found else ()
 
 
 def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:

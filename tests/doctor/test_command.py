@@ -90,6 +90,6 @@ def test_a_doctor_who_fails_costs_no_log(folder: Path, monkeypatch: pytest.Monke
 def test_an_examination_is_kept_once(folder: Path) -> None:
     place = Warehouse(str(folder / "w"))
     one = examinations.StoredExamination("made", "i" * 16, "l" * 64, "c" * 16, "clean", (), {"checks": []})
-    assert examinations.replace(place, one.vessel, [one])
-    assert not examinations.replace(place, one.vessel, [one])
+    assert examinations.replace(place, [one])
+    assert not examinations.replace(place, [one])
     assert examinations.of_ingests(place, ["i" * 16, "none"]) == {"i" * 16: one}

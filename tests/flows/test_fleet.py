@@ -161,16 +161,16 @@ def damage(warehouse: Warehouse, vessel: str) -> None:
 
 
 def test_the_batch_goes_on_behind_a_fault_of_our_own(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
-    from flows import fleet_plan
+    from flows import reprocess_vessel
     from flows.fleet import reports_of
 
-    def one(warehouse: Warehouse, vessel: str, **named: Any) -> Any:
+    def one(warehouse: Warehouse, vessel: str, *rest: Any) -> Any:
         if vessel == "ferry":
             raise ZeroDivisionError("division by zero")
-        return real(warehouse, vessel, **named)
+        return real(warehouse, vessel, *rest)
 
-    real = fleet_plan.reprocess_vessel
-    monkeypatch.setattr(fleet_plan, "reprocess_vessel", one)
+    real = reprocess_vessel._requests
+    monkeypatch.setattr(reprocess_vessel, "_requests", one)
     vessels.register(own, "ferry", vessels.current(own, "ferry").model_copy(update={"wind_arm_per_m": 0.003}))
     reports = reports_of(own.uri, ["tramp", "ferry", "ferry"])
     assert [(r["vessel"], r["status"]) for r in reports] == [("ferry", "failed"), ("tramp", "unchanged")]

@@ -1,0 +1,94 @@
+"""What was made and is not stored yet: parameter sets and what aliases shall point to, for one commit a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+
+from flows.unforeseen import as_told
+from schemas.errors import KempfError
+from warehouse import aliases, parameter_sets
+from warehouse.parameter_set import ParameterSet
+from warehouse.store import Warehouse
+
+#: New sets of a vessel that wait for one commit: less than a minute of work, which is what a crash may cost.
+_SETS_A_COMMIT = 8
+
+
+class Waiting:
+    """New sets of one vessel, and her aliases; a long list of sets is stored on the way.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    """
+
+    def __init__(self, warehouse: Warehouse, vessel: str) -> None:
+        self._warehouse, self._vessel = warehouse, vessel
+        self.sets: list[ParameterSet] = []
+        #: by vessel and alias
+        self.aliases: dict[tuple[str, str], str] = {}
+
+    def keep(self, made: Sequence[ParameterSet]) -> None:
+        """Take new sets."""
+        self.sets.extend(made)
+        if len(self.sets) >= _SETS_A_COMMIT:
+            # what cannot be stored is not tried again on the way out
+            made, self.sets = self.sets, []
+            parameter_sets.insert(self._warehouse, made)
+
+    def standing(self, alias: str = aliases.CURRENT) -> ParameterSet | None:
+        """Return the set that an alias points to, or will."""
+        stored = aliases.of_vessel(self._warehouse, self._vessel).get(alias)
+        name = self.aliases.get((self._vessel, alias), stored)
+        if name is None:
+            return None
+        made = next((one for one in self.sets if one.parameter_set_id == name), None)
+        return made or parameter_sets.get(self._warehouse, name)
+
+    def point(self, parameter_set_id: str, alias: str = aliases.CURRENT) -> None:
+        """Let an alias point to one of her sets, once that is stored."""
+        self.aliases[self._vessel, alias] = parameter_set_id
+
+
+@contextmanager
+def waiting(warehouse: Warehouse, vessel: str) -> Iterator[Waiting]:
+    """Lend a list, and store what is in it also where the block is left by an error."""
+    one = Waiting(warehouse, vessel)
+    try:
+        yield one
+    finally:
+        _store(warehouse, [one])
+
+
+def store_together(warehouse: Warehouse, lists: Mapping[str, Waiting]) -> dict[str, KempfError]:
+    """Store what waits of several vessels, in one commit a table; where that fails each vessel's alone.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    lists : mapping of str to Waiting
+        By vessel.
+
+    Returns
+    -------
+    dict of str to KempfError
+        What could not be stored, by vessel.
+    """
+    try:
+        _store(warehouse, list(lists.values()))
+    except Exception as error:  # noqa: BLE001 - told below, for the vessels that it concerns
+        if len(lists) == 1:
+            return dict.fromkeys(lists, as_told(error))
+        failed: dict[str, KempfError] = {}
+        for vessel, one in lists.items():
+            failed |= store_together(warehouse, {vessel: one})
+        return failed
+    return {}
+
+
+def _store(warehouse: Warehouse, lists: Sequence[Waiting]) -> None:
+    parameter_sets.insert(warehouse, [made for one in lists for made in one.sets])
+    # behind the sets: an alias never points to what is not there
+    aliases.point_all(warehouse, {key: name for one in lists for key, name in one.aliases.items()})
