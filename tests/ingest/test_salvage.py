@@ -100,6 +100,18 @@ def test_without_a_footer_nothing_is_lost_where_the_data_section_is_whole():
     assert numbers == whole(range(CHUNKS)) and readings.partial
 
 
+@pytest.mark.parametrize("rotten", [3, CHUNKS - 1])
+def test_messages_of_a_chunk_that_says_it_is_shorter_are_not_taken_for_loose_ones(rotten):
+    data, places = log(b"", index=False, closed=False)
+    damaged = bytearray(data)
+    # its record ends between two of its messages, so that the others seem to stand behind it
+    inside = 40 + sum(len(record(*one)) for one in messages(rotten)[:10])
+    damaged[places[rotten][0] + 1 : places[rotten][0] + 9] = struct.pack("<Q", inside)
+    readings, chunks, numbers = kept(bytes(damaged))
+    assert chunks == set(range(CHUNKS)) - {rotten} and numbers == whole(chunks)
+    assert readings.partial
+
+
 @pytest.mark.parametrize("compression", PACK)
 @pytest.mark.parametrize("rotten", [0, 5, CHUNKS - 1])
 @pytest.mark.parametrize("closed", [True, False])

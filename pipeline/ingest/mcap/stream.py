@@ -12,7 +12,7 @@ MCAP specification, https://mcap.dev/spec.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 
 import numpy as np
 from numpy.typing import NDArray
@@ -94,6 +94,8 @@ class McapStream:
         self._crc_to = 0
         self._last_ns: int | None = None
         self._found = 0
+        # whether the last record was a chunk that is lost, of which no summary says where it ends
+        self._doubted = False
 
     @property
     def partial(self) -> bool:
@@ -182,11 +184,11 @@ class McapStream:
                 buffer = as_bytes(data)
                 opcode, first, end, reached = walk(buffer, 0, len(data))
             sound = self._sound(at, opcode, first, end)
-            yield from self._window(at, data, opcode[:sound], first[:sound], end[:sound])
-            if sound < opcode.size:
-                kind, place = int(opcode[sound]), at + int(first[sound]) - HEAD
+            handed = yield from self._window(at, data, opcode[:sound], first[:sound], end[:sound])
+            if handed < opcode.size:
+                kind, place = int(opcode[handed]), at + int(first[handed]) - HEAD
                 if kind == DATA_END and self._summary.data_end in (-1, place):
-                    self._end(data, place - at, at, int(first[sound]), int(end[sound]))
+                    self._end(data, place - at, at, int(first[handed]), int(end[handed]))
                     return
                 self._check_window(at, data, place - at)
                 yield from self._mended(place)
@@ -213,29 +215,40 @@ class McapStream:
         found = np.flatnonzero(strange)
         return int(found[0]) if found.size else int(opcode.size)
 
-    def _window(self, at: int, data: bytes, opcode: NDArray[np.uint8], first: Index, end: Index) -> Iterator[Batch]:
-        """Hand on the messages of some records, those of chunks and those outside in the order of the file."""
+    def _window(
+        self, at: int, data: bytes, opcode: NDArray[np.uint8], first: Index, end: Index
+    ) -> Generator[Batch, None, int]:
+        """Hand on the messages of some records, those of chunks and those outside in the order of the file.
+
+        Returns how many records were believed: messages right behind a chunk that fails its checksum may be its own.
+        """
         buffer, told = as_bytes(data), np.flatnonzero((opcode == CHUNK) | (opcode == CHANNEL) | (opcode == SCHEMA))
         loose_from = 0
         for i in [*told.tolist(), opcode.size]:
+            if self._doubted and loose_from < i and opcode[loose_from] == MESSAGE:
+                self._doubted = False
+                return loose_from
+            self._doubted &= loose_from == i
             loose = loose_from + np.flatnonzero(opcode[loose_from:i] == MESSAGE)
             if loose.size:
                 low, high = int(first[loose[0]]), int(end[loose[-1]])
                 piece = Piece(at + low, high - low, packed=False, size=high - low)
                 yield messages_of(buffer[low:high], first[loose] - low, end[loose] - low, piece)
             loose_from = i + 1
-            if i == opcode.size:
-                return
-            content = memoryview(data)[int(first[i]) : int(end[i])]
-            if opcode[i] == CHUNK:
-                yield from self._chunk(at + int(first[i]) - HEAD, content)
-            else:
-                self._describe(int(opcode[i]), bytes(content))
+            if i < opcode.size:
+                self._doubted = False
+                content = memoryview(data)[int(first[i]) : int(end[i])]
+                if opcode[i] == CHUNK:
+                    yield from self._chunk(at + int(first[i]) - HEAD, content)
+                else:
+                    self._describe(int(opcode[i]), bytes(content))
+        return int(opcode.size)
 
     def _chunk(self, place: int, content: memoryview) -> Iterator[Batch]:
         try:
             records = unpacked(content, CHUNK_LIMIT)
         except DamagedChunkError as why:
+            self._doubted = place not in self._length
             batch, lost = lost_chunk(self._log, place, HEAD + len(content), str(why))
             self._note_chunk(place, lost)
             yield batch
