@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Nanoseconds, Values
+from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Nanoseconds, Values
 from pipeline.ingest.mapping import check_once
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.sniff import separator_of
@@ -23,6 +23,9 @@ _QUOTE, _TAB, _FEED = 34, 9, 10
 
 #: Most characters of a cell that are looked at: far more than any number or time has.
 _LONGEST_CELL = 1_000
+
+#: Longest row that is cut into cells, bytes, and about so many bytes of rows that are cut at a time.
+_LONGEST_ROW, _BLOCK = 1 << 20, 4 << 20
 
 #: Most names of columns that a message lists.
 _SHOWN = 40
@@ -165,10 +168,39 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
         )
 
 
-def _cells(layout: Layout, wanted: list[str]) -> tuple[NDArray[np.bool_], dict[str, pl.Series]]:
+def _cells(layout: Layout, wanted: list[str]) -> tuple[Flag, dict[str, pl.Series]]:
     """Cut the cells of some columns out of the rows; also tell which rows have as many cells as the header."""
-    rows, width = layout.rows, len(layout.columns)
-    buffer = np.append(rows.buffer, np.uint8(_FEED))
+    rows = layout.rows
+    whole = rows.stop - rows.start <= _LONGEST_ROW
+    parts: list[dict[str, pl.Series]] = [_no_cells(wanted)]
+    looked_at = np.flatnonzero(whole)
+    # so that what is known of every byte is not held for all of a file
+    for of_block in np.split(looked_at, _cuts(rows.take(looked_at))):
+        if of_block.size:
+            whole[of_block], cells = _cut(layout, _alone(rows.take(of_block)), wanted)
+            parts.append(cells)
+    return whole, {name: pl.concat([part[name] for part in parts]) for name in wanted}
+
+
+def _cuts(rows: Spans) -> Index:
+    """Return the rows with which blocks of about `_BLOCK` bytes begin, but for the first."""
+    block = rows.start // _BLOCK
+    return np.flatnonzero(np.diff(block)) + 1
+
+
+def _alone(rows: Spans) -> Spans:
+    """Return rows with a buffer of their own, behind which there is room for one byte."""
+    first, last = int(rows.start[0]), int(rows.stop[-1])
+    return Spans(np.append(rows.buffer[first:last], np.uint8(_FEED)), rows.start - first, rows.stop - first)
+
+
+def _no_cells(wanted: list[str]) -> dict[str, pl.Series]:
+    return {name: pl.Series(name, [], dtype=pl.String) for name in wanted}
+
+
+def _cut(layout: Layout, rows: Spans, wanted: list[str]) -> tuple[Flag, dict[str, pl.Series]]:
+    """Cut the cells of some columns out of some rows, with which the buffer begins and ends but for a byte."""
+    buffer, width = rows.buffer, len(layout.columns)
     separator = layout.separator or "\x1f"
     if separator == "whitespace":
         buffer[rows.stop] = _FEED
@@ -193,8 +225,8 @@ def _cells(layout: Layout, wanted: list[str]) -> tuple[NDArray[np.bool_], dict[s
         k = layout.columns.index(name)
         start = good.start if k == 0 else bounds[np.minimum(low + k - 1, places.size)] + 1
         stop = good.stop if k == width - 1 else bounds[np.minimum(low + k, places.size)]
-        text = Spans(buffer, start, stop).text(limit=_LONGEST_CELL)
-        cell = _unquoted(pl.col("raw").str.strip_chars()) if quoted else pl.col("raw").str.strip_chars()
+        text = Spans(buffer, start, stop).text(limit=_LONGEST_CELL).alias(name)
+        cell = _unquoted(pl.col(name).str.strip_chars()) if quoted else pl.col(name).str.strip_chars()
         cells[name] = text.to_frame().select(cell.replace("", None)).to_series()
     return whole, cells
 
@@ -206,7 +238,7 @@ def _unquoted(cell: pl.Expr) -> pl.Expr:
     return pl.when(is_quoted).then(inner).otherwise(cell)
 
 
-def _inside_quotes(quote: NDArray[np.bool_], rows: Spans) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _inside_quotes(quote: Flag, rows: Spans) -> tuple[Flag, Flag]:
     """Tell which bytes stand between quotation marks, and which rows close all of theirs."""
     # whether the marks up to each byte are odd in number; a count of them would take eight times the memory
     odd = np.logical_xor.accumulate(quote)

@@ -6,6 +6,7 @@ from time import process_time
 
 import pytest
 
+from pipeline.ingest import delimited
 from pipeline.ingest.read import read_log
 from schemas.errors import DataRejected, UsageError
 from schemas.profile import VesselProfile
@@ -176,3 +177,33 @@ def test_a_message_does_not_list_very_many_columns():
 
 def test_lines_may_end_with_carriage_returns_alone():
     assert read(f"utc,sog,hdg\r{T}1Z,10,90\r{T}2Z,,91\r").frame.height == 2
+
+
+@pytest.mark.parametrize("sign", [",", "whitespace"])
+@pytest.mark.parametrize("block", [16, 100, 1_000])
+def test_where_the_rows_are_cut_into_blocks_changes_nothing(monkeypatch, sign, block):
+    empty = "n/a" if sign == "whitespace" else ""
+    rows = [f"{T}1.{k:03d}Z,{empty if k % 7 == 0 else k / 8},{k}{',x' if k % 11 == 0 else ''}" for k in range(200)]
+    rows[5] = f'{T}1.005Z,"5",5'
+    rows[150] = f'{T}1.150Z,"1""5",5'
+    rows[151] = f'{T}1.151Z,"15,5'
+    text = "\n".join(["utc,sog,hdg", *rows, ""])
+    given = profile()
+    if sign == "whitespace":
+        text = "\n".join(row.replace(",", "  " if k % 2 else "\t") for k, row in enumerate(text.split("\n")))
+        given = profile(separator="whitespace")
+    whole = read(text, given)
+    assert 0 < whole.tally.records_rejected < whole.tally.records_kept
+    monkeypatch.setattr(delimited, "_BLOCK", block)
+    parted = read(text, given)
+    assert parted.frame.equals(whole.frame) and parted.rejected.equals(whole.rejected)
+    assert parted.tally == whole.tally
+
+
+def test_a_row_longer_than_any_is_refused_and_the_others_are_kept():
+    rows = [f"{T}1Z,1,1", f'{T}2Z,"{"7" * (2 << 20)}",2', f"{T}3Z,3,3"]
+    readings = read("\n".join(["utc,sog,hdg", *rows]))
+    assert readings.tally.by_reason == {"malformed": 1}
+    assert readings.frame["heading_rad"].to_list() == [math.radians(1), math.radians(3)]
+    (raw,) = readings.rejected["raw"].to_list()
+    assert raw.startswith(f'{T}2Z,"777')
