@@ -46,7 +46,7 @@ def measure(folder: Path, sizes: Sequence[int]) -> dict[str, Any]:
     for n in sorted(set(sizes)):
         found.append(at(Warehouse(str(folder / f"of{n}")), template, n))
         print(f"{n} vessels: a commit {found[-1]['one']['cpu_s']:.3f} s of the processor", flush=True)
-    return {"table": TABLE, "together": TOGETHER, "times": TIMES, "sizes": found}
+    return {"table": TABLE, "together": TOGETHER, "times": TIMES, "shared": SHARED, "sizes": found}
 
 
 def at(warehouse: Warehouse, template: Template, n: int) -> dict[str, Any]:
@@ -56,8 +56,9 @@ def at(warehouse: Warehouse, template: Template, n: int) -> dict[str, Any]:
     -------
     dict
         ``vessels``, ``files``; ``one`` and ``together``: seconds on the clock and of the processor, all threads
-        together, of a commit of one vessel and of `TOGETHER`; ``a_second``: commits of `TOGETHER` vessels a second by
-        several writers at once, by their number; ``read``: of reading the sets of one vessel.
+        together, of a commit of one vessel and of `TOGETHER`; ``read``: of reading the sets of one vessel;
+        ``writers``: commits of `TOGETHER` vessels a second by several writers at once, by their number, and what each
+        takes of the processor.
     """
     if n < TOGETHER:
         raise ValueError(f"{n} vessels: {TOGETHER} of them share a commit.")
@@ -80,7 +81,7 @@ def at(warehouse: Warehouse, template: Template, n: int) -> dict[str, Any]:
         "read": _medians([_timed(partial(parameter_sets.get_all, warehouse, hers)) for hers in asked]),
         "one": timed(1),
         "together": timed(TOGETHER),
-        "a_second": {str(k): _a_second(warehouse, new, k) for k in WRITERS if k * TOGETHER <= n},
+        "writers": {str(k): _at_once(warehouse, new, n, filled.version(), k) for k in WRITERS if k * TOGETHER <= n},
     }
 
 
@@ -125,15 +126,17 @@ def _take_back(warehouse: Warehouse, n: int, version: int) -> None:
         table.restore(version)
 
 
-def _a_second(warehouse: Warehouse, new: _New, n_writers: int) -> float:
-    """Return how many commits a second several writers make together; a lost race costs them time, as in use."""
+def _at_once(warehouse: Warehouse, new: _New, n: int, version: int, n_writers: int) -> dict[str, float]:
+    """Return commits a second of several writers together, and what each took of the processor, s."""
     work = [[new(TOGETHER, writer, n_writers) for _ in range(SHARED // n_writers)] for writer in range(n_writers)]
 
     def write(batches: list[list[ParameterSet]]) -> None:
         for batch in batches:
             parameter_sets.insert(warehouse, batch)
 
-    begun = perf_counter()
+    begun, worked = perf_counter(), process_time()
     with ThreadPoolExecutor(n_writers) as pool:
         list(pool.map(write, work))
-    return sum(map(len, work)) / (perf_counter() - begun)
+    took, cpu, n_commits = perf_counter() - begun, process_time() - worked, sum(map(len, work))
+    _take_back(warehouse, n, version)
+    return {"a_second": n_commits / took, "cpu_s": cpu / n_commits}

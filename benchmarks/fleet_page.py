@@ -84,8 +84,11 @@ def lines(figures: Figures) -> list[str]:
         "## Commits",
         "",
         *result_page.table(
-            ["table", "commits a vessel"],
-            [[name, f"{n / whole['vessels']:.2f}"] for name, n in sorted(whole["commits"].items())],
+            ["table", "commits a vessel", "a batch"],
+            [
+                [name, f"{n / whole['vessels']:.2f}", f"{n / whole['batches']:.2f}"]
+                for name, n in sorted(whole["commits"].items())
+            ],
         ),
         "",
         *commits(figures),
@@ -95,7 +98,7 @@ def lines(figures: Figures) -> list[str]:
 def commits(figures: Figures) -> list[str]:
     """Lines about what a commit costs."""
     told, sizes = figures["commits"], figures["commits"]["sizes"]
-    writers = sorted({n for size in sizes for n in size["a_second"]}, key=int)
+    writers = sorted({n for size in sizes for n in size["writers"]}, key=int)
     shared = f"{told['together']} vessels"
     return [
         f"A commit to the table {told['table']} by the number of vessels in it, one set and one file each, which is "
@@ -120,14 +123,19 @@ def commits(figures: Figures) -> list[str]:
             ],
         ),
         "",
-        f"Writers at once, in threads of one process, each commit of {shared}, no vessel of two writers:",
+        f"Writers at once, in threads of one process, each commit of {shared}, no vessel of two writers, "
+        f"{told['shared']} commits in all:",
         "",
         *result_page.table(
-            ["vessels", *(f"commits a second, {n} writer{'s' if n != '1' else ''}" for n in writers)],
+            ["vessels", *(f"{n} writer{'s' if n != '1' else ''}, {what}" for n in writers for what in _AT_ONCE)],
             [
                 [
                     f"{size['vessels']}",
-                    *(f"{size['a_second'][n]:.2g}" if n in size["a_second"] else "" for n in writers),
+                    *(
+                        f"{size['writers'][n][k]:.2g}" if n in size["writers"] else ""
+                        for n in writers
+                        for k in _AT_ONCE.values()
+                    ),
                 ]
                 for size in sizes
             ],
@@ -135,6 +143,7 @@ def commits(figures: Figures) -> list[str]:
     ]
 
 
+_AT_ONCE = {"commits a second": "a_second", "s of the processor each": "cpu_s"}
 _HOW = {"wall_s": "on the clock", "cpu_s": "of the processor"}
 
 
@@ -165,7 +174,7 @@ def draw(figures: Figures, path: Path) -> None:
         axes[:2], (each, nothing), ("first run, s a vessel", "a run for nothing, s"), strict=True
     ):
         one.plot(sizes, values, "o-", color="black")
-        one.set(xlabel="vessels", title=title, ylim=(0.0, None), xlim=(0.0, None))
+        one.set(xlabel="vessels", title=title, ylim=(0.0, 1.1 * max(values)), xlim=(0.0, 1.05 * max(sizes)))
     _draw_commits(figures, axes[2])
     figure.savefig(path, dpi=120, metadata={"Software": None})
     plt.close(figure)
@@ -178,6 +187,6 @@ def _draw_commits(figures: Figures, axes: Axes) -> None:
         axes.loglog(
             vessels, [size[what]["cpu_s"] for size in told["sizes"]], mark, color="black", mfc="white", label=name
         )
-    axes.set(xlabel="vessels in the table", title="a commit, s of the processor")
+    axes.set(xlabel="vessels in the table", ylabel="s", title="a commit, s of the processor")
     axes.grid(visible=True, which="major", linewidth=0.4)
     axes.legend(frameon=False)

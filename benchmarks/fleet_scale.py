@@ -28,8 +28,11 @@ class Large:
         Batches that `flows.fleet_plan` makes, and vessels of the largest.
     core_s : float
         Of the processor without the commits, s: that of the fleet measured times the vessels.
+    writers, a_second, commit_s : int, float, float
+        How many at once the table that was measured took most commits a second from, how many it took, and what each
+        was of the processor, s.
     commit_core_s : float
-        Of the processor for the commits to all tables, s: each taken for one to the table that was measured.
+        Of the processor for the commits to all tables, s: each taken for one to that table.
     busiest : str
         Table that is committed to most.
     commits : float
@@ -41,6 +44,9 @@ class Large:
     batches: int
     most: int
     core_s: float
+    writers: int
+    a_second: float
+    commit_s: float
     commit_core_s: float
     busiest: str
     commits: float
@@ -69,15 +75,19 @@ def large(figures: Figures, vessels: int) -> Large:
     plan = Plan(tuple((f"{k}", logs) for k in range(vessels)), ())
     batches = plan.batches(figures["cores"])
     a_batch = {name: n / whole["batches"] for name, n in whole["commits"].items()}
+    writers, best = max(at["writers"].items(), key=lambda item: item[1]["a_second"])
     busiest, most = max(a_batch.items(), key=lambda item: (item[1], item[0]))
     return Large(
         batches=len(batches),
         most=max(map(len, batches)),
         core_s=whole["cpu_s"] / whole["vessels"] * vessels,
-        commit_core_s=sum(a_batch.values()) * len(batches) * at["together"]["cpu_s"],
+        writers=int(writers),
+        a_second=best["a_second"],
+        commit_s=best["cpu_s"],
+        commit_core_s=sum(a_batch.values()) * len(batches) * best["cpu_s"],
         busiest=busiest,
         commits=most * len(batches),
-        serial_s=most * len(batches) / max(at["a_second"].values()),
+        serial_s=most * len(batches) / best["a_second"],
     )
 
 
@@ -86,12 +96,10 @@ def lines(figures: Figures) -> list[str]:
     whole, at = figures["whole"], figures["commits"]["sizes"][-1]
     n, fleet = whole["vessels"], at["vessels"]
     everything, some = large(figures, fleet), large(figures, max(1, fleet // 100))
-    writers, rate = max(at["a_second"].items(), key=lambda item: item[1])
     sizes = np.array([step["vessels"] for step in figures["steps"]], dtype=float)
     slope, at_none = np.polyfit(sizes, [step["again"]["wall_s"] for step in figures["steps"]], 1)
     nothing = max(float(at_none), 0.0) + max(float(slope), 0.0) * fleet
     raw, tables = figures["bytes"].get("raw", 0), sum(v for k, v in figures["bytes"].items() if k != "raw")
-    own = at["together"]["cpu_s"]
     commits_first = everything.full_from < everything.cores_a_night
     rows = [
         ["everything again (new code), core hours", f"{everything.all_core_s / 3600.0:.1f}"],
@@ -100,8 +108,11 @@ def lines(figures: Figures) -> list[str]:
         ["batches", f"{everything.batches}"],
         ["vessels in the largest of them", f"{everything.most}"],
         [f"commits to the busiest table, {everything.busiest}", f"{everything.commits:.0f}"],
-        ["processor time of a commit, s", f"{own:.2f}"],
-        [f"hours for these at {rate:.2g} a second, however many cores", f"{everything.serial_s / 3600.0:.2f}"],
+        ["processor time of a commit, s", f"{everything.commit_s:.2f}"],
+        [
+            f"hours for these at {everything.a_second:.2g} a second, however many cores",
+            f"{everything.serial_s / 3600.0:.2f}",
+        ],
         ["cores from which commits to one table, not cores, are the limit", f"{everything.full_from:.0f}"],
         ["one vessel in a hundred changed, core hours", f"{some.all_core_s / 3600.0:.2f}"],
         ["nothing changed, seconds", f"{nothing:.0f}"],
@@ -114,9 +125,9 @@ def lines(figures: Figures) -> list[str]:
         f"{np.ceil(n / whole['batches']):.0f}. A vessel takes {everything.core_s / fleet:.1f} core seconds, a batch "
         f"{sum(whole['commits'].values()) / whole['batches']:.1f} commits to all tables together, of which "
         f"{everything.commits / everything.batches:.1f} to {everything.busiest}. A commit to a table of {at['files']} "
-        f"files takes {own:.2f} s of the processor, so that commits are "
-        f"{100.0 * everything.commit_core_s / everything.all_core_s:.0f} % of the work. One table took {rate:.2g} "
-        f"commits a second at best, from {writers} {'writer' if writers == '1' else 'writers'} at once on "
+        f"files takes {everything.commit_s:.2f} s of the processor, so that commits are "
+        f"{100.0 * everything.commit_core_s / everything.all_core_s:.0f} % of the work. One table took "
+        f"{everything.a_second:.2g} commits a second at best, writers at once being {everything.writers}, on "
         f"{figures['cores']} cores: were it never more, more than {everything.full_from:.0f} cores would not help. "
         f"{fleet} vessels in {NIGHT_H:.0f} hours want {everything.cores_a_night}."
     )

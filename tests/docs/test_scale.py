@@ -11,9 +11,10 @@ from benchmarks import fleet_figures, fleet_page, fleet_scale, result_page
 def _figures() -> dict[str, Any]:
     """A made-up measurement with round figures: 8 batches of 5 vessels, one core second a vessel."""
     cost = {"wall_s": 0.2, "cpu_s": 0.1}
+    writers = {"1": {"a_second": 4.0, "cpu_s": 0.1}, "2": {"a_second": 5.0, "cpu_s": 0.125}}
     run = {"wall_s": 25.0, "cpu_s": 40.0, "plan_s": 0.1, "changed": 1, "sets": 40, "reread": 160, "vessels": 40}
     whole = {**run, "batches": 8, "engine_share": 0.04, "commits": {"parameter_sets": 16, "runs": 8, "vessels": 0}}
-    size = {"vessels": 1000, "files": 1000, "read": cost, "one": cost, "together": cost, "a_second": {"1": 4, "2": 5}}
+    size = {"vessels": 1000, "files": 1000, "read": cost, "one": cost, "together": cost, "writers": writers}
     return {
         "vessels": 40,
         "logs": 4,
@@ -28,7 +29,7 @@ def _figures() -> dict[str, Any]:
             for plain in (1.8, 2.4, 1.9)
         ],
         "dask_s": {"1": 2.0, "2": 1.0},
-        "commits": {"table": "parameter_sets", "together": 20, "times": 7, "sizes": [size]},
+        "commits": {"table": "parameter_sets", "together": 20, "times": 7, "shared": 12, "sizes": [size]},
         "bytes": {"raw": 1, "runs": 1},
     }
 
@@ -50,16 +51,16 @@ def test_a_large_fleet_costs_its_work_and_its_commits() -> None:
     # 4,000 logs, about twenty a batch: 200 batches of five; three commits each, two of them to one table
     assert (whole.batches, whole.most, whole.busiest, whole.commits) == (200, 5, "parameter_sets", 400.0)
     assert whole.core_s == pytest.approx(1000.0)
-    assert whole.commit_core_s == pytest.approx(200 * 3 * 0.1)
+    assert whole.commit_core_s == pytest.approx(200 * 3 * 0.125)
     assert whole.serial_s == pytest.approx(400 / 5)
-    assert whole.full_from == pytest.approx(1060.0 / 80.0)
+    assert whole.full_from == pytest.approx(1075.0 / 80.0)
     assert whole.cores_a_night == 1
 
 
 @pytest.mark.parametrize(("a_second", "cpu_s", "first"), [(5.0, 0.1, "the cores"), (0.01, 100.0, "the commits")])
 def test_what_is_full_first_comes_out_of_the_figures(a_second: float, cpu_s: float, first: str) -> None:
     figures = copy.deepcopy(_figures())
-    figures["commits"]["sizes"][-1] |= {"a_second": {"1": a_second}, "together": {"wall_s": cpu_s, "cpu_s": cpu_s}}
+    figures["commits"]["sizes"][-1] |= {"writers": {"1": {"a_second": a_second, "cpu_s": cpu_s}}}
     assert fleet_scale.lines(figures)[0].startswith(f"**First full: {first}")
 
 
