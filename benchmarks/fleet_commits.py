@@ -26,7 +26,7 @@ from warehouse.parameter_set import ParameterSet
 from warehouse.store import Warehouse
 
 TABLE = "parameter_sets"
-#: Vessels that share a commit where it is not of one vessel: as many as the largest batch has.
+#: Vessels that share a commit where it is not of one: somewhat more than a batch has, of vessels with some logs each.
 TOGETHER = 20
 #: Commits whose median counts, and commits shared by all writers of one trial.
 TIMES, SHARED = 7, 12

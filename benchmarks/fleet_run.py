@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -78,16 +77,9 @@ def without_prefect(warehouse: Warehouse, names: list[str]) -> Run:
     watch = _Watch()
     with watch.patched():
         begun, worked = time.perf_counter(), time.process_time()
-        todo = fleet_plan.plan(warehouse, names)
-        assert not todo.kept
-        with ThreadPoolExecutor(usable()) as pool:
-            done = list(pool.map(lambda one: _batch(warehouse, one), todo.batches(usable())))
+        reports = fleet_plan.do_fleet(warehouse, names)
         took = time.perf_counter() - begun, time.process_time() - worked
-    return _run([report for reports in done for report in reports], took, watch, {})
-
-
-def _batch(warehouse: Warehouse, batch: list[str]) -> list[dict[str, Any]]:
-    return fleet_plan.do_batch(warehouse, batch, changed_only=True)
+    return _run(reports, took, watch, {})
 
 
 def _run(reports: list[dict[str, Any]], took: tuple[float, float], watch: _Watch, commits: dict[str, int]) -> Run:

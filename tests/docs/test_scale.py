@@ -6,6 +6,7 @@ from typing import Any
 import pytest
 
 from benchmarks import fleet_figures, fleet_page, fleet_scale, result_page
+from flows import fleet_plan
 
 
 def _figures() -> dict[str, Any]:
@@ -46,9 +47,10 @@ def test_the_figures_are_computed_from_the_last_measurement() -> None:
     assert figures["commits"]["sizes"][-1]["vessels"] == 10_000  # the fleet that the words around them are about
 
 
-def test_a_large_fleet_costs_its_work_and_its_commits() -> None:
+def test_a_large_fleet_costs_its_work_and_its_commits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet_plan, "LOGS_A_BATCH", 20)
     whole = fleet_scale.large(_figures(), 1000)
-    # 4,000 logs, about twenty a batch: 200 batches of five; three commits each, two of them to one table
+    # 4,000 logs, twenty a batch: 200 batches of five; three commits each, two of them to one table
     assert (whole.batches, whole.most, whole.busiest, whole.commits) == (200, 5, "parameter_sets", 400.0)
     assert whole.core_s == pytest.approx(1000.0)
     assert whole.commit_core_s == pytest.approx(200 * 3 * 0.125)
@@ -57,7 +59,7 @@ def test_a_large_fleet_costs_its_work_and_its_commits() -> None:
     assert whole.cores_a_night == 1
 
 
-@pytest.mark.parametrize(("a_second", "cpu_s", "first"), [(5.0, 0.1, "the cores"), (0.01, 100.0, "the commits")])
+@pytest.mark.parametrize(("a_second", "cpu_s", "first"), [(5.0, 0.1, "the cores"), (0.002, 100.0, "the commits")])
 def test_what_is_full_first_comes_out_of_the_figures(a_second: float, cpu_s: float, first: str) -> None:
     figures = copy.deepcopy(_figures())
     figures["commits"]["sizes"][-1] |= {"writers": {"1": {"a_second": a_second, "cpu_s": cpu_s}}}
