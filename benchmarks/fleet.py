@@ -7,18 +7,17 @@ run on one machine: look at their ratios. ``--draw`` makes the pages anew from t
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from benchmarks import fleet_logs, fleet_page, fleet_run
+from benchmarks import fleet_commits, fleet_figures, fleet_logs, fleet_page, fleet_run
 from flows.cores import usable
 from tests.scale.cluster import Cluster
 from tests.scale.servers import environment, free_port, running
@@ -28,6 +27,8 @@ from warehouse.store import Warehouse
 STEPS = (0.125, 0.25, 0.5, 1.0)
 #: Vessels of the comparisons that have to do everything twice.
 SUBSET = 24
+#: Rounds of Prefect, plain threads, plain threads, Prefect: a drift is in both pairs of a round, one way each.
+ROUNDS = 2
 
 
 @contextmanager
@@ -85,8 +86,24 @@ def grow(warehouse: Warehouse, voyages: fleet_logs.Voyages, n_vessels: int) -> l
     return found
 
 
-def measure(folder: Path, n_vessels: int, n_logs: int) -> dict[str, Any]:
-    """Measure everything on a fleet of some size."""
+def side_by_side(warehouse: Warehouse, names: list[str]) -> list[dict[str, dict[str, float]]]:
+    """Do the same by Prefect and by plain threads in turns; return what each cost, in pairs."""
+
+    def one(way: str) -> dict[str, float]:
+        fleet_logs.touch(warehouse, names)
+        run = (fleet_run.with_prefect if way == "engine" else fleet_run.without_prefect)(warehouse, names)
+        return {"wall_s": run.wall_s, "cpu_s": run.cpu_s}
+
+    found = []
+    for order in (("engine", "plain"), ("plain", "engine")) * ROUNDS:
+        found.append({way: one(way) for way in order})
+        print(f"beside plain threads: {found[-1]}", flush=True)
+    return found
+
+
+def measure(folder: Path, n_vessels: int, n_logs: int, sizes: Sequence[int]) -> dict[str, Any]:
+    """Measure everything on a fleet of some size, and commits to tables of several."""
+    commits = fleet_commits.measure(folder / "commits", sizes)
     voyages = fleet_logs.simulate(n_logs)
     warehouse = Warehouse(str(folder / "w"))
     names = [fleet_logs.name_of(k) for k in range(n_vessels)]
@@ -102,12 +119,7 @@ def measure(folder: Path, n_vessels: int, n_logs: int) -> dict[str, Any]:
         again = fleet_run.with_prefect(warehouse)
         fleet_logs.one_more(warehouse, voyages, n_vessels // 2)
         one = fleet_run.with_prefect(warehouse)
-        pairs = []
-        for _ in range(2):
-            fleet_logs.touch(warehouse, subset)
-            engine = fleet_run.with_prefect(warehouse, subset)
-            fleet_logs.touch(warehouse, subset)
-            pairs.append((engine.wall_s, fleet_run.without_prefect(warehouse, subset).wall_s))
+        pairs = side_by_side(warehouse, subset)
         dask = {}
         for n_workers in (1, 2):
             with dask_cluster(folder, n_workers, settings) as address:
@@ -116,7 +128,6 @@ def measure(folder: Path, n_vessels: int, n_logs: int) -> dict[str, Any]:
                 fleet_logs.touch(warehouse, subset)
                 dask[n_workers] = fleet_run.with_prefect(warehouse, subset, address).wall_s
             print(f"{n_workers} Dask workers: {dask[n_workers]:.1f} s", flush=True)
-        rates = {str(n): fleet_run.commits_a_second(warehouse, n) for n in (1, 2, 4)}
     return {
         "vessels": n_vessels,
         "logs": n_logs,
@@ -126,9 +137,9 @@ def measure(folder: Path, n_vessels: int, n_logs: int) -> dict[str, Any]:
         "again": asdict(again),
         "one": asdict(one),
         "subset": len(subset),
-        "prefect_pairs_s": pairs,
+        "pairs": pairs,
         "dask_s": {str(n): wall for n, wall in dask.items()},
-        "commits_a_second": rates,
+        "commits": commits,
         "bytes": fleet_run.size_bytes(warehouse),
         "log_bytes": len(voyages.rows[fleet_logs.HULLS[0]][0]),
     }
@@ -138,14 +149,27 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--vessels", type=int, default=200)
     parser.add_argument("--logs", type=int, default=5)
+    parser.add_argument(
+        "--commit-vessels",
+        type=int,
+        nargs="+",
+        default=[100, 1000, 10_000],
+        metavar="N",
+        help="commits are measured to tables of so many vessels, of which docs/scale.md is about the largest",
+    )
     parser.add_argument("--draw", action="store_true", help="only the pages, from the figures of the last run")
     options = parser.parse_args()
+    if min(options.commit_vessels) < fleet_commits.TOGETHER:
+        parser.error(f"--commit-vessels: {fleet_commits.TOGETHER} or more each")
     fleet_run.quiet()
     if not options.draw:
         with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            figures = measure(Path(folder), options.vessels, options.logs)
-        fleet_page.FIGURES.write_text(json.dumps(figures, indent=1) + "\n", encoding="utf-8")
-    path = fleet_page.write(json.loads(fleet_page.FIGURES.read_text(encoding="utf-8")))
+            figures = measure(Path(folder), options.vessels, options.logs, options.commit_vessels)
+        fleet_figures.store(figures)
+    try:
+        path = fleet_page.write(fleet_figures.stored())
+    except fleet_figures.OldFigures as error:
+        raise SystemExit(str(error)) from error
     print(path.read_text(encoding="utf-8"))
 
 

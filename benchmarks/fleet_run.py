@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,7 +12,7 @@ from unittest.mock import patch
 
 from flows import fleet_plan
 from flows.cores import usable
-from warehouse import delta, runs
+from warehouse import delta
 from warehouse.store import Warehouse
 
 
@@ -29,6 +28,8 @@ class Run:
         Vessels that something was done for, new parameter sets, logs read anew.
     wall_s : float
         From the call of the flow to its end.
+    cpu_s : float
+        Of the processor, all threads of this process together.
     busy_s : float
         Time inside the batches, summed over the threads; 0 where they ran elsewhere.
     batches : int
@@ -43,6 +44,7 @@ class Run:
     sets: int
     reread: int
     wall_s: float
+    cpu_s: float
     busy_s: float = 0.0
     batches: int = 0
     commits: dict[str, int] = field(default_factory=dict)
@@ -62,32 +64,33 @@ def with_prefect(warehouse: Warehouse, names: list[str] | None = None, dask: str
     flow = reprocess.with_options(task_runner=task_runner(dask or ""))
     before, watch = delta.versions(warehouse), _Watch()
     with watch.patched():
-        begun = time.perf_counter()
+        begun, worked = time.perf_counter(), time.process_time()
         reports = flow(warehouse.uri, names)
-        wall = time.perf_counter() - begun
+        took = time.perf_counter() - begun, time.process_time() - worked
     assert isinstance(reports, list)
     commits = {name: at - before.get(name, 0) for name, at in delta.versions(warehouse).items()}
-    return _run(reports, wall, watch, commits)
+    return _run(reports, took, watch, commits)
 
 
 def without_prefect(warehouse: Warehouse, names: list[str]) -> Run:
-    """Do the same by plain threads."""
+    """Do the same batches by plain threads."""
     watch = _Watch()
     with watch.patched():
-        begun = time.perf_counter()
+        begun, worked = time.perf_counter(), time.process_time()
         reports = fleet_plan.do_fleet(warehouse, names)
-        wall = time.perf_counter() - begun
-    return _run(reports, wall, watch, {})
+        took = time.perf_counter() - begun, time.process_time() - worked
+    return _run(reports, took, watch, {})
 
 
-def _run(reports: list[dict[str, Any]], wall: float, watch: _Watch, commits: dict[str, int]) -> Run:
+def _run(reports: list[dict[str, Any]], took: tuple[float, float], watch: _Watch, commits: dict[str, int]) -> Run:
     assert not any(report["failures"] for report in reports), reports
     return Run(
         vessels=len(reports),
         changed=sum(report["status"] == "changed" for report in reports),
         sets=sum(report["new_sets"] for report in reports),
         reread=sum(report["reread"] for report in reports),
-        wall_s=wall,
+        wall_s=took[0],
+        cpu_s=took[1],
         busy_s=sum(watch.batches),
         batches=len(watch.batches),
         commits=commits,
@@ -120,20 +123,6 @@ def _timed(function: Any, into: list[float]) -> Any:
             into.append(time.perf_counter() - begun)
 
     return wrapped
-
-
-def commits_a_second(warehouse: Warehouse, n_writers: int, n_commits: int = 40) -> float:
-    """Commits a second to one table of a warehouse that stands, by several writers at once."""
-
-    def write(writer: int) -> None:
-        for k in range(n_commits // n_writers):
-            name = runs.run_id("commits", [writer, k])
-            assert runs.record(warehouse, runs.Run(name, "commits", None, f"{n_writers} {time.monotonic_ns()}"))
-
-    begun = time.perf_counter()
-    with ThreadPoolExecutor(n_writers) as pool:
-        list(pool.map(write, range(n_writers)))
-    return n_commits / (time.perf_counter() - begun)
 
 
 def size_bytes(warehouse: Warehouse) -> dict[str, int]:

@@ -1,17 +1,81 @@
 """docs/scale.md: its figures are those of the last measurement, computed and not typed."""
 
-import json
+import copy
+from typing import Any
 
 import pytest
 
-from benchmarks import fleet_page, result_page
+from benchmarks import fleet_figures, fleet_page, fleet_scale, result_page
+from flows import fleet_plan
+
+
+def _figures() -> dict[str, Any]:
+    """A made-up measurement with round figures: 8 batches of 5 vessels, one core second a vessel."""
+    cost = {"wall_s": 0.2, "cpu_s": 0.1}
+    writers = {"1": {"a_second": 4.0, "cpu_s": 0.1}, "2": {"a_second": 5.0, "cpu_s": 0.125}}
+    run = {"wall_s": 25.0, "cpu_s": 40.0, "plan_s": 0.1, "changed": 1, "sets": 40, "reread": 160, "vessels": 40}
+    whole = {**run, "batches": 8, "engine_share": 0.04, "commits": {"parameter_sets": 16, "runs": 8, "vessels": 0}}
+    size = {"vessels": 1000, "files": 1000, "read": cost, "one": cost, "together": cost, "writers": writers}
+    return {
+        "vessels": 40,
+        "logs": 4,
+        "cores": 2,
+        "steps": [{"vessels": n, "new": 20, "take_in_s": 1.0, "first": run, "again": run} for n in (20, 40)],
+        "whole": whole,
+        "again": run,
+        "one": run,
+        "subset": 24,
+        "pairs": [
+            {"engine": {"wall_s": 2.0, "cpu_s": 1.0}, "plain": {"wall_s": plain, "cpu_s": 0.98}}
+            for plain in (1.8, 2.4, 1.9)
+        ],
+        "dask_s": {"1": 2.0, "2": 1.0},
+        "commits": {"table": "parameter_sets", "together": 20, "times": 7, "shared": 12, "sizes": [size]},
+        "bytes": {"raw": 1, "runs": 1},
+    }
 
 
 def test_the_figures_are_computed_from_the_last_measurement() -> None:
-    text = fleet_page.SCALE.read_text(encoding="utf-8")
-    if not fleet_page.FIGURES.is_file():
-        pytest.skip("no fleet was measured: python -m benchmarks.fleet")
-    figures = json.loads(fleet_page.FIGURES.read_text(encoding="utf-8"))
-    assert fleet_page.with_figures(text, figures) == text
+    text = fleet_scale.SCALE.read_text(encoding="utf-8")
+    try:
+        figures = fleet_figures.stored()
+    except fleet_figures.OldFigures as error:
+        pytest.skip(str(error))
+    assert fleet_scale.with_figures(text, figures) == text
     page = (result_page.RESULTS / "fleet.md").read_text(encoding="utf-8")
     assert "\n".join(fleet_page.lines(figures)) in page
+    assert figures["commits"]["sizes"][-1]["vessels"] == 10_000  # the fleet that the words around them are about
+
+
+def test_a_large_fleet_costs_its_work_and_its_commits(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet_plan, "LOGS_A_BATCH", 20)
+    whole = fleet_scale.large(_figures(), 1000)
+    # 4,000 logs, twenty a batch: 200 batches of five; three commits each, two of them to one table
+    assert (whole.batches, whole.most, whole.busiest, whole.commits) == (200, 5, "parameter_sets", 400.0)
+    assert whole.core_s == pytest.approx(1000.0)
+    assert whole.commit_core_s == pytest.approx(200 * 3 * 0.125)
+    assert whole.serial_s == pytest.approx(400 / 5)
+    assert whole.full_from == pytest.approx(1075.0 / 80.0)
+    assert whole.cores_a_night == 1
+
+
+@pytest.mark.parametrize(("a_second", "cpu_s", "first"), [(5.0, 0.1, "the cores"), (0.002, 100.0, "the commits")])
+def test_what_is_full_first_comes_out_of_the_figures(a_second: float, cpu_s: float, first: str) -> None:
+    figures = copy.deepcopy(_figures())
+    figures["commits"]["sizes"][-1] |= {"writers": {"1": {"a_second": a_second, "cpu_s": cpu_s}}}
+    assert fleet_scale.lines(figures)[0].startswith(f"**First full: {first}")
+
+
+def test_a_share_comes_with_its_spread() -> None:
+    assert fleet_page.against_threads(_figures(), "wall_s") == "5.0 % (-20.0 to 10.0)"
+    assert "5.0 % (-20.0 to 10.0)" in "\n".join(fleet_page.lines(_figures()))
+
+
+def test_figures_of_an_older_form_are_refused_in_one_sentence(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fleet_figures, "FIGURES", tmp_path / "fleet.json")
+    old = {key: value for key, value in _figures().items() if key != "commits"}
+    fleet_figures.store(old)
+    with pytest.raises(fleet_figures.OldFigures, match=r"^fleet.json lacks commits: measure anew by `[^`]*`\.$"):
+        fleet_figures.stored()
+    fleet_figures.store(_figures())
+    assert fleet_figures.stored() == _figures()
