@@ -10,6 +10,7 @@ from typing import Any
 from flows.examine_log import examine_instruments
 from flows.files import opened_log
 from flows.find_segments import Ingest, find_segments
+from flows.freed import give_back
 from flows.lost import as_json
 from flows.progress import Progress, silent
 from flows.spool import spooled
@@ -191,7 +192,9 @@ def ingest_log(
             path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, lost=gone, examination=seen
         )
     with spooled(file_name, log, profile) as readings:
+        give_back()
         read = look_through(vessel, file_name, log, profile, readings)
+        give_back()
         (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
     return IngestOutcome(
@@ -226,7 +229,9 @@ def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfi
     code = code_version.fingerprint()
     one = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code))
     instruments = from_readings(readings.lazy())
+    give_back()
     zigzags, notes = find_segments(one, profile, instruments)
+    give_back()
     seen = _examined(one, profile, file_name, instruments, readings.format)
     delivery = Delivery(vessel, file_name, log, profile, readings, code, notes)
     return ReadLog(delivery, one.ingest_id, tuple(zigzags), seen)

@@ -7,6 +7,7 @@ under `warehouse.retry.with_retry`. (Merges lose the units in the field metadata
 
 from __future__ import annotations
 
+import os
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -25,6 +26,13 @@ if TYPE_CHECKING:
     import polars as pl
     import pyarrow as pa
     from deltalake import DeltaTable
+
+# One thread moves the rows of a write on: with more, those that read ahead outrun the one that packs, and a log of
+# gigabytes piles up between them. Packing is done by that one alone in any case. Asked for when the library starts.
+os.environ.setdefault("TOKIO_WORKER_THREADS", "1")
+
+#: Rows that are handed to the writer at once; it holds some ten such batches.
+_BATCH_ROWS = 16_384
 
 #: The past is kept: history as of a time and reruns read old versions.
 _CONFIGURATION = {
@@ -304,7 +312,8 @@ def _batches(frames: Iterator[pl.DataFrame], schema: pa.Schema) -> Iterator[pa.R
     import polars as pl
 
     for frame in frames:
-        yield from frame.select(schema.names).to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema).to_batches()
+        for some in frame.select(schema.names).iter_slices(_BATCH_ROWS):
+            yield from some.to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema).to_batches()
 
 
 @contextmanager

@@ -77,9 +77,9 @@ def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
         return everything
     changed = np.concatenate(([True], np.any(values[1:] != values[:-1], axis=1)))
     starts = np.flatnonzero(changed)
-    lengths = np.diff(np.append(starts, n_rows))
-    if starts.size < _MIN_RUNS:
+    if starts.size < _MIN_RUNS or starts.size == n_rows:
         return everything
+    lengths = np.diff(np.append(starts, n_rows))
     # smoothed, because a sample on the edge of a row slips: runs of one row less and more are of the same period
     period = int(np.convolve(np.bincount(lengths, minlength=4), [1, 2, 1], "same").argmax())
     inner = lengths[1:-1]  # the first and last run may be cut by the ends of the log

@@ -60,8 +60,8 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     Parameters
     ----------
     readings : polars.DataFrame or polars.LazyFrame
-        Of one log, sorted by record, schema `pipeline.ingest.readings.READING_SCHEMA`; of a lazy one a few columns are
-        held at a time.
+        Of one log, sorted by record, schema `pipeline.ingest.readings.READING_SCHEMA`; of a lazy one the columns of one
+        instrument are held at a time.
 
     Returns
     -------
@@ -71,22 +71,22 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     there = set(frame.collect_schema().names())
     grouped = {name for group in _TOGETHER for name in group}
     groups = [*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped)]
+    groups = [group for group in groups if there.issuperset(_columns(group))]
+    counts = _counts(frame, [*groups, *((name,) for group in groups if len(group) > 1 for name in group)])
     series: dict[str, Series] = {}
     sources: dict[str, str] = {}
     notes: list[str] = []
     for group in groups:
-        columns = [CHANNELS[name].column for name in group]
-        if not there.issuperset(columns):
-            continue
-        rows = frame.select("time_utc_ns", "source", *columns).drop_nulls().collect()
-        if rows.is_empty():
+        offered = counts.filter(pl.col(_name(group)) > 0)
+        if offered.is_empty():
             # messages of their own, such as a topic for the speed and one for the course
             groups += [(name,) for name in group if len(group) > 1]
             continue
-        source = _choose(rows["source"], group, notes)
-        rows = rows.filter(pl.col("source") == source)
-        time = rows["time_utc_ns"].to_numpy().astype(np.int64)
-        values = rows.select(columns).to_numpy().astype(np.float64)
+        source = _choose(dict(offered.select("source", _name(group)).iter_rows()), group, notes)
+        rows = frame.filter(pl.col("source") == source).select("time_utc_ns", *_columns(group)).drop_nulls().collect()
+        time = rows["time_utc_ns"].to_numpy().astype(np.int64, copy=False)
+        values = rows.select(_columns(group)).to_numpy().astype(np.float64, copy=False)
+        del rows
         for name, one in _at_instants(group, time, values, source, notes).items():
             series[name] = one
             sources[name] = source
@@ -96,13 +96,26 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     return Instruments(series, sources, tuple(notes), frozenset(set(series) - own))
 
 
-def _choose(source: pl.Series, group: tuple[str, ...], notes: list[str]) -> str:
+def _columns(group: tuple[str, ...]) -> list[str]:
+    return [CHANNELS[name].column for name in group]
+
+
+def _name(group: tuple[str, ...]) -> str:
+    return " ".join(group)
+
+
+def _counts(frame: pl.LazyFrame, groups: list[tuple[str, ...]]) -> pl.DataFrame:
+    """Count the readings that give all channels of a group: a row a source, sorted by name, and a column a group."""
+    whole = [pl.all_horizontal(pl.col(_columns(g)).is_not_null()).sum().alias(_name(g)) for g in groups]
+    return frame.drop_nulls(["time_utc_ns", "source"]).group_by("source").agg(whole).sort("source").collect()
+
+
+def _choose(counts: dict[str, int], group: tuple[str, ...], notes: list[str]) -> str:
     """Name the source with most readings; among equals (within 2 %) one with its own clock, then by name."""
-    counts = source.value_counts(name="n").sort("source")
-    most = int(np.max(counts["n"].to_numpy()))
-    close = [str(name) for name, n in counts.iter_rows() if n >= 0.98 * most]
+    most = max(counts.values())
+    close = [name for name, n in counts.items() if n >= 0.98 * most]
     chosen = min(close, key=lambda name: (name[-3:] not in _OWN_CLOCK, name))
-    others = [str(name) for name in counts["source"] if name != chosen]
+    others = [name for name in counts if name != chosen]
     if others:
         notes.append(f"{' and '.join(group)} from {chosen}; also in {', '.join(others)}, not used")
     return chosen
@@ -111,19 +124,22 @@ def _choose(source: pl.Series, group: tuple[str, ...], notes: list[str]) -> str:
 def _at_instants(
     group: tuple[str, ...], time: Nanoseconds, values: Float, source: str, notes: list[str]
 ) -> dict[str, Series]:
-    order = np.argsort(time, kind="stable")
-    time, values = time[order], values[order]
-    first = np.concatenate(([True], np.diff(time) > 0))
-    time, values = time[first], values[first]
+    # most logs are in order, and a long one is not copied for nothing
+    if np.any(time[1:] < time[:-1]):
+        order = np.argsort(time, kind="stable")
+        time, values = time[order], values[order]
+    if np.any(time[1:] == time[:-1]):
+        first = np.concatenate(([True], time[1:] > time[:-1]))
+        time, values = time[first], values[first]
     held = find_held(time, values)
     if held.rows_per_value > 1:
         notes.append(
             f"{' and '.join(group)}: {source} holds each value for {held.rows_per_value} rows; "
-            f"kept {held.rows.size} of {time.size} rows, at their instants of measurement"
+            f"kept {held.time_utc_ns.size} of {time.size} rows, at their instants of measurement"
         )
     result = {}
     for k, name in enumerate(group):
-        value = values[held.rows, k]
+        value = values[held.rows, k] if held.rows_per_value > 1 else np.ascontiguousarray(values[:, k])
         if CHANNELS[name].wrap == "circle":
             value = np.unwrap(value)
         result[name] = Series(held.time_utc_ns, value)

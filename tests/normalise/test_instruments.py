@@ -137,3 +137,24 @@ def test_the_towing_tank_gives_speed_and_course_from_its_velocities() -> None:
     drift = np.arctan2(np.sin(drift), np.cos(drift))
     assert np.nanmax(np.abs(drift[200:])) < np.deg2rad(30.0)
     assert found.series["rudder_angle"].period_s == pytest.approx(0.05)
+
+
+def test_readings_in_files_out_of_order_give_the_same_series(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    t = np.arange(0.0, 300.0, 0.5)
+    t[[40, 41, 200]] = t[[41, 40, 199]]  # two exchanged, one instant twice: the first reading counts
+    rows = frame(("HEHDT", t, {"heading_rad": random.uniform(1.0, 1.2, t.size)}), ("GPRMC", t, gnss(t)))
+    rows = rows.sort("time_utc_ns", maintain_order=True).with_columns(record=pl.int_range(rows.height))
+    rows = pl.concat([rows[500:], rows[:500]])
+    for k, part in enumerate(rows.iter_slices(97)):
+        part.write_parquet(tmp_path / f"{k:03d}.parquet")
+    held, lazy = from_readings(rows), from_readings(pl.scan_parquet(sorted(tmp_path.glob("*.parquet"))))
+    order = np.argsort(rows["time_utc_ns"].to_numpy(), kind="stable")
+    own = (
+        rows[order].filter(pl.col("heading_rad").is_not_null()).unique("time_utc_ns", keep="first", maintain_order=True)
+    )
+    for found in (held, lazy):
+        heading = found.series["heading"]
+        assert np.array_equal(heading.time_utc_ns, own["time_utc_ns"].to_numpy())
+        assert np.array_equal(heading.value, own["heading_rad"].to_numpy())
+    assert held.sources == lazy.sources and held.notes == lazy.notes
