@@ -20,6 +20,13 @@ if TYPE_CHECKING:
 #: Handles kept in all; of more the one that was used longest ago goes.
 MOST = 24
 
+#: Commits that a handle is brought forward over before it is opened anew: the library keeps apart what each of them
+#: brought, and every question goes through all of these pieces. Opening costs less than a commit does.
+MOST_COMMITS = 32
+
+#: Attribute of a handle: the version at which it was opened.
+_BORN = "kempf_born"
+
 _lock = threading.Lock()
 _kept: list[tuple[tuple[object, ...], tuple[int, ...], DeltaTable]] = []
 
@@ -44,6 +51,8 @@ def borrowed(
     table = _taken(warehouse, name, key)
     if table is None:
         table = opened(warehouse, name)
+        if table is not None:
+            vars(table)[_BORN] = table.version()
     try:
         yield table
     except CommitFailedError:  # a lost race is no fault of the handle, and the next attempt wants it
@@ -81,7 +90,7 @@ def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: Delta
     if table is not None:
         with suppress(OSError):  # what was done with the table is done: a bucket that is gone now is told at the next
             mark = warehouse.mark_of(name, *_commit(table.version()))
-    if table is None or mark is None:
+    if table is None or mark is None or table.version() - vars(table).get(_BORN, 0) > MOST_COMMITS:
         return
     with _lock:
         _kept.append((key, mark, table))

@@ -137,3 +137,21 @@ def test_many_threads_lose_nothing(warehouse: Warehouse) -> None:
         seen = list(pool.map(lambda _: len(stands(warehouse)), range(8)))
     assert seen == [13] * 8
     assert len(handles._kept) <= handles.MOST
+
+
+def test_a_handle_that_saw_many_commits_is_opened_anew(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    opened = []
+    real = delta.open_table
+
+    def counted(place: Warehouse, name: str, version: int | None = None) -> Any:
+        opened.append(name)
+        return real(place, name, version)
+
+    monkeypatch.setattr(delta, "open_table", counted)
+    monkeypatch.setattr(handles, "MOST_COMMITS", 3)
+    put(warehouse, "0")
+    opened.clear()
+    for k in range(1, 9):
+        put(warehouse, str(k))
+        assert stands(warehouse) == {"run-1": str(k)}
+    assert 2 <= len(opened) <= 3
