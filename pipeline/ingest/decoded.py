@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Protocol, Self
+from typing import Protocol
 
 import numpy as np
 import polars as pl
@@ -31,7 +31,7 @@ class Pieces(Protocol):
         """Return the number of records."""
         ...
 
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Self:
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Pieces:
         """Return some of them, chosen by mask or by ascending index."""
         ...
 
@@ -54,10 +54,15 @@ class Chained:
     def __len__(self) -> int:
         return len(self.first) + len(self.second)
 
-    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Chained:
+    def take(self, chosen: NDArray[np.int64] | NDArray[np.bool_]) -> Pieces:
         """Return some of them, chosen by mask or by ascending index."""
         index = np.flatnonzero(chosen) if chosen.dtype == np.bool_ else chosen
         here = index < len(self.first)
+        # a place of which nothing is left is let go: else the chain grows by a link with every part of a long log
+        if not here.any():
+            return self.second.take(index - len(self.first))
+        if here.all():
+            return self.first.take(index)
         return Chained(self.first.take(index[here]), self.second.take(index[~here] - len(self.first)))
 
     def binary(self) -> pl.Series:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,18 +32,18 @@ class Series:
     def __post_init__(self) -> None:
         if self.time_utc_ns.shape != self.value.shape or self.value.ndim != 1:
             raise ValueError(f"time has shape {self.time_utc_ns.shape}, value {self.value.shape}: expected (n,) twice")
-        if self.time_utc_ns.size > 1 and not bool(np.all(np.diff(self.time_utc_ns) > 0)):
+        if self.time_utc_ns.size > 1 and not bool(np.all(self.time_utc_ns[1:] > self.time_utc_ns[:-1])):
             raise ValueError("the instants of a series must increase strictly")
 
     def __len__(self) -> int:
         return int(self.value.size)
 
-    @property
+    @cached_property
     def period_s(self) -> float:
         """Median time between values, s; NaN for fewer than two values."""
         if len(self) < 2:
             return float("nan")
-        return float(np.median(np.diff(self.time_utc_ns))) / SECOND_NS
+        return float(np.median(np.diff(self.time_utc_ns), overwrite_input=True)) / SECOND_NS
 
     def between(self, start_ns: int, end_ns: int) -> Series:
         """Return the values with ``start_ns <= time <= end_ns``."""

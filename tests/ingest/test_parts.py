@@ -79,6 +79,15 @@ def test_little_is_held_back() -> None:
     assert checks.part(first).tally.records_read == 4_000 - 2 * 3  # the last that is believed and the last, a source
 
 
+def test_a_log_of_thousands_of_parts_holds_no_more_than_a_link_a_source() -> None:
+    n = 1_500
+    whole = replace(untidy(3, n), time_utc_ns=START_NS + np.arange(n) * SECOND)
+    checks = Screen("nmea")
+    # each part holds something back for the next; a chain of all parts would be too deep to be walked
+    found = joined([checks.part(part) for part in cut(whole, list(range(1, n)))])
+    equal(found, screen(whole, "nmea"))
+
+
 def untidy_log(n: int = 300) -> bytes:
     """Two mapped topics and one that nobody asked for; clocks that jump, repetitions, broken payloads."""
     draw, out, at = random.Random(8), io.BytesIO(), dict.fromkeys(("/hdg", "/rot", "/other"), START_NS)
