@@ -21,8 +21,9 @@ from schemas.profile import VesselProfile
 _MOST_NODES = 100_000
 
 
-#: Largest file that is read whole, bytes; a raw log is opened, and its reader says what is too much.
-LARGEST_BYTES = 1 << 20
+#: Largest file that is read whole, bytes: a person writes some thousand, and what takes the parser of YAML a second is
+#: refused. A raw log is opened, and its reader says what is too much.
+LARGEST_BYTES = 1 << 16
 
 
 def read_bytes(path: Path, what: str) -> bytes:
@@ -41,7 +42,7 @@ def read_bytes(path: Path, what: str) -> bytes:
             raise DataRejected(
                 "file_too_large",
                 f"{path} has {file.size} bytes; a {what} of more than {LARGEST_BYTES} is not read.",
-                "Shorten it.",
+                "Look whether it is the right file; a long profile may be given as several files.",
                 {"path": str(path), "bytes": file.size},
             )
         return file.whole()
@@ -122,9 +123,10 @@ def read_yaml(path: Path, what: str) -> Any:
     """
     data = read_bytes(path, what)
     try:
-        root = yaml.compose(data, Loader=yaml.SafeLoader)
+        loader = yaml.SafeLoader(data)
+        root = loader.get_single_node()
         too_large = root is not None and _written_out(root, {}) > _MOST_NODES
-        content = None if too_large else yaml.safe_load(data)
+        content = None if root is None or too_large else loader.construct_document(root)
     except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError) as error:
         told = " ".join(str(error).split())
         raise UsageError(
