@@ -20,6 +20,9 @@ from schemas.profile import VesselProfile
 #: Keys and values in a file that a person wrote; a few hundred bytes of nested aliases can stand for billions.
 _MOST_NODES = 100_000
 
+#: Brackets that may stand within each other; a profile has two or three.
+_DEEPEST = 32
+
 
 #: Largest file that is read whole, bytes: a person writes some thousand, and what takes the parser of YAML a second is
 #: refused. A raw log is opened, and its reader says what is too much.
@@ -123,7 +126,7 @@ def read_yaml(path: Path, what: str) -> Any:
     """
     data = read_bytes(path, what)
     try:
-        loader = yaml.SafeLoader(data)
+        loader = _Loader(data)
         root = loader.get_single_node()
         too_large = root is not None and _written_out(root, {}) > _MOST_NODES
         content = None if root is None or too_large else loader.construct_document(root)
@@ -147,6 +150,15 @@ def read_yaml(path: Path, what: str) -> Any:
             {"path": str(path)},
         )
     return content
+
+
+class _Loader(yaml.SafeLoader):  # type: ignore[misc]  # the library has no types
+    """Refuses deep nesting at once: each further level costs the parser more than the one before."""
+
+    def fetch_flow_collection_start(self, token_class: type[yaml.Token]) -> None:
+        if self.flow_level >= _DEEPEST:
+            raise yaml.scanner.ScannerError(None, None, f"nested deeper than {_DEEPEST} brackets", self.get_mark())
+        super().fetch_flow_collection_start(token_class)
 
 
 def _written_out(node: yaml.Node, known: dict[int, int]) -> int:

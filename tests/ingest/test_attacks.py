@@ -68,6 +68,15 @@ def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
     assert caught.value.code == "file_too_large"
 
 
+@pytest.mark.parametrize("text", ["{" * 9_000, "[{" * 20_000, "sources: " + "[" * 40 + "]" * 40])
+def test_deep_nesting_is_refused_where_it_begins(tmp_path: Path, text: str) -> None:
+    profile = tmp_path / "profile.yaml"
+    profile.write_text(text)
+    with pytest.raises(UsageError, match="nested deeper than 32 brackets.* line 1, column") as caught:
+        read_profiles([profile])
+    assert caught.value.code == "not_yaml"
+
+
 @pytest.mark.parametrize(
     "text", ["length_m: !!float ''", "length_m: !!int _", "vessel: !!bool x", r'vessel: "\UFFFFFFFF"']
 )
