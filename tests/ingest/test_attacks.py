@@ -72,7 +72,7 @@ def test_a_huge_file_is_not_read(tmp_path: Path) -> None:
 def test_deep_nesting_is_refused_where_it_begins(tmp_path: Path, text: str) -> None:
     profile = tmp_path / "profile.yaml"
     profile.write_text(text)
-    with pytest.raises(UsageError, match="nested deeper than 32 brackets.* line 1, column") as caught:
+    with pytest.raises(UsageError, match=r"nested deeper than 32 brackets.* line 1, column") as caught:
         read_profiles([profile])
     assert caught.value.code == "not_yaml"
 
