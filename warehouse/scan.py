@@ -15,6 +15,9 @@ if TYPE_CHECKING:
     import polars as pl
     from deltalake import DeltaTable
 
+#: Attribute of an open table: a version, and which files answer the questions that were asked of it.
+_ASKED = "kempf_asked"
+
 #: Values that a column may have, by column.
 Where = Mapping[str, str | list[str]]
 
@@ -63,7 +66,7 @@ def _of_few_files(table: DeltaTable, empty: pl.DataFrame, single: Mapping[str, s
     """Return the rows of the files that may hold these values, by their folder or their statistics."""
     import polars as pl
 
-    files = table.file_uris(file_pruning_predicate=[(column, "=", value) for column, value in single.items()])
+    files = _files(table, single)
     if not files:
         return empty.lazy()
     folders = table.metadata().partition_columns  # what a folder is named by does not stand in its files
@@ -72,6 +75,18 @@ def _of_few_files(table: DeltaTable, empty: pl.DataFrame, single: Mapping[str, s
         files, schema=inside, missing_columns="insert", extra_columns="ignore", glob=False, hive_partitioning=False
     )
     return lazy.with_columns(pl.lit(single[column]).alias(column) for column in folders).select(empty.columns)
+
+
+def _files(table: DeltaTable, single: Mapping[str, str]) -> list[str]:
+    """Return the files that may hold these values; what was asked before of this version is not looked for again."""
+    version, known = vars(table).get(_ASKED, (None, {}))
+    if version != table.version():
+        version, known = vars(table)[_ASKED] = table.version(), {}
+    asked = tuple(sorted(single.items()))
+    if asked not in known:
+        known[asked] = table.file_uris(file_pruning_predicate=[(column, "=", value) for column, value in asked])
+    found: list[str] = known[asked]
+    return found
 
 
 def _empty(name: str) -> pl.DataFrame:

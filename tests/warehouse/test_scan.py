@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import pytest
+from deltalake import DeltaTable
+
 from warehouse import compaction, delta, runs
 from warehouse.store import Warehouse
 
@@ -23,3 +28,22 @@ def test_every_text_is_found_by_itself(warehouse: Warehouse) -> None:
             ships = delta.read(warehouse, "runs", {"vessel": one.flow})["run_id"].to_list()
             assert ships == ([one.run_id] if one.vessel is not None else [])
         compaction.compact(warehouse, more_files_than=1)
+
+
+def test_which_files_answer_is_asked_once_a_version(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    asked = []
+    real = DeltaTable.file_uris
+
+    def counted(table: DeltaTable, *given: Any, **named: Any) -> list[str]:
+        asked.append(table.version())
+        return real(table, *given, **named)
+
+    monkeypatch.setattr(DeltaTable, "file_uris", counted)
+    runs.record(warehouse, runs.Run("run-1", "ingest", None, "done"))
+    for _ in range(3):
+        assert [run.run_id for run in runs.all_runs(warehouse, "ingest")] == ["run-1"]
+    once = len(asked)
+    assert once == len(set(asked))
+    runs.record(warehouse, runs.Run("run-2", "ingest", None, "done"))
+    assert [run.run_id for run in runs.all_runs(warehouse, "ingest")] == ["run-1", "run-2"]
+    assert len(asked) > once
