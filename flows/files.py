@@ -152,7 +152,7 @@ def read_yaml(path: Path, what: str) -> Any:
     return content
 
 
-class _Loader(yaml.SafeLoader):  # type: ignore[misc]  # the library has no types
+class _Loader(yaml.SafeLoader):
     """Refuses deep nesting at once: each further level costs the parser more than the one before."""
 
     def fetch_flow_collection_start(self, token_class: type[yaml.Token]) -> None:
