@@ -101,6 +101,29 @@ def side_by_side(warehouse: Warehouse, names: list[str]) -> list[dict[str, dict[
     return found
 
 
+def by_workers(folder: Path, settings: dict[str, str], warehouse: Warehouse, names: list[str]) -> dict[int, float]:
+    """Let one Dask worker and then two do the same; return the seconds by their number."""
+    found = {}
+    for n_workers in (1, 2):
+        with dask_cluster(folder, n_workers, settings) as address:
+            fleet_logs.touch(warehouse, names[:n_workers])  # each worker loads its compiled code
+            fleet_run.with_prefect(warehouse, names[:n_workers], address)
+            fleet_logs.touch(warehouse, names)
+            found[n_workers] = fleet_run.with_prefect(warehouse, names, address).wall_s
+        print(f"{n_workers} Dask workers: {found[n_workers]:.1f} s", flush=True)
+    return found
+
+
+def dask_again(folder: Path, n_logs: int) -> dict[str, Any]:
+    """Measure Dask alone, on a fleet of its own."""
+    warehouse = Warehouse(str(folder / "w"))
+    with prefect_server(folder) as settings:
+        fleet_logs.take_in(warehouse, fleet_logs.simulate(n_logs), range(SUBSET))
+        fleet_run.with_prefect(warehouse)
+        found = by_workers(folder, settings, warehouse, [fleet_logs.name_of(k) for k in range(SUBSET)])
+    return {"dask_s": {str(n): wall for n, wall in found.items()}, "dask_of": SUBSET}
+
+
 def measure(folder: Path, n_vessels: int, n_logs: int, sizes: Sequence[int]) -> dict[str, Any]:
     """Measure everything on a fleet of some size, and commits to tables of several."""
     commits = fleet_commits.measure(folder / "commits", sizes)
@@ -120,14 +143,7 @@ def measure(folder: Path, n_vessels: int, n_logs: int, sizes: Sequence[int]) -> 
         fleet_logs.one_more(warehouse, voyages, n_vessels // 2)
         one = fleet_run.with_prefect(warehouse)
         pairs = side_by_side(warehouse, subset)
-        dask = {}
-        for n_workers in (1, 2):
-            with dask_cluster(folder, n_workers, settings) as address:
-                fleet_logs.touch(warehouse, names[:n_workers])  # each worker loads its compiled code
-                fleet_run.with_prefect(warehouse, names[:n_workers], address)
-                fleet_logs.touch(warehouse, subset)
-                dask[n_workers] = fleet_run.with_prefect(warehouse, subset, address).wall_s
-            print(f"{n_workers} Dask workers: {dask[n_workers]:.1f} s", flush=True)
+        dask = by_workers(folder, settings, warehouse, subset)
     return {
         "vessels": n_vessels,
         "logs": n_logs,
@@ -139,6 +155,7 @@ def measure(folder: Path, n_vessels: int, n_logs: int, sizes: Sequence[int]) -> 
         "subset": len(subset),
         "pairs": pairs,
         "dask_s": {str(n): wall for n, wall in dask.items()},
+        "dask_of": n_vessels,
         "commits": commits,
         "bytes": fleet_run.size_bytes(warehouse),
         "log_bytes": len(voyages.rows[fleet_logs.HULLS[0]][0]),
@@ -157,16 +174,22 @@ def main() -> None:
         metavar="N",
         help="commits are measured to tables of so many vessels, of which docs/scale.md is about the largest",
     )
+    parser.add_argument("--dask", action="store_true", help="only Dask anew, beside the other figures of the last run")
     parser.add_argument("--draw", action="store_true", help="only the pages, from the figures of the last run")
     options = parser.parse_args()
     if min(options.commit_vessels) < fleet_commits.TOGETHER:
         parser.error(f"--commit-vessels: {fleet_commits.TOGETHER} or more each")
     fleet_run.quiet()
-    if not options.draw:
-        with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-            figures = measure(Path(folder), options.vessels, options.logs, options.commit_vessels)
-        fleet_figures.store(figures)
     try:
+        if not options.draw:
+            before = fleet_figures.stored() if options.dask else {}
+            with TemporaryDirectory(ignore_cleanup_errors=True) as folder:
+                figures = (
+                    {**before, **dask_again(Path(folder), options.logs)}
+                    if options.dask
+                    else measure(Path(folder), options.vessels, options.logs, options.commit_vessels)
+                )
+            fleet_figures.store(figures)
         path = fleet_page.write(fleet_figures.stored())
     except fleet_figures.OldFigures as error:
         raise SystemExit(str(error)) from error

@@ -9,7 +9,21 @@ from benchmarks import result_page
 
 FIGURES = result_page.RESULTS / "fleet.json"
 #: What the pages are made from.
-_KEYS = ("vessels", "logs", "cores", "steps", "whole", "again", "one", "subset", "pairs", "dask_s", "commits", "bytes")
+_KEYS = (
+    "vessels",
+    "logs",
+    "cores",
+    "steps",
+    "whole",
+    "again",
+    "one",
+    "subset",
+    "pairs",
+    "dask_s",
+    "dask_of",
+    "commits",
+    "bytes",
+)
 
 Figures = dict[str, Any]
 

@@ -37,7 +37,7 @@ def lines(figures: Figures) -> list[str]:
         ["a second run, nothing changed, of the first", f"{100 * again['wall_s'] / whole['wall_s']:.2f} %", "2 %"],
         ["one log more: vessels looked at", f"{one['changed']}", "1"],
         ["one log more, time of the first", f"{100 * one['wall_s'] / whole['wall_s']:.2f} %", ""],
-        [f"two Dask workers over one, {figures['subset']} vessels", f"{workers:.2f}", "1.6"],
+        [f"two Dask workers over one, {figures['subset']} of {figures['dask_of']} vessels", f"{workers:.2f}", "1.6"],
         ["a vessel in the largest fleet over one in the smallest", f"{growth(figures):.2f}", "1 (linear)"],
     ]
     return [
