@@ -9,9 +9,20 @@ from __future__ import annotations
 import ctypes
 from functools import cache
 
+#: Records of a log of some parts.
+_LONG = 1 << 17
 
-def give_back() -> None:
-    """Give back what the allocators of C and of Arrow keep and do not use; nothing where they cannot."""
+
+def give_back(records: int) -> None:
+    """Give back what the allocators of C and of Arrow keep and do not use; nothing where they cannot.
+
+    Parameters
+    ----------
+    records : int
+        Of the log that is worked on; what a short one leaves is not worth the asking, which takes some 10 ms.
+    """
+    if records < _LONG:
+        return
     import pyarrow as pa
 
     pa.default_memory_pool().release_unused()

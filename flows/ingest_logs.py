@@ -192,9 +192,9 @@ def ingest_log(
             path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, lost=gone, examination=seen
         )
     with spooled(file_name, log, profile) as readings:
-        give_back()
+        give_back(readings.tally.records_read)
         read = look_through(vessel, file_name, log, profile, readings)
-        give_back()
+        give_back(readings.tally.records_read)
         (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
     return IngestOutcome(
@@ -229,9 +229,9 @@ def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfi
     code = code_version.fingerprint()
     one = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code))
     instruments = from_readings(readings.lazy())
-    give_back()
+    give_back(readings.tally.records_read)
     zigzags, notes = find_segments(one, profile, instruments)
-    give_back()
+    give_back(readings.tally.records_read)
     seen = _examined(one, profile, file_name, instruments, readings.format)
     delivery = Delivery(vessel, file_name, log, profile, readings, code, notes)
     return ReadLog(delivery, one.ingest_id, tuple(zigzags), seen)
@@ -247,7 +247,7 @@ def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
     """
     # zigzags and verdicts before the rows that make the logs count: what a crash leaves in between is not seen, and not
     # missed
-    segments.replace_all(warehouse, {(one.delivery.vessel, one.ingest_id): one.segments for one in read})
+    segments.replace(warehouse, {(one.delivery.vessel, one.ingest_id): one.segments for one in read})
     examinations.replace(warehouse, [one.examination for one in read])
     return deposit(warehouse, [one.delivery for one in read])
 

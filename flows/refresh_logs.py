@@ -5,10 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
+from functools import partial
 
 from flows.ingest_logs import ReadLog, look_through, store
 from flows.progress import Progress, silent
 from flows.spool import spooled
+from flows.together import together_or_each
 from flows.unforeseen import as_told
 from schemas.errors import KempfError
 from schemas.profile import VesselProfile
@@ -113,7 +115,7 @@ def read_anew(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Progre
                     read[row.ingest_id] = look_through(row.vessel, row.file_name, log, profile, readings)
                 except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                     failed[row.ingest_id] = as_told(error)
-            failed |= _stored(warehouse, read)
+            failed |= together_or_each(read, partial(store, warehouse))
     return {vessel: _refreshed(hers, failed) for vessel, hers in stale.items()}
 
 
@@ -132,17 +134,3 @@ def _chunks(stale: Sequence[LogRow]) -> list[list[LogRow]]:
         else:
             chunks.append([row])
     return chunks
-
-
-def _stored(warehouse: Warehouse, read: Mapping[str, ReadLog]) -> dict[str, KempfError]:
-    """Store logs together; where that fails each alone, so that one does not take the others with it."""
-    try:
-        store(warehouse, list(read.values()))
-    except Exception as error:  # noqa: BLE001 - told below, for the logs that it concerns
-        if len(read) == 1:
-            return dict.fromkeys(read, as_told(error))
-        failed: dict[str, KempfError] = {}
-        for name, one in read.items():
-            failed |= _stored(warehouse, {name: one})
-        return failed
-    return {}

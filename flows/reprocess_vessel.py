@@ -6,8 +6,9 @@ and each commit looks at all of them.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 from flows.fleet_state import VesselState, fleet_state
 from flows.identify_vessel import IdentifyOutcome, Request, identify_segments
@@ -15,11 +16,12 @@ from flows.pool_vessel import POOLED, pool_segments
 from flows.progress import Progress, silent
 from flows.refresh_logs import Refreshed, Stale, read_anew, stale_logs
 from flows.rerun_set import rerun
+from flows.together import together_or_each
 from flows.unforeseen import as_told
 from flows.vessel_model import ALIAS, ESTIMATOR, model_of, point, standing, store_model
 from flows.vessel_report import VesselReport, remember_all
 from flows.vessel_runs import choose
-from flows.waiting import Waiting, store_together
+from flows.waiting import Waiting, store
 from schemas.errors import KempfError
 from schemas.model_spec import ModelSpec
 from warehouse import aliases, code_version, logs, parameter_sets, segments
@@ -91,14 +93,15 @@ def reprocess_vessels(
     try:
         _each(all_of_them, job.identify)
     finally:  # also where it is interrupted: what was identified need not be so again
-        for vessel, error in store_together(warehouse, {w.vessel: w.new for w in all_of_them}).items():
-            works[vessel].report.new_sets -= len(works[vessel].new.sets)
+        new = {vessel: work.new for vessel, work in works.items()}
+        for vessel, error in together_or_each(new, partial(store, warehouse)).items():
+            works[vessel].report.new_sets -= len(new[vessel].sets)
             works[vessel].stop(error)
     _each(all_of_them, job.finish)
     if not changed_only:
         _each(all_of_them, lambda work: _verify(warehouse, work.vessel, work.report))
     if request is None:
-        _together(all_of_them, lambda: _leave(warehouse, list(_going(all_of_them))))
+        _together(all_of_them, lambda: _leave(warehouse, _going(all_of_them)))
     estimator = request.estimator if request else None
     runs = [(w.report, w.report.as_run(w.left, changed_only=changed_only, estimator=estimator)) for w in all_of_them]
     _together(all_of_them, lambda: remember_all(warehouse, runs))
@@ -121,7 +124,6 @@ class _Work:
     new: Waiting
     before: VesselState | None = None
     requests: Sequence[Request] = ()
-    names: Mapping[str, str] = field(default_factory=dict)
     stale: Stale | None = None
     refreshed: Refreshed | None = None
     left: str | None = None
@@ -171,16 +173,16 @@ class _Job:
     def look(self, work: _Work) -> None:
         """See what there is to do."""
         work.requests = _requests(self.warehouse, work.vessel, self.request)
-        work.names = {row.ingest_id: row.file_name for row in logs.current(self.warehouse, work.vessel)}
         work.stale = stale_logs(self.warehouse, work.vessel)
 
     def identify(self, work: _Work) -> None:
         """Identify what is not identified yet, every segment and all of them together."""
         report, refreshed = work.report, work.refreshed
-        assert refreshed is not None
+        assert refreshed is not None and work.stale is not None
+        names = {row.ingest_id: row.file_name for row in work.stale.rows}
         report.logs, report.reread = refreshed.logs, refreshed.reread
         for ingest, error in refreshed.failed.items():
-            report.fail(work.names.get(ingest, ingest), error)  # another process may have added it in between
+            report.fail(names[ingest], error)
         report.segments = len(segments.current(self.warehouse, work.vessel))
         for one in work.requests if report.segments else ():
             outcomes = identify_segments(

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from flows.unforeseen import as_told
-from schemas.errors import KempfError
 from warehouse import aliases, parameter_sets
 from warehouse.parameter_set import ParameterSet
 from warehouse.store import Warehouse
@@ -59,36 +57,11 @@ def waiting(warehouse: Warehouse, vessel: str) -> Iterator[Waiting]:
     try:
         yield one
     finally:
-        _store(warehouse, [one])
+        store(warehouse, [one])
 
 
-def store_together(warehouse: Warehouse, lists: Mapping[str, Waiting]) -> dict[str, KempfError]:
-    """Store what waits of several vessels, in one commit a table; where that fails each vessel's alone.
-
-    Parameters
-    ----------
-    warehouse : Warehouse
-    lists : mapping of str to Waiting
-        By vessel.
-
-    Returns
-    -------
-    dict of str to KempfError
-        What could not be stored, by vessel.
-    """
-    try:
-        _store(warehouse, list(lists.values()))
-    except Exception as error:  # noqa: BLE001 - told below, for the vessels that it concerns
-        if len(lists) == 1:
-            return dict.fromkeys(lists, as_told(error))
-        failed: dict[str, KempfError] = {}
-        for vessel, one in lists.items():
-            failed |= store_together(warehouse, {vessel: one})
-        return failed
-    return {}
-
-
-def _store(warehouse: Warehouse, lists: Sequence[Waiting]) -> None:
+def store(warehouse: Warehouse, lists: Sequence[Waiting]) -> None:
+    """Store what waits of several vessels, in one commit a table."""
     parameter_sets.insert(warehouse, [made for one in lists for made in one.sets])
     # behind the sets: an alias never points to what is not there
     aliases.point_all(warehouse, {key: name for one in lists for key, name in one.aliases.items()})

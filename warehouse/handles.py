@@ -90,7 +90,7 @@ def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: Delta
     if table is not None:
         with suppress(OSError):  # what was done with the table is done: a bucket that is gone now is told at the next
             mark = warehouse.mark_of(name, *_commit(table.version()))
-    if table is None or mark is None or table.version() - vars(table).get(_BORN, 0) > MOST_COMMITS:
+    if table is None or mark is None or table.version() - vars(table)[_BORN] > MOST_COMMITS:
         return
     with _lock:
         _kept.append((key, mark, table))

@@ -97,17 +97,15 @@ class Segment:
         return result
 
 
-def replace(warehouse: Warehouse, vessel: str, found: Mapping[str, Sequence[Segment]]) -> tuple[str, ...]:
-    """Put what was found in some ingests of a vessel in place of what is stored of them, in at most one commit.
+def replace(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segment]]) -> tuple[str, ...]:
+    """Put what was found in some ingests, of any vessels, in place of what is stored of them, in at most one commit.
 
     Parameters
     ----------
     warehouse : Warehouse
         Made where there is none.
-    vessel : str
-        Her name.
-    found : mapping of str to sequence of Segment
-        By ingest id; an empty sequence says that nothing was found.
+    found : mapping of (str, str) to sequence of Segment
+        By vessel and ingest id; an empty sequence says that nothing was found.
 
     Returns
     -------
@@ -118,29 +116,6 @@ def replace(warehouse: Warehouse, vessel: str, found: Mapping[str, Sequence[Segm
     ------
     ValueError
         A segment names another vessel or ingest than it is given for.
-    """
-    return replace_all(warehouse, {(vessel, ingest): segments for ingest, segments in found.items()})
-
-
-def replace_all(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segment]]) -> tuple[str, ...]:
-    """Do as `replace` for ingests of several vessels, all in at most one commit.
-
-    Parameters
-    ----------
-    warehouse : Warehouse
-        Made where there is none.
-    found : mapping of (str, str) to sequence of Segment
-        By vessel and ingest id.
-
-    Returns
-    -------
-    tuple of str
-        Ingests whose segments changed, sorted.
-
-    Raises
-    ------
-    ValueError
-        See `replace`.
     """
     keys = {vessel: vessel_key(vessel) for vessel, _ in found}
     for (vessel, ingest), segments in found.items():

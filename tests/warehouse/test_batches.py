@@ -42,4 +42,4 @@ def test_every_row_arrives_in_one_commit(tmp_path: Path) -> None:
 
 def test_one_thread_moves_rows_on_and_memory_is_given_back() -> None:
     assert os.environ["TOKIO_WORKER_THREADS"]
-    give_back()
+    give_back(1 << 20)

@@ -35,7 +35,7 @@ def lived_in(warehouse: Warehouse) -> list[dict[str, int]]:
         (stored,) = deposit(warehouse, [delivery("aurora", f"log {i}".encode())])
         for start in (START_NS, START_NS + 10**9):  # found, then found otherwise: rows of no version that counts
             found = [segment("aurora", stored.log_id, stored.ingest_id, start)]
-            segments.replace(warehouse, "aurora", {stored.ingest_id: found})
+            segments.replace(warehouse, {("aurora", stored.ingest_id): found})
         asked = inputs(stored.log_id, START_NS + i)
         told = collect(warehouse, asked, [stored.ingest_id])
         made = parameter_set("aurora", asked, provenance=told)
@@ -107,7 +107,7 @@ def test_work_that_began_before_keeps_the_versions_it_began_with(
     for i in range(3):
         (stored,) = deposit(warehouse, [delivery("aurora", f"log {i}".encode())])
         found = [segment("aurora", stored.log_id, stored.ingest_id)]
-        segments.replace(warehouse, "aurora", {stored.ingest_id: found})
+        segments.replace(warehouse, {("aurora", stored.ingest_id): found})
     time.sleep(0.02)
     began, began_with = datetime.now(UTC), delta.versions(warehouse)
     then = content(warehouse, began_with)

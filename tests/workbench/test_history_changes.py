@@ -117,7 +117,7 @@ def test_a_voyage_that_two_logs_hold_counts_once(place: Path) -> None:
             replace(segment(VESSEL, log, letter, s.start_utc_ns), segment_id=f"{letter}-{i}")
             for i, s in enumerate(ours)
         ]
-        segments.replace(Warehouse(str(place)), VESSEL, {letter: found})
+        segments.replace(Warehouse(str(place)), {(VESSEL, letter): found})
     (one,) = asked(place, "--json").json["changes"]
     assert one["parameter_set_ids"] == [s.parameter_set_id for s in ours] and one["sets"] == 4
     assert one["left_out"] == {"of a manoeuvre that another log holds": 4}
