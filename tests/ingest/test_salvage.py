@@ -26,6 +26,8 @@ PROFILE = VesselProfile.model_validate(
 )
 PACK = {b"": bytes, b"zstd": zstandard.ZstdCompressor().compress, b"lz4": lz4.frame.compress}
 CHUNKS, EACH = 12, 30
+#: The end of a file without a summary and without a CRC.
+END = record(15, bytes(4)) + record(2, bytes(20)) + MAGIC
 
 
 def messages(chunk):
@@ -110,6 +112,43 @@ def test_messages_of_a_chunk_that_says_it_is_shorter_are_not_taken_for_loose_one
     readings, chunks, numbers = kept(bytes(damaged))
     assert chunks == set(range(CHUNKS)) - {rotten} and numbers == whole(chunks)
     assert readings.partial
+
+
+@pytest.mark.parametrize("hidden", [1, 7])
+@pytest.mark.parametrize("closed", [True, False])
+def test_messages_of_a_chunk_that_a_record_before_it_hides_are_not_taken_for_loose_ones(hidden, closed):
+    def wrong(out, places):
+        # the attachment before it says that it ends between two messages of the chunk
+        note = record(9, bytes(50))
+        at, to = places[hidden]
+        chunk = bytearray(out[at:to])
+        inside = len(note) - 9 + 9 + 40 + sum(len(record(*one)) for one in messages(hidden)[:10])
+        chunk[-20] ^= 0x10
+        out[at:to] = note[:1] + struct.pack("<Q", inside) + note[9:] + bytes(chunk)
+        return out
+
+    data, _ = log(b"", index=False, closed=False, mend=wrong)
+    readings, chunks, numbers = kept(bytes(data) + (END if closed else b""))
+    assert chunks == set(range(CHUNKS)) - {hidden} and numbers == whole(chunks)
+    assert readings.partial
+
+
+@pytest.mark.parametrize("vouched", [True, False])
+def test_messages_beside_chunks_are_believed_where_the_crc_of_the_data_is_right(vouched):
+    data, _ = log(
+        b"", index=False, closed=False, mend=lambda out, _: bytes(out) + b"".join(record(*m) for m in messages(CHUNKS))
+    )
+    readings, _, numbers = kept(data + record(15, struct.pack("<I", zlib.crc32(data) if vouched else 0)) + END[13:])
+    assert numbers == whole(range(CHUNKS + vouched))
+    assert readings.partial is not vouched
+
+
+def test_a_file_without_chunks_and_without_an_end_is_read():
+    loose = b"".join(record(*m) for m in messages(CHUNKS))
+    readings, _, numbers = kept(
+        MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json")) + loose
+    )
+    assert numbers == whole([CHUNKS]) and readings.partial
 
 
 @pytest.mark.parametrize("compression", PACK)
@@ -241,7 +280,7 @@ def test_a_chunk_of_too_many_messages_is_refused(monkeypatch):
 def test_a_file_of_nothing_but_beginnings_of_chunks_takes_no_time_and_no_space():
     head = struct.pack("<BQQQQI", 6, 40, START, START, 0, 1) + text(b"") + struct.pack("<Q", 0)
     data = MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json"))
-    data += record(*message(START, START, 0, b'{"heading": 1}')) + (head + b"\xff" * 12) * 3_000
+    data += chunk_record([message(START, START, 0, b'{"heading": 1}')], b"", bytes)[0] + (head + b"\xff" * 12) * 3_000
     begin = time.process_time()
     readings, _, numbers = kept(data)
     assert numbers == [0] and len(readings.lost) <= 1_000 and len(readings.notes) <= 1_001

@@ -16,6 +16,9 @@ ATTACHMENT, ATTACHMENT_INDEX, STATISTICS, METADATA, METADATA_INDEX, SUMMARY_OFFS
 #: From here on opcodes belong to applications; those between `DATA_END` and it are reserved, 0 is none.
 FIRST_PRIVATE = 0x80
 
+#: Counts of messages, schemas, channels, attachments, metadata and chunks.
+_STATISTICS = struct.Struct("<QHIIII")
+
 #: Content of a footer, and of a data end as it is written today, bytes.
 FOOTER_SIZE, DATA_END_SIZE = 20, 4
 
@@ -78,9 +81,12 @@ def parse_footer(content: bytes) -> Footer | None:
     return Footer(start, crc)
 
 
-def parse_message_count(content: bytes) -> int | None:
-    """Return how many messages a statistics record counts."""
-    return int(struct.unpack_from("<Q", content, 0)[0]) if len(content) >= 8 else None
+def parse_statistics(content: bytes) -> tuple[int, int] | tuple[None, None]:
+    """Return how many messages and how many chunks a statistics record counts."""
+    if len(content) < _STATISTICS.size:
+        return None, None
+    messages, _, _, _, _, chunks = _STATISTICS.unpack_from(content, 0)
+    return messages, chunks
 
 
 def parse_chunk_place(content: bytes) -> tuple[int, int] | None:

@@ -12,7 +12,8 @@ MCAP specification, https://mcap.dev/spec.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Generator, Iterator
+from collections.abc import Iterator
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.mcap.batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
 from pipeline.ingest.mcap.chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
+from pipeline.ingest.mcap.outside import believed, chunk_behind
 from pipeline.ingest.mcap.records import (
     CHANNEL,
     CHUNK,
@@ -34,7 +36,7 @@ from pipeline.ingest.mcap.records import (
     parse_schema,
 )
 from pipeline.ingest.mcap.summary import read_summary
-from pipeline.ingest.mcap.walk import HEAD, chunk_after, walk
+from pipeline.ingest.mcap.walk import HEAD, walk
 from pipeline.ingest.readings import LostStretch
 from pipeline.ingest.sniff import MCAP_MAGIC
 from pipeline.ingest.spans import Index, as_bytes
@@ -48,9 +50,6 @@ _FIRST_WINDOW = 1 << 14
 
 #: From here on a chunk is handed on as it is; smaller ones are worth a copy that puts them together.
 _LARGE = 1 << 19
-
-#: Bytes of a chunk's head that tell it for one.
-_CHUNK_HEAD = 64
 
 #: Lost stretches that are told apart; what more there are is one.
 _MOST_STRETCHES = 1_000
@@ -94,13 +93,15 @@ class McapStream:
         self._crc_to = 0
         self._last_ns: int | None = None
         self._found = 0
-        # whether the last record was a chunk that is lost, of which no summary says where it ends
-        self._doubted = False
 
     @property
     def partial(self) -> bool:
         """Whether something of the file is lost."""
         return bool(self.lost)
+
+    @cached_property
+    def _outside_believed(self) -> bool:
+        return believed(self._log, self._summary)
 
     def batches(self) -> Iterator[Batch]:
         """Read the file.
@@ -184,11 +185,11 @@ class McapStream:
                 buffer = as_bytes(data)
                 opcode, first, end, reached = walk(buffer, 0, len(data))
             sound = self._sound(at, opcode, first, end)
-            handed = yield from self._window(at, data, opcode[:sound], first[:sound], end[:sound])
-            if handed < opcode.size:
-                kind, place = int(opcode[handed]), at + int(first[handed]) - HEAD
+            yield from self._window(at, data, opcode[:sound], first[:sound], end[:sound])
+            if sound < opcode.size:
+                kind, place = int(opcode[sound]), at + int(first[sound]) - HEAD
                 if kind == DATA_END and self._summary.data_end in (-1, place):
-                    self._end(data, place - at, at, int(first[handed]), int(end[handed]))
+                    self._end(data, place - at, at, int(first[sound]), int(end[sound]))
                     return
                 self._check_window(at, data, place - at)
                 yield from self._mended(place)
@@ -205,6 +206,9 @@ class McapStream:
         if not self._summary.ended:
             # opcodes of a later version of the format; in a file that is damaged, rather the wrong place
             strange |= (opcode > DATA_END) & (opcode < FIRST_PRIVATE)
+        messages = opcode == MESSAGE
+        if messages.any() and not self._outside_believed:
+            strange |= messages
         # the walk is off where it steps over the beginning of a chunk that the summary knows
         beyond = np.searchsorted(self._expected, at + first - HEAD, side="right")
         strange |= np.searchsorted(self._expected, at + end, side="left") > beyond
@@ -215,20 +219,11 @@ class McapStream:
         found = np.flatnonzero(strange)
         return int(found[0]) if found.size else int(opcode.size)
 
-    def _window(
-        self, at: int, data: bytes, opcode: NDArray[np.uint8], first: Index, end: Index
-    ) -> Generator[Batch, None, int]:
-        """Hand on the messages of some records, those of chunks and those outside in the order of the file.
-
-        Returns how many records were believed: messages right behind a chunk that fails its checksum may be its own.
-        """
+    def _window(self, at: int, data: bytes, opcode: NDArray[np.uint8], first: Index, end: Index) -> Iterator[Batch]:
+        """Hand on the messages of some records, those of chunks and those outside in the order of the file."""
         buffer, told = as_bytes(data), np.flatnonzero((opcode == CHUNK) | (opcode == CHANNEL) | (opcode == SCHEMA))
         loose_from = 0
         for i in [*told.tolist(), opcode.size]:
-            if self._doubted and loose_from < i and opcode[loose_from] == MESSAGE:
-                self._doubted = False
-                return loose_from
-            self._doubted &= loose_from == i
             loose = loose_from + np.flatnonzero(opcode[loose_from:i] == MESSAGE)
             if loose.size:
                 low, high = int(first[loose[0]]), int(end[loose[-1]])
@@ -236,19 +231,16 @@ class McapStream:
                 yield messages_of(buffer[low:high], first[loose] - low, end[loose] - low, piece)
             loose_from = i + 1
             if i < opcode.size:
-                self._doubted = False
                 content = memoryview(data)[int(first[i]) : int(end[i])]
                 if opcode[i] == CHUNK:
                     yield from self._chunk(at + int(first[i]) - HEAD, content)
                 else:
                     self._describe(int(opcode[i]), bytes(content))
-        return int(opcode.size)
 
     def _chunk(self, place: int, content: memoryview) -> Iterator[Batch]:
         try:
             records = unpacked(content, CHUNK_LIMIT)
         except DamagedChunkError as why:
-            self._doubted = place not in self._length
             batch, lost = lost_chunk(self._log, place, HEAD + len(content), str(why))
             self._note_chunk(place, lost)
             yield batch
@@ -293,17 +285,12 @@ class McapStream:
             return at + self._length[at]
         later = self._expected[self._expected > at]
         place = int(later[0]) if later.size else -1
-        look, window = at + 1, _FIRST_WINDOW
-        while place < 0 and look < stop and not self._summary.chunks:
-            data = self._log.read(look, min(window, stop - look))
-            hit = chunk_after(as_bytes(data), stop - look)
-            place = look + hit if hit >= 0 else -1
-            if look + len(data) >= stop:
-                break
-            look += len(data) - _CHUNK_HEAD
-            window = min(2 * window, WINDOW)
+        if place < 0 and not self._summary.chunks:
+            place = chunk_behind(self._log, at + 1, stop)
         if place < 0:
             if self._summary.ended and self._summary.data_end > at:
+                if not self._summary.chunks:
+                    self._lose(stretch(self._last_ns, None, None, f"the file is damaged from byte {at} to its end"))
                 return self._summary.data_end
             self._cut(f"the file is cut short or damaged at byte {at}")
             self._summary.ended = True  # said once

@@ -26,8 +26,8 @@ from pipeline.ingest.mcap.records import (
     parse_channel,
     parse_chunk_place,
     parse_footer,
-    parse_message_count,
     parse_schema,
+    parse_statistics,
 )
 from pipeline.ingest.mcap.walk import HEAD, walk
 from pipeline.ingest.sniff import MCAP_MAGIC
@@ -50,7 +50,7 @@ class Summary:
     channels, schemas : dict by id
     chunks : list of (int, int)
         Where chunks stand and their bytes, ascending.
-    messages : int or None
+    messages, chunk_count : int or None
         How many the file should hold.
     data_crc : int
         CRC of the data section, 0 for none; `data_end` is where its record stands.
@@ -63,6 +63,7 @@ class Summary:
     schemas: dict[int, Schema] = field(default_factory=dict)
     chunks: list[tuple[int, int]] = field(default_factory=list)
     messages: int | None = None
+    chunk_count: int | None = None
     data_crc: int = 0
     data_end: int = -1
     notes: list[str] = field(default_factory=list)
@@ -127,7 +128,7 @@ def _take(found: Summary, content: bytes) -> None:
         elif kind == CHUNK_INDEX and (chunk := parse_chunk_place(record)):
             found.chunks.append(chunk)
         elif kind == STATISTICS:
-            found.messages = parse_message_count(record)
+            found.messages, found.chunk_count = parse_statistics(record)
     found.chunks = sorted(
         {(at, size) for at, size in found.chunks if len(MCAP_MAGIC) <= at and at + size <= found.stop}
     )
