@@ -120,7 +120,7 @@ def page(campaigns: list[dict[str, Any]]) -> list[str]:
         "inputs",
         "refused whole",
         "kinds of outcome",
-        "slowest input",
+        "longest in the reader",
         "memory grew by",
     ]
     return [
@@ -129,7 +129,7 @@ def page(campaigns: list[dict[str, Any]]) -> list[str]:
         "checksums that fit again, so that the damage reaches the fields. Some are compressed, and damaged after that.",
         "",
         "A finding is: an exception that is no error for a person to read; a ledger that does not close; a line, "
-        f"record or value that is not counted; more than {HANG_S:g} s of the processor for one input; more than "
+        f"record or value that is not counted; more than {HANG_S:g} s in the reader for one input; more than "
         f"{MEMORY >> 20} MB of memory added; an NMEA sentence, an MCAP message or a gzip file kept although its "
         "checksum fails, which is computed anew without the readers' code; a process that dies.",
         "",

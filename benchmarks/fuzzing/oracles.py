@@ -8,9 +8,11 @@ from __future__ import annotations
 import gzip
 import re
 import zlib
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from time import perf_counter, process_time
 
 from benchmarks.fuzzing.corpus import PROFILE, Reader, inputs
 from benchmarks.fuzzing.whole_chunks import vouched_times
@@ -37,10 +39,17 @@ class Oracle:
     reader : Reader
     folder : Path
         Where it may write its files.
+
+    Attributes
+    ----------
+    took : float
+        How long the reader itself took over the latest input, s: of the processor or on the wall, whichever is less,
+        for on a machine that others use, too, the clock on the wall says little.
     """
 
     def __init__(self, reader: Reader, folder: Path) -> None:
         self.folder = folder
+        self.took = 0.0
         self._judge: Callable[[str, bytes], Outcome] = {
             "nmea": self._log,
             "delimited": self._log,
@@ -60,14 +69,24 @@ class Oracle:
         AssertionError
             Something does not hold; any other exception is a crash of the reader.
         """
+        self.took = 0.0
         try:
             return self._judge(name, data)
         except KempfError as error:
             assert error.code and error.message and error.next_step, "an error that tells too little"
             return ("refused", error.code)
 
+    @contextmanager
+    def _timed(self) -> Iterator[None]:
+        begin, worked = perf_counter(), process_time()
+        try:
+            yield
+        finally:
+            self.took += min(perf_counter() - begin, process_time() - worked)
+
     def _log(self, name: str, data: bytes, profile: VesselProfile | None = None) -> Outcome:
-        readings = read_log(name, data, profile or self._known)
+        with self._timed():
+            readings = read_log(name, data, profile or self._known)
         check_ledgers(readings)
         content = data
         if data.startswith(b"\x1f\x8b"):
@@ -85,7 +104,8 @@ class Oracle:
     def _profile(self, name: str, data: bytes) -> Outcome:
         path = self.folder / name
         path.write_bytes(data)
-        profile = read_profiles([path])
+        with self._timed():
+            profile = read_profiles([path])
         assert profile == VesselProfile.model_validate_json(profile.canonical_json()), (
             "a profile that does not come back"
         )

@@ -12,7 +12,7 @@ GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 LIMIT = 512 << 20
 
 #: A log may unpack to so many bytes, and to so many for each byte that was delivered; the same for its records.
-_BASE, _RATIO, _RECORDS = 32 << 20, 100, 1_000_000
+_BASE, _RATIO, _RECORDS = 16 << 20, 100, 500_000
 
 #: Compressed bytes that are unpacked at once: few at first, for a file of many small members, and with zstd never many,
 #: for 4 bytes of it may stand for 128 kB.
