@@ -18,11 +18,12 @@ from warehouse import runs, vessels
 from warehouse.runs import Run
 from warehouse.store import Warehouse
 
-#: A batch holds about so many logs: a minute or two of work, beside which what an engine asks for a task and the tables
-#: for a commit is small, and little enough that a lost worker costs no more and progress is seen.
+#: A batch holds about so many logs at most: a minute or two of work, beside which what an engine asks for a task and
+#: the tables for a commit is small, and little enough that a lost worker costs no more and progress is seen.
 LOGS_A_BATCH = 60
-#: Batches a worker where the fleet is small: more than one evens out vessels of different size.
-BATCHES_A_WORKER = 2
+#: A batch takes this part of a worker's even share of what is left, so that the last ones are small and no worker waits
+#: long for another; but it is never smaller than this part of the first.
+OF_SHARE, OF_FIRST = 1 / 2, 1 / 4
 
 Report = dict[str, Any]
 
@@ -48,18 +49,32 @@ class Plan:
         return len(self.due) + len(self.kept)
 
     def batches(self, workers: int) -> list[list[str]]:
-        """Return the vessels that are due in batches of about equal work, the heavier vessels begun first.
+        """Return the vessels that are due in batches, the heavier vessels first and the smaller batches last.
 
         Parameters
         ----------
         workers : int
             That will share them.
+
+        References
+        ----------
+        Polychronopoulos, C. D. and Kuck, D. J. (1987): Guided self-scheduling: a practical scheduling scheme for
+        parallel supercomputers. IEEE Transactions on Computers C-36(12), 1425-1439.
         """
-        n_logs = sum(logs for _, logs in self.due)
-        wanted = max(-(-n_logs // LOGS_A_BATCH), workers * BATCHES_A_WORKER)
-        n_batches = min(len(self.due), wanted)
-        names = [name for name, _ in self.due]
-        return [names[k::n_batches] for k in range(n_batches)]
+        left = sum(logs for _, logs in self.due)
+        first = wanted = min(LOGS_A_BATCH, OF_SHARE * left / workers)
+        found: list[list[str]] = []
+        batch: list[str] = []
+        held = 0
+        for name, logs in self.due:
+            batch.append(name)
+            held += logs
+            if held >= wanted:
+                found.append(batch)
+                left -= held
+                batch, held = [], 0
+                wanted = max(min(LOGS_A_BATCH, OF_SHARE * left / workers), OF_FIRST * first)
+        return [*found, batch] if batch else found
 
 
 def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_only: bool = True) -> Plan:

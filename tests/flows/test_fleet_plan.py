@@ -147,15 +147,33 @@ def test_what_may_be_mended_is_tried_again_and_alarms_every_night(own: Warehouse
     assert due(own) == []
 
 
-def test_batches_hold_everybody_once_and_about_equal_work() -> None:
-    fleet = tuple((f"v{k:03d}", 1 + k % 7) for k in reversed(range(100)))
-    found = Plan(tuple(sorted(fleet, key=lambda one: -one[1])), ())
-    batches = found.batches(workers=2)
-    assert sorted(name for batch in batches for name in batch) == sorted(name for name, _ in fleet)
-    work = [sum(dict(fleet)[name] for name in batch) for batch in batches]
-    assert len(batches) == -(-sum(logs for _, logs in fleet) // fleet_plan.LOGS_A_BATCH)
-    assert max(work) <= 1.5 * min(work)
-    assert [len(b) for b in Plan((("a", 1), ("b", 1), ("c", 900)), ()).batches(2)] == [1, 1, 1]
+def finished(work: list[int], workers: int) -> list[int]:
+    """When each worker is done, where each takes the next batch when it has done one."""
+    until = [0] * workers
+    for logs in work:
+        until[until.index(min(until))] += logs
+    return until
+
+
+@pytest.mark.parametrize("workers", [1, 2, 5])
+@pytest.mark.parametrize("vessels", [1, 6, 24, 100, 1000])
+def test_batches_hold_everybody_once_and_workers_end_together(vessels: int, workers: int) -> None:
+    logs_of = {f"v{k:03d}": 1 + k % 7 for k in range(vessels)}
+    found = Plan(tuple(sorted(logs_of.items(), key=lambda one: -one[1])), ())
+    batches = found.batches(workers)
+    assert sorted(name for batch in batches for name in batch) == sorted(logs_of)
+    work = [sum(logs_of[name] for name in batch) for batch in batches]
+    assert max(work) < fleet_plan.LOGS_A_BATCH + 7
+    until = finished(work, workers)
+    # nobody waits for longer than one of the last batches takes, or a vessel
+    assert max(until) - min(until) <= max(work[0] / 4, 7) + 7
+    everybody = sum(work)
+    assert len(work) <= everybody / fleet_plan.LOGS_A_BATCH + 6 * workers + 1
+
+
+def test_batches_of_hardly_anything() -> None:
+    assert Plan((("c", 900), ("a", 1), ("b", 1)), ()).batches(2) == [["c"], ["a", "b"]]
+    assert Plan((("a", 0), ("b", 0)), ()).batches(2) == [["a"], ["b"]]
     assert Plan((), ()).batches(4) == []
 
 
