@@ -68,14 +68,17 @@ class Series:
         -------
         ndarray, shape (m,)
         """
-        if len(self) == 0:
+        if len(self) == 0 or time_utc_ns.size == 0:
             return np.full(time_utc_ns.shape, np.nan)
-        origin = int(self.time_utc_ns[0])
-        own = self.seconds_since(origin)
+        # what lies about the question: a manoeuvre asks a voyage for a minute at a time
+        first = max(int(np.searchsorted(self.time_utc_ns, time_utc_ns.min(), side="left")) - 1, 0)
+        near = slice(first, int(np.searchsorted(self.time_utc_ns, time_utc_ns.max(), side="right")) + 1)
+        origin, instant = int(self.time_utc_ns[0]), self.time_utc_ns[near]
+        own = (instant - origin).astype(np.float64) / SECOND_NS
         asked = (time_utc_ns - origin).astype(np.float64) / SECOND_NS
-        result = np.interp(asked, own, self.value, left=np.nan, right=np.nan)
-        after = np.clip(np.searchsorted(self.time_utc_ns, time_utc_ns, side="left"), 1, max(len(self) - 1, 1))
-        if len(self) > 1:
+        result = np.interp(asked, own, self.value[near], left=np.nan, right=np.nan)
+        if own.size > 1:
+            after = np.clip(np.searchsorted(instant, time_utc_ns, side="left"), 1, own.size - 1)
             in_gap = (own[after] - own[after - 1] > max_gap_s) & (asked > own[after - 1]) & (asked < own[after])
             result[in_gap] = np.nan
         return result

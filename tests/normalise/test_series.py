@@ -90,3 +90,19 @@ def test_at_is_linear_interpolation_or_nothing(seconds: list[float], asked: list
             assert np.isnan(found)
         else:
             assert found == pytest.approx(3.0 * t - 1.0, abs=1e-8 + 1e-10 * abs(t))
+
+
+@given(
+    seconds=st.lists(st.floats(0.0, 1e5), min_size=1, max_size=40, unique_by=lambda t: round(t * 1e3)),
+    asked=st.lists(st.floats(-10.0, 1e5 + 10.0), min_size=1, max_size=20),
+    max_gap_s=st.floats(0.5, 1e5),
+)
+def test_a_question_alone_has_the_same_answer_as_among_others(
+    seconds: list[float], asked: list[float], max_gap_s: float
+) -> None:
+    time = sorted(round(t * 1e3) / 1e3 for t in seconds)
+    one = series(time, [np.sin(t) for t in time])
+    everything = at(one, [-20.0, *asked, *time, 2e5], max_gap_s)[1 : 1 + len(asked)]
+    np.testing.assert_array_equal(at(one, asked, max_gap_s), everything)
+    np.testing.assert_array_equal([at(one, [t], max_gap_s)[0] for t in asked], everything)
+    assert at(one, [], max_gap_s) == []
