@@ -24,6 +24,9 @@ _TOGETHER: tuple[tuple[str, ...], ...] = (
     ("velocity_forward", "velocity_starboard"),
     ("wind_speed", "wind_angle"),
 )
+#: readings that are held whole: asking the tables for the columns of one instrument after the other costs a short log
+#: more than its readings take
+_SHORT = 1 << 16
 #: sentences that carry the receiver's own time of the fix; preferred where two sources are equally fast
 _OWN_CLOCK = ("RMC", "GGA", "GLL")
 
@@ -60,8 +63,8 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     Parameters
     ----------
     readings : polars.DataFrame or polars.LazyFrame
-        Of one log, sorted by record, schema `pipeline.ingest.readings.READING_SCHEMA`; of a lazy one the columns of one
-        instrument are held at a time.
+        Of one log, sorted by record, schema `pipeline.ingest.readings.READING_SCHEMA`; of a long lazy one the columns
+        of one instrument are held at a time.
 
     Returns
     -------
@@ -73,6 +76,8 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     groups = [*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped)]
     groups = [group for group in groups if there.issuperset(_columns(group))]
     counts = _counts(frame, [*groups, *((name,) for group in groups if len(group) > 1 for name in group)])
+    if counts["readings"].sum() <= _SHORT:
+        frame = frame.collect().lazy()
     series: dict[str, Series] = {}
     sources: dict[str, str] = {}
     notes: list[str] = []
@@ -105,9 +110,15 @@ def _name(group: tuple[str, ...]) -> str:
 
 
 def _counts(frame: pl.LazyFrame, groups: list[tuple[str, ...]]) -> pl.DataFrame:
-    """Count the readings that give all channels of a group: a row a source, sorted by name, and a column a group."""
+    """Count the readings, and those that give all channels of a group: a row a source, sorted by name."""
     whole = [pl.all_horizontal(pl.col(_columns(g)).is_not_null()).sum().alias(_name(g)) for g in groups]
-    return frame.drop_nulls(["time_utc_ns", "source"]).group_by("source").agg(whole).sort("source").collect()
+    return (
+        frame.drop_nulls(["time_utc_ns", "source"])
+        .group_by("source")
+        .agg(pl.len().alias("readings"), *whole)
+        .sort("source")
+        .collect()
+    )
 
 
 def _choose(counts: dict[str, int], group: tuple[str, ...], notes: list[str]) -> str:

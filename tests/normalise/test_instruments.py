@@ -11,6 +11,7 @@ import yaml
 
 from pipeline.ingest.read import read_log
 from pipeline.ingest.readings import READING_SCHEMA
+from pipeline.normalise import instruments
 from pipeline.normalise.instruments import from_readings
 from schemas.profile import parse
 
@@ -64,6 +65,18 @@ def test_a_much_faster_vtg_comes_before_rmc() -> None:
     slow, fast = np.arange(0.0, 100.0), np.arange(0.0, 100.0, 0.2)
     found = from_readings(frame(("GPRMC", slow, gnss(slow)), ("GPVTG", fast, gnss(fast))))
     assert found.sources["course_over_ground"] == "GPVTG"
+
+
+def test_a_long_log_is_asked_column_by_column_and_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow, fast = np.arange(0.0, 100.0), np.arange(0.0, 100.0, 0.2)
+    rows = frame(("GPRMC", slow, gnss(slow)), ("GPVTG", fast, gnss(fast)), ("HEHDT", fast, {"heading_rad": 0.1 * fast}))
+    short = from_readings(rows.lazy())
+    monkeypatch.setattr(instruments, "_SHORT", rows.height - 1)
+    long = from_readings(rows.lazy())
+    assert (long.sources, long.notes, set(long.series)) == (short.sources, short.notes, set(short.series))
+    for name, one in long.series.items():
+        np.testing.assert_array_equal(one.time_utc_ns, short.series[name].time_utc_ns)
+        np.testing.assert_array_equal(one.value, short.series[name].value)
 
 
 def test_angles_are_unwrapped_across_north_both_ways() -> None:
