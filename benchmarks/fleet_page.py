@@ -38,6 +38,7 @@ def lines(figures: Figures) -> list[str]:
         ["one log more: vessels looked at", f"{one['changed']}", "1"],
         ["one log more, time of the first", f"{100 * one['wall_s'] / whole['wall_s']:.2f} %", ""],
         [f"two Dask workers over one, {figures['subset']} of {figures['dask_of']} vessels", f"{workers:.2f}", "1.6"],
+        *_threads_over_workers(figures),
         ["a vessel in the largest fleet over one in the smallest", f"{growth(figures):.2f}", "1 (linear)"],
     ]
     return [
@@ -92,6 +93,19 @@ def lines(figures: Figures) -> list[str]:
         ),
         "",
         *commits(figures),
+    ]
+
+
+def _threads_over_workers(figures: Figures) -> list[list[str]]:
+    if figures["dask_of"] != figures["vessels"]:  # not of one run
+        return []
+    threads = median(pair["engine"]["wall_s"] for pair in figures["pairs"])
+    return [
+        [
+            f"threads of one process over two Dask workers, {figures['subset']} vessels, on the clock",
+            f"{threads / figures['dask_s']['2']:.2f}",
+            "",
+        ]
     ]
 
 
