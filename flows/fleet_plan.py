@@ -18,8 +18,8 @@ from warehouse import runs, vessels
 from warehouse.runs import Run
 from warehouse.store import Warehouse
 
-#: A batch holds about so many logs at most: a minute or two of work, beside which what an engine asks for a task and
-#: the tables for a commit is small, and little enough that a lost worker costs no more and progress is seen.
+#: With so many logs a batch is full: a minute or two of work, beside which what an engine asks for a task and the
+#: tables for a commit is small, and little enough that a lost worker costs no more and progress is seen.
 LOGS_A_BATCH = 60
 #: A batch takes this part of a worker's even share of what is left, so that the last ones are small and no worker waits
 #: long for another; but it is never smaller than this part of the first.
@@ -61,14 +61,16 @@ class Plan:
         Polychronopoulos, C. D. and Kuck, D. J. (1987): Guided self-scheduling: a practical scheduling scheme for
         parallel supercomputers. IEEE Transactions on Computers C-36(12), 1425-1439.
         """
-        left = sum(logs for _, logs in self.due)
+        # a vessel without any log is looked at, too
+        weights = [(name, max(logs, 1)) for name, logs in self.due]
+        left = sum(weight for _, weight in weights)
         first = wanted = min(LOGS_A_BATCH, OF_SHARE * left / workers)
         found: list[list[str]] = []
         batch: list[str] = []
         held = 0
-        for name, logs in self.due:
+        for name, weight in weights:
             batch.append(name)
-            held += logs
+            held += weight
             if held >= wanted:
                 found.append(batch)
                 left -= held

@@ -12,7 +12,7 @@ GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 LIMIT = 512 << 20
 
 #: A log may unpack to so many bytes, and to so many for each byte that was delivered; the same for its records.
-_BASE, _RATIO, _RECORDS = 16 << 20, 100, 500_000
+_BASE, _RATIO, _RECORDS = 32 << 20, 100, 1_000_000
 
 #: Compressed bytes that are unpacked at once: few at first, for a file of many small members, and with zstd never many,
 #: for 4 bytes of it may stand for 128 kB.
@@ -57,7 +57,8 @@ def unpack(name: str, data: bytes, limit: int = LIMIT) -> tuple[bytes, list[str]
 def allowance(delivered: int) -> tuple[int, int]:
     """Return to how many bytes, and to how many records, a log may unpack that was delivered in so many bytes.
 
-    Measured logs unpack to 5 to 30 times their size and hold a record for every 4 bytes or more.
+    Logs of ships that move unpack to 5 to 30 times their size and hold a record for every 4 bytes or more. Where
+    nothing changes, at berth, it is a record a byte or more; a day at 10 Hz of that has to fit.
     """
     return _BASE + _RATIO * delivered, _RECORDS + delivered
 

@@ -168,12 +168,17 @@ def test_batches_hold_everybody_once_and_workers_end_together(vessels: int, work
     # nobody waits for longer than one of the last batches takes, or a vessel
     assert max(until) - min(until) <= max(work[0] / 4, 7) + 7
     everybody = sum(work)
+    # the first batch leaves enough for all to share
+    assert work[0] < everybody / workers * 0.5 + 7
     assert len(work) <= everybody / fleet_plan.LOGS_A_BATCH + 6 * workers + 1
 
 
 def test_batches_of_hardly_anything() -> None:
     assert Plan((("c", 900), ("a", 1), ("b", 1)), ()).batches(2) == [["c"], ["a", "b"]]
-    assert Plan((("a", 0), ("b", 0)), ()).batches(2) == [["a"], ["b"]]
+    idle = tuple((f"v{k}", 0) for k in range(600))
+    assert [len(batch) for batch in Plan(idle, ()).batches(2)][:3] == [60, 60, 60]
+    mixed = Plan((*((f"w{k}", 5) for k in range(100)), *idle), ()).batches(2)
+    assert max(map(len, mixed)) <= 60
     assert Plan((), ()).batches(4) == []
 
 

@@ -35,7 +35,18 @@ def messages(chunk):
     return [message(START + k * STEP, START + k * STEP, k, json.dumps({"heading": k / 8}).encode()) for k in numbers]
 
 
-def log(compression=b"zstd", *, crc=None, index=True, closed=True, data_crc=True, mend=None, counted=0):
+def log(
+    compression=b"zstd",
+    *,
+    crc=None,
+    index=True,
+    closed=True,
+    data_crc=True,
+    mend=None,
+    counted=0,
+    unlisted=None,
+    statistics=True,
+):
     """A log of chunks of which the first holds the channel, and where its chunks begin and end."""
     out, places = MAGIC + record(1, text(b"") + text(b"")), []
     for k in range(CHUNKS):
@@ -52,12 +63,13 @@ def log(compression=b"zstd", *, crc=None, index=True, closed=True, data_crc=True
     out += record(15, struct.pack("<I", zlib.crc32(out) if data_crc else 0))
     index_of_chunks = b"".join(
         record(8, struct.pack("<QQQQ", 0, 0, at, to - at) + text(b"") + struct.pack("<Q", 0) + text(b"") + bytes(16))
-        for at, to in places
+        for k, (at, to) in enumerate(places)
+        if k != unlisted
     )
     records = [channel(schema_id=0, encoding=b"json"), *(m for k in range(CHUNKS) for m in messages(k))]
     records += messages(CHUNKS)[:counted]
     groups = {8: index_of_chunks, 10: b"", 13: b""}
-    return bytes(out) + summary_of(records, {"rch", "st"}, len(out), groups, CHUNKS), places
+    return bytes(out) + summary_of(records, {"rch", "st"} if statistics else {"rch"}, len(out), groups, CHUNKS), places
 
 
 def kept(data):
@@ -133,22 +145,81 @@ def test_messages_of_a_chunk_that_a_record_before_it_hides_are_not_taken_for_loo
     assert readings.partial
 
 
+def loose(number=CHUNKS):
+    return b"".join(record(*one) for one in messages(number))
+
+
+def loose_behind_chunks(**how):
+    return log(b"", mend=lambda out, _: bytes(out) + loose(), **how)[0]
+
+
 @pytest.mark.parametrize("vouched", [True, False])
 def test_messages_beside_chunks_are_believed_where_the_crc_of_the_data_is_right(vouched):
-    data, _ = log(
-        b"", index=False, closed=False, mend=lambda out, _: bytes(out) + b"".join(record(*m) for m in messages(CHUNKS))
-    )
+    data = loose_behind_chunks(index=False, closed=False)
     readings, _, numbers = kept(data + record(15, struct.pack("<I", zlib.crc32(data) if vouched else 0)) + END[13:])
     assert numbers == whole(range(CHUNKS + vouched))
     assert readings.partial is not vouched
 
 
-def test_a_file_without_chunks_and_without_an_end_is_read():
-    loose = b"".join(record(*m) for m in messages(CHUNKS))
-    readings, _, numbers = kept(
-        MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json")) + loose
-    )
-    assert numbers == whole([CHUNKS]) and readings.partial
+def test_messages_beside_chunks_are_believed_where_the_summary_lists_them():
+    readings, _, numbers = kept(loose_behind_chunks(data_crc=False, counted=EACH))
+    assert numbers == whole(range(CHUNKS + 1)) and not readings.partial
+
+
+def test_a_summary_whose_crc_fails_takes_nothing_from_the_crc_of_the_data():
+    data = bytearray(loose_behind_chunks(counted=EACH))
+    data[-80] ^= 1
+    readings, _, numbers = kept(bytes(data))
+    assert numbers == whole(range(CHUNKS + 1)) and not readings.partial
+
+
+def test_a_summary_that_leaves_a_chunk_out_does_not_vouch_for_what_seems_to_stand_outside():
+    def short(out, places):
+        # the fifth chunk says that it ends between two of its messages, and fails its CRC
+        struct.pack_into("<Q", out, places[4][0] + 1, 40 + sum(len(record(*one)) for one in messages(4)[:10]))
+        return out
+
+    readings, chunks, numbers = kept(log(b"", index=False, data_crc=False, mend=short, unlisted=4)[0])
+    assert chunks == set(range(CHUNKS)) - {4} and numbers == whole(chunks)
+    assert readings.partial
+
+
+def test_damage_behind_the_last_chunk_is_told_where_nothing_counts_the_messages():
+    data = bytearray(loose_behind_chunks(data_crc=False, statistics=False))
+    first = data.index(loose()[:40])
+    data[first + sum(len(record(*one)) for one in messages(CHUNKS)[:5])] = 0
+    readings, _, numbers = kept(bytes(data))
+    assert numbers == whole(range(CHUNKS)) and readings.partial
+
+
+OPENED = MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json"))
+
+
+def attachment(data, crc=True):
+    body = bytes(16) + text(b"a.mcap") + text(b"") + struct.pack("<Q", len(data)) + data
+    return record(9, body + struct.pack("<I", zlib.crc32(body) if crc else 0))
+
+
+@pytest.mark.parametrize("end", [b"", END])
+@pytest.mark.parametrize("place", ["none", "before", "behind"])
+def test_a_file_without_chunks_is_read_whatever_is_attached_to_it(place, end):
+    other = attachment(log(b"")[0]) if place != "none" else b""
+    data = OPENED + (other if place == "before" else b"") + loose() + (other if place == "behind" else b"")
+    readings, _, numbers = kept(data + end)
+    assert numbers == whole([CHUNKS]) and readings.partial is not bool(end)
+
+
+def test_a_record_that_says_too_much_hides_the_first_chunk_from_nobody():
+    data, places = log(b"", index=False, closed=False)
+    at, to = places[0]
+    inside = 9 + 40 + len(record(*channel(schema_id=0, encoding=b"json")))
+    inside += sum(len(record(*one)) for one in messages(0)[:10])
+    rotten = bytearray(data[at:to])
+    rotten[-20] ^= 0x10
+    note = record(12, b"")[:1] + struct.pack("<Q", inside)
+    head = record(*channel(schema_id=0, encoding=b"json"))
+    readings, chunks, numbers = kept(data[:at] + head + note + bytes(rotten) + data[to:])
+    assert chunks == set(range(1, CHUNKS)) and numbers == whole(chunks) and readings.partial
 
 
 @pytest.mark.parametrize("compression", PACK)
@@ -309,3 +380,21 @@ def test_times_that_damage_made_are_not_told(instant):
     readings, chunks, _ = kept(log(index=False, closed=False, mend=wrong)[0])
     assert chunks == set(range(CHUNKS)) - {4}
     assert (readings.lost[0].since_ns, readings.lost[0].until_ns) == (None, None)
+
+
+def test_a_quiet_day_at_berth_packs_very_well_and_is_no_bomb():
+    start = "2025-05-03T00:00:00Z"
+    profile = VesselProfile.model_validate(
+        {
+            "sources": [
+                {
+                    "match": "*",
+                    "time": {"column": "t", "unit": "s", "start": start},
+                    "channels": {"h": {"channel": "heading", "unit": "deg"}},
+                }
+            ]
+        }
+    )
+    day = b"t,h\n" + b"".join(b"%d.%d,90.0\n" % divmod(k, 10) for k in range(864_000))
+    packed = zstandard.ZstdCompressor().compress(day)
+    assert read_log("a.csv.zst", packed, profile).tally.records_kept == 864_000

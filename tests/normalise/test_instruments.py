@@ -70,9 +70,21 @@ def test_a_much_faster_vtg_comes_before_rmc() -> None:
 def test_a_long_log_is_asked_column_by_column_and_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     slow, fast = np.arange(0.0, 100.0), np.arange(0.0, 100.0, 0.2)
     rows = frame(("GPRMC", slow, gnss(slow)), ("GPVTG", fast, gnss(fast)), ("HEHDT", fast, {"heading_rad": 0.1 * fast}))
+    heights: list[int] = []
+    collect = pl.LazyFrame.collect
+
+    def told(frame: pl.LazyFrame) -> pl.DataFrame:
+        found = collect(frame)
+        heights.append(found.height)
+        return found
+
+    monkeypatch.setattr(pl.LazyFrame, "collect", told)
     short = from_readings(rows.lazy())
+    assert rows.height in heights
+    heights.clear()
     monkeypatch.setattr(instruments, "_SHORT", rows.height - 1)
     long = from_readings(rows.lazy())
+    assert heights and rows.height not in heights
     assert (long.sources, long.notes, set(long.series)) == (short.sources, short.notes, set(short.series))
     for name, one in long.series.items():
         np.testing.assert_array_equal(one.time_utc_ns, short.series[name].time_utc_ns)

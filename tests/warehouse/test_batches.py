@@ -6,6 +6,8 @@ import os
 from pathlib import Path
 
 import polars as pl
+import pyarrow as pa
+import pytest
 
 from flows.freed import give_back
 from schemas.tables import TABLES, arrow_schema
@@ -40,6 +42,19 @@ def test_every_row_arrives_in_one_commit(tmp_path: Path) -> None:
     assert found.to_list() == list(range(2 * ROWS))
 
 
-def test_one_thread_moves_rows_on_and_memory_is_given_back() -> None:
+def test_one_thread_moves_rows_on() -> None:
     assert os.environ["TOKIO_WORKER_THREADS"]
+
+
+def test_memory_is_given_back_behind_long_logs_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool, asked = pa.default_memory_pool(), []
+
+    def told() -> pa.MemoryPool:
+        asked.append(True)
+        return pool
+
+    monkeypatch.setattr(pa, "default_memory_pool", told)
+    give_back(10_000)
+    assert not asked
     give_back(1 << 20)
+    assert asked

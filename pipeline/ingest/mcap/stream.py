@@ -286,10 +286,10 @@ class McapStream:
         later = self._expected[self._expected > at]
         place = int(later[0]) if later.size else -1
         if place < 0 and not self._summary.chunks:
-            place = chunk_behind(self._log, at + 1, stop)
+            place = chunk_behind(self._log, at + 1, stop, stop)
         if place < 0:
             if self._summary.ended and self._summary.data_end > at:
-                if not self._summary.chunks:
+                if self._summary.messages is None:  # else their count tells
                     self._lose(stretch(self._last_ns, None, None, f"the file is damaged from byte {at} to its end"))
                 return self._summary.data_end
             self._cut(f"the file is cut short or damaged at byte {at}")

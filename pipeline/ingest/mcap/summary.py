@@ -95,12 +95,12 @@ def read_summary(log: LogFile) -> Summary:
         found.notes.append("The footer of the file points nowhere: its summary was not used.")
         return found
     content = log.read(footer.summary_start, length)
+    _note_data_end(log, found, footer.summary_start)
     # the CRC covers the summary and the footer up to the CRC itself
     if footer.summary_crc and zlib.crc32(tail[: HEAD + 16], zlib.crc32(content)) != footer.summary_crc:
         found.notes.append("The CRC of the file's summary does not match: its summary was not used.")
         return found
     found.stop = footer.summary_start
-    _note_data_end(log, found, footer.summary_start)
     _take(found, content)
     return found
 
