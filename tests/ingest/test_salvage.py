@@ -12,7 +12,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from pipeline.ingest import unpack
+from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.mcap import chunk as mcap_chunk
+from pipeline.ingest.mcap.stream import McapStream
 from pipeline.ingest.read import read_log
 from schemas.errors import DataRejected, KempfError
 from schemas.profile import VesselProfile
@@ -380,6 +382,16 @@ def test_times_that_damage_made_are_not_told(instant):
     readings, chunks, _ = kept(log(index=False, closed=False, mend=wrong)[0])
     assert chunks == set(range(CHUNKS)) - {4}
     assert (readings.lost[0].since_ns, readings.lost[0].until_ns) == (None, None)
+
+
+def test_lost_chunks_that_follow_each_other_are_handed_on_together():
+    rotten = chunk_record(messages(1)[:1], b"", bytes, crc=12345)[0]
+    data, _ = log(index=False, closed=False, mend=lambda out, _: bytes(out) + rotten * 3_000)
+    stream = McapStream("a.mcap", LogFile(data))
+    batches = list(stream.batches())
+    assert [batch.lost for batch in batches] == [False, True]
+    assert [batch.first.size for batch in batches] == [CHUNKS * EACH, 3_000]
+    assert len(stream.lost) == 1_000 and stream.partial
 
 
 def test_a_quiet_day_at_berth_packs_very_well_and_is_no_bomb():

@@ -94,7 +94,7 @@ def messages_of(content: Bytes, first: Index, end: Index, piece: Piece) -> Batch
 
 
 def joined(batches: list[Batch]) -> Batch:
-    """Return batches of messages that follow each other as one."""
+    """Return batches of messages that follow each other, all of them lost or none, as one."""
     if len(batches) == 1:
         return batches[0]
     if not batches:
@@ -109,6 +109,7 @@ def joined(batches: list[Batch]) -> Batch:
         np.concatenate([b.log_time for b in batches]),
         np.concatenate([b.publish_time for b in batches]),
         tuple(piece for b in batches for piece in b.pieces),
+        lost=batches[0].lost,
     )
 
 

@@ -48,6 +48,9 @@ WINDOW = 4 << 20
 #: Bytes that are read at once right behind damage, where there may be more of it.
 _FIRST_WINDOW = 1 << 14
 
+#: Bytes that are known of a message whose chunk is lost: two places, its channel, two times.
+_HEADS = 40
+
 #: From here on a chunk is handed on as it is; smaller ones are worth a copy that puts them together.
 _LARGE = 1 << 19
 
@@ -120,16 +123,15 @@ class McapStream:
         size = 0
         for batch in self._pieces():
             self._count(batch)
-            alone = batch.lost or batch.content.size >= _LARGE
-            if alone or size + batch.content.size > WINDOW:
-                if waiting:
-                    yield joined(waiting)
+            own = _HEADS * batch.first.size if batch.lost else batch.content.size
+            if waiting and (size + own > WINDOW or own >= _LARGE or batch.lost != waiting[0].lost):
+                yield joined(waiting)
                 waiting, size = [], 0
-            if alone:
+            if own >= _LARGE:
                 yield batch
             else:
                 waiting.append(batch)
-                size += batch.content.size
+                size += own
         if waiting:
             yield joined(waiting)
         expected = self._summary.messages
