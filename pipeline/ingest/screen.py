@@ -175,9 +175,11 @@ def _readings(decoded: Decoded, reason: Code, refused: dict[str, Code], log_form
         "source": _source_names(decoded, kept),
     }
     values_read = values_kept = 0
+    # most logs have few of the channels: one column of nothing serves all others
+    nothing = pl.Series(pa.nulls(kept.size, pa.float64()))
     for channel in CHANNELS.values():
         if channel.name not in refused:
-            columns[channel.column] = pl.Series(pa.nulls(kept.size, pa.float64()))
+            columns[channel.column] = nothing
             continue
         offered = decoded.channels[channel.name].present[kept]
         there = offered & (refused[channel.name][kept] == 0)
@@ -209,10 +211,13 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
     # most channels have nothing refused
     parts = [part for part in parts if part[0].size] or parts[:1]
     record = np.concatenate([where for where, _, _ in parts])
-    named = np.zeros(len(decoded), dtype=np.bool_)
-    named[record] = True
-    distinct = np.flatnonzero(named)
-    text = decoded.raw.take(distinct).text()
+    if len(parts) == 1:
+        text = decoded.raw.take(record).text()
+    else:
+        named = np.zeros(len(decoded), dtype=np.bool_)
+        named[record] = True
+        distinct = np.flatnonzero(named)
+        text = decoded.raw.take(distinct).text().gather(np.searchsorted(distinct, record))
     time = decoded.time_utc_ns[record]
     words = pl.Series([None, *(str(r) for r in REASONS)], dtype=pl.String)
     codes = np.concatenate([code[where] for where, _, code in parts])
@@ -225,11 +230,12 @@ def _rejected(decoded: Decoded, reason: Code, refused: dict[str, Code]) -> pl.Da
                 [pl.repeat(name, where.size, dtype=pl.String, eager=True) for where, name, _ in parts]
             ),
             "reason": words.gather(codes.astype(np.int64)),
-            "raw": text.gather(np.searchsorted(distinct, record)),
+            "raw": text,
         },
         schema=REJECTED_SCHEMA,
     )
-    return table.sort("record", "channel", nulls_last=False, maintain_order=True)
+    # one part is in order already
+    return table if len(parts) == 1 else table.sort("record", "channel", nulls_last=False, maintain_order=True)
 
 
 def _source_names(decoded: Decoded, record: Index) -> pl.Series:

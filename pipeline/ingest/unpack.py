@@ -11,8 +11,11 @@ GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 #: Largest log that is unpacked, bytes: a bound against a small file that holds a huge one.
 LIMIT = 512 << 20
 
-#: A log may unpack to so many bytes, and to so many for each byte that was delivered; the same for its records.
-_BASE, _RATIO, _RECORDS = 32 << 20, 100, 1_000_000
+#: A log may unpack to so many bytes, and to so many more for each byte that was delivered.
+_BASE, _RATIO = 32 << 20, 100
+
+#: It may hold so many records, or so many for each byte that was delivered.
+_RECORDS, _RECORDS_A_BYTE = 1_000_000, 4
 
 #: Compressed bytes that are unpacked at once: few at first, for a file of many small members, and with zstd never many,
 #: for 4 bytes of it may stand for 128 kB.
@@ -60,7 +63,7 @@ def allowance(delivered: int) -> tuple[int, int]:
     Logs of ships that move unpack to 5 to 30 times their size and hold a record for every 4 bytes or more. Where
     nothing changes, at berth, it is a record a byte or more; a day at 10 Hz of that has to fit.
     """
-    return _BASE + _RATIO * delivered, _RECORDS + delivered
+    return _BASE + _RATIO * delivered, max(_RECORDS, _RECORDS_A_BYTE * delivered)
 
 
 def _gzip(name: str, data: bytes, limit: int) -> tuple[bytes, list[str]]:
