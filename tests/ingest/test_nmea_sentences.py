@@ -223,6 +223,17 @@ def test_the_compass_own_variation_comes_before_that_of_the_receiver():
     assert np.degrees(column(readings, "heading_rad")[1:]) == pytest.approx([12.0, 3.0, 12.0])
 
 
+@pytest.mark.parametrize("degrees", ["180.1", "1e308"])
+def test_a_variation_of_more_than_half_a_turn_is_none(degrees):
+    fix = "GPRMC,07470{}.00,A,5954.0003,N,02435.9999,E,17.64,13.43,030525,{},W,A"
+    readings = read(
+        fix.format(1, "3.4"), fix.format(2, degrees), "HCHDM,10.0,M", f"HCHDG,1.0,,,{degrees},E", "HCHDM,1e308,M"
+    )
+    assert np.degrees(column(readings, "heading_rad")[2:]) == pytest.approx([6.6])
+    assert readings.tally.by_reason == {"not_a_number": 1, "out_of_range": 1}
+    assert any("tells: -3.4 deg" in note for note in readings.notes)
+
+
 def test_two_rudders_that_turn_together_are_their_mean():
     angles = [(-10.0, -11.0), (0.0, 0.5), (10.0, 11.0)]
     readings = read(

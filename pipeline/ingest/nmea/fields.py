@@ -159,7 +159,8 @@ def _read_field(fields: Fields, item: NmeaField) -> tuple[Float, Flag]:
         for name, times in item.factors.items():
             factor[ord(name)] = times
         value = value * factor[fields.at(item.letter).letter()]
-    return value * factor_to_si(item.unit, CHANNELS[item.channel].unit, item.channel), cells.there()
+    with np.errstate(over="ignore"):  # beyond all numbers: refused as not finite
+        return value * factor_to_si(item.unit, CHANNELS[item.channel].unit, item.channel), cells.there()
 
 
 def east(letter: Cells) -> Float:

@@ -9,6 +9,7 @@ from pipeline.ingest.nmea.fields import Fields, Said, east
 from pipeline.ingest.nmea.frames import Frames
 from pipeline.ingest.readings import Reason
 from pipeline.ingest.spans import Index
+from schemas.channels import CHANNELS
 
 _DEGREE = np.pi / 180.0
 
@@ -58,15 +59,20 @@ def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
             notes.append(
                 f"Magnetic headings of {name} were made true by the variation that {teller} tells: {shown} deg."
             )
-        said[name].values["heading"] = (np.mod(magnetic + variation, 2.0 * np.pi), there)
+        # what is no heading stays as it is, to be refused: on the circle it would look like one
+        known = (magnetic >= CHANNELS["heading"].low) & (magnetic <= CHANNELS["heading"].high)
+        made = np.mod(np.where(known, magnetic, 0.0) + variation, 2.0 * np.pi)
+        said[name].values["heading"] = (np.where(known, made, magnetic), there)
     return notes
 
 
 def _variation(fields: Fields, name: str) -> tuple[Float, Flag]:
-    """Return the variation, east positive, rad, and where the sentences tell one."""
+    """Return the variation, rad, east positive, NaN for more than half a turn, and where the sentences tell one."""
     place, side = _VARIATION[name]
     cells = fields.at(place)
-    return cells.number() * east(fields.at(side)) * _DEGREE, cells.there()
+    degrees = cells.number()
+    degrees[np.abs(degrees) > 180.0] = np.nan
+    return degrees * east(fields.at(side)) * _DEGREE, cells.there()
 
 
 def _told(frames: Frames, said: dict[str, Said]) -> tuple[Index, Float, str] | None:
