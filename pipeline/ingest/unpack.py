@@ -12,7 +12,7 @@ GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 LIMIT = 512 << 20
 
 #: A log may unpack to so many bytes, and to so many more for each byte that was delivered.
-_BASE, _RATIO = 32 << 20, 100
+_BASE, _RATIO = 24 << 20, 100
 
 #: It may hold so many records, or so many for each byte that was delivered.
 _RECORDS, _RECORDS_A_BYTE = 1_000_000, 4
