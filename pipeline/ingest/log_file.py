@@ -55,10 +55,11 @@ class LogFile:
         """Return all bytes."""
         return self.read(0, self.size)
 
-    def pieces(self) -> Iterator[bytes]:
-        """Yield all bytes, a few megabytes at a time."""
-        for at in range(0, self.size, _PIECE):
-            yield self.read(at, _PIECE)
+    def pieces(self, start: int = 0, stop: int | None = None) -> Iterator[bytes]:
+        """Yield the bytes between two places, all of them where none is given, a few megabytes at a time."""
+        end = self.size if stop is None else stop
+        for at in range(start, end, _PIECE):
+            yield self.read(at, min(_PIECE, end - at))
 
     @cached_property
     def sha256(self) -> str:

@@ -52,7 +52,7 @@ class Series:
 
     def seconds_since(self, origin_ns: int) -> Float:
         """Return the instants as seconds after ``origin_ns``, shape (n,)."""
-        return (self.time_utc_ns - origin_ns).astype(np.float64) / SECOND_NS
+        return _seconds(self.time_utc_ns, origin_ns)
 
     def at(self, time_utc_ns: Nanoseconds, max_gap_s: float) -> Float:
         """Interpolate linearly; NaN outside the series and across gaps.
@@ -74,11 +74,14 @@ class Series:
         first = max(int(np.searchsorted(self.time_utc_ns, time_utc_ns.min(), side="left")) - 1, 0)
         near = slice(first, int(np.searchsorted(self.time_utc_ns, time_utc_ns.max(), side="right")) + 1)
         origin, instant = int(self.time_utc_ns[0]), self.time_utc_ns[near]
-        own = (instant - origin).astype(np.float64) / SECOND_NS
-        asked = (time_utc_ns - origin).astype(np.float64) / SECOND_NS
+        own, asked = _seconds(instant, origin), _seconds(time_utc_ns, origin)
         result = np.interp(asked, own, self.value[near], left=np.nan, right=np.nan)
         if own.size > 1:
             after = np.clip(np.searchsorted(instant, time_utc_ns, side="left"), 1, own.size - 1)
             in_gap = (own[after] - own[after - 1] > max_gap_s) & (asked > own[after - 1]) & (asked < own[after])
             result[in_gap] = np.nan
         return result
+
+
+def _seconds(time_utc_ns: Nanoseconds, origin_ns: int) -> Float:
+    return (time_utc_ns - origin_ns).astype(np.float64) / SECOND_NS

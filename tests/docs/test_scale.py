@@ -71,6 +71,12 @@ def test_a_share_comes_with_its_spread() -> None:
     assert "5.0 % (-20.0 to 10.0)" in "\n".join(fleet_page.lines(_figures()))
 
 
+def test_threads_are_held_against_dask_workers_of_the_same_run_only() -> None:
+    told = "threads of one process over two Dask workers, 24 vessels, on the clock | 2.00 |"
+    assert told in "\n".join(fleet_page.lines({**_figures(), "dask_of": 40}))
+    assert "over two Dask workers" not in "\n".join(fleet_page.lines(_figures()))
+
+
 def test_figures_of_an_older_form_are_refused_in_one_sentence(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(fleet_figures, "FIGURES", tmp_path / "fleet.json")
     old = {key: value for key, value in _figures().items() if key != "commits"}

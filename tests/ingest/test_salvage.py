@@ -28,6 +28,8 @@ PROFILE = VesselProfile.model_validate(
 )
 PACK = {b"": bytes, b"zstd": zstandard.ZstdCompressor().compress, b"lz4": lz4.frame.compress}
 CHUNKS, EACH = 12, 30
+#: The beginning of a file of one channel.
+OPENED = MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json"))
 #: The end of a file without a summary and without a CRC.
 END = record(15, bytes(4)) + record(2, bytes(20)) + MAGIC
 
@@ -147,8 +149,8 @@ def test_messages_of_a_chunk_that_a_record_before_it_hides_are_not_taken_for_loo
     assert readings.partial
 
 
-def loose(number=CHUNKS):
-    return b"".join(record(*one) for one in messages(number))
+def loose():
+    return b"".join(record(*one) for one in messages(CHUNKS))
 
 
 def loose_behind_chunks(**how):
@@ -194,12 +196,9 @@ def test_damage_behind_the_last_chunk_is_told_where_nothing_counts_the_messages(
     assert numbers == whole(range(CHUNKS)) and readings.partial
 
 
-OPENED = MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json"))
-
-
-def attachment(data, crc=True):
+def attachment(data):
     body = bytes(16) + text(b"a.mcap") + text(b"") + struct.pack("<Q", len(data)) + data
-    return record(9, body + struct.pack("<I", zlib.crc32(body) if crc else 0))
+    return record(9, body + struct.pack("<I", zlib.crc32(body)))
 
 
 @pytest.mark.parametrize("end", [b"", END])
@@ -335,7 +334,7 @@ def test_many_chunks_that_unpack_to_too_much_are_refused(monkeypatch):
     monkeypatch.setattr(unpack, "_BASE", 1 << 20)
     records = [message(START, START, 0, bytes(1 << 18))]
     chunk = chunk_record(records, b"zstd", PACK[b"zstd"])[0]
-    data = MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json")) + chunk * 100
+    data = OPENED + chunk * 100
     with pytest.raises(DataRejected) as refused:
         read_log("a.mcap", data, PROFILE)
     assert refused.value.code == "log_too_large"
@@ -344,7 +343,7 @@ def test_many_chunks_that_unpack_to_too_much_are_refused(monkeypatch):
 def test_a_chunk_of_too_many_messages_is_refused(monkeypatch):
     monkeypatch.setattr(unpack, "_RECORDS", 1000)
     chunk = chunk_record([message(START, START, 0, b"{}")] * 100_000, b"zstd", PACK[b"zstd"])[0]
-    data = MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json")) + chunk
+    data = OPENED + chunk
     with pytest.raises(DataRejected) as refused:
         read_log("a.mcap", data, PROFILE)
     assert refused.value.code == "too_many_records"
@@ -352,7 +351,7 @@ def test_a_chunk_of_too_many_messages_is_refused(monkeypatch):
 
 def test_a_file_of_nothing_but_beginnings_of_chunks_takes_no_time_and_no_space():
     head = struct.pack("<BQQQQI", 6, 40, START, START, 0, 1) + text(b"") + struct.pack("<Q", 0)
-    data = MAGIC + record(1, text(b"") + text(b"")) + record(*channel(schema_id=0, encoding=b"json"))
+    data = OPENED
     data += chunk_record([message(START, START, 0, b'{"heading": 1}')], b"", bytes)[0] + (head + b"\xff" * 12) * 3_000
     begin = time.process_time()
     readings, _, numbers = kept(data)

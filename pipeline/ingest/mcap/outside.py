@@ -20,8 +20,9 @@ from pipeline.ingest.mcap.walk import HEAD, chunk_after
 from pipeline.ingest.sniff import MCAP_MAGIC
 from pipeline.ingest.spans import as_bytes
 
-#: Bytes that are read at once: few at first, where the next chunk may be near, then more.
-_FIRST, _MOST = 1 << 14, 4 << 20
+#: Bytes that are read at once, and of messages that are handed on together, unpacked; few are read at first behind
+#: damage, where there may be more of it, or the next chunk near.
+WINDOW, FIRST_WINDOW = 4 << 20, 1 << 14
 
 #: Bytes of a chunk's head that tell it for one.
 _CHUNK_HEAD = 64
@@ -41,14 +42,14 @@ def chunk_behind(log: LogFile, at: int, stop: int, end: int) -> int:
     end : int
         Where the chunk has to end at the latest.
     """
-    window = _FIRST
+    window = FIRST_WINDOW
     while at < stop:
         data = log.read(at, min(window, stop - at) + _CHUNK_HEAD)
         hit = chunk_after(as_bytes(data), end - at)
         if hit >= 0:
             return at + hit if at + hit < stop else -1
         at += min(window, stop - at)
-        window = min(2 * window, _MOST)
+        window = min(2 * window, WINDOW)
     return -1
 
 
@@ -96,6 +97,6 @@ def _attached(log: LogFile, first: int, end: int) -> bool:
 
 def _crc(log: LogFile, first: int, end: int) -> int:
     crc = 0
-    for at in range(first, end, _MOST):
-        crc = zlib.crc32(log.read(at, min(_MOST, end - at)), crc)
+    for piece in log.pieces(first, end):
+        crc = zlib.crc32(piece, crc)
     return crc

@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from pipeline.ingest.log_file import LogFile
 from pipeline.ingest.mcap.batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
 from pipeline.ingest.mcap.chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
-from pipeline.ingest.mcap.outside import believed, chunk_behind
+from pipeline.ingest.mcap.outside import FIRST_WINDOW, WINDOW, believed, chunk_behind
 from pipeline.ingest.mcap.records import (
     CHANNEL,
     CHUNK,
@@ -41,12 +41,6 @@ from pipeline.ingest.readings import LostStretch
 from pipeline.ingest.sniff import MCAP_MAGIC
 from pipeline.ingest.spans import Index, as_bytes
 from pipeline.ingest.unpack import allowance, too_large, too_many
-
-#: Bytes that are read from the file at once, and messages that are handed on together, unpacked.
-WINDOW = 4 << 20
-
-#: Bytes that are read at once right behind damage, where there may be more of it.
-_FIRST_WINDOW = 1 << 14
 
 #: Bytes that are known of a message whose chunk is lost: two places, its channel, two times.
 _HEADS = 40
@@ -173,7 +167,7 @@ class McapStream:
                 length = int.from_bytes(data[1:HEAD], "little") if len(data) >= HEAD else stop
                 if HEAD + length > stop - at or self._sound(at, *_alone(data[0], length)) == 0:
                     yield from self._mended(at)
-                    at, window = self._resume(at, stop), _FIRST_WINDOW
+                    at, window = self._resume(at, stop), FIRST_WINDOW
                     continue
                 if HEAD + length > _RECORD_LIMIT or data[0] not in (CHUNK, MESSAGE, SCHEMA, CHANNEL):
                     if data[0] in (CHUNK, MESSAGE):
@@ -195,7 +189,7 @@ class McapStream:
                     return
                 self._check_window(at, data, place - at)
                 yield from self._mended(place)
-                at, window = self._resume(place, stop), _FIRST_WINDOW
+                at, window = self._resume(place, stop), FIRST_WINDOW
                 continue
             self._check_window(at, data, reached)
             at += reached
@@ -320,9 +314,9 @@ class McapStream:
             self._crc = None
 
     def _check(self, at: int, length: int) -> None:
-        for place in range(at, at + length, WINDOW):
-            part = self._log.read(place, min(WINDOW, at + length - place))
-            self._check_window(place, part, len(part))
+        for piece in self._log.pieces(at, at + length):
+            self._check_window(at, piece, len(piece))
+            at += len(piece)
 
     def _end(self, data: bytes, length: int, at: int, first: int, end: int) -> None:
         """Compare the CRC of the data section with the one that its last record tells."""
