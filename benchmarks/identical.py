@@ -81,7 +81,7 @@ def _sets(vessel: str, sets: list[ParameterSet]) -> Iterator[tuple[str, Content]
     for one in sets:
         kind = f"{one.model_name} {one.estimator}".replace("linear ", "plain ")
         yield (
-            f"set {vessel}/{kind}/{one.start_utc_ns}",
+            f"set {vessel}/{kind}/{' '.join(log[:6] for log in one.log_ids)}/{one.start_utc_ns}",
             {
                 "parameters": {p.name: [p.value, p.std] for p in one.parameters},
                 "noise": {p.name: [p.value, p.std] for p in one.noise},
