@@ -23,14 +23,16 @@ check: $(DEVELOP)
 
 # Every figure anew, each on its own page in benchmarks/results; needs the measured logs in ../shared. Minutes.
 bench: $(RIVALS)
-	for name in hsva hsva_held_out usv trials rerun_demo speed monte_carlo current_frame draw_paper course_keeping \
-		estimator_speed rivals vessel_models trials_diagnosis hsva_ladder diagnosis_speed mcap_speed nmea_speed adopt; \
+	for name in identify.hsva identify.hsva_held_out identify.usv identify.trials fleet.rerun_demo ingest.speed \
+		identify.monte_carlo identify.current_frame documents.draw_paper identify.course_keeping identify.estimator_speed \
+		identify.estimators baselines.vessel_models diagnose.trials_diagnosis diagnose.hsva_ladder diagnose.diagnosis_speed \
+		ingest.mcap_speed ingest.nmea_speed fleet.adopt; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 # The long ones, half an hour and more each on two cores.
 bench-long: $(DEVELOP)
-	for name in information_limit changes no_log paper_map hidden_effects doctor fleet history_speed kill kill_dask \
-		fuzz; \
+	for name in identify.information_limit identify.changes identify.no_log identify.paper_map diagnose.hidden_effects \
+		ingest.doctor fleet.fleet fleet.history_speed fleet.kill fleet.kill_dask ingest.fuzz; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 setup: $(DEVELOP)

@@ -7,10 +7,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from flows.files import read_profiles
-from flows.ingest_logs import IngestOutcome, ingest
-from schemas.errors import NotFound
-from warehouse.store import Warehouse
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest_logs import IngestOutcome, ingest
+from kempf.schemas.errors import NotFound
+from kempf.warehouse.store import Warehouse
 
 _PROFILES = Path(__file__).parents[1] / "docs" / "profiles"
 

@@ -22,12 +22,12 @@ def table(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
 
 
 def write(name: str, title: str, lines: Sequence[str], *, options: str = "") -> Path:
-    """Write ``results/NAME.md`` and return its path.
+    """Write the page of a benchmark, ``results/NAME.md`` without its room, and return its path.
 
     Parameters
     ----------
     name : str
-        Of the benchmark's module.
+        Of the benchmark's module below `benchmarks`, such as ``identify.hsva``.
     title : str
     lines : sequence of str
         Markdown after the line that names command and versions.
@@ -38,6 +38,6 @@ def write(name: str, title: str, lines: Sequence[str], *, options: str = "") -> 
     command = f"python -m benchmarks.{name} {options}".strip()
     versions = ", ".join(f"{library} {version(library)}" for library in LIBRARIES)
     head = [f"# {title}", "", f"`{command}`; Python {platform.python_version()}, {versions}.", ""]
-    path = RESULTS / f"{name}.md"
+    path = RESULTS / f"{name.rpartition('.')[2]}.md"
     path.write_text("\n".join([*head, *lines, ""]), encoding="utf-8")
     return path

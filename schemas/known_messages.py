@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from math import pi
 
-from schemas.profile import ChannelMap
+from kempf.schemas.profile import ChannelMap
 
 _FIX = {
     "latitude": ChannelMap(channel="latitude", unit="deg"),

@@ -21,7 +21,7 @@ HULL_PARAMETERS: dict[str, str] = {
 #: Noise levels of eqs. (16) and (18) that are estimated with them, and their units (continuous time, standard
 #: deviations): wind force, yaw acceleration beside it, unaccounted current, lateral speed, yaw rate, heading. Those of
 #: the disturbances are their levels in the long run; within a time short beside their memory they only change by
-#: `pipeline.model.disturbances.change_within`.
+#: `kempf.pipeline.model.disturbances.change_within`.
 NOISE_PARAMETERS: dict[str, str] = {
     "sigma_F": "m/s^2",
     "sigma_M": "rad/s^2",

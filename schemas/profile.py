@@ -14,9 +14,9 @@ from typing import Any, Literal
 
 from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
 
-from schemas.channels import CHANNELS
-from schemas.errors import UsageError
-from schemas.units import factor_to_si
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.errors import UsageError
+from kempf.schemas.units import factor_to_si
 
 
 class _Frozen(BaseModel):

@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, Literal
 
-from schemas.channels import CHANNELS
+from kempf.schemas.channels import CHANNELS
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from math import pi
 
-from schemas.errors import UsageError
+from kempf.schemas.errors import UsageError
 
 #: unit -> (SI unit, factor): value_SI = value * factor
 TO_SI: dict[str, tuple[str, float]] = {

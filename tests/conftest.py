@@ -36,11 +36,11 @@ class Ship:
 
 
 def sail(hull: str, duration_s: float, seed: int) -> Ship:
-    from pipeline.simulate.csv_log import to_csv
-    from pipeline.simulate.logger_profile import logger_profile
-    from pipeline.simulate.mcap_log import to_mcap
-    from pipeline.simulate.nmea_log import to_nmea
-    from pipeline.simulate.trial import simulate_trial, zigzag_settings
+    from kempf.pipeline.simulate.csv_log import to_csv
+    from kempf.pipeline.simulate.logger_profile import logger_profile
+    from kempf.pipeline.simulate.mcap_log import to_mcap
+    from kempf.pipeline.simulate.nmea_log import to_nmea
+    from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
 
     settings = zigzag_settings(hull, duration_s=duration_s, seed=seed)
     trial = simulate_trial(settings)

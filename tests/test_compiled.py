@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 INNER = """
-from pipeline.compiled import njit
+from kempf.pipeline.compiled import njit
 
 HELD = {held}
 
@@ -18,7 +18,7 @@ def inner(x):
     return {factor} * x
 """
 OUTER = """
-from pipeline.compiled import njit
+from kempf.pipeline.compiled import njit
 from inner import HELD, inner
 
 @njit(cache=True)

@@ -18,19 +18,32 @@ BELOW = {
     "flows": {"flows", "warehouse", "pipeline", "schemas"},
     "workbench": {"workbench", "flows", "warehouse", "pipeline", "schemas"},
 }
+#: What each room of the pipeline may import of the others. The simulator knows none and none knows it: an error that
+#: both share would hide itself.
+ROOMS = {
+    "compiled": set(),
+    "ingest": {"compiled"},
+    "channels": set(),
+    "segment": {"channels"},
+    "model": {"compiled", "channels"},
+    "estimate": {"compiled", "channels", "segment", "model"},
+    "predict": {"compiled", "channels", "model", "estimate"},
+    "compare": {"channels", "model", "estimate", "predict"},
+    "diagnose": {"channels", "model", "estimate", "predict", "compare"},
+    "steering": {"channels", "model", "estimate", "predict"},
+    "history": {"channels"},
+    "simulate": set(),
+}
 #: What the warehouse may know of the pipeline: the types that it stores.
-STORED = ("pipeline.ingest.readings.", "pipeline.ingest.log_file.")
+STORED = ("kempf.pipeline.ingest.readings.", "kempf.pipeline.ingest.log_file.")
 #: Libraries with one door, and the files that are it.
 DOORS = {
-    "prefect": ("flows/engine.py", "flows/fleet.py"),
+    "prefect": ("flows/fleet/engine.py", "flows/fleet/flows.py"),
     "deltalake": ("warehouse/",),
     "click": ("workbench/",),
     "rich": ("workbench/",),
     "matplotlib": ("workbench/figures/",),
 }
-#: Rooms that must not know the simulator, nor it them: an error that both share would hide itself.
-SIMULATOR = "pipeline.simulate"
-ESTIMATOR = ("pipeline.model", "pipeline.identify", "pipeline.segment")
 #: What opens a file or reaches outside, by name of the function or method, and the modules that exist for it.
 OPENS = {
     *("open", "read_text", "read_bytes", "write_text", "write_bytes", "mkdir", "unlink", "touch"),
@@ -42,7 +55,7 @@ OUTSIDE = {"os", "pathlib", "shutil", "tempfile", "subprocess", "socket", "urlli
 
 def imported(path: str, tree: ast.AST) -> Iterator[tuple[int, str]]:
     """Every module that a file imports, wherever in it, with the line."""
-    package = path.removesuffix(".py").split("/")[:-1]
+    package = ["kempf", *path.removesuffix(".py").split("/")[:-1]]
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
             yield from ((node.lineno, alias.name) for alias in node.names)
@@ -52,8 +65,8 @@ def imported(path: str, tree: ast.AST) -> Iterator[tuple[int, str]]:
             # `from pipeline import simulate` imports a module as well
             yield from ((node.lineno, f"{base}.{alias.name}") for alias in node.names)
         elif isinstance(node, ast.Call) and _name(node.func) in ("import_module", "__import__") and node.args:
-            told = node.args[0].values[0] if isinstance(node.args[0], ast.JoinedStr) else node.args[0]
-            yield node.lineno, str(told.value) if isinstance(told, ast.Constant) else "?"
+            name = node.args[0].values[0] if isinstance(node.args[0], ast.JoinedStr) else node.args[0]
+            yield node.lineno, str(name.value) if isinstance(name, ast.Constant) else "?"
 
 
 def _name(function: ast.expr) -> str:
@@ -78,24 +91,27 @@ def faults(path: str, source: str) -> list[str]:
 
 def wrong(path: str, layer: str, module: str) -> Iterator[str]:
     """Why a file may not import a module, nothing where it may."""
-    top = module.partition(".")[0]
+    top, _, rest = module.partition(".")
     if top == "?":
         yield "imports what nobody can tell"
-    if top in BELOW and top not in BELOW[layer]:
-        yield f"{layer} imports {module}"
-    if top in DOORS and not path.startswith(DOORS[top] or ("-",)):
+    if top in BELOW:
+        yield f"{module} goes by the name kempf.{module}"
+    if top in DOORS and not path.startswith(DOORS[top]):
         yield f"{module} has another door"
-    if layer == "warehouse" and module.startswith("pipeline.") and not module.startswith(STORED):
-        yield f"the warehouse stores no {module}"
-    if layer != "pipeline":
-        return
-    room = path.removesuffix(".py").removesuffix("/__init__").replace("/", ".")
-    if top in OUTSIDE:
+    if layer == "pipeline" and top in OUTSIDE:
         yield f"pipeline reaches outside with {module}"
-    if within(room, SIMULATOR) and any(within(module, other) for other in ESTIMATOR):
-        yield f"the simulator imports {module}"
-    if not within(room, SIMULATOR) and within(module, SIMULATOR):
-        yield f"{room} imports the simulator"
+    if top != "kempf":
+        return
+    other, _, inner = rest.partition(".")
+    if other in BELOW and other not in BELOW[layer]:
+        yield f"{layer} imports {module}"
+    if layer == "warehouse" and other == "pipeline" and inner and not module.startswith(STORED):
+        yield f"the warehouse stores no {module}"
+    if layer == other == "pipeline":
+        here = path.removesuffix(".py").split("/")[1]
+        there = inner.partition(".")[0]
+        if here in ROOMS and there in ROOMS and there != here and there not in ROOMS[here]:
+            yield f"pipeline.{here} imports {module}"
 
 
 def sources() -> list[str]:
@@ -105,6 +121,11 @@ def sources() -> list[str]:
 def test_every_layer_is_there():
     assert {path.split("/")[0] for path in sources()} == set(BELOW)
     assert len(sources()) > 80
+
+
+def test_every_room_of_the_pipeline_has_its_place():
+    rooms = {p.split("/")[1].removesuffix(".py") for p in sources() if p.startswith("pipeline/")} - {"__init__"}
+    assert rooms == set(ROOMS)
 
 
 @pytest.mark.parametrize("layer", BELOW)
@@ -119,32 +140,38 @@ def read(path: str) -> str:
 
 def test_only_the_fleet_knows_prefect():
     knows = [p for p in sources() if any(within(m, "prefect") for _, m in imported(p, ast.parse(read(p))))]
-    assert knows == ["flows/engine.py", "flows/fleet.py"]
+    assert knows == ["flows/fleet/engine.py", "flows/fleet/flows.py"]
 
 
 @pytest.mark.parametrize(
     ("path", "source"),
     [
-        ("schemas/a.py", "import pipeline.ingest.read"),
-        ("pipeline/a.py", "from warehouse import raw"),
-        ("pipeline/a.py", "def f():\n    from flows.progress import silent"),
+        ("schemas/a.py", "import kempf.pipeline.ingest.read"),
+        ("pipeline/a.py", "from kempf.warehouse import raw"),
+        ("pipeline/a.py", "from pipeline.ingest import read"),
+        ("pipeline/a.py", "def f():\n    from kempf.flows.process.progress import silent"),
         ("pipeline/a.py", "import deltalake"),
         ("pipeline/a.py", "def f(x):\n    return open(x)"),
         ("pipeline/a.py", "def f(x):\n    return x.read_bytes()"),
         ("pipeline/a.py", "from pathlib import Path"),
         ("pipeline/a.py", "import prefect"),
-        ("pipeline/simulate/a.py", "from pipeline.model import ship"),
-        ("pipeline/simulate/a.py", "from pipeline import identify"),
+        ("pipeline/simulate/a.py", "from kempf.pipeline.model import ship"),
+        ("pipeline/simulate/a.py", "from kempf.pipeline import estimate"),
         ("pipeline/simulate/a.py", "from ..segment import find"),
-        ("pipeline/identify/a.py", "if True:\n    from pipeline.simulate.trial import Trial"),
-        ("pipeline/identify/a.py", "from .. import simulate"),
-        ("warehouse/a.py", "from flows import files"),
-        ("warehouse/a.py", "from pipeline.identify import estimators"),
-        ("warehouse/a.py", "import workbench"),
-        ("flows/a.py", "from workbench.terminal import number"),
+        ("pipeline/estimate/a.py", "if True:\n    from kempf.pipeline.simulate.trial import Trial"),
+        ("pipeline/estimate/a.py", "from .. import simulate"),
+        ("pipeline/estimate/a.py", "from kempf.pipeline.predict.free_run import FreeRun"),
+        ("pipeline/predict/a.py", "from kempf.pipeline import diagnose"),
+        ("pipeline/predict/a.py", "from kempf.pipeline.compare.misfit import where"),
+        ("pipeline/compare/a.py", "from kempf.pipeline.diagnose.diagnosis import Diagnosis"),
+        ("pipeline/channels/a.py", "from kempf.pipeline.segment.find import find_manoeuvres"),
+        ("warehouse/a.py", "from kempf.flows.jobs import files"),
+        ("warehouse/a.py", "from kempf.pipeline.estimate import estimators"),
+        ("warehouse/a.py", "import kempf.workbench"),
+        ("flows/a.py", "from kempf.workbench.terminal import number"),
         ("flows/a.py", "from prefect import flow"),
-        ("flows/a.py", "from importlib import import_module\nimport_module('workbench.cli')"),
-        ("flows/a.py", "from importlib import import_module\nimport_module(f'workbench.{1}')"),
+        ("flows/a.py", "from importlib import import_module\nimport_module('kempf.workbench.cli')"),
+        ("flows/a.py", "from importlib import import_module\nimport_module(f'kempf.workbench.{1}')"),
         ("flows/a.py", "import importlib\nimportlib.import_module(name)"),
         ("workbench/a.py", "import prefect.artifacts"),
         ("workbench/a.py", "import deltalake"),
@@ -157,11 +184,11 @@ def test_the_checker_catches_a_violation(path, source):
 @pytest.mark.parametrize(
     ("path", "source"),
     [
-        ("workbench/a.py", "import flows.fleet, warehouse.raw, schemas.errors, click"),
-        ("flows/fleet.py", "from prefect import flow"),
-        ("warehouse/a.py", "from pipeline.ingest.readings import Readings\nimport deltalake"),
-        ("pipeline/simulate/a.py", "from pipeline.simulate.trial import Trial\nimport numpy"),
-        ("pipeline/identify/a.py", "from pipeline.segment.find import find_manoeuvres"),
+        ("workbench/a.py", "import kempf.flows.fleet, kempf.warehouse.raw, kempf.schemas.errors, click"),
+        ("flows/fleet/flows.py", "from prefect import flow"),
+        ("warehouse/a.py", "from kempf.pipeline.ingest.readings import Readings\nimport deltalake"),
+        ("pipeline/simulate/a.py", "from kempf.pipeline.simulate.trial import Trial\nimport numpy"),
+        ("pipeline/estimate/a.py", "from kempf.pipeline.segment.find import find_manoeuvres"),
     ],
 )
 def test_the_checker_lets_good_imports_pass(path, source):

@@ -12,8 +12,8 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from warehouse.canonical import canonical_json, sha256
-from warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.canonical import canonical_json, sha256
+from kempf.warehouse.parameter_set import Estimate, ParameterSet
 
 Verdict = Literal["bit-identical", "equal within tolerance", "different"]
 

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from schemas.errors import UsageError
-from warehouse import delta, parameter_sets
-from warehouse.keys import one_of, quoted, vessel_key
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.schemas.errors import UsageError
+from kempf.warehouse import delta, parameter_sets
+from kempf.warehouse.keys import one_of, quoted, vessel_key
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 CURRENT = "current"
 

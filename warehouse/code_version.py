@@ -12,8 +12,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
 
-import pipeline
-import schemas
+from kempf import pipeline, schemas
 
 #: Packages whose version may change a result or how it is stored.
 PACKAGES = ("deltalake", "numba", "numpy", "polars", "pyarrow", "scipy")

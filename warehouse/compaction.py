@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
-from schemas.errors import KempfError
-from schemas.tables import TABLES
-from warehouse import delta
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.schemas.errors import KempfError
+from kempf.schemas.tables import TABLES
+from kempf.warehouse import delta
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     from deltalake import DeltaTable

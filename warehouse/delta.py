@@ -2,7 +2,7 @@
 
 Every change is one commit of `replace`: rows that a predicate names are exchanged for others, on the version that was
 read. A commit that meanwhile touched what the predicate names makes it fail, so that read, decide, write is one step
-under `warehouse.retry.with_retry`. (Merges lose the units in the field metadata; blind appends see no conflict.)
+under `kempf.warehouse.retry.with_retry`. (Merges lose the units in the field metadata; blind appends see no conflict.)
 """
 
 from __future__ import annotations
@@ -16,11 +16,11 @@ from itertools import accumulate
 from typing import TYPE_CHECKING, Any
 from urllib.parse import unquote
 
-from schemas.errors import KempfError, NotFound
-from schemas.tables import TABLES, arrow_schema
-from warehouse import handles
-from warehouse.scan import Where, scanned
-from warehouse.store import Warehouse, not_writable
+from kempf.schemas.errors import KempfError, NotFound
+from kempf.schemas.tables import TABLES, arrow_schema
+from kempf.warehouse import table_cache
+from kempf.warehouse.scan import Where, scanned
+from kempf.warehouse.store import Warehouse, not_writable
 
 if TYPE_CHECKING:
     import polars as pl
@@ -50,7 +50,7 @@ def open_table(warehouse: Warehouse, name: str, version: int | None = None) -> D
     warehouse : Warehouse
         Where it is.
     name : str
-        Key of `schemas.tables.TABLES`.
+        Key of `kempf.schemas.tables.TABLES`.
     version : int, optional
         Version to pin; the newest by default.
 
@@ -149,7 +149,7 @@ def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
     What was lent is not to be used after, nor by another thread. One over which something else than a lost race went
     wrong is opened anew the next time.
     """
-    with handles.borrowed(warehouse, name, ensure_table) as table:
+    with table_cache.borrowed(warehouse, name, ensure_table) as table:
         assert table is not None
         # here, and not where it is opened: a handle that was lent for reading before may lack columns too
         yield _with_every_column(warehouse, table, name)
@@ -181,7 +181,7 @@ def read(
     warehouse : Warehouse
         Where it is.
     name : str
-        Key of `schemas.tables.TABLES`.
+        Key of `kempf.schemas.tables.TABLES`.
     where : mapping of str to str or list of str, optional
         Only rows whose column has that value, or one of those.
     columns : sequence of str, optional
@@ -216,7 +216,7 @@ def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iter
     KempfError
         ``table_unreadable``.
     """
-    with handles.borrowed(warehouse, name, open_table) as table:
+    with table_cache.borrowed(warehouse, name, open_table) as table:
         if version is None or (table is not None and table.version() == version):
             yield table
             return
@@ -281,12 +281,12 @@ def replace(
     new : sequence of dict, or iterator of polars.DataFrame
         New rows, with every column of the table; frames are written one after the other. All satisfy the predicate.
     predicate : str
-        SQL; texts in it through `warehouse.keys.quoted`.
+        SQL; texts in it through `kempf.warehouse.keys.quoted`.
 
     Raises
     ------
     deltalake.exceptions.CommitFailedError
-        Another writer changed what the predicate names: read again, see `warehouse.retry.with_retry`.
+        Another writer changed what the predicate names: read again, see `kempf.warehouse.retry.with_retry`.
     KempfError
         ``disk_full``, ``warehouse_not_writable``.
     """

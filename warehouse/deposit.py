@@ -9,12 +9,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.readings import LogReadings
-from schemas.profile import VesselProfile
-from warehouse import logs, lost, raw, readings, vessels
-from warehouse.keys import ingest_id, vessel_key
-from warehouse.store import Warehouse
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.readings import LogReadings
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import logs, lost, raw, readings, vessels
+from kempf.warehouse.keys import ingest_id, vessel_key
+from kempf.warehouse.store import Warehouse
 
 Outcome = Literal["new", "reread", "unchanged"]
 
@@ -36,7 +36,7 @@ class Delivery:
     readings : LogReadings
         What the reader returned.
     code_version : str
-        Of the code that read it, see `warehouse.code_version.fingerprint`.
+        Of the code that read it, see `kempf.warehouse.code_version.fingerprint`.
     notes : tuple of str
         What a person should know besides what the reader says.
     """

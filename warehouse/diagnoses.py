@@ -7,12 +7,12 @@ from dataclasses import dataclass
 from json import loads
 from typing import Any
 
-from schemas.errors import NotFound
-from warehouse import delta
-from warehouse.canonical import canonical_json, plain, sha256
-from warehouse.keys import quoted, vessel_key
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.schemas.errors import NotFound
+from kempf.warehouse import delta
+from kempf.warehouse.canonical import canonical_json, plain, sha256
+from kempf.warehouse.keys import quoted, vessel_key
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 
 def diagnosis_id(inputs: Mapping[str, Any]) -> str:

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from json import loads
 from typing import Any
 
-from warehouse import delta
-from warehouse.canonical import canonical_json, plain
-from warehouse.keys import one_of, vessel_key
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.warehouse import delta
+from kempf.warehouse.canonical import canonical_json, plain
+from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 
 @dataclass(frozen=True)

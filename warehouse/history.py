@@ -12,18 +12,18 @@ from math import isfinite
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
-from schemas.errors import UsageError
-from warehouse import delta, vessels
-from warehouse.canonical import plain
-from warehouse.instant import iso_utc
-from warehouse.keys import vessel_key
-from warehouse.store import Warehouse
+from kempf.schemas.errors import UsageError
+from kempf.warehouse import delta, vessels
+from kempf.warehouse.canonical import plain
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     import polars as pl
     from deltalake import DeltaTable
 
-    from warehouse.segments import Segment
+    from kempf.warehouse.segments import Segment
 
 
 #: Half a 95 % interval, in standard errors.
@@ -165,7 +165,7 @@ def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None)
     UsageError
         ``as_of_without_zone``.
     """
-    from warehouse import segments
+    from kempf.warehouse import segments
 
     warehouse.require()
     with _sets_as_of(warehouse, as_of) as table:
@@ -187,7 +187,7 @@ _COMPARED = (
 
 def _compared(rows: list[dict[str, Any]], found: Mapping[str, Segment]) -> Comparable:
     """Keep of sets of one kind those that stand for themselves and can be weighed, each manoeuvre once."""
-    from warehouse.manoeuvres import once, same
+    from kempf.warehouse.deduplicate import once, same
 
     names = {name: unit for row in rows for name, unit in _known(row).items()}
     left_out: Counter[str] = Counter()

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from schemas.errors import UsageError
-from warehouse.canonical import canonical_json, sha256
+from kempf.schemas.errors import UsageError
+from kempf.warehouse.canonical import canonical_json, sha256
 
 
 def vessel_key(vessel: str) -> str:

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
 from typing import Any
 
-from pipeline.ingest.readings import Tally
-from schemas.errors import DataRejected, NotFound, UsageError
-from warehouse import delta
-from warehouse.keys import one_of, vessel_key
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.pipeline.ingest.readings import Tally
+from kempf.schemas.errors import DataRejected, NotFound, UsageError
+from kempf.warehouse import delta
+from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 
 @dataclass(frozen=True)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.ingest.readings import LogReadings, LostStretch
-from warehouse import delta
-from warehouse.keys import one_of, vessel_key
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.pipeline.ingest.readings import LogReadings, LostStretch
+from kempf.warehouse import delta
+from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 
 def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, LogReadings]]) -> None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from math import hypot, nan
 from typing import Any
 
-from warehouse.canonical import canonical_json, plain, sha256
-from warehouse.instant import iso_utc
+from kempf.warehouse.canonical import canonical_json, plain, sha256
+from kempf.warehouse.instant import iso_utc
 
 _CONTENTS = ("model_spec", "settings", "fit", "iterations", "convergence", "provenance")
 
@@ -53,7 +53,7 @@ class Inputs:
     settings : mapping
         Of the estimator, JSON content.
     code_version : str
-        Fingerprint of the source, see `warehouse.code_version.fingerprint`.
+        Fingerprint of the source, see `kempf.warehouse.code_version.fingerprint`.
     """
 
     log_ids: tuple[str, ...]

@@ -6,14 +6,14 @@ from collections.abc import Collection, Sequence
 from json import loads
 from typing import TYPE_CHECKING, Any
 
-from schemas.errors import KempfError, NotFound, UsageError
-from warehouse import delta
-from warehouse.agreement import content_digest, differences
-from warehouse.canonical import canonical_json
-from warehouse.keys import one_of, vessel_key
-from warehouse.parameter_set import Estimate, ParameterSet
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.warehouse import delta
+from kempf.warehouse.agreement import content_digest, differences
+from kempf.warehouse.canonical import canonical_json
+from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     import polars as pl

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from warehouse import code_version, delta, examinations
-from warehouse.parameter_set import Inputs
-from warehouse.store import Warehouse
+from kempf.warehouse import code_version, delta, examinations
+from kempf.warehouse.parameter_set import Inputs
+from kempf.warehouse.store import Warehouse
 
 
 def collect(

@@ -6,9 +6,9 @@ import hashlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from pipeline.ingest.log_file import LogFile
-from schemas.errors import DataRejected, KempfError, NotFound
-from warehouse.store import Warehouse
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.errors import DataRejected, KempfError, NotFound
+from kempf.warehouse.store import Warehouse
 
 #: A log that is shorter is fetched once, and held; a longer one is read again where it lies. Bytes.
 _SHORT = 32 << 20

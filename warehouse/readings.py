@@ -6,11 +6,11 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
-from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, LogReadings
-from warehouse import delta, logs
-from warehouse.keys import one_of, vessel_key
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, LogReadings
+from kempf.warehouse import delta, logs
+from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     import polars as pl
@@ -47,7 +47,7 @@ def read(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
     Returns
     -------
     polars.DataFrame
-        Columns `pipeline.ingest.readings.READING_SCHEMA`, sorted by record.
+        Columns `kempf.pipeline.ingest.readings.READING_SCHEMA`, sorted by record.
 
     Raises
     ------

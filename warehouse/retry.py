@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import TypeVar
 
-from schemas.errors import KempfError
+from kempf.schemas.errors import KempfError
 
 T = TypeVar("T")
 

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from json import loads
 from typing import TYPE_CHECKING, Any
 
-from warehouse import delta
-from warehouse.canonical import canonical_json, plain, sha256
-from warehouse.keys import one_of
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.warehouse import delta
+from kempf.warehouse.canonical import canonical_json, plain, sha256
+from kempf.warehouse.keys import one_of
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     import polars as pl

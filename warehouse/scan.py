@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
-from schemas.tables import TABLES, arrow_schema
+from kempf.schemas.tables import TABLES, arrow_schema
 
 if TYPE_CHECKING:
     import polars as pl
@@ -30,7 +30,7 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     table : DeltaTable or None
         Open.
     name : str
-        Key of `schemas.tables.TABLES`; a column of it that the table lacks is null.
+        Key of `kempf.schemas.tables.TABLES`; a column of it that the table lacks is null.
     where : mapping of str to str or list of str, optional
 
     Returns

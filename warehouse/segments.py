@@ -7,14 +7,14 @@ from dataclasses import asdict, dataclass, field
 from json import loads
 from typing import Any
 
-from schemas.errors import NotFound
-from warehouse import delta, logs, vessels
-from warehouse.canonical import canonical_json, plain, sha256
-from warehouse.instant import iso_utc
-from warehouse.keys import one_of, vessel_key
-from warehouse.retry import with_retry
-from warehouse.scan import Where
-from warehouse.store import Warehouse
+from kempf.schemas.errors import NotFound
+from kempf.warehouse import delta, logs, vessels
+from kempf.warehouse.canonical import canonical_json, plain, sha256
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.scan import Where
+from kempf.warehouse.store import Warehouse
 
 _JSON = ("imo", "quality", "detail")
 

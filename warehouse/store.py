@@ -21,8 +21,8 @@ from pathlib import Path
 from typing import Any, BinaryIO
 from urllib.parse import unquote
 
-from schemas.errors import KempfError, NotFound, UsageError
-from warehouse import object_store
+from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.warehouse import object_store
 
 #: Name and content of the file that marks a warehouse.
 MARKER = "kempf-warehouse.json"

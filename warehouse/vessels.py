@@ -7,12 +7,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from schemas.errors import NotFound
-from schemas.profile import VesselProfile
-from warehouse import delta
-from warehouse.keys import quoted, vessel_key
-from warehouse.retry import with_retry
-from warehouse.store import Warehouse
+from kempf.schemas.errors import NotFound
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import delta
+from kempf.warehouse.keys import quoted, vessel_key
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
 
 
 @dataclass(frozen=True)

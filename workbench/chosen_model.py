@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from flows.files import read_model
-from flows.vessel_model import PLAIN, Own, model_of
-from schemas.errors import UsageError
-from schemas.model_spec import ModelSpec
-from warehouse import parameter_sets
-from warehouse.store import Warehouse
+from kempf.flows.jobs.files import read_model
+from kempf.flows.jobs.vessel_model import PLAIN, Own, model_of
+from kempf.schemas.errors import UsageError
+from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse import parameter_sets
+from kempf.warehouse.store import Warehouse
 
 _LARGEST = 100_000
 
@@ -58,7 +58,7 @@ def read_effect_files(paths: Sequence[Path]) -> dict[str, str]:
     KempfError
         What is wrong in it, with its name.
     """
-    from pipeline.model.effects import from_file
+    from kempf.pipeline.model.effects import from_file
 
     found = {}
     for path in paths:

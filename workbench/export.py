@@ -11,13 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from schemas.errors import UsageError
-from schemas.model_spec import HULL_PARAMETERS
-from warehouse.parameter_set import ParameterSet
+from kempf.schemas.errors import UsageError
+from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.warehouse.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
-    from flows.known_ship import KnownShip
-    from pipeline.steering.state_space import StateSpace
+    from kempf.flows.jobs.ship_model import KnownShip
+    from kempf.pipeline.steering.state_space import StateSpace
 
 #: bytes of the description at the head of a MAT file, which scipy fills with the time of day
 _MAT_DESCRIPTION = 116
@@ -63,7 +63,7 @@ def linear(ship: KnownShip, step_s: float, course_rad: float) -> Linear:
     UsageError
         The step is not positive, or the course not finite.
     """
-    from pipeline.steering.state_space import continuous, discretised
+    from kempf.pipeline.steering.state_space import continuous, discretised
 
     model = continuous(
         ship.hull, ship.spec, ship.speed_m_s, arm_per_m=ship.arm_per_m, course_rad=course_rad, noise=ship.noise

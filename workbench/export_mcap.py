@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipeline.compare.ahead import WIDTH_95
-from pipeline.compare.comparison import ComparedRun
-from pipeline.compare.predicted import Predicted
-from pipeline.diagnose.run import Run
-from pipeline.normalise.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.compare.comparison import ComparedRun
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.predict.linear_ahead import WIDTH_95
+from kempf.pipeline.predict.prediction import Predicted
 
 #: written into the header instead of the writer's version, so that an upgrade of it leaves the bytes alone
 _LIBRARY = "kempf"
@@ -38,7 +38,7 @@ _WORDS = {
 
 
 if TYPE_CHECKING:
-    from flows.compare_vessel import Comparison
+    from kempf.flows.jobs.compare_vessel import Comparison
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from schemas.errors import UsageError
+from kempf.schemas.errors import UsageError
 
 
 def require_new(path: Path, option: str) -> None:

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
-from workbench.figures.measured_over_predicted import as_png, measured_over_predicted
+from kempf.workbench.figures.measured_over_predicted import as_png, measured_over_predicted
 
 if TYPE_CHECKING:
     import polars as pl
 
-    from flows.compare_vessel import Comparison
+    from kempf.flows.jobs.compare_vessel import Comparison
 
 _WORDS = {"held_out": "held out", "fitted": "fitted"}
 
@@ -60,7 +60,7 @@ class ComparisonView:
         return pl.DataFrame(rows)
 
     def where(self) -> dict[str, Any]:
-        """Say where the model fails, see `pipeline.compare.where.where`; fitted and held-out runs apart."""
+        """Say where the model fails, see `kempf.pipeline.compare.misfit.where`; fitted and held-out runs apart."""
         return self.comparison.where()
 
     @property
@@ -98,7 +98,7 @@ def compare(warehouse: str, vessel: str, set_id: str | None = None, horizon: str
         A folder, or ``s3://bucket/prefix``.
     vessel : str
     set_id : str, optional
-        Parameter set; by default the vessel's newest, see `flows.compare_vessel.ALIASES`.
+        Parameter set; by default the vessel's newest, see `kempf.flows.jobs.compare_vessel.ALIASES`.
     horizon : str, optional
         ``1`` (one step), a time such as ``10s`` or ``60s``, or ``free``.
 
@@ -110,9 +110,9 @@ def compare(warehouse: str, vessel: str, set_id: str | None = None, horizon: str
     Raises
     ------
     KempfError
-        See `flows.compare_vessel.compare_vessel`.
+        See `kempf.flows.jobs.compare_vessel.compare_vessel`.
     """
-    from flows.compare_vessel import compare_vessel
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.compare_vessel import compare_vessel
+    from kempf.warehouse.store import Warehouse
 
     return ComparisonView(compare_vessel(Warehouse(warehouse), vessel, set_id, horizon))

@@ -11,7 +11,7 @@ from typing import Any
 
 import click
 
-from flows.progress import Progress, silent
+from kempf.flows.process.progress import Progress, silent
 
 
 def print_json(content: Any) -> None:

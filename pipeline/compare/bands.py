@@ -15,10 +15,10 @@ from typing import Any
 import numpy as np
 from scipy.stats import beta
 
-from pipeline.compare.group import BAND, UNITS
-from pipeline.compare.looked import Looked
-from pipeline.diagnose.held_out import CHANNELS
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.compare.group import BAND, UNITS
+from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.predict.run_residuals import Looked
 
 #: edges of the bands, Hz: octaves, so that the waves a ship meets lie within 0.08 to 0.16 Hz
 EDGES_HZ = tuple(0.0025 * 2.0**k for k in range(14))

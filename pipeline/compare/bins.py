@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.compare.group import group
-from pipeline.compare.looked import Samples
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.compare.group import group
+from kempf.pipeline.predict.run_residuals import Samples
 
 #: bins of what has a sign, to either side of nothing; bins of the speed
 _HALF, _SPEEDS, _COURSES = 3, 5, 8

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.compare.group import UNITS
-from pipeline.compare.looked import Looked
-from pipeline.compare.overshoot import Overshoot
-from pipeline.compare.predicted import Predicted
+from kempf.pipeline.compare.group import UNITS
+from kempf.pipeline.compare.overshoot import Overshoot
+from kempf.pipeline.predict.prediction import Predicted
+from kempf.pipeline.predict.run_residuals import Looked
 
 FITTED, HELD_OUT = "fitted", "held_out"
 #: the order of the command line's JSON
@@ -36,7 +36,7 @@ class ComparedRun:
         The free run, for overshoots and for the threshold.
     overshoots : tuple of Overshoot
     looked : Looked
-        For `pipeline.compare.where.where`.
+        For `kempf.pipeline.compare.misfit.where`.
     levels_from : str
         Where the noise levels come from, in words.
     """

@@ -12,12 +12,12 @@ from typing import Any
 import numpy as np
 from scipy.stats import chi2, norm
 
-from pipeline.compare.group import BAND
-from pipeline.compare.looked import Looked
-from pipeline.diagnose.held_out import CHANNELS
-from pipeline.diagnose.run import Run
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.compare.group import BAND
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS
+from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.predict.run_residuals import Looked
 
 #: lags go up to this time, and to so many steps at most
 _LONGEST_S, _MOST = 60.0, 120

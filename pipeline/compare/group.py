@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2, norm
 
-from pipeline.compare.looked import Samples
-from pipeline.diagnose.held_out import CHANNELS
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.predict.run_residuals import Samples
 
 #: probability of the bands
 BAND = 0.99

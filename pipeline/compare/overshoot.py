@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
 
 
 @dataclass(frozen=True)

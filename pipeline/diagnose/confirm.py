@@ -8,14 +8,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.diagnose import sensitivity
-from pipeline.diagnose.held_out import predictive
-from pipeline.diagnose.pooled_fit import Fit
-from pipeline.diagnose.run import Run
-from pipeline.diagnose.screen import Candidate
-from pipeline.diagnose.sensitivity import N_HULL, Point
-from pipeline.diagnose.staged import added
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.forward_selection import added
+from kempf.pipeline.diagnose.screen import Candidate
+from kempf.pipeline.estimate import sensitivity
+from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.sensitivity import N_HULL, Point
+from kempf.pipeline.predict.free_run import predictive
 
 #: what a candidate must save in the Bayesian information criterion (Kass & Raftery 1995, JASA 90: strong evidence)
 BIC_SAVING = 6.0

@@ -12,19 +12,19 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unseen
-from pipeline.diagnose.flexible import Flexible, flexible
-from pipeline.diagnose.held_out import FreeRun, free_run
-from pipeline.diagnose.pooled_fit import Fit
-from pipeline.diagnose.run import Run
-from pipeline.diagnose.screen import Candidate, score, screen
-from pipeline.diagnose.sets import WINDOW, shortlist, undecided
-from pipeline.diagnose.split import split
-from pipeline.diagnose.staged import is_ship, staged
-from pipeline.diagnose.start import Start
-from pipeline.model.terms.effect import Effect
-from pipeline.normalise.series import Float
-from schemas.model_spec import ModelSpec
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unseen
+from kempf.pipeline.diagnose.confusion_sets import WINDOW, shortlist, undecided
+from kempf.pipeline.diagnose.forward_selection import is_ship, staged
+from kempf.pipeline.diagnose.ridge_reference import Flexible, flexible
+from kempf.pipeline.diagnose.screen import Candidate, score, screen
+from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.search.pooled_start import Start
+from kempf.pipeline.model.terms.effect import Effect
+from kempf.pipeline.predict.free_run import FreeRun, free_run
+from kempf.schemas.model_spec import ModelSpec
 
 Told = Callable[[str], None]
 #: how many times its score a refit gains at most, as far as has been seen; a hull bent by what is missing hides much
@@ -98,7 +98,7 @@ class Step:
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What a diagnosis found; `pipeline.diagnose.verdict` puts it in words.
+    """What a diagnosis found; `kempf.pipeline.diagnose.verdict` puts it in words.
 
     Attributes
     ----------

@@ -18,11 +18,11 @@ from itertools import product
 import numpy as np
 from scipy.stats import chi2
 
-from pipeline.diagnose.pooled_fit import Fit, Linearised
-from pipeline.diagnose.response import Trial, responses
-from pipeline.diagnose.sensitivity import N_HULL
-from pipeline.model.terms.effect import Effect
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.effect_responses import Trial, responses
+from kempf.pipeline.estimate.pooled_fit import Fit, Linearised
+from kempf.pipeline.estimate.sensitivity import N_HULL
+from kempf.pipeline.model.terms.effect import Effect
 
 #: share of an effect that the fitted parameters imitate, above which nothing can be told of it
 NOT_TESTABLE = 0.999

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from pipeline.diagnose.run import Run
+from kempf.pipeline.estimate.record.grid_run import Run
 
 #: fewer runs than this are all fitted: one held out would leave too little
 FEWEST_TO_HOLD_OUT = 3

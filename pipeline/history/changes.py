@@ -11,12 +11,12 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.history import effects
-from pipeline.history.power import smallest_steps
-from pipeline.history.scan import Stretch, judge, stretch
-from pipeline.history.sets import Mask, ParameterHistory, occasions
-from pipeline.history.settings import ChangeSettings
-from pipeline.normalise.series import Float, Nanoseconds
+from kempf.pipeline.channels.series import Float, Nanoseconds
+from kempf.pipeline.history import effects
+from kempf.pipeline.history.power import smallest_steps
+from kempf.pipeline.history.scan import Stretch, judge, stretch
+from kempf.pipeline.history.sets import Mask, ParameterHistory, occasions
+from kempf.pipeline.history.settings import ChangeSettings
 
 Kind = Literal["step", "drift"]
 

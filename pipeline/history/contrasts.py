@@ -18,7 +18,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
 
 _ROUNDS = 3
 

@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.history.contrasts import scatter
-from pipeline.history.scan import Stretch
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.history.contrasts import scatter
+from kempf.pipeline.history.scan import Stretch
 
 _DRAWS = 400
 

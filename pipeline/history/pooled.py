@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.history.sets import usable
-from pipeline.normalise.series import Float
-from schemas.errors import DataRejected
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.history.sets import usable
+from kempf.schemas.errors import DataRejected
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.history.contrasts import scatter, statistics
-from pipeline.history.scan import Stretch, Verdict
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.history.contrasts import scatter, statistics
+from kempf.pipeline.history.scan import Stretch, Verdict
 
 _DRAWS = 200
 #: How many differences of neighbours the scatter common to all directions is worth. A change shows in the direction

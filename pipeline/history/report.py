@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.history.changes import Change, Changes
-from pipeline.history.pooled import Pooled
-from pipeline.history.sets import ParameterHistory
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.history.changes import Change, Changes
+from kempf.pipeline.history.pooled import Pooled
+from kempf.pipeline.history.sets import ParameterHistory
 
 
 def report(history: ParameterHistory, pooled: Pooled | None, found: Changes) -> dict[str, Any]:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.history.contrasts import Statistics, axes, directions, scatter, statistics, variances
-from pipeline.history.sets import ParameterHistory
-from pipeline.history.settings import ChangeSettings
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.history.contrasts import Statistics, axes, directions, scatter, statistics, variances
+from kempf.pipeline.history.sets import ParameterHistory
+from kempf.pipeline.history.settings import ChangeSettings
 
 YEAR_S = 365.25 * 86400.0
 

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds
-from schemas.errors import DataRejected
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.schemas.errors import DataRejected
 
 Mask = NDArray[np.bool_]
 

@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.ingest.readings import LostStretch, Reason
+from kempf.pipeline.ingest.readings import LostStretch, Reason
 
 Float = NDArray[np.float64]
 Flag = NDArray[np.bool_]

@@ -9,15 +9,15 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Nanoseconds, Values
-from pipeline.ingest.mapping import check_once
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.sniff import separator_of
-from pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, spans_of, trimmed
-from pipeline.ingest.text import decimal_time, iso_time
-from pipeline.ingest.text.numerals import number
-from schemas.errors import DataRejected, UsageError
-from schemas.profile import Source, TimeColumn, start_ns
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Nanoseconds, Values
+from kempf.pipeline.ingest.mapping import check_once
+from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.sniff import separator_of
+from kempf.pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, spans_of, trimmed
+from kempf.pipeline.ingest.text import decimal_time, iso_time
+from kempf.pipeline.ingest.text.numerals import number
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.profile import Source, TimeColumn, start_ns
 
 _QUOTE, _TAB, _FEED = 34, 9, 10
 

@@ -11,7 +11,7 @@ from functools import cached_property
 from io import BytesIO
 from typing import BinaryIO
 
-from schemas.errors import KempfError
+from kempf.schemas.errors import KempfError
 
 _PIECE = 4 << 20
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from schemas.errors import UsageError
-from schemas.profile import ChannelMap
+from kempf.schemas.errors import UsageError
+from kempf.schemas.profile import ChannelMap
 
 
 def check_once(name: str, channels: dict[str, ChannelMap]) -> None:

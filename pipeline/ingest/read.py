@@ -7,15 +7,15 @@ from dataclasses import replace
 
 import polars as pl
 
-from pipeline.ingest import sniff
-from pipeline.ingest.decoded import Decoded
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.own_clocks import OwnClocks
-from pipeline.ingest.readings import Readings, Tally, joined
-from pipeline.ingest.screen import Screen
-from pipeline.ingest.unpack import unpack
-from schemas.errors import DataRejected, UsageError
-from schemas.profile import Source, VesselProfile
+from kempf.pipeline.ingest import sniff
+from kempf.pipeline.ingest.clock_corrections import OwnClocks
+from kempf.pipeline.ingest.decoded import Decoded
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.readings import Readings, Tally, joined
+from kempf.pipeline.ingest.screen import Screen
+from kempf.pipeline.ingest.unpack import unpack
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.profile import Source, VesselProfile
 
 #: Longest log that is read whole, bytes; MCAP is read by the chunk and may be longer.
 MOST_TEXT_BYTES = 2 << 30
@@ -53,7 +53,7 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
     ------
     Readings
         In the order of the log, but that of each source some records may come with the part behind their own; notes and
-        what is lost with the last part. See `pipeline.ingest.readings.joined`.
+        what is lost with the last part. See `kempf.pipeline.ingest.readings.joined`.
 
     Raises
     ------
@@ -114,11 +114,11 @@ def _decode(
 ) -> Iterator[Decoded]:
     """Call the reader of the format; each is imported where it is used, `kempf --help` pays for none."""
     if log_format == "nmea":
-        from pipeline.ingest.nmea.decode import decode as nmea
+        from kempf.pipeline.ingest.nmea.decode import decode as nmea
 
         yield nmea(_whole(name, log), name, source)
     elif log_format == "mcap":
-        from pipeline.ingest.mcap.decode import decode as mcap
+        from kempf.pipeline.ingest.mcap.decode import decode as mcap
 
         yield from mcap(name, log, source, [s.match for s in profile.sources])
     else:
@@ -126,7 +126,7 @@ def _decode(
 
 
 def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source | None) -> Decoded:
-    from pipeline.ingest import delimited
+    from kempf.pipeline.ingest import delimited
 
     data = _whole(name, log)
     if source is None or source.time is None or not source.channels:

@@ -15,7 +15,7 @@ from typing import Protocol
 
 import polars as pl
 
-from schemas.channels import CHANNEL_COLUMNS
+from kempf.schemas.channels import CHANNEL_COLUMNS
 
 #: Columns of `Readings.frame`; the channel columns are Float64 in SI, null where the record does not carry them.
 READING_SCHEMA: dict[str, pl.DataType] = {

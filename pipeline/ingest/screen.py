@@ -11,12 +11,12 @@ import polars as pl
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from pipeline.ingest.clock import Clock
-from pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Values
-from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Reason, Tally
-from pipeline.ingest.spans import Index
-from pipeline.ingest.text.iso_time import DAY_NS, days_since_1970
-from schemas.channels import CHANNELS
+from kempf.pipeline.ingest.clock import Clock
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Values
+from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Reason, Tally
+from kempf.pipeline.ingest.spans import Index
+from kempf.pipeline.ingest.text.iso_time import DAY_NS, days_since_1970
+from kempf.schemas.channels import CHANNELS
 
 Code = NDArray[np.int8]
 Flag = NDArray[np.bool_]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 
-from schemas.errors import DataRejected
+from kempf.schemas.errors import DataRejected
 
 GZIP, ZSTD = b"\x1f\x8b", b"\x28\xb5\x2f\xfd"
 

@@ -1,15 +1,15 @@
 """What moves the ship of eq. (16) and what effects add to it: dx/dt with its derivatives, compiled.
 
-Everything stands in lanes (`pipeline.model.lanes`). Terms of effects are programs (`pipeline.model.terms.program`),
+Everything stands in lanes (`pipeline.model.batch`). Terms of effects are programs (`pipeline.model.terms.program`),
 added to what their kind says: to the speed and the rudder that the hull feels, to sway and yaw, to states of their own.
 """
 
 from __future__ import annotations
 
-from pipeline.compiled import FILLING, njit
-from pipeline.model.lanes import each
-from pipeline.model.terms.program import evaluate
-from pipeline.model.terms.symbols import SYMBOLS
+from kempf.pipeline.compiled import FILLING, njit
+from kempf.pipeline.model.batch import each
+from kempf.pipeline.model.terms.program import evaluate
+from kempf.pipeline.model.terms.symbols import SYMBOLS
 
 #: places of symbols among the variables; states come first, in the filter's order
 DELTA, SPEED, VDOT, RDOT = (SYMBOLS.index(name) for name in ("delta", "V", "vdot", "rdot"))

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.model.ship import Hull
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.ship import Hull
 
 #: rows and columns of the chain
 SWAY, YAW, FORCE, MOMENT, HEADING = 0, 1, 2, 3, 4

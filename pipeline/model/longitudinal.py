@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
 
 #: rows and columns of the states: V, m/s; V_0, m/s; k, m; integral of V, m
 SPEED, SETTLED, LOSS, PATH = 0, 1, 2, 3

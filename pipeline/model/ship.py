@@ -7,7 +7,7 @@ from dataclasses import astuple, dataclass
 import numpy as np
 from scipy.linalg import expm
 
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.normalise.series import Float
-from schemas.errors import UsageError
+from kempf.pipeline.channels.series import Float
+from kempf.schemas.errors import UsageError
 
 
 @dataclass(frozen=True)

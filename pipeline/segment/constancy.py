@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.normalise.series import Series
-from pipeline.segment.zigzag import SpeedConstancy
+from kempf.pipeline.channels.series import Series
+from kempf.pipeline.segment.zigzag import SpeedConstancy
 
 
 def speed_constancy(

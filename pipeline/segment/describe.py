@@ -6,15 +6,24 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.normalise.series import Series
-from pipeline.segment.constancy import speed_constancy
-from pipeline.segment.local_fit import value_and_rate
-from pipeline.segment.measured import Signals
-from pipeline.segment.nominal import HEADING_TOLERANCE, RUDDER_TOLERANCE, measured_angles, nominal_angle
-from pipeline.segment.phases import leg_phases, turning_point
-from pipeline.segment.settings import SegmentSettings
-from pipeline.segment.switching import Chain, Switching
-from pipeline.segment.zigzag import Execute, Overshoot, Phase, PhaseName, Quality, Side, SpeedConstancy, Zigzag
+from kempf.pipeline.channels.series import Series
+from kempf.pipeline.segment.constancy import speed_constancy
+from kempf.pipeline.segment.local_fit import value_and_rate
+from kempf.pipeline.segment.measured import Signals
+from kempf.pipeline.segment.nominal import HEADING_TOLERANCE, RUDDER_TOLERANCE, measured_angles, nominal_angle
+from kempf.pipeline.segment.phases import leg_phases, turning_point
+from kempf.pipeline.segment.settings import SegmentSettings
+from kempf.pipeline.segment.switching import Chain, Switching
+from kempf.pipeline.segment.zigzag import (
+    Execute,
+    Overshoot,
+    Phase,
+    PhaseName,
+    Quality,
+    Side,
+    SpeedConstancy,
+    Zigzag,
+)
 
 #: Change of speed after the second execute from which it is called not constant, percent.
 _SPEED_TREND_PERCENT = 10.0

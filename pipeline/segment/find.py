@@ -6,14 +6,14 @@ of them is measured in `describe`.
 
 from __future__ import annotations
 
-from pipeline.normalise.series import Series
-from pipeline.segment.describe import describe
-from pipeline.segment.legs import find_chains
-from pipeline.segment.measured import Signals, measure
-from pipeline.segment.settings import SegmentSettings
-from pipeline.segment.short import is_trial
-from pipeline.segment.switching import Chain, Switching, zigzags_in
-from pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.channels.series import Series
+from kempf.pipeline.segment.describe import describe
+from kempf.pipeline.segment.legs import find_chains
+from kempf.pipeline.segment.measured import Signals, measure
+from kempf.pipeline.segment.settings import SegmentSettings
+from kempf.pipeline.segment.short import is_trial
+from kempf.pipeline.segment.switching import Chain, Switching, zigzags_in
+from kempf.pipeline.segment.zigzag import Zigzag
 
 _DEFAULT = SegmentSettings()
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.zigzag import Zigzag
 
 #: The standards apply to ships of this length and more, and to chemical tankers and gas carriers of any length, m.
 SHORTEST_SHIP_M = 100.0

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.lateral_speed import check_current, lateral_speed, noise_std
-from pipeline.normalise.instruments import Instruments
-from pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.lateral_speed import check_current, lateral_speed, noise_std
+from kempf.pipeline.segment.zigzag import Zigzag
 
 _NEEDED = ("speed_over_ground", "course_over_ground", "heading")
 _FEWEST = 8

@@ -11,8 +11,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.normalise.series import Float
-from pipeline.segment.settings import SegmentSettings
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.segment.settings import SegmentSettings
 
 #: Ratio of neighbouring rudder angles in the search; the search band covers the ratio three times over.
 _LADDER = 1.15

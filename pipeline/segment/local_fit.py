@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
 
 
 def value_and_rate(time_s: Float, values: Float, instant_s: float, half_window_s: float) -> tuple[float, float]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.segment.switching import Chain, Switching
+from kempf.pipeline.segment.switching import Chain, Switching
 
 #: Angles at which zigzags are customarily run, deg (IMO 10/10 and 20/20, ITTC 7.5-02-06-01, tank programmes).
 CUSTOMARY_DEG: tuple[float, ...] = (1.0, 2.0, 5.0, 10.0, 15.0, 20.0, 25.0, 30.0, 35.0)

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.segment.local_fit import peak, value_and_rate
-from pipeline.segment.measured import Signals
-from pipeline.segment.zigzag import PhaseName
+from kempf.pipeline.segment.local_fit import peak, value_and_rate
+from kempf.pipeline.segment.measured import Signals
+from kempf.pipeline.segment.zigzag import PhaseName
 
 #: Points at which the yaw rate of a leg is looked at.
 _POINTS = 41

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
 
 #: Part of the movement through which the line is laid: the end of it is bent where the servo slows down.
 _FIT_UP_TO = 0.7

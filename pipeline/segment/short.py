@@ -9,10 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.segment.local_fit import peak, value_and_rate
-from pipeline.segment.measured import Signals
-from pipeline.segment.nominal import HEADING_TOLERANCE, RUDDER_TOLERANCE, is_customary, measured_angles
-from pipeline.segment.switching import Chain, Switching
+from kempf.pipeline.segment.local_fit import peak, value_and_rate
+from kempf.pipeline.segment.measured import Signals
+from kempf.pipeline.segment.nominal import HEADING_TOLERANCE, RUDDER_TOLERANCE, is_customary, measured_angles
+from kempf.pipeline.segment.switching import Chain, Switching
 
 #: Largest difference between the two rudder angles, as a share and at least in rad: both were ordered alike.
 _ALIKE_SHARE = 0.04

@@ -12,10 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from pipeline.normalise.series import Float
-from pipeline.segment.legs import Leg
-from pipeline.segment.ramps import Ramp
-from pipeline.segment.settings import SegmentSettings
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.segment.legs import Leg
+from kempf.pipeline.segment.ramps import Ramp
+from kempf.pipeline.segment.settings import SegmentSettings
 
 #: How the first leg of a zigzag begins, see `Switching.start`.
 Start = Literal["steady", "turning", "switching", "unknown"]

@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-from pipeline.segment.switching import Start
+from kempf.pipeline.segment.switching import Start
 
 #: ``zigzag_broken_off``: fewer than two executes after the first, so that no second overshoot exists.
 Kind = Literal["zigzag", "zigzag_broken_off"]

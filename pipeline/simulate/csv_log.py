@@ -7,10 +7,10 @@ import gzip
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.instruments import SECOND_NS
-from pipeline.simulate.logger_fields import LOGGER_FIELDS
-from pipeline.simulate.trial import Trial
-from schemas.errors import UsageError
+from kempf.pipeline.simulate.instruments import SECOND_NS
+from kempf.pipeline.simulate.logger_fields import LOGGER_FIELDS
+from kempf.pipeline.simulate.trial import Trial
+from kempf.schemas.errors import UsageError
 
 Nanoseconds = NDArray[np.int64]
 
@@ -23,7 +23,7 @@ def to_csv(trial: Trial, rate_hz: float = 10.0) -> bytes:
     Parameters
     ----------
     trial : Trial
-        See `pipeline.simulate.trial`.
+        See `kempf.pipeline.simulate.trial`.
     rate_hz : float
         Rows per second.
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.random_streams import stream
+from kempf.pipeline.simulate.random_streams import stream
 
 Float = NDArray[np.float64]
 

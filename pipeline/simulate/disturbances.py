@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.compiled import compiled
-from pipeline.simulate.random_streams import stream
+from kempf.pipeline.simulate.compiled import compiled
+from kempf.pipeline.simulate.random_streams import stream
 
 Float = NDArray[np.float64]
 

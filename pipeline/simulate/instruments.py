@@ -9,11 +9,11 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.hulls import Hull
-from pipeline.simulate.random_streams import stream
-from pipeline.simulate.sensors import SENSORS, Setting
-from pipeline.simulate.trajectory import Trajectory
-from schemas.errors import UsageError
+from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.random_streams import stream
+from kempf.pipeline.simulate.sensors import SENSORS, Setting
+from kempf.pipeline.simulate.trajectory import Trajectory
+from kempf.schemas.errors import UsageError
 
 Float = NDArray[np.float64]
 Nanoseconds = NDArray[np.int64]
@@ -28,7 +28,7 @@ class Instrument:
     Parameters
     ----------
     name : str
-        A key of `pipeline.simulate.sensors.SENSORS`.
+        A key of `kempf.pipeline.simulate.sensors.SENSORS`.
     rate_hz : float
         Samples per second.
     phase_s : float
@@ -82,7 +82,7 @@ class InstrumentRecord:
     arrival_utc_ns : ndarray, shape (n,)
         Instants at which the messages reached the logger, not decreasing.
     values : dict of str to ndarray, shape (n,)
-        By canonical column (`schemas.channels`), SI; angles on the circle within [0, 2 pi).
+        By canonical column (`kempf.schemas.channels`), SI; angles on the circle within [0, 2 pi).
     """
 
     instrument: Instrument

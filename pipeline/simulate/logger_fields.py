@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from schemas.channels import CHANNELS
-from schemas.units import factor_to_si
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.units import factor_to_si
 
 Float = NDArray[np.float64]
 

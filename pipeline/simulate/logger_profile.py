@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from pipeline.simulate.logger_fields import LOGGER_FIELDS
-from pipeline.simulate.trial import TrialSettings
-from schemas.profile import Antenna, ChannelMap, Source, TimeColumn, VesselProfile
+from kempf.pipeline.simulate.logger_fields import LOGGER_FIELDS
+from kempf.pipeline.simulate.trial import TrialSettings
+from kempf.schemas.profile import Antenna, ChannelMap, Source, TimeColumn, VesselProfile
 
 
 def logger_profile(settings: TrialSettings) -> VesselProfile:

@@ -9,8 +9,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.hulls import Hull
-from pipeline.simulate.plant import AUTOPILOT, FIXED, ORDERS, ZIGZAG
+from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.plant import AUTOPILOT, FIXED, ORDERS, ZIGZAG
 
 Float = NDArray[np.float64]
 Side = Literal["starboard", "port"]
@@ -21,7 +21,7 @@ TICK_S = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Steering:
-    """A step of the programme as the kernel `pipeline.simulate.plant.steer` takes it."""
+    """A step of the programme as the kernel `kempf.pipeline.simulate.plant.steer` takes it."""
 
     kind: int
     settings: Float

@@ -9,8 +9,8 @@ from itertools import groupby
 import numpy as np
 from mcap.writer import CompressionType, Writer
 
-from pipeline.simulate.logger_fields import LOGGER_FIELDS, LoggerField
-from pipeline.simulate.trial import Trial
+from kempf.pipeline.simulate.logger_fields import LOGGER_FIELDS, LoggerField
+from kempf.pipeline.simulate.trial import Trial
 
 #: Written into the header instead of the writer's version, so that an upgrade of it leaves the bytes alone.
 _LIBRARY = "kempf simulator"
@@ -22,7 +22,7 @@ def to_mcap(trial: Trial, chunk_bytes: int = 1_048_576) -> bytes:
     Parameters
     ----------
     trial : Trial
-        See `pipeline.simulate.trial`.
+        See `kempf.pipeline.simulate.trial`.
     chunk_bytes : int
         Uncompressed size at which a chunk is closed.
 

@@ -10,10 +10,10 @@ from operator import xor
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.instruments import InstrumentRecord
-from pipeline.simulate.random_streams import stream
-from pipeline.simulate.trial import Trial
-from schemas.units import factor_to_si
+from kempf.pipeline.simulate.instruments import InstrumentRecord
+from kempf.pipeline.simulate.random_streams import stream
+from kempf.pipeline.simulate.trial import Trial
+from kempf.schemas.units import factor_to_si
 
 Float = NDArray[np.float64]
 Nanoseconds = NDArray[np.int64]
@@ -44,7 +44,7 @@ def to_nmea(trial: Trial, damaged_share: float = 0.002) -> bytes:
     Parameters
     ----------
     trial : Trial
-        See `pipeline.simulate.trial`. A rudder order has no sentence here and is left out.
+        See `kempf.pipeline.simulate.trial`. A rudder order has no sentence here and is left out.
     damaged_share : float
         Probability of a line to be damaged: a changed digit, a cut end, or foreign bytes in the middle.
 

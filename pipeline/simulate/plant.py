@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.compiled import compiled
-from pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.compiled import compiled
+from kempf.pipeline.simulate.hulls import Hull
 
 Float = NDArray[np.float64]
 
@@ -272,7 +272,7 @@ def steer(
     rudder_limits : (float, float)
         Rate in rad/s, largest angle in rad.
     constants : ndarray, shape (11,)
-        See `pipeline.simulate.plant.hull_constants`.
+        See `kempf.pipeline.simulate.plant.hull_constants`.
     states, rudders, ordered, forcing : ndarray
         The columns of `Tables`.
     crossings : ndarray

@@ -9,9 +9,9 @@ from math import radians
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.disturbances import Environment
-from pipeline.simulate.hulls import Hull
-from pipeline.simulate.manoeuvre import (
+from kempf.pipeline.simulate.disturbances import Environment
+from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.manoeuvre import (
     TICK_S,
     HandSteering,
     ManoeuvreRecord,
@@ -20,10 +20,10 @@ from pipeline.simulate.manoeuvre import (
     TurningCircle,
     ZigzagTest,
 )
-from pipeline.simulate.plant import STATE, hull_constants, slopes, steer
-from pipeline.simulate.random_streams import stream
-from pipeline.simulate.trajectory import Trajectory
-from schemas.errors import UsageError
+from kempf.pipeline.simulate.plant import STATE, hull_constants, slopes, steer
+from kempf.pipeline.simulate.random_streams import stream
+from kempf.pipeline.simulate.trajectory import Trajectory
+from kempf.schemas.errors import UsageError
 
 Float = NDArray[np.float64]
 
@@ -40,11 +40,11 @@ class _Tables:
     Attributes
     ----------
     state : ndarray, shape (n, 6)
-        See `pipeline.simulate.plant.STATE`.
+        See `kempf.pipeline.simulate.plant.STATE`.
     rudder, order : ndarray, shape (n,)
         Rudder angle and order, rad.
     forcing : ndarray, shape (n, 4)
-        Given; see `pipeline.simulate.disturbances.FORCING`.
+        Given; see `kempf.pipeline.simulate.disturbances.FORCING`.
     """
 
     state: Float

@@ -9,9 +9,9 @@ from math import cos, pi, radians, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.hulls import Hull
-from pipeline.simulate.plant import STATE
-from pipeline.simulate.trajectory import Sample
+from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.plant import STATE
+from kempf.pipeline.simulate.trajectory import Sample
 
 Float = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.simulate.disturbances import FORCING
-from pipeline.simulate.plant import STATE
+from kempf.pipeline.simulate.disturbances import FORCING
+from kempf.pipeline.simulate.plant import STATE
 
 Float = NDArray[np.float64]
 
@@ -22,13 +22,13 @@ class Trajectory:
     step_s : float
         Distance of the grid's points; the first is at 0 s.
     state : ndarray, shape (n, 6)
-        Columns `pipeline.simulate.plant.STATE`: m/s, rad/s, rad (not wrapped), m, m, m/s.
+        Columns `kempf.pipeline.simulate.plant.STATE`: m/s, rad/s, rad (not wrapped), m, m, m/s.
     slope : ndarray, shape (n, 6)
         d(state)/dt.
     rudder, order : ndarray, shape (n,)
         Rudder angle and its order, rad.
     forcing : ndarray, shape (n, 4)
-        Columns `pipeline.simulate.disturbances.FORCING`.
+        Columns `kempf.pipeline.simulate.disturbances.FORCING`.
     """
 
     step_s: float

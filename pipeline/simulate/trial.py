@@ -7,15 +7,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from pipeline.simulate.disturbances import CALM, Disturbance, Environment
-from pipeline.simulate.hulls import HULLS, Hull, HullParameters
-from pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument, InstrumentRecord, measure
-from pipeline.simulate.manoeuvre import ManoeuvreRecord, Side, SteadyCourse, Step, ZigzagTest
-from pipeline.simulate.programme import GRID_S, sail
-from pipeline.simulate.random_streams import stream
-from pipeline.simulate.sensors import Setting
-from pipeline.simulate.trajectory import Trajectory
-from schemas.errors import UsageError
+from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
+from kempf.pipeline.simulate.hulls import HULLS, Hull, HullParameters
+from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument, InstrumentRecord, measure
+from kempf.pipeline.simulate.manoeuvre import ManoeuvreRecord, Side, SteadyCourse, Step, ZigzagTest
+from kempf.pipeline.simulate.programme import GRID_S, sail
+from kempf.pipeline.simulate.random_streams import stream
+from kempf.pipeline.simulate.sensors import Setting
+from kempf.pipeline.simulate.trajectory import Trajectory
+from kempf.schemas.errors import UsageError
 
 #: The disturbances of the paper's simulated trial: force 5e-3 m/s^2, here with a slow part, and a stream of 0.3 m/s.
 PAPER_ENVIRONMENT = Environment(
@@ -32,9 +32,9 @@ class TrialSettings:
     Parameters
     ----------
     hull : Hull
-        The ship, such as one of `pipeline.simulate.hulls.HULLS`.
+        The ship, such as one of `kempf.pipeline.simulate.hulls.HULLS`.
     programme : tuple of Step
-        What she does; see `pipeline.simulate.manoeuvre`.
+        What she does; see `kempf.pipeline.simulate.manoeuvre`.
     environment : Environment
         What acts on her.
     instruments : tuple of Instrument
@@ -219,7 +219,7 @@ def zigzag_settings(
     Parameters
     ----------
     hull : str
-        A key of `pipeline.simulate.hulls.HULLS`.
+        A key of `kempf.pipeline.simulate.hulls.HULLS`.
     heading_deg, rudder_deg : float
         psi0 and delta0.
     first_side : {"starboard", "port"}

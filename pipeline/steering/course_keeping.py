@@ -22,12 +22,12 @@ import numpy as np
 from scipy.linalg import solve_discrete_are
 from scipy.signal import place_poles
 
-from pipeline.model.ship import Hull
-from pipeline.normalise.series import Float
-from pipeline.steering.nomoto import largest_rate_per_s, turning_frequency_rad_s
-from pipeline.steering.state_space import NoiseLevels, StateSpace, continuous, discretised
-from schemas.errors import DataRejected, UsageError
-from schemas.model_spec import ModelSpec
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.nomoto import largest_rate_per_s, turning_frequency_rad_s
+from kempf.pipeline.steering.state_space import NoiseLevels, StateSpace, continuous, discretised
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.model_spec import ModelSpec
 
 #: of v, r, psi, F, V_T
 N_STATE = 5

@@ -12,7 +12,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
 
 #: two-sided 95 % point of the normal distribution
 NORMAL_95 = 1.959963984540054

@@ -16,10 +16,10 @@ from math import isfinite, sqrt
 
 import numpy as np
 
-from pipeline.model.ship import Hull
-from pipeline.normalise.series import Float
-from pipeline.steering.delta_method import gradient, quotient
-from schemas.errors import DataRejected, UsageError
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.delta_method import gradient, quotient
+from kempf.schemas.errors import DataRejected, UsageError
 
 #: standard errors between the denominator of a constant and zero, below which its error is far from normal
 _SAFE = 4.0
@@ -116,7 +116,7 @@ def nomoto(hull: Hull, covariance: Float, speed_m_s: float, length_m: float | No
 
     Examples
     --------
-    >>> from pipeline.model.ship import mariner_like
+    >>> from kempf.pipeline.model.ship import mariner_like
     >>> told = nomoto(mariner_like(160.93), np.zeros((6, 6)), 7.7, 160.93)
     >>> told.poles, round(told.constants["K'"].value, 2), round(told.constants["T'"].value, 2)
     ('real', 3.84, 4.86)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm
 
-from pipeline.model.ship import Hull
-from pipeline.normalise.series import Float
-from pipeline.steering.course_keeping import N_SHIP, N_STATE, Law
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.course_keeping import N_SHIP, N_STATE, Law
 
 _FREQUENCIES = 2000
 

@@ -15,11 +15,11 @@ import numpy as np
 from scipy.special import ndtri
 from scipy.stats import qmc
 
-from pipeline.identify.estimate import Value
-from pipeline.model.ship import Hull
-from pipeline.normalise.series import Float
-from pipeline.steering.delta_method import gradient
-from pipeline.steering.nomoto import require_numbers
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.result import Value
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.delta_method import gradient
+from kempf.pipeline.steering.nomoto import require_numbers
 
 Verdict = Literal["stable", "unstable", "cannot be told from these data"]
 #: how sure a verdict must be

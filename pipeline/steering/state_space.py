@@ -16,12 +16,12 @@ from math import cos, isfinite, sin
 import numpy as np
 from scipy.linalg import expm
 
-from pipeline.model.disturbances import level_of_change
-from pipeline.model.ship import Hull
-from pipeline.normalise.series import Float
-from pipeline.steering.nomoto import require_numbers
-from schemas.errors import UsageError
-from schemas.model_spec import ModelSpec
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.disturbances import level_of_change
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.nomoto import require_numbers
+from kempf.schemas.errors import UsageError
+from kempf.schemas.model_spec import ModelSpec
 
 #: name and unit of what the model puts out, in order
 OUTPUTS = {"lateral_speed": "m/s", "yaw_rate": "rad/s", "heading": "rad", "cross_track_speed": "m/s"}

@@ -1,7 +1,7 @@
 """A ship on her course under a law: the loop, what it recorded, and the numbers that are compared.
 
 The ship is any `Ship`: the loop knows what her instruments show and what rudder it orders. It shares no dynamics with
-her. `flows.steered_ship` is the simulator as one.
+her. `kempf.flows.jobs.steered_ship` is the simulator as one.
 """
 
 from __future__ import annotations
@@ -12,9 +12,9 @@ from typing import Protocol
 
 import numpy as np
 
-from pipeline.normalise.series import Float
-from pipeline.steering.course_keeping import N_STATE, Law
-from schemas.errors import UsageError
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.steering.course_keeping import N_STATE, Law
+from kempf.schemas.errors import UsageError
 
 
 class Ship(Protocol):

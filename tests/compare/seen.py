@@ -6,17 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.compare.looked import Looked, PhaseInterval
-from pipeline.diagnose import sensitivity
-from pipeline.diagnose.filtered import Filtered
-from pipeline.diagnose.held_out import free_run_of
-from pipeline.diagnose.run import Run, Ship, make_run, step_of
-from pipeline.diagnose.sensitivity import Point
-from pipeline.model.augmented import Augmented
-from pipeline.model.extended import ROWS
-from pipeline.simulate.trial import Trial
-from schemas.model_spec import ModelSpec
-from tests.identify.simulated import instruments_of, record_of
+from kempf.pipeline.estimate import sensitivity
+from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.filters.ekf import ROWS
+from kempf.pipeline.estimate.record.grid_run import Run, Ship, make_run, step_of
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.predict.free_run import free_run_of
+from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
+from kempf.pipeline.simulate.trial import Trial
+from kempf.schemas.model_spec import ModelSpec
+from tests.estimate.simulated import instruments_of, record_of
 
 #: the disturbance model of the simulator with its arm known, and still water
 SPEC = ModelSpec(moment="none", rate_bias=False)

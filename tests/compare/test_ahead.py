@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from pipeline.compare.ahead import predict_ahead
-from pipeline.identify.maximum_likelihood import MaximumLikelihoodSettings, search
-from schemas.model_spec import ModelSpec
-from tests.identify.simulated import record_of, sailed
+from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, search
+from kempf.pipeline.predict.linear_ahead import predict_ahead
+from kempf.schemas.model_spec import ModelSpec
+from tests.estimate.simulated import record_of, sailed
 
 SETTINGS = MaximumLikelihoodSettings()
 

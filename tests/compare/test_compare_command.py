@@ -10,12 +10,12 @@ from shutil import copytree
 
 import pytest
 
+from kempf.warehouse import aliases, parameter_sets, segments
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+from kempf.workbench import notebook
 from tests.conftest import Ship
 from tests.workbench.driving import kempf, refused, tree
-from warehouse import aliases, parameter_sets, segments
-from warehouse.parameter_set import ParameterSet
-from warehouse.store import Warehouse
-from workbench import notebook
 
 CHANNELS = ["yaw_rate", "heading", "lateral_speed"]
 #: the keys that people script against

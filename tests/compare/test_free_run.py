@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.compare.free_run import free_run
-from pipeline.model.ship import Hull
-from pipeline.simulate.disturbances import Environment
-from schemas.model_spec import ModelSpec
-from tests.identify.simulated import record_of, sailed, truth_of
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.predict.linear_free_run import free_run
+from kempf.pipeline.simulate.disturbances import Environment
+from kempf.schemas.model_spec import ModelSpec
+from tests.estimate.simulated import record_of, sailed, truth_of
 
 
 def test_it_is_the_differential_equation_integrated() -> None:

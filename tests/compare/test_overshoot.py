@@ -7,14 +7,14 @@ import json
 import numpy as np
 import pytest
 
-from pipeline.compare.comparison import free_run_error, judged, summary
-from pipeline.compare.horizon import horizon_of
-from pipeline.compare.levels import fit_levels
-from pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
-from pipeline.compare.run import compare_run
-from pipeline.diagnose.sensitivity import Point
+from kempf.pipeline.compare.compared_run import compare_run
+from kempf.pipeline.compare.comparison import free_run_error, judged, summary
+from kempf.pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
+from kempf.pipeline.estimate.levels import fit_levels
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.predict.horizon import horizon_of
 from tests.compare.seen import NOISE, QUIET, levels_of, run_of, sailed_by_model
-from tests.identify.simulated import sailed, truth_of
+from tests.estimate.simulated import sailed, truth_of
 
 TIME = np.arange(0.0, 100.0, 1.0)
 

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.compare.horizon import horizon_of
-from pipeline.compare.predicted import predict
-from pipeline.diagnose.sensitivity import Point
-from pipeline.simulate.disturbances import Environment
-from schemas.errors import DataRejected, UsageError
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.predict.horizon import horizon_of
+from kempf.pipeline.predict.prediction import predict
+from kempf.pipeline.simulate.disturbances import Environment
+from kempf.schemas.errors import DataRejected, UsageError
 from tests.compare.seen import QUIET, SPEC, filtered_of, levels_of, run_of, sailed_by_model
-from tests.identify.simulated import sailed, truth_of
+from tests.estimate.simulated import sailed, truth_of
 
 HORIZONS = ("1", "10s", "60s", "free")
 

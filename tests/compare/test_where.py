@@ -9,11 +9,11 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from pipeline.compare.group import rms_band
-from pipeline.compare.looked import Looked, PhaseInterval
-from pipeline.compare.where import where
+from kempf.pipeline.compare.group import rms_band
+from kempf.pipeline.compare.misfit import where
+from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
 from tests.compare.seen import NOISE, QUIET, looked_at, run_of, sailed_by_model
-from tests.identify.simulated import sailed, truth_of
+from tests.estimate.simulated import sailed, truth_of
 
 TRIAL = sailed("mariner", seed=3, duration_s=900.0)
 HULL = truth_of(TRIAL)

@@ -10,20 +10,20 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.hidden_effects import programme, readings, sail
-from benchmarks.hidden_effects.effects import CATALOGUE, HiddenEffect
-from benchmarks.hidden_effects.outsiders import OUTSIDERS
-from pipeline.diagnose.diagnosis import Diagnosis, diagnose
-from pipeline.diagnose.run import Run, Ship, make_run
-from pipeline.diagnose.split import split
-from pipeline.diagnose.start import Start, start_of
-from pipeline.identify.record import make_record
-from pipeline.model.effects import catalogue
-from pipeline.normalise.instruments import Instruments
-from pipeline.normalise.series import SECOND_NS, Series
-from pipeline.simulate.trial import Trial, TrialSettings
-from schemas.channels import CHANNELS
-from schemas.model_spec import ModelSpec
+from benchmarks.diagnose.hidden_effects import programme, readings, sail
+from benchmarks.diagnose.hidden_effects.effects import CATALOGUE, HiddenEffect
+from benchmarks.diagnose.hidden_effects.outsiders import OUTSIDERS
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
+from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.estimate.record.grid_run import Run, Ship, make_run
+from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.search.pooled_start import Start, start_of
+from kempf.pipeline.model.effects import catalogue
+from kempf.pipeline.simulate.trial import Trial, TrialSettings
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.model_spec import ModelSpec
 
 CHANNEL_OF = {channel.column: channel for channel in CHANNELS.values()}
 #: some that a rudder, a hull and a sensor can have; the whole catalogue takes too long for a test

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
-from pipeline.diagnose.screen import score
-from pipeline.diagnose.split import split
-from pipeline.diagnose.staged import added, is_ship, plain, staged
-from pipeline.diagnose.verdict import as_json, finding, sentences, verdict
-from pipeline.model import effects
-from schemas.errors import DataRejected
+from kempf.pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from kempf.pipeline.diagnose.forward_selection import added, is_ship, plain, staged
+from kempf.pipeline.diagnose.screen import score
+from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.diagnose.verdict import as_json, finding, sentences, verdict
+from kempf.pipeline.model import effects
+from kempf.schemas.errors import DataRejected
 from tests.diagnose.sailing import SOME, WORKERS, Sailed, sailed
 
 LAG = ("rudder_lag", "cross_flow_drag")

@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from pipeline.diagnose import pooled_fit, sensitivity
-from pipeline.diagnose.confirm import confirm, unseen
-from pipeline.diagnose.diagnosis import step_of
-from pipeline.diagnose.filtered import Filtered, Passed
-from pipeline.diagnose.pooled_fit import Fit, Linearised, linearise
-from pipeline.diagnose.screen import score
-from pipeline.diagnose.sensitivity import Point
-from pipeline.model.augmented import Augmented
-from pipeline.model.effects import get
+from kempf.pipeline.diagnose.confirm import confirm, unseen
+from kempf.pipeline.diagnose.diagnosis import step_of
+from kempf.pipeline.diagnose.screen import score
+from kempf.pipeline.estimate import pooled_fit, sensitivity
+from kempf.pipeline.estimate.filtered import Filtered, Passed
+from kempf.pipeline.estimate.pooled_fit import Fit, Linearised, linearise
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effects import get
 from tests.diagnose.sailing import WORKERS, Sailed, sailed
 
 

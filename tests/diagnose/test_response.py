@@ -5,19 +5,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.diagnose import response
-from pipeline.diagnose.filtered import Filtered
-from pipeline.diagnose.flexible import TERMS
-from pipeline.diagnose.pooled_fit import Fit, linearise
-from pipeline.diagnose.response import Trial, responses
-from pipeline.diagnose.screen import _grid
-from pipeline.diagnose.sensitivity import Point, passed
-from pipeline.model.augmented import Augmented
-from pipeline.model.effects import catalogue
-from pipeline.model.lanes import MOST
-from pipeline.model.ship import mariner_like
-from pipeline.model.terms.effect import Effect, Parameter
-from schemas.model_spec import ModelSpec
+from kempf.pipeline.diagnose import effect_responses
+from kempf.pipeline.diagnose.effect_responses import Trial, responses
+from kempf.pipeline.diagnose.ridge_reference import TERMS
+from kempf.pipeline.diagnose.screen import _grid
+from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.pooled_fit import Fit, linearise
+from kempf.pipeline.estimate.sensitivity import Point, passed
+from kempf.pipeline.model.batch import MOST
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effects import catalogue
+from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.model.terms.effect import Effect, Parameter
+from kempf.schemas.model_spec import ModelSpec
 from tests.diagnose.sailing import WORKERS, sailed
 
 LEVELS = np.log(np.array([2e-3, 1e-5, 2e-2, 0.05, 6e-4, 2e-3]))
@@ -37,14 +37,14 @@ def base() -> Fit:
 
 
 def alone(base: Fit, trial: Trial) -> np.ndarray | None:
-    return response._passed(base, [trial])[0]
+    return effect_responses._passed(base, [trial])[0]
 
 
 def test_together_is_as_alone(base: Fit) -> None:
     chosen = [effect for effect in catalogue().values() if effect.name != "sway_quadratic"]
     trials = [Trial(effect, steps) for effect in [*chosen[::3], *TERMS[:9]] for steps in _grid(effect)]
     found = responses(base, trials, WORKERS)
-    assert max(map(len, response._bundles(trials))) > 5
+    assert max(map(len, effect_responses._bundles(trials))) > 5
     for trial, together in zip(trials, found, strict=True):
         single = alone(base, trial)
         if single is None:
@@ -58,7 +58,7 @@ def test_together_is_as_alone(base: Fit) -> None:
 
 def test_no_bundle_is_wider_than_the_lanes_and_none_is_lost() -> None:
     trials = [Trial(effect, steps) for effect in catalogue().values() for steps in _grid(effect)]
-    bundles = response._bundles(trials)
+    bundles = effect_responses._bundles(trials)
     assert sorted(i for bundle in bundles for i in bundle) == list(range(len(trials)))
     for bundle in bundles:
         assert sum(len(trials[i].making) for i in bundle) <= MOST or len(bundle) == 1

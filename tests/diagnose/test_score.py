@@ -8,16 +8,16 @@ import numpy as np
 import pytest
 from scipy.stats import kstest
 
-from pipeline.diagnose import pooled_fit
-from pipeline.diagnose.filtered import Filtered
-from pipeline.diagnose.pooled_fit import Fit, linearise
-from pipeline.diagnose.run import Run
-from pipeline.diagnose.screen import Candidate, score
-from pipeline.diagnose.sensitivity import Point, passed
-from pipeline.model.augmented import Augmented
-from pipeline.model.effects import catalogue
-from pipeline.model.ship import mariner_like
-from schemas.model_spec import ModelSpec
+from kempf.pipeline.diagnose.screen import Candidate, score
+from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.pooled_fit import Fit, linearise
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.sensitivity import Point, passed
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effects import catalogue
+from kempf.pipeline.model.ship import mariner_like
+from kempf.schemas.model_spec import ModelSpec
 from tests.diagnose.sailing import WORKERS, sailed
 
 #: no disturbance: then a free run and white noise are all there is, and the model is true

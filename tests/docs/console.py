@@ -153,7 +153,7 @@ def follow(text: str, folder: Path, *before: str) -> int:
             found, code = shell.run(names.resolved(step.line))
             assert code == 0, (step.line, found)
             told = difference(step.shown, found, names)
-            assert told is None, f"$ {step.line}\n{told}\nmend it with python -m benchmarks.refresh_documents"
+            assert told is None, f"$ {step.line}\n{told}\nmend it with python -m benchmarks.documents.refresh_documents"
     finally:
         shell.close()
     return commands

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.identify import agreement, checks, jumps, record
-from tests.identify.test_checks import REFUSED
+from kempf.pipeline.estimate.record import agreement, checks, jumps, record
+from tests.estimate.test_checks import REFUSED
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "bad_input.md").read_text(encoding="utf-8")

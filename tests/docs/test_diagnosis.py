@@ -7,8 +7,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import get_args
 
-from pipeline.diagnose.flexible import TERMS
-from pipeline.diagnose.verdict import Finding, Verdict
+from kempf.pipeline.diagnose.ridge_reference import TERMS
+from kempf.pipeline.diagnose.verdict import Finding, Verdict
 from tests.docs.console import Command, follow, steps
 
 ROOT = Path(__file__).parents[2]
@@ -24,7 +24,7 @@ def test_the_thresholds_are_those_of_the_code() -> None:
     rows = re.findall(r"^\| [^|]+ \| ([\d.]+) \| `(\w+)\.([\w.]+)` \|$", TEXT, flags=re.MULTILINE)
     assert len(rows) == TEXT.partition("## Thresholds")[2].partition("\n## ")[0].count("\n|") - 2
     for value, module, path in rows:
-        found = import_module(f"pipeline.diagnose.{module}")
+        found = import_module(f"kempf.pipeline.diagnose.{module}")
         for name in path.split("."):
             found = getattr(found, name)
         assert float(value) == found, path

@@ -6,10 +6,18 @@ import re
 from pathlib import Path
 from typing import get_args
 
-from pipeline.normalise.doctor import heading_course, heading_rate, legs, rudder_order, rudder_turn, track, water_speed
-from pipeline.normalise.doctor.examine import examine
-from pipeline.normalise.doctor.faults import Kind
-from pipeline.normalise.doctor.outcome import SURE
+from kempf.pipeline.channels.doctor import (
+    heading_course,
+    heading_rate,
+    misalignment,
+    rudder_order,
+    rudder_turn,
+    track,
+    water_speed,
+)
+from kempf.pipeline.channels.doctor.examine import examine
+from kempf.pipeline.channels.doctor.faults import Kind
+from kempf.pipeline.channels.doctor.outcome import SURE
 from tests.docs.console import follow
 from tests.doctor import made
 
@@ -42,7 +50,7 @@ def test_thresholds_are_the_codes() -> None:
         ("rudder_order_angle", rudder_order._SLOPES),
     ):
         assert f"{low:g} to {high:g}" in row(check), check
-    assert f"within {legs._DEVIATION_DEG:g} deg" in row("legs_")
+    assert f"within {misalignment._DEVIATION_DEG:g} deg" in row("legs_")
     assert f"within {track._ANGLES_DEG[1]:g} deg" in row("bearing_")
     assert f"within {rudder_turn._NEUTRAL_DEG:g} deg" in row("rudder_angle_")
     assert f"within {rudder_order._OFFSETS_DEG[1]:g} deg" in row("rudder_order_angle")

@@ -12,7 +12,7 @@ SETTINGS = yaml.safe_load((ROOT / "prefect.yaml").read_text(encoding="utf-8"))
 
 
 def flows() -> dict[str, list[str]]:
-    """Return the parameters of every flow in flows/fleet.py by the flow's name, without importing Prefect."""
+    """Return the parameters of every flow in flows/fleet/flows.py by the flow's name, without importing Prefect."""
     tree = ast.parse((ROOT / "flows" / "fleet.py").read_text(encoding="utf-8"))
     found = {}
     for node in tree.body:

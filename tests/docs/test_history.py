@@ -6,7 +6,7 @@ import re
 from dataclasses import fields
 from pathlib import Path
 
-from pipeline.history.settings import ChangeSettings
+from kempf.pipeline.history.settings import ChangeSettings
 from tests.docs.console import blocks, follow
 
 ROOT = Path(__file__).parents[2]

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from flows.files import read_model
-from schemas.model_spec import ModelSpec
+from kempf.flows.jobs.files import read_model
+from kempf.schemas.model_spec import ModelSpec
 from tests.docs.console import blocks
 
 FOLDER = Path(__file__).parents[2] / "docs"

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from pipeline.identify.no_log import NoLogSettings
+from kempf.pipeline.estimate.no_log.identify import NoLogSettings
 from tests.docs.console import blocks
-from tests.identify.test_no_log import sailed, true_speed
+from tests.estimate.test_no_log import sailed, true_speed
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "no_log.md").read_text(encoding="utf-8")

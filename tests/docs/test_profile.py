@@ -8,16 +8,25 @@ import polars as pl
 import pytest
 import yaml
 
-from pipeline.ingest.read import read_log
-from pipeline.ingest.readings import Readings
-from pipeline.normalise.instruments import from_readings
-from pipeline.simulate.hulls import HULLS
-from pipeline.simulate.manoeuvre import SteadyCourse
-from pipeline.simulate.mcap_log import to_mcap
-from pipeline.simulate.trial import TrialSettings, simulate_trial
-from schemas.channels import CHANNELS
-from schemas.profile import Antenna, ChannelMap, Source, TimeColumn, VesselProfile, merge, overlay, parse
-from schemas.units import TO_SI
+from kempf.pipeline.channels.instruments import from_readings
+from kempf.pipeline.ingest.read import read_log
+from kempf.pipeline.ingest.readings import Readings
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.pipeline.simulate.manoeuvre import SteadyCourse
+from kempf.pipeline.simulate.mcap_log import to_mcap
+from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.profile import (
+    Antenna,
+    ChannelMap,
+    Source,
+    TimeColumn,
+    VesselProfile,
+    merge,
+    overlay,
+    parse,
+)
+from kempf.schemas.units import TO_SI
 from tests.docs.console import blocks
 from tests.ingest.test_mcap_messages import START, fix, header, imu, ros
 

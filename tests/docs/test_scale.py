@@ -5,8 +5,9 @@ from typing import Any
 
 import pytest
 
-from benchmarks import fleet_figures, fleet_page, fleet_scale, result_page
-from flows import fleet_plan
+from benchmarks import result_page
+from benchmarks.fleet import fleet_figures, fleet_page, fleet_scale
+from kempf.flows.fleet import plan
 
 
 def _figures() -> dict[str, Any]:
@@ -46,7 +47,7 @@ def test_the_figures_are_computed_from_the_last_measurement() -> None:
 
 
 def test_a_large_fleet_costs_its_work_and_its_commits(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fleet_plan, "LOGS_A_BATCH", 20)
+    monkeypatch.setattr(plan, "LOGS_A_BATCH", 20)
     whole = fleet_scale.large(_figures(), 1000)
     # 4,000 logs, twenty a batch: 200 batches of five and a few more, since the last ones are smaller; three commits
     # each, two of them to one table

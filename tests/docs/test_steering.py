@@ -13,11 +13,11 @@ from pathlib import Path
 import click
 import pytest
 
-from pipeline.steering.state_space import OUTPUTS
+from kempf.pipeline.steering.state_space import OUTPUTS
+from kempf.workbench.cli.entry import cli
 from tests.conftest import Ship
 from tests.docs.console import Command, File, steps
 from tests.workbench.driving import kempf, one_of
-from workbench.cli.entry import cli
 
 PAGE = Path(__file__).parents[2] / "docs" / "steering.md"
 TEXT = PAGE.read_text(encoding="utf-8")

@@ -7,9 +7,9 @@ from functools import cache
 
 import numpy as np
 
-from pipeline.normalise.doctor.log import EARTH_M, Log
-from pipeline.normalise.series import SECOND_NS, Float, Series
-from schemas.profile import ChannelMap, Source, TimeColumn, VesselProfile
+from kempf.pipeline.channels.doctor.log import EARTH_M, Log
+from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.schemas.profile import ChannelMap, Source, TimeColumn, VesselProfile
 
 START_NS = 1_746_252_000_000_000_000
 STEP_S, LONG_S = 0.5, 1200.0

@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.normalise.doctor.examine import CHECKS, ask, examine
-from pipeline.normalise.doctor.faults import UNITS, Fault
-from pipeline.normalise.doctor.log import Log
-from pipeline.normalise.series import SECOND_NS, Series
+from kempf.pipeline.channels.doctor.examine import CHECKS, ask, examine
+from kempf.pipeline.channels.doctor.faults import UNITS, Fault
+from kempf.pipeline.channels.doctor.log import Log
+from kempf.pipeline.channels.series import SECOND_NS, Series
 from tests.doctor import made
 
 SWAP = Fault("swap", ("latitude", "longitude"))

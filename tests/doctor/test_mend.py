@@ -7,11 +7,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from flows.examine_log import Examined, examine_instruments
-from pipeline.ingest.read import read_log
-from pipeline.normalise.doctor.mend import Mend, put_into
-from pipeline.normalise.instruments import from_readings
-from schemas.profile import ChannelMap, VesselProfile
+from kempf.flows.jobs.examine_log import Examined, examine_instruments
+from kempf.pipeline.channels.doctor.corrections import Mend, put_into
+from kempf.pipeline.channels.instruments import from_readings
+from kempf.pipeline.ingest.read import read_log
+from kempf.schemas.profile import ChannelMap, VesselProfile
 from tests.doctor import made
 
 

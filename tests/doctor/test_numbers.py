@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.normalise.doctor.align import align
-from pipeline.normalise.doctor.fit import fit, posterior
-from pipeline.normalise.series import SECOND_NS, Series
+from kempf.pipeline.channels.doctor.align import align
+from kempf.pipeline.channels.doctor.robust_regression import fit, posterior
+from kempf.pipeline.channels.series import SECOND_NS, Series
 
 
 def test_fit_is_least_squares_where_nothing_is_wild_and_forgets_what_is() -> None:

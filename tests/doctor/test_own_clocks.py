@@ -6,9 +6,9 @@ import numpy as np
 import polars as pl
 import pytest
 
-from pipeline.ingest.read import read_log
-from pipeline.ingest.readings import READING_SCHEMA
-from schemas.channels import CHANNEL_COLUMNS, CHANNELS
+from kempf.pipeline.ingest.read import read_log
+from kempf.pipeline.ingest.readings import READING_SCHEMA
+from kempf.schemas.channels import CHANNEL_COLUMNS, CHANNELS
 from tests.doctor import made
 
 
@@ -39,7 +39,7 @@ def test_times_move_and_nothing_is_lost() -> None:
 
 
 def test_a_sentence_of_nmea_and_no_other() -> None:
-    from schemas.profile import ChannelMap, Source, VesselProfile
+    from kempf.schemas.profile import ChannelMap, Source, VesselProfile
 
     lines = b"2025-05-03T06:00:01.0Z $HEHDT,20.00,T*2D\n2025-05-03T06:00:01.5Z $AGRSA,-5.0,A,,*01\n"
     source = Source(match="*", channels={"HEHDT.heading": ChannelMap(channel="heading", unit="deg", delay_s=0.5)})
@@ -52,7 +52,7 @@ def test_a_sentence_of_nmea_and_no_other() -> None:
 def test_impossible_corrections_are_refused(bad: dict[str, float]) -> None:
     from pydantic import ValidationError
 
-    from schemas.profile import ChannelMap
+    from kempf.schemas.profile import ChannelMap
 
     with pytest.raises(ValidationError):
         ChannelMap(channel="heading", unit="deg", **bad)  # type: ignore[arg-type]

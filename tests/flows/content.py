@@ -8,9 +8,9 @@ from typing import Any
 
 from pyarrow import fs
 
-from schemas.tables import TABLES
-from warehouse import delta
-from warehouse.store import Warehouse
+from kempf.schemas.tables import TABLES
+from kempf.warehouse import delta
+from kempf.warehouse.store import Warehouse
 
 #: Runs tell how the work went, which an interruption changes.
 TOLD = tuple(name for name in TABLES if name != "runs")

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from flows.cores import usable
+from kempf.flows.process.cores import usable
 
 _TOLD_AT_NUMPY = """
 import os, sys
@@ -23,7 +23,9 @@ import {module}
 """
 
 
-@pytest.mark.parametrize("module", ["flows.fleet", "flows.reprocess_vessel", "flows.compare_vessel"])
+@pytest.mark.parametrize(
+    "module", ["kempf.flows.fleet.flows", "kempf.flows.jobs.reprocess_vessel", "kempf.flows.jobs.compare_vessel"]
+)
 @pytest.mark.parametrize("wanted", [None, "3"])
 def test_numpy_begins_with_one_thread_unless_told_otherwise(module: str, wanted: str | None) -> None:
     env = {key: value for key, value in os.environ.items() if key != "OPENBLAS_NUM_THREADS"}
@@ -43,7 +45,7 @@ def test_numpy_begins_with_one_thread_unless_told_otherwise(module: str, wanted:
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="this system does not bind processes to cores")
 def test_a_process_bound_to_one_core_uses_one() -> None:
     bound = "import os; os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})"
-    told = f"{bound}; from flows.cores import usable; print(usable())"
+    told = f"{bound}; from kempf.flows.process.cores import usable; print(usable())"
     done = subprocess.run([sys.executable, "-c", told], capture_output=True, text=True, check=True)
     assert done.stdout == "1\n"
     assert usable() == len(os.sched_getaffinity(0))

@@ -10,20 +10,20 @@ from typing import Any
 import pytest
 from prefect.logging import disable_run_logger
 
-from benchmarks import late_rudder
-from flows.diagnose_vessel import diagnose_vessel
-from flows.files import read_profiles
-from flows.fleet import diagnose_batch
-from flows.fleet_diagnosis import summary
-from flows.ingest_logs import ingest
-from flows.reprocess_vessel import reprocess_vessel
-from flows.rerun_set import rerun
-from flows.vessel_model import PLAIN
-from pipeline.model import effects
+from benchmarks.diagnose import late_rudder
+from kempf.flows.fleet.diagnosis_summary import summary
+from kempf.flows.fleet.flows import diagnose_batch
+from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.pipeline.model import effects
+from kempf.warehouse import aliases, parameter_sets
+from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf, refused
-from warehouse import aliases, parameter_sets
-from warehouse.store import Warehouse
 
 VESSEL = late_rudder.VESSEL
 SOME = ("rudder_lag", "gyro_bias", "shallow_water")

@@ -11,17 +11,17 @@ from typing import Any
 
 import pytest
 
+from kempf.warehouse import aliases, logs, parameter_sets, runs, segments, vessels
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh, versions
-from warehouse import aliases, logs, parameter_sets, runs, segments, vessels
-from warehouse.store import Warehouse
 
 FLEET = ("ferry", "mariner", "tramp")
 
 
 @pytest.fixture(scope="module", autouse=True)
 def _server() -> Iterator[None]:
-    import_module("flows.fleet")  # first: it sets what Prefect reads when it is imported
+    import_module("kempf.flows.fleet.flows")  # first: it sets what Prefect reads when it is imported
     from prefect.testing.utilities import prefect_test_harness
 
     with prefect_test_harness(server_startup_timeout=180):
@@ -31,7 +31,7 @@ def _server() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def fleet(mariner: Ship, ferry: Ship, tmp_path_factory: pytest.TempPathFactory) -> Warehouse:
     """Three vessels, a log each, taken in by the flow and identified by reprocessing."""
-    from flows.fleet import ingest, reprocess
+    from kempf.flows.fleet.flows import ingest, reprocess
 
     folder = tmp_path_factory.mktemp("fleet")
     mariner.write(folder / "mariner")
@@ -88,7 +88,7 @@ def test_every_flow_leaves_a_table(fleet: Warehouse):
 
 
 def test_identify_as_a_flow(own: Warehouse):
-    from flows.fleet import identify
+    from kempf.flows.fleet.flows import identify
 
     rows = identify("ferry", own.uri, "least-squares")
     assert [(row["converged"], row["error"]) for row in rows] == [(True, "")]
@@ -99,7 +99,7 @@ def test_identify_as_a_flow(own: Warehouse):
 
 
 def test_a_second_run_changes_nothing_but_the_runs(own: Warehouse):
-    from flows.fleet import reprocess
+    from kempf.flows.fleet.flows import reprocess
 
     at = versions(own)
     reports = reprocess(own.uri)
@@ -109,7 +109,7 @@ def test_a_second_run_changes_nothing_but_the_runs(own: Warehouse):
 
 
 def test_a_changed_profile_concerns_her_alone(own: Warehouse):
-    from flows.fleet import reprocess
+    from kempf.flows.fleet.flows import reprocess
 
     before = {row.log_id: row.ingest_id for row in logs.current(own)}
     vessels.register(own, "ferry", vessels.current(own, "ferry").model_copy(update={"wind_arm_per_m": 0.001}))
@@ -125,8 +125,8 @@ def test_a_changed_profile_concerns_her_alone(own: Warehouse):
 
 
 def test_a_damaged_raw_copy_is_reported_and_the_others_are_done(own: Warehouse):
-    from flows.fleet import reports_of, reprocess
-    from flows.fleet_report import VesselsFailed
+    from kempf.flows.fleet.flows import reports_of, reprocess
+    from kempf.flows.fleet.report import VesselsFailed
 
     damage(own, "mariner")
     for name in FLEET:
@@ -161,8 +161,8 @@ def damage(warehouse: Warehouse, vessel: str) -> None:
 
 
 def test_the_batch_goes_on_behind_a_fault_of_our_own(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
-    from flows import reprocess_vessel
-    from flows.fleet import reports_of
+    from kempf.flows.fleet.flows import reports_of
+    from kempf.flows.jobs import reprocess_vessel
 
     def one(warehouse: Warehouse, vessel: str, *rest: Any) -> Any:
         if vessel == "ferry":
@@ -178,8 +178,8 @@ def test_the_batch_goes_on_behind_a_fault_of_our_own(own: Warehouse, monkeypatch
 
 
 def test_a_fleet_of_none(tmp_path: Path):
-    from flows.fleet import reprocess
-    from schemas.errors import NotFound
+    from kempf.flows.fleet.flows import reprocess
+    from kempf.schemas.errors import NotFound
 
     warehouse = fresh(tmp_path / "w")
     with pytest.raises(NotFound, match="no warehouse"):
@@ -202,8 +202,8 @@ def test_the_command_runs_the_flow_and_prints_one_document(own: Warehouse):
 
 
 def test_the_fleet_is_diagnosed_as_a_flow(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
-    from flows.fleet import diagnose
-    from pipeline.model import effects
+    from kempf.flows.fleet.flows import diagnose
+    from kempf.pipeline.model import effects
 
     few = {name: effects.catalogue()[name] for name in ("rudder_lag", "cross_flow_drag")}
     monkeypatch.setattr(effects, "catalogue", lambda: few)

@@ -8,19 +8,21 @@ from typing import Any
 
 import pytest
 
-from flows import fleet_plan, fleet_report, fleet_state
-from flows.fleet_plan import Plan, do_batch, do_fleet, lost, plan, to_try_again, together
-from flows.fleet_state import fleet_state as state_of
-from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest_log
-from flows.vessel_report import VesselReport, run_id_of
-from pipeline.ingest.log_file import LogFile
-from schemas.errors import DataRejected, KempfError
-from schemas.profile import VesselProfile
+from kempf.flows.fleet import plan as planning
+from kempf.flows.fleet import report as fleet_report
+from kempf.flows.fleet import state
+from kempf.flows.fleet.plan import Plan, do_batch, do_fleet, lost, plan, to_try_again, together
+from kempf.flows.fleet.state import fleet_state as state_of
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest_log
+from kempf.flows.jobs.vessel_report import VesselReport, run_id_of
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.errors import DataRejected, KempfError
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import aliases, runs, vessels
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh, versions
-from warehouse import aliases, runs, vessels
-from warehouse.store import Warehouse
 
 QUICK = Request(estimator="least-squares")
 
@@ -77,14 +79,14 @@ def test_everything_that_a_result_rests_on_makes_her_due(own: Warehouse, ferry: 
     assert due(own) == ["idle"]
     do_fleet(own)
     assert due(own) == []
-    fleet_state.responsible_code.cache_clear()
-    monkeypatch.setattr(fleet_state.code_version, "fingerprint", lambda: "0" * 16)
+    state.responsible_code.cache_clear()
+    monkeypatch.setattr(state.code_version, "fingerprint", lambda: "0" * 16)
     assert due(own) == ["ferry", "idle"]
-    fleet_state.responsible_code.cache_clear()
+    state.responsible_code.cache_clear()
 
 
 def test_a_log_that_comes_while_she_is_worked_on_leaves_her_due(own: Warehouse, ferry: Ship, monkeypatch: Any) -> None:
-    from flows import reprocess_vessel
+    from kempf.flows.jobs import reprocess_vessel
 
     real = reprocess_vessel._withdraw
 
@@ -103,7 +105,7 @@ def test_a_log_that_comes_while_she_is_worked_on_leaves_her_due(own: Warehouse, 
 
 def refuse(monkeypatch: Any, error: KempfError) -> None:
     """Let every vessel but the idle one fail so."""
-    from flows import reprocess_vessel
+    from kempf.flows.jobs import reprocess_vessel
 
     real = reprocess_vessel._withdraw
 
@@ -163,14 +165,14 @@ def test_batches_hold_everybody_once_and_workers_end_together(vessels: int, work
     batches = found.batches(workers)
     assert sorted(name for batch in batches for name in batch) == sorted(logs_of)
     work = [sum(logs_of[name] for name in batch) for batch in batches]
-    assert max(work) < fleet_plan.LOGS_A_BATCH + 7
+    assert max(work) < planning.LOGS_A_BATCH + 7
     until = finished(work, workers)
     # nobody waits for longer than one of the last batches takes, or a vessel
     assert max(until) - min(until) <= max(work[0] / 4, 7) + 7
     everybody = sum(work)
     # the first batch leaves enough for all to share
     assert work[0] < everybody / workers * 0.5 + 7
-    assert len(work) <= everybody / fleet_plan.LOGS_A_BATCH + 6 * workers + 1
+    assert len(work) <= everybody / planning.LOGS_A_BATCH + 6 * workers + 1
 
 
 def test_batches_of_hardly_anything() -> None:
@@ -191,7 +193,7 @@ def test_a_lost_batch_is_told_and_tried_again_and_other_code_is_refused(own: War
     at = versions(own)
     refused = do_batch(own, ["ferry"], changed_only=True, code=["another", "version"])
     assert refused[0]["failures"][0]["error"]["code"] == "other_code" and versions(own) == at
-    assert do_batch(own, ["ferry"], changed_only=True, code=fleet_state.responsible_code())[0]["failures"] == []
+    assert do_batch(own, ["ferry"], changed_only=True, code=state.responsible_code())[0]["failures"] == []
 
 
 def test_a_large_fleet_has_a_table_of_those_where_something_happened() -> None:

@@ -14,12 +14,12 @@ from typing import Any
 import pytest
 import yaml
 
-from flows.identify_vessel import identify_vessel
-from flows.ingest_logs import ingest
-from schemas.profile import VesselProfile
+from kempf.flows.jobs.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import delta, logs, segments
+from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh, seen
-from warehouse import delta, logs, segments
-from warehouse.store import Warehouse
 
 ROOT = Path(__file__).parents[2]
 
@@ -122,7 +122,7 @@ def test_identify_may_die_at_any_write(
 
 def start(*arguments: object) -> subprocess.Popen[bytes]:
     return subprocess.Popen(
-        [sys.executable, "-c", "from workbench.cli import main; main()", *map(str, arguments)],
+        [sys.executable, "-c", "from kempf.workbench.cli import main; main()", *map(str, arguments)],
         stdout=subprocess.PIPE,
         stderr=subprocess.PIPE,
         env={**os.environ, "PYTHONPATH": str(ROOT)},

@@ -7,23 +7,23 @@ from pathlib import Path
 import pytest
 import yaml
 
-from flows import demonstrate as demonstration
-from flows.demonstrate import demonstrate
-from flows.files import read_model, read_profiles
-from flows.identify_vessel import Request, build, identify_vessel, inputs_of
-from flows.ingest_logs import ingest, settle_vessel
-from flows.register_vessel import set_vessel
-from flows.reprocess_vessel import reprocess_vessel
-from flows.rerun_set import rerun
-from flows.unforeseen import as_told
-from pipeline.normalise.instruments import from_readings
-from schemas.errors import KempfError, NotFound, UsageError
-from schemas.model_spec import ModelSpec
-from schemas.profile import VesselProfile
+from kempf.flows.jobs import demonstrate as demonstration
+from kempf.flows.jobs.demonstrate import demonstrate
+from kempf.flows.jobs.files import read_model, read_profiles
+from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel, inputs_of
+from kempf.flows.jobs.ingest_logs import ingest, settle_vessel
+from kempf.flows.jobs.register_vessel import set_vessel
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.process.wrap_error import as_told
+from kempf.pipeline.channels.instruments import from_readings
+from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import aliases, logs, parameter_sets, readings, runs, segments, vessels
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh, versions
-from warehouse import aliases, logs, parameter_sets, readings, runs, segments, vessels
-from warehouse.store import Warehouse
 
 LEAST_SQUARES = Request(estimator="least-squares")
 

@@ -7,20 +7,20 @@ from pathlib import Path
 
 import pytest
 
-from flows.files import read_profiles
-from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest
-from flows.pool_vessel import ALIAS, POOLED, pool_vessel
-from flows.reprocess_vessel import reprocess_vessel
-from flows.rerun_set import rerun
-from pipeline.simulate.csv_log import to_csv
-from pipeline.simulate.nmea_log import to_nmea
-from pipeline.simulate.trial import simulate_trial, zigzag_settings
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.pool_vessel import ALIAS, POOLED, pool_vessel
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.pipeline.simulate.csv_log import to_csv
+from kempf.pipeline.simulate.nmea_log import to_nmea
+from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
+from kempf.warehouse import aliases, parameter_sets
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf
-from warehouse import aliases, parameter_sets
-from warehouse.store import Warehouse
 
 DAY_NS = 86_400_000_000_000
 

@@ -10,23 +10,24 @@ from typing import Any
 import pytest
 import yaml
 
-from flows import fleet_state, preview_code, rerun_all
-from flows.identify_vessel import Request, build, identify_vessel
-from flows.ingest_logs import ingest
-from flows.moves import Move, paired
-from flows.preview_code import VesselPreview, preview_all, standing_sets
-from flows.reprocess_vessel import reprocess_vessel
-from flows.rerun_all import verify_all
-from pipeline.ingest.log_file import LogFile
-from schemas.errors import NotFound
-from schemas.model_spec import ModelSpec
-from schemas.profile import VesselProfile
+from kempf.flows.fleet import state
+from kempf.flows.jobs import preview_code, rerun_all
+from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.parameter_changes import Move, paired
+from kempf.flows.jobs.preview_code import VesselPreview, preview_all, standing_sets
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_all import verify_all
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.errors import NotFound
+from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import code_version, compaction, delta, logs, parameter_sets, runs
+from kempf.warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh, seen
 from tests.warehouse.samples import parameter_set
 from tests.workbench.driving import kempf, refused, tree
-from warehouse import code_version, compaction, delta, logs, parameter_sets, runs
-from warehouse.parameter_set import Estimate, ParameterSet
-from warehouse.store import Warehouse
 
 LEAST_SQUARES = Request(estimator="least-squares")
 NONE = {"bit-identical": 0, "equal within tolerance": 0, "different": 0, "failed": 0}
@@ -51,7 +52,7 @@ def own(_identified: Path, tmp_path: Path) -> Warehouse:
 
 def other_code(monkeypatch: pytest.MonkeyPatch, letter: str = "f") -> None:
     monkeypatch.setattr(code_version, "fingerprint", lambda: letter * 16)
-    for module in ("flows.find_segments",):  # has it by name
+    for module in ("kempf.flows.jobs.find_segments",):  # has it by name
         monkeypatch.setattr(f"{module}.fingerprint", lambda: letter * 16)
 
 
@@ -74,11 +75,11 @@ def test_a_verdict_of_other_flows_is_not_taken_over(own: Warehouse, monkeypatch:
     """What the flows put beside an estimate, such as warnings, is compared too; their code is no part of a set's id."""
     assert verify_all(own).counts() == {**NONE, "bit-identical": 2}
     monkeypatch.setattr(code_version, "fingerprint_of_packages", lambda *_: "f" * 16)
-    fleet_state.responsible_code.cache_clear()
+    state.responsible_code.cache_clear()
     try:
         assert verify_all(own).show()["known_before"] == 0
     finally:
-        fleet_state.responsible_code.cache_clear()
+        state.responsible_code.cache_clear()
 
 
 def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -204,7 +205,7 @@ def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeyp
         beside = [replace(e, value=e.value + steps.get(e.name, 0.0) * (e.std or 0.0)) for e in made.parameters]
         return replace(made, parameters=tuple(beside))
 
-    monkeypatch.setattr("flows.identify_vessel.build", moved)
+    monkeypatch.setattr("kempf.flows.jobs.identify_vessel.build", moved)
     assert own.folder is not None
     before = tree(own.folder)
     told = kempf("rerun", "--all", "--preview", "--fail-above", 1.4, "--warehouse", own.uri, "--json")

@@ -9,16 +9,16 @@ from typing import Any
 import polars as pl
 import pytest
 
-from flows import spool
-from flows.channels import channels_of
-from flows.ingest_logs import ingest
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap import decode
-from schemas.errors import DataRejected
-from schemas.profile import VesselProfile
+from kempf.flows.jobs import spool
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.log_channels import channels_of
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap import decode
+from kempf.schemas.errors import DataRejected
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import seen
-from warehouse.store import Warehouse
 
 
 @pytest.fixture
@@ -34,7 +34,7 @@ def beside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 def cut(monkeypatch: pytest.MonkeyPatch) -> None:
     """Parts of a thousand messages."""
     monkeypatch.setattr(decode, "_TOGETHER", 1_000)
-    monkeypatch.setattr("pipeline.ingest.mcap.stream.WINDOW", 20_000)
+    monkeypatch.setattr("kempf.pipeline.ingest.mcap.stream.WINDOW", 20_000)
 
 
 def taken(ferry: Ship, folder: Path) -> tuple[Warehouse, Any]:

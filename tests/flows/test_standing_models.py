@@ -6,17 +6,17 @@ from pathlib import Path
 
 import pytest
 
-from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest
-from flows.reprocess_vessel import reprocess_vessel
-from flows.rerun_set import rerun
-from pipeline.simulate.logger_profile import logger_profile
-from pipeline.simulate.mcap_log import to_mcap
-from pipeline.simulate.trial import simulate_trial, zigzag_settings
-from schemas.model_spec import ModelSpec
-from schemas.profile import VesselProfile
-from warehouse import aliases, code_version, history, logs, parameter_sets, vessels
-from warehouse.store import Warehouse
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.pipeline.simulate.logger_profile import logger_profile
+from kempf.pipeline.simulate.mcap_log import to_mcap
+from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
+from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import aliases, code_version, history, logs, parameter_sets, vessels
+from kempf.warehouse.store import Warehouse
 
 SETTINGS = zigzag_settings("ferry", duration_s=400.0, steady_s=60.0)
 CALM = Request(ModelSpec(name="calm", current="none"))

@@ -14,12 +14,12 @@ from typing import Any
 import pytest
 import yaml
 
-from flows.ingest_logs import ingest
-from schemas.profile import VesselProfile
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import delta
+from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh, seen
 from tests.workbench.driving import kempf
-from warehouse import delta
-from warehouse.store import Warehouse
 
 ROOT = Path(__file__).parents[2]
 INGESTED = ("vessels", "logs", "readings", "rejected", "segments", "raw")
@@ -91,7 +91,7 @@ def test_a_full_disk_is_one_clear_error_and_costs_nothing(harbour: Path, disk: D
 
 
 def begun(harbour: Path, place: Path) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-c", "from workbench.cli import main; main()", *map(str, asked(harbour, place))]
+    command = [sys.executable, "-c", "from kempf.workbench.cli import main; main()", *map(str, asked(harbour, place))]
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, env=environment)
 
@@ -115,10 +115,10 @@ def test_a_signal_at_any_moment_leaves_what_the_next_run_completes(
     moments = [(2, int(signal.SIGTERM)), (4, int(signal.SIGINT)), (6, int(signal.SIGTERM)), (8, int(signal.SIGINT))]
     code = (
         "import os, sys\n"
-        "import deltalake, polars, pyarrow.fs, flows.ingest_logs, workbench.cli.ingest\n"
+        "import deltalake, polars, pyarrow.fs, kempf.flows.jobs.ingest_logs, kempf.workbench.cli.ingest\n"
         "from warehouse import delta\n"
-        "from warehouse.store import Warehouse\n"
-        "from workbench.cli import main\n"
+        "from kempf.warehouse.store import Warehouse\n"
+        "from kempf.workbench.cli import main\n"
         "left = [0]\n"
         "def dying(write):\n"
         "    def wrapped(*arguments, **named):\n"

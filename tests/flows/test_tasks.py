@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
+from kempf.warehouse import parameter_sets
 from tests.flows.content import fresh
-from warehouse import parameter_sets
 
 
 def test_the_tasks_do_the_jobs(harbour: Path, tmp_path: Path):
-    from flows.fleet import identify_task, ingest_batch
+    from kempf.flows.fleet.flows import identify_task, ingest_batch
 
     place, profile = str(tmp_path / "w"), str(harbour / "profile.yaml")
     paths = [str(harbour / "mariner.mcap"), str(tmp_path / "none")]

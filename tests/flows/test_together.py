@@ -10,17 +10,17 @@ from typing import Any
 
 import pytest
 
-from flows import reprocess_vessel as job
-from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest_log
-from flows.reprocess_vessel import reprocess_vessel, reprocess_vessels
-from pipeline.ingest.log_file import LogFile
-from schemas.model_spec import ModelSpec
-from schemas.profile import VesselProfile
+from kempf.flows.jobs import reprocess_vessel as job
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest_log
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel, reprocess_vessels
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import aliases, delta, parameter_sets, runs, segments, vessels
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh, seen
-from warehouse import aliases, delta, parameter_sets, runs, segments, vessels
-from warehouse.store import Warehouse
 
 FLEET = ["cutter", "ferry", "sloop"]
 QUICK = Request(estimator="least-squares")

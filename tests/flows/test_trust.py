@@ -39,7 +39,7 @@ def test_nothing_stored_is_ever_run() -> None:
 
 
 def test_the_flows_keep_no_pickled_results() -> None:
-    fleet = import_module("flows.fleet")
+    fleet = import_module("kempf.flows.fleet.flows")
     from prefect import Flow, Task
 
     kept = [one for one in vars(fleet).values() if isinstance(one, (Flow, Task))]

@@ -10,23 +10,23 @@ import numpy as np
 import pytest
 import yaml
 
-from flows.identify_vessel import Request, identify_vessel, inputs_of
-from flows.pool_vessel import pool_vessel
-from flows.without_log import KEY, without_log
-from pipeline.identify.no_log import NoLogSettings
-from pipeline.normalise.series import SECOND_NS
-from pipeline.simulate.csv_log import to_csv
-from pipeline.simulate.disturbances import Disturbance, Environment
-from pipeline.simulate.instruments import DEFAULT_INSTRUMENTS
-from pipeline.simulate.logger_profile import logger_profile
-from pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
-from pipeline.simulate.plant import STATE
-from pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel, inputs_of
+from kempf.flows.jobs.no_speed_log import KEY, without_log
+from kempf.flows.jobs.pool_vessel import pool_vessel
+from kempf.pipeline.channels.series import SECOND_NS
+from kempf.pipeline.estimate.no_log.identify import NoLogSettings
+from kempf.pipeline.simulate.csv_log import to_csv
+from kempf.pipeline.simulate.disturbances import Disturbance, Environment
+from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS
+from kempf.pipeline.simulate.logger_profile import logger_profile
+from kempf.pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
+from kempf.pipeline.simulate.plant import STATE
+from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
+from kempf.warehouse import parameter_sets, segments
+from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
+from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
 from tests.workbench.driving import kempf
-from warehouse import parameter_sets, segments
-from warehouse.parameter_set import ParameterSet, parameter_set_id
-from warehouse.store import Warehouse
 
 STREAM_M_S = 0.5
 #: a compass read as rarely as the rest makes the fits quick

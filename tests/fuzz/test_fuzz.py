@@ -1,11 +1,11 @@
-"""The fuzzing of the readers in a form that takes seconds; `python -m benchmarks.fuzz` takes as long as one likes."""
+"""The fuzzing of the readers in a form that takes seconds, the whole of it is `benchmarks.ingest.fuzz`."""
 
 import pytest
 from mcap.writer import CompressionType
 
-from benchmarks.fuzzing.campaign import run
-from benchmarks.fuzzing.corpus import READERS, START_NS, mcap_log
-from benchmarks.fuzzing.whole_chunks import vouched_times
+from benchmarks.ingest.fuzzing.campaign import run
+from benchmarks.ingest.fuzzing.corpus import READERS, START_NS, mcap_log
+from benchmarks.ingest.fuzzing.whole_chunks import vouched_times
 
 
 @pytest.mark.parametrize("reader", READERS)
@@ -17,7 +17,7 @@ def test_damaged_inputs_crash_nothing_and_no_failed_checksum_is_accepted(reader)
 
 
 def test_a_reader_that_accepts_any_checksum_is_found_out(monkeypatch):
-    from pipeline.ingest.nmea import frames as nmea_frames
+    from kempf.pipeline.ingest.nmea import frames as nmea_frames
 
     monkeypatch.setattr(nmea_frames, "checksum_right", lambda buffer, prefix, first, star: star > first)
     with pytest.raises(AssertionError, match="kept under a wrong checksum"):

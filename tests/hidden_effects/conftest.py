@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from benchmarks.hidden_effects.cases import Case, design
-from benchmarks.hidden_effects.write import write_case
+from benchmarks.diagnose.hidden_effects.cases import Case, design
+from benchmarks.diagnose.hidden_effects.write import write_case
 
 
 @pytest.fixture(scope="session")

@@ -7,9 +7,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from benchmarks.hidden_effects.draw import draw_confusion
-from benchmarks.hidden_effects.score import page
-from benchmarks.hidden_effects.tally import Judged, Share, targets
+from benchmarks.diagnose.hidden_effects.draw import draw_confusion
+from benchmarks.diagnose.hidden_effects.score import page
+from benchmarks.diagnose.hidden_effects.tally import Judged, Share, targets
 
 
 def judged(kind: str, effect: str, verdict: str, sets: list[list[str]], ratio: float = 100.0, value: float = 1.0):

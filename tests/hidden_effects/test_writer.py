@@ -11,15 +11,15 @@ from pathlib import Path
 import pytest
 from mcap.reader import make_reader
 
-from benchmarks.hidden_effects import write
-from benchmarks.hidden_effects.cases import NOISES, design
-from benchmarks.hidden_effects.effects import CATALOGUE
-from benchmarks.hidden_effects.outsiders import OUTSIDERS
-from benchmarks.hidden_effects.programme import DISTURBANCES
-from benchmarks.hidden_effects.seal import open_sealed, seal
-from pipeline.simulate.hulls import HULLS
-from schemas.errors import DataRejected
-from warehouse.store import Warehouse
+from benchmarks.diagnose.hidden_effects import write
+from benchmarks.diagnose.hidden_effects.cases import NOISES, design
+from benchmarks.diagnose.hidden_effects.effects import CATALOGUE
+from benchmarks.diagnose.hidden_effects.outsiders import OUTSIDERS
+from benchmarks.diagnose.hidden_effects.programme import DISTURBANCES
+from benchmarks.diagnose.hidden_effects.seal import open_sealed, seal
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.schemas.errors import DataRejected
+from kempf.warehouse.store import Warehouse
 
 
 def test_the_sample_is_balanced_and_large_enough(sample):
@@ -45,8 +45,8 @@ def test_the_sample_is_balanced_and_large_enough(sample):
 
 
 def test_the_flows_take_a_case_in_and_find_its_zigzags(written, tmp_path: Path):
-    from flows.files import read_profiles
-    from flows.ingest_logs import ingest
+    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.ingest_logs import ingest
 
     for case, folder, answer in written:
         warehouse = Warehouse(str(tmp_path / case.case_id))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.history.sets import ParameterHistory
-from schemas.model_spec import HULL_PARAMETERS
+from kempf.pipeline.history.sets import ParameterHistory
+from kempf.schemas.model_spec import HULL_PARAMETERS
 
 NAMES, UNITS = tuple(HULL_PARAMETERS), tuple(HULL_PARAMETERS.values())
 TRUTH = np.array([-0.00479, -0.335, -0.000131, -0.013, -0.00106, 6.28e-05])

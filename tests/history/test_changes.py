@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from pipeline.history.changes import Changes, find_changes
-from pipeline.history.scan import judge, stretch
-from pipeline.history.sets import ParameterHistory, occasions, usable
-from pipeline.history.settings import ChangeSettings
-from schemas.errors import DataRejected
+from kempf.pipeline.history.changes import Changes, find_changes
+from kempf.pipeline.history.scan import judge, stretch
+from kempf.pipeline.history.sets import ParameterHistory, occasions, usable
+from kempf.pipeline.history.settings import ChangeSettings
+from kempf.schemas.errors import DataRejected
 from tests.history.made import DAY_NS, NAMES, START_NS, TRUTH, history, step
 
 #: Enough for what is tested here.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.history.contrasts import axes, directions, scatter, statistics
+from kempf.pipeline.history.contrasts import axes, directions, scatter, statistics
 from tests.history.made import relative_covariance
 
 

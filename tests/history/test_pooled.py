@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from pipeline.history.pooled import pool
-from schemas.errors import DataRejected
+from kempf.pipeline.history.pooled import pool
+from kempf.schemas.errors import DataRejected
 from tests.history.made import TRUTH, history, relative_covariance
 
 

@@ -6,10 +6,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from mcap.writer import Writer
 
-from benchmarks.fuzzing.oracles import check_ledgers
-from pipeline.ingest.read import read_log
-from schemas.errors import KempfError
-from schemas.profile import VesselProfile
+from benchmarks.ingest.fuzzing.oracles import check_ledgers
+from kempf.pipeline.ingest.read import read_log
+from kempf.schemas.errors import KempfError
+from kempf.schemas.profile import VesselProfile
 
 PROFILE = VesselProfile.model_validate(
     {

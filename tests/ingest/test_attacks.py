@@ -12,12 +12,12 @@ import polars as pl
 import pytest
 import zstandard
 
-from flows.files import opened_log, read_bytes, read_profiles
-from pipeline.ingest.read import read_log
-from pipeline.ingest.text.decimal_time import to_ns
-from pipeline.ingest.unpack import unpack
-from schemas.errors import DataRejected, UsageError
-from schemas.profile import VesselProfile, parse
+from kempf.flows.jobs.files import opened_log, read_bytes, read_profiles
+from kempf.pipeline.ingest.read import read_log
+from kempf.pipeline.ingest.text.decimal_time import to_ns
+from kempf.pipeline.ingest.unpack import unpack
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.profile import VesselProfile, parse
 
 HALF = b"2025-05-03T07:47:01.147Z $HEHDT,11.37,T*2B\n"
 

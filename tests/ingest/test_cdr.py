@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap_ros2._dynamic import generate_dynamic, serialize_dynamic
 
-from pipeline.ingest.messages.cdr_definition import types_of
-from pipeline.ingest.messages.cdr_reader import CdrReader
-from pipeline.ingest.messages.columns import NoReaderError
-from pipeline.ingest.spans import Spans, as_bytes
+from kempf.pipeline.ingest.messages.cdr_definition import types_of
+from kempf.pipeline.ingest.messages.cdr_reader import CdrReader
+from kempf.pipeline.ingest.messages.columns import NoReaderError
+from kempf.pipeline.ingest.spans import Spans, as_bytes
 from tests.ingest.ros_definitions import DEFINITIONS, joined
 
 

@@ -5,8 +5,8 @@ import polars as pl
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.ingest.text.cells import Cells, leading_digits, words
-from pipeline.ingest.text.numerals import number
+from kempf.pipeline.ingest.text.cells import Cells, leading_digits, words
+from kempf.pipeline.ingest.text.numerals import number
 
 plain = st.decimals(allow_nan=False, allow_infinity=False, places=8, min_value=-(10**9), max_value=10**9).map(str)
 short = st.from_regex(r"\A[-+]?[0-9]{0,10}\.?[0-9]{0,10}\Z")

@@ -7,11 +7,11 @@ import struct
 import pytest
 from mcap.stream_reader import StreamReader
 
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap.stream import McapStream
-from pipeline.ingest.read import read_log
-from schemas.errors import KempfError
-from schemas.profile import VesselProfile
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap.stream import McapStream
+from kempf.pipeline.ingest.read import read_log
+from kempf.schemas.errors import KempfError
+from kempf.schemas.profile import VesselProfile
 from tests.ingest.mcap_variants import CONTENTS, channel, message, variants, write
 
 START = 1_755_497_274_000_000_000

@@ -6,10 +6,10 @@ from time import process_time
 
 import pytest
 
-from pipeline.ingest import delimited
-from pipeline.ingest.read import read_log
-from schemas.errors import DataRejected, UsageError
-from schemas.profile import VesselProfile
+from kempf.pipeline.ingest import delimited
+from kempf.pipeline.ingest.read import read_log
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.profile import VesselProfile
 
 
 def profile(channels=None, time=None, **source):

@@ -8,10 +8,10 @@ import pytest
 from mcap.writer import Writer
 from mcap_ros2.writer import Writer as RosWriter
 
-from pipeline.ingest.read import read_log
-from schemas.errors import UsageError
-from schemas.known_messages import OFFERED
-from schemas.profile import VesselProfile
+from kempf.pipeline.ingest.read import read_log
+from kempf.schemas.errors import UsageError
+from kempf.schemas.known_messages import OFFERED
+from kempf.schemas.profile import VesselProfile
 from tests.ingest.ros_definitions import DEFINITIONS
 from tests.ingest.test_protobuf import described
 

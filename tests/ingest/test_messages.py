@@ -5,9 +5,9 @@ from pathlib import Path
 
 import yaml
 
-from pipeline.ingest.messages.cdr_definition import types_of
-from schemas.known_messages import TAKEN
-from schemas.profile import parse
+from kempf.pipeline.ingest.messages.cdr_definition import types_of
+from kempf.schemas.known_messages import TAKEN
+from kempf.schemas.profile import parse
 
 ROOT = Path(__file__).parents[2]
 

@@ -5,14 +5,14 @@ from datetime import UTC, datetime
 
 import pytest
 
-from pipeline.ingest.nmea import frames as nmea_frames
-from pipeline.ingest.nmea.decode import decode
-from pipeline.ingest.nmea.frames import frames_of
-from pipeline.ingest.readings import Readings
-from pipeline.ingest.screen import screen
-from pipeline.ingest.spans import as_bytes
-from schemas.errors import UsageError
-from schemas.profile import ChannelMap, Source
+from kempf.pipeline.ingest.nmea import frames as nmea_frames
+from kempf.pipeline.ingest.nmea.decode import decode
+from kempf.pipeline.ingest.nmea.frames import frames_of
+from kempf.pipeline.ingest.readings import Readings
+from kempf.pipeline.ingest.screen import screen
+from kempf.pipeline.ingest.spans import as_bytes
+from kempf.schemas.errors import UsageError
+from kempf.schemas.profile import ChannelMap, Source
 
 KN = 1852 / 3600
 

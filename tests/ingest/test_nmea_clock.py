@@ -4,9 +4,9 @@ from datetime import UTC, datetime, timedelta
 
 import pytest
 
-from pipeline.ingest.nmea.decode import decode
-from pipeline.ingest.screen import screen
-from pipeline.ingest.sniff import sniff
+from kempf.pipeline.ingest.nmea.decode import decode
+from kempf.pipeline.ingest.screen import screen
+from kempf.pipeline.ingest.sniff import sniff
 
 
 def sentence(body):

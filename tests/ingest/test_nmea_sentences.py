@@ -10,10 +10,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.ingest.decoded import CODE
-from pipeline.ingest.nmea.decode import decode
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.screen import screen
+from kempf.pipeline.ingest.decoded import CODE
+from kempf.pipeline.ingest.nmea.decode import decode
+from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.screen import screen
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 DEG, KN = math.pi / 180, 1852 / 3600

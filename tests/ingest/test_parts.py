@@ -12,14 +12,14 @@ import pytest
 from mcap.writer import Writer
 from polars.testing import assert_frame_equal
 
-from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
-from pipeline.ingest.mcap import decode
-from pipeline.ingest.own_clocks import OwnClocks
-from pipeline.ingest.read import read_log, read_parts
-from pipeline.ingest.readings import Reason, joined
-from pipeline.ingest.screen import Screen, screen
-from pipeline.ingest.spans import Spans
-from schemas.profile import Source, VesselProfile
+from kempf.pipeline.ingest.clock_corrections import OwnClocks
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
+from kempf.pipeline.ingest.mcap import decode
+from kempf.pipeline.ingest.read import read_log, read_parts
+from kempf.pipeline.ingest.readings import Reason, joined
+from kempf.pipeline.ingest.screen import Screen, screen
+from kempf.pipeline.ingest.spans import Spans
+from kempf.schemas.profile import Source, VesselProfile
 
 START_NS = 1_755_497_274_000_000_000
 SECOND = 1_000_000_000
@@ -111,7 +111,7 @@ def test_mcap_in_parts(monkeypatch: pytest.MonkeyPatch, together: int) -> None:
     wanted = read_log("a.mcap", data, profile)
     assert wanted.tally.records_rejected > 10 and wanted.notes
     monkeypatch.setattr(decode, "_TOGETHER", together)
-    monkeypatch.setattr("pipeline.ingest.mcap.stream.WINDOW", 500)
+    monkeypatch.setattr("kempf.pipeline.ingest.mcap.stream.WINDOW", 500)
     parts = list(read_parts("a.mcap", data, profile))
     assert len(parts) > 1 and not any(part.notes for part in parts[:-1])
     equal(joined(parts), wanted)

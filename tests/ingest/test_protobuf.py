@@ -8,8 +8,8 @@ from google.protobuf import descriptor_pb2, descriptor_pool, message_factory
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.ingest.messages.columns import NoReaderError
-from pipeline.ingest.messages.protobuf_reader import ProtobufReader
+from kempf.pipeline.ingest.messages.columns import NoReaderError
+from kempf.pipeline.ingest.messages.protobuf_reader import ProtobufReader
 from tests.ingest.test_cdr import spans
 
 TYPES = {

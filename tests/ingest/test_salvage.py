@@ -11,13 +11,13 @@ import zstandard
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.ingest import unpack
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap import chunk as mcap_chunk
-from pipeline.ingest.mcap.stream import McapStream
-from pipeline.ingest.read import read_log
-from schemas.errors import DataRejected, KempfError
-from schemas.profile import VesselProfile
+from kempf.pipeline.ingest import unpack
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap import chunk as mcap_chunk
+from kempf.pipeline.ingest.mcap.stream import McapStream
+from kempf.pipeline.ingest.read import read_log
+from kempf.schemas.errors import DataRejected, KempfError
+from kempf.schemas.profile import VesselProfile
 from tests.ingest.mcap_variants import MAGIC, channel, chunk_record, index_records, message, record, text
 from tests.ingest.mcap_variants import summary as summary_of
 

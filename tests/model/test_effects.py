@@ -12,16 +12,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from pipeline.model import effects
-from pipeline.model.augmented import Augmented
-from pipeline.model.effects import as_json, catalogue, digest, from_file, get
-from pipeline.model.terms.effect import Effect
-from pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
-from pipeline.model.terms.ordinary import answer, require_ordinary, run
-from pipeline.model.terms.places import places
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, SYMBOLS
-from schemas.errors import KempfError, NotFound
-from workbench.effects_table import effects_table
+from kempf.pipeline.model import effects
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effects import as_json, catalogue, digest, from_file, get
+from kempf.pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
+from kempf.pipeline.model.terms.ordinary import answer, require_ordinary, run
+from kempf.pipeline.model.terms.places import places
+from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS, SYMBOLS
+from kempf.schemas.errors import KempfError, NotFound
+from kempf.workbench.effects_table import effects_table
 
 ALL = catalogue()
 DOCUMENT = Path(__file__).parents[2] / "docs" / "effects.md"
@@ -267,12 +267,12 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
     before = set(sys.modules)
     yield tmp_path
     for name in set(sys.modules) - before:
-        if name.startswith("pipeline.model.effects."):
+        if name.startswith("kempf.pipeline.model.effects."):
             del sys.modules[name]
 
 
 GOOD = """
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 EFFECT = Effect(
     name="{name}", title="t", group="hull", plain="p", equation="e", reference="r",
     parameters=(Parameter("c", "1", -1.0, 1.0, (0.1,), "m"),), terms={{"{target}": "c*r"}},

@@ -7,16 +7,16 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from pipeline.diagnose.filtered import Filtered
-from pipeline.diagnose.run import Run, Ship
-from pipeline.model.augmented import Augmented
-from pipeline.model.dynamics import N_INPUT
-from pipeline.model.effects import catalogue
-from pipeline.model.extended import ROWS
-from pipeline.model.ship import mariner_like
-from pipeline.model.terms.effect import Effect
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS
-from schemas.model_spec import ModelSpec
+from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.filters.ekf import ROWS
+from kempf.pipeline.estimate.record.grid_run import Run, Ship
+from kempf.pipeline.model.dynamics import N_INPUT
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effects import catalogue
+from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS
+from kempf.schemas.model_spec import ModelSpec
 
 HULL = mariner_like(100.0).array()
 LEVELS = np.array([1e-4, 1e-5, 1e-3, 0.05, 5e-4, 2e-3])

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
-from pipeline.model.terms.ordinary import run
-from pipeline.model.terms.program import DEPTH
-from pipeline.model.terms.symbols import STATE_SYMBOLS, SYMBOLS
-from schemas.errors import UsageError
+from kempf.pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
+from kempf.pipeline.model.terms.ordinary import run
+from kempf.pipeline.model.terms.program import DEPTH
+from kempf.pipeline.model.terms.symbols import STATE_SYMBOLS, SYMBOLS
+from kempf.schemas.errors import UsageError
 
 STATES = tuple(STATE_SYMBOLS)
 INDEX = {name: i for i, name in enumerate(SYMBOLS)}

@@ -11,9 +11,9 @@ from collections.abc import Callable
 
 import pytest
 
-from pipeline.model.effects import from_expression, from_file
-from pipeline.model.terms.expression import compiled, names_in
-from schemas.errors import UsageError
+from kempf.pipeline.model.effects import from_expression, from_file
+from kempf.pipeline.model.terms.expression import compiled, names_in
+from kempf.schemas.errors import UsageError
 
 VARIABLES = {"v": 0, "r": 1, "V": 2}
 DEEP = 1000

@@ -8,17 +8,17 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.diagnose.filtered import INITIAL_STD, Filtered
-from pipeline.diagnose.run import Run, Ship
-from pipeline.identify.chain import LONGEST
-from pipeline.identify.kernel import N_STATE, likelihood, no_trace
-from pipeline.model.augmented import Augmented
-from pipeline.model.dynamics import N_INPUT
-from pipeline.model.effects import from_expression
-from pipeline.model.extended import ROWS
-from pipeline.model.terms.effect import Effect, ExtraState, Parameter
-from schemas.errors import UsageError
-from schemas.model_spec import ModelSpec
+from kempf.pipeline.estimate.filtered import INITIAL_STD, Filtered
+from kempf.pipeline.estimate.filters.ekf import ROWS
+from kempf.pipeline.estimate.filters.linear_kernel import N_STATE, likelihood, no_trace
+from kempf.pipeline.estimate.record.grid_run import Run, Ship
+from kempf.pipeline.model.discretise import LONGEST
+from kempf.pipeline.model.dynamics import N_INPUT
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effects import from_expression
+from kempf.pipeline.model.terms.effect import Effect, ExtraState, Parameter
+from kempf.schemas.errors import UsageError
+from kempf.schemas.model_spec import ModelSpec
 
 HULL = np.array([-4.4e-3, -0.29, -1.7e-4, -2.66e-2, -2.4e-3, 1.19e-4])
 LEVELS = np.array([2e-4, 2e-6, 1e-3, 0.05, 6e-4, 1.5e-3])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from pipeline.model.filter import run_filter
+from kempf.pipeline.estimate.filters.kalman_filter import run_filter
 
 Float = NDArray[np.float64]
 

@@ -6,10 +6,10 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.model.effects import catalogue, digest, from_expression, from_file
-from pipeline.model.terms.effect import ExtraState, Parameter
-from pipeline.model.terms.ordinary import require_ordinary
-from schemas.errors import UsageError
+from kempf.pipeline.model.effects import catalogue, digest, from_expression, from_file
+from kempf.pipeline.model.terms.effect import ExtraState, Parameter
+from kempf.pipeline.model.terms.ordinary import require_ordinary
+from kempf.schemas.errors import UsageError
 
 ALL = catalogue()
 

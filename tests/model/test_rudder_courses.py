@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.model.effects import catalogue
-from pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.effects import catalogue
+from kempf.pipeline.model.terms.effect import Effect
 
 ALL = catalogue()
 courses = pytest.mark.parametrize("effect", [e for e in ALL.values() if e.rudder_course], ids=lambda e: e.name)

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import logm
 from scipy.signal import cont2discrete
 
-from pipeline.model.ship import Hull, continuous_from_discrete, discretise, mariner_like
+from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discretise, mariner_like
 
 PARTICULARS = st.tuples(st.floats(1.5, 400.0), st.floats(0.5, 15.0), st.floats(0.02, 1.0))
 PRIME = st.tuples(

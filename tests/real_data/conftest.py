@@ -5,8 +5,8 @@ from __future__ import annotations
 import pytest
 
 from benchmarks import measured_ships
+from kempf.warehouse.store import Warehouse
 from tests.real_data.voyage import SHARED, Voyage, require, sail
-from warehouse.store import Warehouse
 
 
 @pytest.fixture(scope="session")

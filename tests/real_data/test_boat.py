@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import re
 
-from flows.identify_vessel import identify_vessel
+from kempf.flows.jobs.identify_vessel import identify_vessel
+from kempf.warehouse import parameter_sets
 from tests.real_data.voyage import Voyage
-from warehouse import parameter_sets
 
 
 def test_one_30_30_and_no_zigzag_in_the_turning_circle(boat: Voyage) -> None:

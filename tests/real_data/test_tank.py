@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from benchmarks.hsva import PUBLISHED
+from benchmarks.identify.hsva import PUBLISHED
 from benchmarks.measured_ships import ordered
-from flows.files import read_profiles
-from flows.identify_vessel import Request, build, inputs_of
-from pipeline.normalise.instruments import from_readings
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.identify_vessel import Request, build, inputs_of
+from kempf.pipeline.channels.instruments import from_readings
+from kempf.warehouse import readings
 from tests.real_data.voyage import Voyage
-from warehouse import readings
 
 
 def test_every_run_is_one_zigzag_with_the_angles_of_its_name(tank: Voyage) -> None:

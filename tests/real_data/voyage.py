@@ -9,8 +9,8 @@ import pytest
 
 from benchmarks import measured_ships
 from benchmarks.measured_ships import Ship
-from flows.ingest_logs import IngestOutcome
-from warehouse.store import Warehouse
+from kempf.flows.jobs.ingest_logs import IngestOutcome
+from kempf.warehouse.store import Warehouse
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest_log
-from pipeline.ingest.log_file import LogFile
-from schemas.profile import VesselProfile
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest_log
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import vessels
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.scale.servers import environment, free_port, running
-from warehouse import vessels
-from warehouse.store import Warehouse
 
 KEYS = {"AWS_ACCESS_KEY_ID": "testing", "AWS_SECRET_ACCESS_KEY": "testing"}
 
@@ -106,7 +106,7 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
 @pytest.fixture
 def on_server(server: Server) -> Iterator[None]:
     """The flows of this process report to the server."""
-    import_module("flows.engine")  # first: it sets what Prefect reads when it is imported
+    import_module("kempf.flows.fleet.engine")  # first: it sets what Prefect reads when it is imported
     from prefect.settings import PREFECT_API_URL, PREFECT_HOME, temporary_settings
 
     with temporary_settings({PREFECT_API_URL: server.url, PREFECT_HOME: server.settings["PREFECT_HOME"]}):

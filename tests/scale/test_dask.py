@@ -14,13 +14,13 @@ from typing import Any
 
 import pytest
 
-from flows.fleet_plan import do_fleet
+from kempf.flows.fleet.plan import do_fleet
+from kempf.warehouse import runs
+from kempf.warehouse.store import Warehouse
 from tests.flows.content import seen
 from tests.scale.cluster import Cluster, Worker
 from tests.scale.conftest import FLEET, Bucket, Server, touch
 from tests.scale.servers import environment, wait_for
-from warehouse import runs
-from warehouse.store import Warehouse
 
 pytest.importorskip("prefect_dask", reason="kempf[dask] is not installed")
 
@@ -51,8 +51,8 @@ def fleet(bucket: Bucket, stocked: Path, tmp_path: Path) -> Warehouse:
 
 def run(cluster: Two, warehouse: Warehouse, bucket: Bucket, **options: Any) -> list[dict[str, Any]]:
     """Run the flow in this process on the cluster's workers."""
-    from flows.engine import task_runner
-    from flows.fleet import reprocess
+    from kempf.flows.fleet.engine import task_runner
+    from kempf.flows.fleet.flows import reprocess
 
     with pytest.MonkeyPatch.context() as patched:
         for name, value in bucket.settings.items():

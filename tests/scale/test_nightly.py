@@ -14,12 +14,12 @@ from typing import Any
 
 import pytest
 
-from flows.fleet_plan import do_fleet, plan
+from kempf.flows.fleet.plan import do_fleet, plan
+from kempf.warehouse import logs, runs
+from kempf.warehouse.store import Warehouse
 from tests.flows.content import seen
 from tests.scale.conftest import FLEET, Server, touch
 from tests.scale.servers import ROOT, environment, running, wait_for
-from warehouse import logs, runs
-from warehouse.store import Warehouse
 
 TEXT = (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8")
 

@@ -10,20 +10,20 @@ from pathlib import Path
 
 import pytest
 
-from flows.identify_vessel import Request, identify_vessel
-from flows.ingest_logs import ingest
-from flows.reprocess_vessel import reprocess_vessel
-from flows.rerun_set import rerun
-from pipeline.ingest.log_file import LogFile
-from schemas.errors import KempfError, NotFound
-from schemas.profile import VesselProfile
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.errors import KempfError, NotFound
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import aliases, compaction, delta, logs, parameter_sets, raw, runs, segments, vessels
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import seen
 from tests.scale.conftest import Bucket
 from tests.warehouse.samples import START_NS, inputs, parameter_set
 from tests.workbench.driving import kempf
-from warehouse import aliases, compaction, delta, logs, parameter_sets, raw, runs, segments, vessels
-from warehouse.store import Warehouse
 
 QUICK = Request(estimator="least-squares")
 

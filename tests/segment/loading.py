@@ -19,7 +19,7 @@ import polars as pl
 import pytest
 from mcap.reader import make_reader
 
-from pipeline.normalise.series import Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 KNOT = 1852.0 / 3600.0

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from pipeline.normalise.series import Float, Series
+from kempf.pipeline.channels.series import Float, Series
 
 STEP_S = 0.02
 START_NS = 1_750_000_000_000_000_000

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 import pytest
 
-from pipeline.segment.find import find_manoeuvres
-from pipeline.segment.imo import first_overshoot_limit, judge, second_overshoot_limit
-from pipeline.segment.zigzag import SpeedConstancy, Zigzag
+from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.imo import first_overshoot_limit, judge, second_overshoot_limit
+from kempf.pipeline.segment.zigzag import SpeedConstancy, Zigzag
 from tests.segment.nomoto import Instruments, Ship, measure
 
 

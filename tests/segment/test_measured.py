@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from pipeline.segment.find import find_manoeuvres
-from pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.zigzag import Zigzag
 from tests.segment.loading import Log, available, load
 
 TANK = available("data/kvlcc2_hsva/*.dat")

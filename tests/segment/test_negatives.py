@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.normalise.series import Series
-from pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.channels.series import Series
+from kempf.pipeline.segment.find import find_manoeuvres
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.normalise.series import Float, Series
-from pipeline.segment.find import find_manoeuvres
-from pipeline.segment.zigzag import Zigzag
+from kempf.pipeline.channels.series import Float, Series
+from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.zigzag import Zigzag
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
 

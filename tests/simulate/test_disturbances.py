@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.simulate.disturbances import FORCING, Disturbance, Environment
-from pipeline.simulate.random_streams import stream
+from kempf.pipeline.simulate.disturbances import FORCING, Disturbance, Environment
+from kempf.pipeline.simulate.random_streams import stream
 
 N_SEEDS = 3000
 

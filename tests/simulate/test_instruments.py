@@ -8,13 +8,13 @@ from math import pi, radians
 import numpy as np
 import pytest
 
-from pipeline.simulate.disturbances import Disturbance, Environment
-from pipeline.simulate.hulls import HULLS
-from pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument
-from pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
-from pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
-from schemas.channels import CHANNEL_COLUMNS
-from schemas.errors import UsageError
+from kempf.pipeline.simulate.disturbances import Disturbance, Environment
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument
+from kempf.pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
+from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
+from kempf.schemas.channels import CHANNEL_COLUMNS
+from kempf.schemas.errors import UsageError
 
 WEATHER = Environment(
     Disturbance(5e-3, 1e-3), Disturbance(0.2, 0.05), Disturbance(-0.1), Disturbance(0.15, 0.05), Disturbance(7.0)

@@ -13,15 +13,15 @@ import numpy as np
 import pytest
 from mcap.reader import make_reader
 
-from pipeline.simulate.csv_log import to_csv
-from pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument
-from pipeline.simulate.logger_fields import LOGGER_FIELDS
-from pipeline.simulate.logger_profile import logger_profile
-from pipeline.simulate.manoeuvre import SteadyCourse
-from pipeline.simulate.mcap_log import to_mcap
-from pipeline.simulate.nmea_log import damage, to_nmea
-from pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
-from schemas.errors import UsageError
+from kempf.pipeline.simulate.csv_log import to_csv
+from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument
+from kempf.pipeline.simulate.logger_fields import LOGGER_FIELDS
+from kempf.pipeline.simulate.logger_profile import logger_profile
+from kempf.pipeline.simulate.manoeuvre import SteadyCourse
+from kempf.pipeline.simulate.mcap_log import to_mcap
+from kempf.pipeline.simulate.nmea_log import damage, to_nmea
+from kempf.pipeline.simulate.trial import Trial, simulate_trial, zigzag_settings
+from kempf.schemas.errors import UsageError
 
 SHARED = Path(__file__).parents[2].parent / "shared" / "trials"
 WRITERS = (to_nmea, to_csv, to_mcap)

@@ -7,9 +7,9 @@ from math import radians
 import numpy as np
 import pytest
 
-from pipeline.simulate.disturbances import CALM
-from pipeline.simulate.hulls import HULLS
-from pipeline.simulate.manoeuvre import (
+from kempf.pipeline.simulate.disturbances import CALM
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.pipeline.simulate.manoeuvre import (
     TICK_S,
     CourseChange,
     HandSteering,
@@ -18,9 +18,9 @@ from pipeline.simulate.manoeuvre import (
     TurningCircle,
     ZigzagTest,
 )
-from pipeline.simulate.programme import sail
-from pipeline.simulate.trial import PAPER_ENVIRONMENT
-from schemas.errors import UsageError
+from kempf.pipeline.simulate.programme import sail
+from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT
+from kempf.schemas.errors import UsageError
 
 
 @pytest.mark.parametrize("name", ["mariner", "container", "tanker", "ferry"])

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-import pipeline.simulate
-from pipeline.simulate.disturbances import CALM, Disturbance, Environment
-from pipeline.simulate.hulls import HULLS, Hull
-from pipeline.simulate.manoeuvre import HandSteering, SteadyCourse, TurningCircle, ZigzagTest
-from pipeline.simulate.programme import sail
+import kempf.pipeline.simulate
+from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
+from kempf.pipeline.simulate.hulls import HULLS, Hull
+from kempf.pipeline.simulate.manoeuvre import HandSteering, SteadyCourse, TurningCircle, ZigzagTest
+from kempf.pipeline.simulate.programme import sail
 
 CONSTANT_SPEED = replace(HULLS["ferry"], speed_loss=0.0)
 STEADY_WEATHER = Environment(Disturbance(5e-3), Disturbance(0.2), Disturbance(-0.1), Disturbance(0.15))
@@ -130,7 +130,7 @@ def test_mariner_follows_from_the_published_derivatives() -> None:
 
 
 def test_the_simulator_shares_no_code_with_the_estimator() -> None:
-    folder = Path(pipeline.simulate.__path__[0])
+    folder = Path(kempf.pipeline.simulate.__path__[0])
     files = sorted(folder.glob("*.py"))
     assert len(files) > 10
     for file in files:
@@ -138,4 +138,4 @@ def test_the_simulator_shares_no_code_with_the_estimator() -> None:
             names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
             names += [node.module or ""] if isinstance(node, ast.ImportFrom) else []
             own = [n for n in names if n.startswith(("pipeline", "warehouse", "flows", "workbench"))]
-            assert all(n.startswith("pipeline.simulate") for n in own), (file.name, own)
+            assert all(n.startswith("kempf.pipeline.simulate") for n in own), (file.name, own)

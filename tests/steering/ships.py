@@ -6,8 +6,8 @@ from dataclasses import astuple
 
 import numpy as np
 
-from pipeline.model.ship import Hull
-from pipeline.simulate.hulls import HULLS
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.simulate.hulls import HULLS
 
 #: about the standard errors of a 20-minute 20/20 zigzag, relative, and a correlation between sway and yaw
 RELATIVE = np.array([0.03, 0.035, 0.02, 0.015, 0.03, 0.01])

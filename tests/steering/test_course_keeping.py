@@ -9,18 +9,18 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from flows.steered_ship import Instruments, SteeredShip
-from pipeline.model.filter import run_filter
-from pipeline.model.ship import Hull
-from pipeline.simulate.disturbances import CALM, Disturbance, Environment
-from pipeline.simulate.hulls import HULLS
-from pipeline.simulate.trial import PAPER_ENVIRONMENT
-from pipeline.steering.course_keeping import LawSettings, course_law
-from pipeline.steering.robustness import closed_loop, share_held
-from pipeline.steering.state_space import continuous, discretised
-from pipeline.steering.track import course_change, keep_course, performance
-from schemas.errors import DataRejected, UsageError
-from schemas.model_spec import ModelSpec
+from kempf.flows.jobs.steered_ship import Instruments, SteeredShip
+from kempf.pipeline.estimate.filters.kalman_filter import run_filter
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT
+from kempf.pipeline.steering.course_keeping import LawSettings, course_law
+from kempf.pipeline.steering.robustness import closed_loop, share_held
+from kempf.pipeline.steering.state_space import continuous, discretised
+from kempf.pipeline.steering.track import course_change, keep_course, performance
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.model_spec import ModelSpec
 from tests.steering.ships import covariance_of, hull_of
 
 STEADY = Environment(Disturbance(5e-3), Disturbance(0.15), Disturbance(0.26))

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.model.ship import Hull
-from pipeline.simulate.hulls import HULLS
-from pipeline.steering.nomoto import nomoto
-from schemas.errors import DataRejected, UsageError
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.pipeline.steering.nomoto import nomoto
+from kempf.schemas.errors import DataRejected, UsageError
 from tests.steering.ships import covariance_of, draws_of, hull_of
 
 NONE = np.full((6, 6), np.nan)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from pipeline.model.ship import Hull
-from pipeline.simulate.hulls import HULLS
-from pipeline.steering.stability import stability
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.pipeline.steering.stability import stability
 from tests.steering.ships import covariance_of, draws_of, hull_of
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from pipeline.model.ship import discretise
-from pipeline.steering.state_space import NoiseLevels, continuous, discretised
-from schemas.errors import UsageError
-from schemas.model_spec import ModelSpec
+from kempf.pipeline.model.ship import discretise
+from kempf.pipeline.steering.state_space import NoiseLevels, continuous, discretised
+from kempf.schemas.errors import UsageError
+from kempf.schemas.model_spec import ModelSpec
 from tests.steering.ships import hull_of
 
 V, ARM = 7.5, 0.004

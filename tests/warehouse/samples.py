@@ -6,12 +6,12 @@ from typing import Any
 
 import polars as pl
 
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
-from schemas.profile import VesselProfile
-from warehouse.deposit import Delivery
-from warehouse.parameter_set import Bounds, Estimate, Inputs, ParameterSet, parameter_set_id
-from warehouse.segments import Segment, segment_id
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse.deposit import Delivery
+from kempf.warehouse.parameter_set import Bounds, Estimate, Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse.segments import Segment, segment_id
 
 START_NS = 1_746_258_421_147_000_001
 CODE = "0123456789abcdef"

@@ -9,10 +9,10 @@ import polars as pl
 import pyarrow as pa
 import pytest
 
-from flows.freed import give_back
-from schemas.tables import TABLES, arrow_schema
-from warehouse import delta
-from warehouse.store import Warehouse
+from kempf.flows.process.release_memory import give_back
+from kempf.schemas.tables import TABLES, arrow_schema
+from kempf.warehouse import delta
+from kempf.warehouse.store import Warehouse
 
 ROWS = 40_000
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from warehouse import code_version
+from kempf.warehouse import code_version
 
 ROOT = Path(__file__).parents[2]
 
@@ -80,7 +80,8 @@ def test_without_git_there_is_no_commit(tmp_path: Path, monkeypatch: pytest.Monk
 
 def test_importing_the_store_loads_no_heavy_library() -> None:
     code = (
-        "import sys, warehouse.store, warehouse.raw, warehouse.delta, warehouse.code_version, warehouse.history;"
+        "import sys, kempf.warehouse.store, kempf.warehouse.raw;"
+        "import kempf.warehouse.delta, kempf.warehouse.code_version, kempf.warehouse.history;"
         "print(sorted({'deltalake', 'pyarrow', 'polars', 'numpy'} & set(sys.modules)))"
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)

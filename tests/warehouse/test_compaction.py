@@ -11,15 +11,25 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from pipeline.ingest.readings import LostStretch
-from schemas.errors import KempfError, NotFound
-from schemas.tables import TABLES, arrow_schema
+from kempf.pipeline.ingest.readings import LostStretch
+from kempf.schemas.errors import KempfError, NotFound
+from kempf.schemas.tables import TABLES, arrow_schema
+from kempf.warehouse import (
+    aliases,
+    compaction,
+    delta,
+    history,
+    logs,
+    parameter_sets,
+    readings,
+    runs,
+    segments,
+)
+from kempf.warehouse.deposit import deposit
+from kempf.warehouse.provenance import collect
+from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import START_NS, delivery, inputs, parameter_set, segment
 from tests.warehouse.samples import readings as readings_of
-from warehouse import aliases, compaction, delta, history, logs, parameter_sets, readings, runs, segments
-from warehouse.deposit import deposit
-from warehouse.provenance import collect
-from warehouse.store import Warehouse
 
 
 def content(warehouse: Warehouse, versions: dict[str, int] | None = None) -> dict[str, list[str]]:

@@ -9,12 +9,12 @@ from multiprocessing.managers import SyncManager
 
 import pytest
 
-from schemas.errors import DataRejected, KempfError
-from schemas.profile import VesselProfile
+from kempf.schemas.errors import DataRejected, KempfError
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import delta, logs, parameter_sets, readings, retry, vessels
+from kempf.warehouse.deposit import deposit
+from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import delivery, inputs, parameter_set
-from warehouse import delta, logs, parameter_sets, readings, retry, vessels
-from warehouse.deposit import deposit
-from warehouse.store import Warehouse
 
 SPAWN = multiprocessing.get_context("spawn")
 

@@ -8,16 +8,16 @@ import pyarrow.parquet as pq
 import pytest
 from polars.testing import assert_frame_equal
 
-from pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA
-from schemas.channels import CHANNELS
-from schemas.errors import DataRejected, NotFound
-from schemas.tables import TABLES
+from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.errors import DataRejected, NotFound
+from kempf.schemas.tables import TABLES
+from kempf.warehouse import delta, logs, raw, readings, vessels
+from kempf.warehouse.deposit import deposit, held
+from kempf.warehouse.keys import ingest_id
+from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import CODE, delivery
 from tests.warehouse.samples import readings as some_readings
-from warehouse import delta, logs, raw, readings, vessels
-from warehouse.deposit import deposit, held
-from warehouse.keys import ingest_id
-from warehouse.store import Warehouse
 
 
 def everything(warehouse: Warehouse) -> dict[str, int]:

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from warehouse import delta, handles, runs
-from warehouse.store import Warehouse
+from kempf.warehouse import delta, runs, table_cache
+from kempf.warehouse.store import Warehouse
 
 ROOT = Path(__file__).parents[2]
 
@@ -43,7 +43,7 @@ def test_what_another_process_wrote_is_seen(warehouse: Warehouse) -> None:
     put(warehouse, "one")
     assert stands(warehouse) == {"run-1": "one"}
     code = (
-        "from warehouse import runs; from warehouse.store import Warehouse\n"
+        "from warehouse import runs; from kempf.warehouse.store import Warehouse\n"
         f"runs.record(Warehouse({warehouse.uri!r}), runs.Run('run-1', 'ingest', None, 'two'))"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, timeout=60)
@@ -136,7 +136,7 @@ def test_many_threads_lose_nothing(warehouse: Warehouse) -> None:
         list(pool.map(lambda i: put(warehouse, "done", f"run-{i}"), range(2, 14)))
         seen = list(pool.map(lambda _: len(stands(warehouse)), range(8)))
     assert seen == [13] * 8
-    assert len(handles._kept) <= handles.MOST
+    assert len(table_cache._kept) <= table_cache.MOST
 
 
 def test_a_handle_that_saw_many_commits_is_opened_anew(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -148,7 +148,7 @@ def test_a_handle_that_saw_many_commits_is_opened_anew(warehouse: Warehouse, mon
         return real(place, name, version)
 
     monkeypatch.setattr(delta, "open_table", counted)
-    monkeypatch.setattr(handles, "MOST_COMMITS", 3)
+    monkeypatch.setattr(table_cache, "MOST_COMMITS", 3)
     put(warehouse, "0")
     opened.clear()
     for k in range(1, 9):

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 from deltalake import DeltaTable
 
-from schemas.errors import NotFound, UsageError
-from schemas.profile import VesselProfile
+from kempf.schemas.errors import NotFound, UsageError
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import compaction, delta, history, parameter_sets, vessels
+from kempf.warehouse.parameter_set import Estimate
+from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import START_NS, inputs, parameter_set
-from warehouse import compaction, delta, history, parameter_sets, vessels
-from warehouse.parameter_set import Estimate
-from warehouse.store import Warehouse
 
 
 def put(warehouse: Warehouse, letter: str, start: int, vessel: str = "aurora") -> str:

@@ -5,14 +5,14 @@ from dataclasses import asdict, replace
 
 import pytest
 
-from schemas.errors import KempfError, NotFound, UsageError
-from schemas.profile import VesselProfile
+from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import aliases, delta, parameter_sets, provenance
+from kempf.warehouse.agreement import content_digest, differences, verdict
+from kempf.warehouse.canonical import canonical_json
+from kempf.warehouse.parameter_set import Bounds, Estimate, ParameterSet, parameter_set_id
+from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import START_NS, inputs, parameter_set
-from warehouse import aliases, delta, parameter_sets, provenance
-from warehouse.agreement import content_digest, differences, verdict
-from warehouse.canonical import canonical_json
-from warehouse.parameter_set import Bounds, Estimate, ParameterSet, parameter_set_id
-from warehouse.store import Warehouse
 
 
 def as_text(one: ParameterSet) -> str:

@@ -5,10 +5,10 @@ from io import BytesIO
 
 import pytest
 
-from pipeline.ingest.log_file import LogFile
-from schemas.errors import DataRejected, KempfError, NotFound
-from warehouse import raw
-from warehouse.store import Warehouse
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.errors import DataRejected, KempfError, NotFound
+from kempf.warehouse import raw
+from kempf.warehouse.store import Warehouse
 
 
 def place(warehouse: Warehouse, name: str):

@@ -1,7 +1,7 @@
 from __future__ import annotations
 
-from warehouse import delta, runs
-from warehouse.store import Warehouse
+from kempf.warehouse import delta, runs
+from kempf.warehouse.store import Warehouse
 
 
 def test_a_run_is_stored_as_it_stands(warehouse: Warehouse) -> None:

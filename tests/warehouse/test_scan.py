@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 from deltalake import DeltaTable
 
-from warehouse import compaction, delta, runs
-from warehouse.store import Warehouse
+from kempf.warehouse import compaction, delta, runs
+from kempf.warehouse.store import Warehouse
 
 ODD = (
     *("o'brien", 'a"b', "ø", "100%", "%41", "a/b", "a\\b", "", " lead", "a\nb", "'; --", "$1", "{x}", "a\x00", "\x00a"),

@@ -6,13 +6,13 @@ from dataclasses import replace as changed
 
 import pytest
 
-from schemas.errors import NotFound
+from kempf.schemas.errors import NotFound
+from kempf.warehouse import delta, segments
+from kempf.warehouse.canonical import canonical_json
+from kempf.warehouse.deposit import deposit
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import START_NS, delivery, segment
-from warehouse import delta, segments
-from warehouse.canonical import canonical_json
-from warehouse.deposit import deposit
-from warehouse.segments import Segment
-from warehouse.store import Warehouse
 
 
 def as_text(one: Segment) -> str:

@@ -6,11 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from pipeline.ingest.log_file import LogFile
-from schemas.errors import KempfError, NotFound, UsageError
-from schemas.tables import TABLES
-from tests.warehouse.samples import delivery
-from warehouse import (
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.schemas.tables import TABLES
+from kempf.warehouse import (
     aliases,
     compaction,
     delta,
@@ -23,8 +22,9 @@ from warehouse import (
     segments,
     vessels,
 )
-from warehouse.deposit import deposit
-from warehouse.store import MARKER, Warehouse
+from kempf.warehouse.deposit import deposit
+from kempf.warehouse.store import MARKER, Warehouse
+from tests.warehouse.samples import delivery
 
 READERS = {
     "vessels": vessels.names,
@@ -115,9 +115,9 @@ def test_an_address_that_cannot_be_used_is_refused(address: str) -> None:
 
 @pytest.mark.parametrize("name", ["a b ø", "a#b", "O'Brien", "a+b,c", "a:b", "readings/logs", "a&b", "ä~(1)"])
 def test_folders_with_odd_names_hold_a_warehouse(tmp_path: Path, name: str) -> None:
+    from kempf.warehouse import readings
+    from kempf.warehouse.deposit import deposit
     from tests.warehouse.samples import delivery
-    from warehouse import readings
-    from warehouse.deposit import deposit
 
     warehouse = Warehouse(str(tmp_path / name))
     (done,) = deposit(warehouse, [delivery()])

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from flows.identify_vessel import identify_vessel
-from flows.ingest_logs import ingest
-from flows.reprocess_vessel import reprocess_vessel
-from pipeline.simulate.logger_profile import logger_profile
-from pipeline.simulate.mcap_log import to_mcap
-from pipeline.simulate.trial import simulate_trial, zigzag_settings
-from warehouse import delta, history, vessels
-from warehouse.store import Warehouse
+from kempf.flows.jobs.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.pipeline.simulate.logger_profile import logger_profile
+from kempf.pipeline.simulate.mcap_log import to_mcap
+from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
+from kempf.warehouse import delta, history, vessels
+from kempf.warehouse.store import Warehouse
 
 
 def test_a_new_profile_supersedes_and_the_past_stays(tmp_path: Path) -> None:

@@ -2,13 +2,13 @@ from __future__ import annotations
 
 import pytest
 
-from schemas.errors import NotFound, UsageError
-from schemas.profile import VesselProfile
+from kempf.schemas.errors import NotFound, UsageError
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import delta, logs, readings, vessels
+from kempf.warehouse.deposit import deposit
+from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import delivery
-from warehouse import delta, logs, readings, vessels
-from warehouse.deposit import deposit
-from warehouse.keys import vessel_key
-from warehouse.store import Warehouse
 
 ODD_NAMES = [
     "../../etc",

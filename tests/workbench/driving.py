@@ -16,7 +16,7 @@ from typing import Any
 ROOT = Path(__file__).parents[2]
 #: The parameters of eq. (16), in the order in which they are shown.
 HULL = ["a11", "a12", "a21", "a22", "b1", "b2"]
-START = "from workbench.cli import main; main()"
+START = "from kempf.workbench.cli import main; main()"
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class Ran:
 
 def kempf(*arguments: object) -> Ran:
     """Run a command in this process."""
-    from workbench.cli.entry import main
+    from kempf.workbench.cli.entry import main
 
     out, err = StringIO(), StringIO()
     code: object = None
@@ -89,8 +89,8 @@ def tree(folder: Path) -> dict[str, str]:
 
 def versions(folder: Path) -> dict[str, int]:
     """The newest version of every table of a warehouse."""
-    from warehouse import delta
-    from warehouse.store import Warehouse
+    from kempf.warehouse import delta
+    from kempf.warehouse.store import Warehouse
 
     return delta.versions(Warehouse(str(folder)))
 

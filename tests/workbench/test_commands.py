@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 import yaml
 
+from kempf.workbench.cli.entry import COMMANDS
 from tests.workbench.driving import HULL, kempf, refused, tree, versions
-from workbench.cli.entry import COMMANDS
 
 #: Keys that people script against: DESIGN's, which may be joined by more but never lost.
 SEGMENT = {
@@ -173,7 +173,7 @@ def test_the_warehouse_may_be_named_by_the_environment(filled: Path, monkeypatch
 
 
 def test_the_demonstration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from flows import demonstrate
+    from kempf.flows.jobs import demonstrate
 
     monkeypatch.setattr(demonstrate, "_DAYS", demonstrate._DAYS[1:2])  # one day is quicker than three
     human = kempf("demo", "--folder", tmp_path / "demo")
@@ -190,7 +190,7 @@ def test_the_demonstration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
 
 
 def test_a_fault_of_our_own_is_told_as_one(filled: Path, monkeypatch: pytest.MonkeyPatch):
-    from warehouse import logs
+    from kempf.warehouse import logs
 
     def broken(*_: object) -> None:
         raise ZeroDivisionError("division by zero")

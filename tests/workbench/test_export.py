@@ -12,7 +12,7 @@ import pytest
 import yaml
 from scipy.io import loadmat
 
-from pipeline.model.ship import Hull, discretise
+from kempf.pipeline.model.ship import Hull, discretise
 from tests.workbench.driving import HULL, kempf, one_of, refused
 
 

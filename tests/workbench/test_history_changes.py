@@ -9,13 +9,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from schemas.profile import VesselProfile
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import parameter_sets, segments, vessels
+from kempf.warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.store import Warehouse
 from tests.history.made import NAMES, UNITS, history, step
 from tests.warehouse.samples import inputs, parameter_set, segment
 from tests.workbench.driving import Ran, kempf, refused
-from warehouse import parameter_sets, segments, vessels
-from warehouse.parameter_set import Estimate, ParameterSet
-from warehouse.store import Warehouse
 
 VESSEL = "aurora"
 

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 import yaml
 
+from kempf.warehouse import delta
+from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.workbench.driving import HULL, kempf, one_of, refused, sets
-from warehouse import delta
-from warehouse.store import Warehouse
 
 #: Keys that people script against: DESIGN's, which may be joined by more but never lost.
 PARAMETER_SET = {"parameter_set_id", "vessel", "model", "estimator", "parameters", "noise", "fit", "provenance"}

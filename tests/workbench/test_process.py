@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from schemas.tables import TABLES
+from kempf.schemas.tables import TABLES
 from tests.workbench.driving import command, environment, kempf, process, refused, tree
 
 HEAVY = {"polars", "numba", "prefect", "deltalake", "numpy", "pydantic", "scipy", "pyarrow", "yaml", "rich"}
@@ -24,7 +24,7 @@ def loaded_by(*arguments: object, **changes: str) -> set[str]:
         "import atexit, sys\n"
         "names = lambda: ' '.join({m.partition('.')[0] for m in sys.modules})\n"
         "atexit.register(lambda: sys.stderr.write('\\nLOADED ' + names()))\n"
-        "from workbench.cli import main\n"
+        "from kempf.workbench.cli import main\n"
         "main()\n"
     )
     done = subprocess.run(

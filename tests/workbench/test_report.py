@@ -13,11 +13,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from flows.vessel_model import Own
-from tests.workbench.driving import kempf, refused
-from warehouse.store import Warehouse
-from workbench.chosen_model import PLAIN
-from workbench.figures import (
+from kempf.flows.jobs.vessel_model import Own
+from kempf.warehouse.store import Warehouse
+from kempf.workbench.chosen_model import PLAIN
+from kempf.workbench.figures import (
     diagnosis_added_variable,
     diagnosis_confusion,
     diagnosis_effects,
@@ -25,12 +24,20 @@ from workbench.figures import (
     diagnosis_missing_force,
     diagnosis_zigzag,
 )
-from workbench.figures.diagnosis_style import bytes_of
-from workbench.report import smoothed
-from workbench.report.content import AddedVariable, Course, MissingForce, RankedEffect, ReportContent, Rung
-from workbench.report.made import Report, made
-from workbench.report.markup import table
-from workbench.report.page import page
+from kempf.workbench.figures.diagnosis_style import bytes_of
+from kempf.workbench.report import smoothed
+from kempf.workbench.report.build import Report, made
+from kempf.workbench.report.content import (
+    AddedVariable,
+    Course,
+    MissingForce,
+    RankedEffect,
+    ReportContent,
+    Rung,
+)
+from kempf.workbench.report.markup import table
+from kempf.workbench.report.page import page
+from tests.workbench.driving import kempf, refused
 
 
 class _Seen(HTMLParser):

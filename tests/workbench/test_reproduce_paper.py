@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from flows.reproduce_paper import ITERATIONS, Reproduction, reproduce_paper
+from kempf.flows.jobs.reproduce_paper import ITERATIONS, Reproduction, reproduce_paper
+from kempf.workbench.cli.reproduce_paper import draw
 from tests.workbench.driving import HULL, kempf, refused
-from workbench.cli.reproduce_paper import draw
 
 
 @lru_cache(maxsize=1)

@@ -1,5 +1,5 @@
 """The command ``kempf``: one file a command, imported when it is called, so that ``--help`` is instant."""
 
-from workbench.cli.entry import main
+from kempf.workbench.cli.entry import main
 
 __all__ = ["main"]

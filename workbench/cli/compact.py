@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from workbench.cli.options import json_option, warehouse_option
-from workbench.terminal import print_json, print_table
+from kempf.workbench.cli.options import json_option, warehouse_option
+from kempf.workbench.terminal import print_json, print_table
 
 
 @click.command("compact")
@@ -36,8 +36,8 @@ def command(more_files_than: int, vacuum: bool, days: float, dry_run: bool, uri:
     Every version stays readable. With --vacuum, versions may go that no parameter set was made from, that are older
     than --older-than, and that `kempf history --as-of` does not need.
     """
-    from warehouse import compaction
-    from warehouse.store import Warehouse
+    from kempf.warehouse import compaction
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     done = () if dry_run else compaction.compact(warehouse, more_files_than)

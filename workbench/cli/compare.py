@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from schemas.errors import ThresholdExceeded, UsageError
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table, progress
+from kempf.schemas.errors import ThresholdExceeded, UsageError
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table, progress
 
 if TYPE_CHECKING:
-    from flows.compare_vessel import Comparison
+    from kempf.flows.jobs.compare_vessel import Comparison
 
 _CHANNELS = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
 #: probability below which a band or a correlation is told
@@ -57,8 +57,8 @@ def command(
     A run that the set was identified from is fitted, every other held out. A free run takes no measurement in: its
     initial state and a constant wind force and current are fitted to the run itself.
     """
-    from flows.compare_vessel import compare_vessel
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.compare_vessel import compare_vessel
+    from kempf.warehouse.store import Warehouse
 
     if fail_above is not None and not isfinite(fail_above):
         raise UsageError("threshold", f"--fail-above {fail_above} is no limit.", "Give a percentage such as 20.")
@@ -89,7 +89,7 @@ def command(
 
 
 def _draw(found: Comparison, figure: Path) -> None:
-    from workbench.figures.measured_over_predicted import draw_measured_over_predicted
+    from kempf.workbench.figures.measured_over_predicted import draw_measured_over_predicted
 
     title = f"{found.vessel}, {found.parameter_set.parameter_set_id}: {found.horizon.words}"
     try:

@@ -10,7 +10,7 @@ from click.shell_completion import get_completion_class
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
 def command(shell: str) -> None:
     """Print the completion script; for bash add `eval "$(kempf completion bash)"` to ~/.bashrc."""
-    from workbench.cli.entry import cli
+    from kempf.workbench.cli.entry import cli
 
     kind = get_completion_class(shell)
     assert kind is not None

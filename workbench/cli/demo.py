@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from flows.demonstrate import Demonstration
-from warehouse.parameter_set import ParameterSet
-from workbench.cli.options import json_option
-from workbench.terminal import number, print_json, print_table, progress
+from kempf.flows.jobs.demonstrate import Demonstration
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.workbench.cli.options import json_option
+from kempf.workbench.terminal import number, print_json, print_table, progress
 
 
 @click.command("demo")
@@ -27,7 +27,7 @@ def command(folder: Path, as_json: bool) -> None:
     The logs are NMEA 0183, delimited text and MCAP with noise, wind, current and damaged lines; the pipeline is told
     nothing but the vessel's profile.
     """
-    from flows.demonstrate import demonstrate
+    from kempf.flows.jobs.demonstrate import demonstrate
 
     with progress() as tell:
         shown = demonstrate(folder, tell)
@@ -47,7 +47,7 @@ def command(folder: Path, as_json: bool) -> None:
 
 
 def _tell(shown: Demonstration) -> None:
-    from workbench.cli.ingest import tell_outcome
+    from kempf.workbench.cli.ingest import tell_outcome
 
     click.echo(click.style("Raw logs", bold=True) + f" in {shown.folder / 'logs'}")
     for log in shown.ingested:

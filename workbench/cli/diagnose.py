@@ -8,8 +8,8 @@ from typing import Any
 
 import click
 
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table, progress
 
 _SHOWN = 12
 
@@ -47,10 +47,10 @@ def command(
             raise click.UsageError("--set, --model and --effect-file need a --vessel; --fleet begins plain.")
         _fleet(uri, as_json=as_json)
         return
-    from flows.diagnose_vessel import diagnose_vessel
-    from flows.vessel_model import Own
-    from warehouse.store import Warehouse
-    from workbench.chosen_model import chosen_model, read_effect_files
+    from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
+    from kempf.flows.jobs.vessel_model import Own
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.chosen_model import chosen_model, read_effect_files
 
     warehouse = Warehouse(uri)
     spec, own = chosen_model(warehouse, vessel, set_id, model)
@@ -64,7 +64,7 @@ def command(
 
 
 def _fleet(uri: str, *, as_json: bool) -> None:
-    from flows.fleet import diagnose
+    from kempf.flows.fleet.flows import diagnose
 
     rows = diagnose(uri)
     if as_json:

@@ -7,8 +7,8 @@ from typing import Any
 
 import click
 
-from workbench.cli.options import json_option, profile_option, warehouse_option
-from workbench.terminal import number, one_line, print_json, print_table
+from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
+from kempf.workbench.terminal import number, one_line, print_json, print_table
 
 
 @click.command("doctor")
@@ -26,11 +26,11 @@ def command(
     PATH is a raw log, read with the profile; or the id or file name of a log in the warehouse. Instruments that see one
     motion are held against each other; with three witnesses the odd one out is named, with two it is one of them.
     """
-    from flows.examine_log import examine_file, examine_held
-    from flows.files import read_profiles
-    from schemas.profile import VesselProfile
-    from warehouse.store import Warehouse
-    from workbench.new_file import require_new
+    from kempf.flows.jobs.examine_log import examine_file, examine_held
+    from kempf.flows.jobs.files import read_profiles
+    from kempf.schemas.profile import VesselProfile
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.new_file import require_new
 
     if figure is not None:
         require_new(figure, "--figure")
@@ -39,7 +39,7 @@ def command(
     else:
         found = examine_held(Warehouse(uri), str(path))
     if figure is not None:
-        from workbench.figures.doctor import draw
+        from kempf.workbench.figures.doctor import draw
 
         draw(found, figure)
     if as_json:

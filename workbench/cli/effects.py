@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from workbench.cli import effects_of_vessel
-from workbench.cli.options import json_option
-from workbench.terminal import print_json, print_table
+from kempf.workbench.cli import effects_of_vessel
+from kempf.workbench.cli.options import json_option
+from kempf.workbench.terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from pipeline.model.terms.effect import Effect
+    from kempf.pipeline.model.terms.effect import Effect
 
 
 @click.group("effects")
@@ -30,9 +30,9 @@ command.add_command(effects_of_vessel.undo)
 @json_option
 def list_effects(group: str | None, markdown: bool, as_json: bool) -> None:
     """List the catalogue: what each effect is and which channels it needs."""
-    from pipeline.model.effects import as_json as told
-    from pipeline.model.effects import catalogue
-    from workbench.effects_table import effects_table
+    from kempf.pipeline.model.effects import as_json as told
+    from kempf.pipeline.model.effects import catalogue
+    from kempf.workbench.effects_table import effects_table
 
     found = [effect for effect in catalogue().values() if group in (None, effect.group)]
     if as_json:
@@ -50,8 +50,8 @@ def list_effects(group: str | None, markdown: bool, as_json: bool) -> None:
 @json_option
 def show(name: str | None, symbols: bool, as_json: bool) -> None:
     """Show an effect whole, or what may stand in a formula."""
-    from pipeline.model.effects import as_json as told
-    from pipeline.model.effects import get
+    from kempf.pipeline.model.effects import as_json as told
+    from kempf.pipeline.model.effects import get
 
     if name is None and not symbols:
         raise click.UsageError("Name an effect, or give --symbols.")
@@ -84,8 +84,8 @@ def _tell(effect: Effect) -> None:
 
 
 def _symbols() -> dict[str, Any]:
-    from pipeline.model.terms.expression import FUNCTIONS
-    from pipeline.model.terms.symbols import (
+    from kempf.pipeline.model.terms.expression import FUNCTIONS
+    from kempf.pipeline.model.terms.symbols import (
         CHANNEL_SYMBOLS,
         COMPUTED_SYMBOLS,
         RUN_SYMBOLS,
@@ -93,7 +93,7 @@ def _symbols() -> dict[str, Any]:
         STATE_SYMBOLS,
         TARGETS,
     )
-    from schemas.channels import CHANNELS
+    from kempf.schemas.channels import CHANNELS
 
     channels = {s: f"{CHANNELS[c].words}, {CHANNELS[c].unit}; channel {c}" for s, c in CHANNEL_SYMBOLS.items()}
     return {

@@ -8,10 +8,10 @@ from typing import Any
 
 import click
 
-from schemas.errors import UsageError
-from workbench.cli.ladder import tell_rungs
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table, progress
+from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.ladder import tell_rungs
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table, progress
 
 
 @click.command("try")
@@ -25,13 +25,13 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
 
     Beside the model that the vessel stands at; nothing is stored.
     """
-    from flows.diagnose_vessel import examine
-    from flows.vessel_model import Own, standing_model
-    from flows.vessel_runs import choose
-    from pipeline.diagnose.diagnosis import DiagnosisSettings
-    from pipeline.diagnose.verdict import as_json as told_as_json
-    from warehouse.canonical import plain
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.diagnose_vessel import examine
+    from kempf.flows.jobs.vessel_model import Own, standing_model
+    from kempf.flows.jobs.vessel_runs import choose
+    from kempf.pipeline.diagnose.diagnosis import DiagnosisSettings
+    from kempf.pipeline.diagnose.verdict import as_json as told_as_json
+    from kempf.warehouse.canonical import plain
+    from kempf.warehouse.store import Warehouse
 
     mine = Own(formulas={name: (formula,)})
     mine.effects()  # a slip of the pen is told before anything is read
@@ -79,10 +79,10 @@ def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
 @json_option
 def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str, as_json: bool) -> None:
     """Add an effect to the model that a vessel stands at, refit, and show the error before and after."""
-    from flows.vessel_model import Own, point, rungs_to, standing_model, store_model
-    from flows.vessel_runs import choose
-    from warehouse.store import Warehouse
-    from workbench.chosen_model import read_effect_files
+    from kempf.flows.jobs.vessel_model import Own, point, rungs_to, standing_model, store_model
+    from kempf.flows.jobs.vessel_runs import choose
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.chosen_model import read_effect_files
 
     if formula is not None and path is not None:
         raise UsageError("two_effects", "Both --formula and --file say what the effect is.", "Give one of them.")
@@ -115,7 +115,7 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
 
 
 def _require_known(name: str) -> None:
-    from pipeline.model.effects import get
+    from kempf.pipeline.model.effects import get
 
     get(name)
 
@@ -151,8 +151,8 @@ def _scaled(value: float | None, factor: float) -> float | None:
 @json_option
 def undo(vessel: str, uri: str, as_json: bool) -> None:
     """Go back to the model before the last effect was added; nothing is deleted."""
-    from flows.vessel_model import undo as go_back
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.vessel_model import undo as go_back
+    from kempf.warehouse.store import Warehouse
 
     now = go_back(Warehouse(uri), vessel)
     if as_json:

@@ -14,10 +14,10 @@ from io import TextIOWrapper
 
 import click
 
-from flows.unforeseen import as_told
-from schemas.errors import KempfError, UsageError
-from workbench.cli.lazy import LazyGroup
-from workbench.terminal import one_line
+from kempf.flows.process.wrap_error import as_told
+from kempf.schemas.errors import KempfError, UsageError
+from kempf.workbench.cli.lazy import LazyGroup
+from kempf.workbench.terminal import one_line
 
 #: Exit code of a command that a person interrupted, as shells have it.
 INTERRUPTED = 130

@@ -9,9 +9,9 @@ from typing import Any, TypeVar
 
 import click
 
-from schemas.errors import UsageError
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import print_json, progress
+from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import print_json, progress
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -60,7 +60,7 @@ def control_file(
     set_id: str, out: Path | None, uri: str, as_json: bool, speed: float | None, step: float, course: float
 ) -> None:
     """State space as a Python module for python-control: named systems, noise, covariance."""
-    from workbench.export import as_control
+    from kempf.workbench.export import as_control
 
     model = _linear(uri, set_id, speed, step, course)
     _deliver("control", model.ship.parameter_set.parameter_set_id, as_control(model), out, as_json)
@@ -72,7 +72,7 @@ def mat_file(
     set_id: str, out: Path | None, uri: str, as_json: bool, speed: float | None, step: float, course: float
 ) -> None:
     """State space as a MATLAB file; there: load FILE, then ss(A, B, C, D) or ss(Ad, Bd, C, D, step_s)."""
-    from workbench.export import as_mat
+    from kempf.workbench.export import as_mat
 
     if out is None:
         raise UsageError(
@@ -95,11 +95,11 @@ def mcap_file(vessel: str, set_id: str | None, out: Path, uri: str, as_json: boo
 
     One step ahead with 95 % intervals, and the free run; UTC nanoseconds, JSON messages with a schema, zstd.
     """
-    from flows.compare_vessel import compare_vessel
-    from warehouse.store import Warehouse
-    from workbench.export import write_new
-    from workbench.export_mcap import about, to_mcap
-    from workbench.new_file import require_new
+    from kempf.flows.jobs.compare_vessel import compare_vessel
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.export import write_new
+    from kempf.workbench.export_mcap import about, to_mcap
+    from kempf.workbench.new_file import require_new
 
     require_new(out, "--output")
     with progress() as tell:
@@ -115,24 +115,24 @@ def mcap_file(vessel: str, set_id: str | None, out: Path, uri: str, as_json: boo
 
 
 def _linear(uri: str, set_id: str, speed: float | None, step: float, course: float) -> Any:
-    from flows.known_ship import known_ship
-    from warehouse.store import Warehouse
-    from workbench.export import linear
+    from kempf.flows.jobs.ship_model import known_ship
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.export import linear
 
     return linear(known_ship(Warehouse(uri), set_id, speed), step, radians(course))
 
 
 def _text(form: str, set_id: str, out: Path | None, uri: str, as_json: bool) -> None:
-    from warehouse import parameter_sets
-    from warehouse.store import Warehouse
-    from workbench.export import as_text
+    from kempf.warehouse import parameter_sets
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.export import as_text
 
     one = parameter_sets.get(Warehouse(uri), set_id)
     _deliver(form, one.parameter_set_id, as_text(one, form), out, as_json)
 
 
 def _deliver(form: str, name: str, content: str | bytes, out: Path | None, as_json: bool) -> None:
-    from workbench.export import write_new
+    from kempf.workbench.export import write_new
 
     if out is not None:
         write_new(out, content, "--out")

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from schemas.errors import UsageError
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table
+from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table
 
 if TYPE_CHECKING:
-    from pipeline.history.changes import Changes
-    from pipeline.history.sets import ParameterHistory
-    from warehouse.history import Comparable, History
+    from kempf.pipeline.history.changes import Changes
+    from kempf.pipeline.history.sets import ParameterHistory
+    from kempf.warehouse.history import Comparable, History
 
 
 @click.command("history")
@@ -51,8 +51,8 @@ def command(
     as_json: bool,
 ) -> None:
     """Show a vessel's parameters over time, as known now or at an earlier time, and whether she changed."""
-    from warehouse import history
-    from warehouse.store import Warehouse
+    from kempf.warehouse import history
+    from kempf.warehouse.store import Warehouse
 
     if figure is not None and not changes:
         raise UsageError("figure_without_changes", "--figure draws what --changes found.", "Add --changes.")
@@ -102,11 +102,11 @@ def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: s
     """Put the sets of one model and estimator to the tests."""
     import numpy as np
 
-    from pipeline.history.changes import find_changes
-    from pipeline.history.pooled import pool
-    from pipeline.history.report import report
-    from pipeline.history.sets import ParameterHistory, usable
-    from pipeline.history.settings import ChangeSettings
+    from kempf.pipeline.history.changes import find_changes
+    from kempf.pipeline.history.pooled import pool
+    from kempf.pipeline.history.report import report
+    from kempf.pipeline.history.sets import ParameterHistory, usable
+    from kempf.pipeline.history.settings import ChangeSettings
 
     n, p = len(kind.parameter_set_ids), len(kind.names)
     time = np.array(kind.starts_utc_ns, dtype=np.int64)
@@ -132,7 +132,7 @@ def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: s
 
 
 def _draw(history: ParameterHistory, found: Changes, figure: Path, title: str) -> None:
-    from workbench.figures.history import draw_history
+    from kempf.workbench.figures.history import draw_history
 
     if figure.suffix not in (".png", ".svg", ".pdf"):
         raise UsageError(

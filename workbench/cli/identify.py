@@ -7,14 +7,14 @@ from pathlib import Path
 
 import click
 
-from flows.identify_vessel import IdentifyOutcome, Request
-from flows.progress import Progress
-from pipeline.identify.names import NAMES
-from schemas.errors import KempfError
-from warehouse.parameter_set import ParameterSet
-from warehouse.store import Warehouse
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table, progress
+from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
+from kempf.flows.process.progress import Progress
+from kempf.pipeline.estimate.names import NAMES
+from kempf.schemas.errors import KempfError
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table, progress
 
 
 @click.command("identify")
@@ -30,9 +30,9 @@ def command(vessel: str, model: Path | None, estimator: str, uri: str, as_json: 
 
     What was identified before from the same inputs, with the same code and settings, is not computed again.
     """
-    from flows.files import read_model
-    from flows.identify_vessel import identify_vessel
-    from schemas.model_spec import ModelSpec
+    from kempf.flows.jobs.files import read_model
+    from kempf.flows.jobs.identify_vessel import identify_vessel
+    from kempf.schemas.model_spec import ModelSpec
 
     request = Request(read_model(model) if model else ModelSpec(), estimator)
     with progress() as tell:
@@ -60,7 +60,7 @@ def _pooled(
     warehouse: Warehouse, vessel: str, request: Request, outcomes: list[IdentifyOutcome], tell: Progress
 ) -> ParameterSet | None:
     """Return the set that all zigzags share; where they share none the reason goes to stderr."""
-    from flows.pool_vessel import pool_vessel
+    from kempf.flows.jobs.pool_vessel import pool_vessel
 
     try:
         found = pool_vessel(warehouse, vessel, request, outcomes, progress=tell)

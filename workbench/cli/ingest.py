@@ -7,10 +7,10 @@ from pathlib import Path
 
 import click
 
-from flows.ingest_logs import IngestOutcome
-from flows.lost import as_json
-from workbench.cli.options import json_option, profile_option, vessel_option, warehouse_option
-from workbench.terminal import one_line, print_json, progress
+from kempf.flows.jobs.ingest_logs import IngestOutcome
+from kempf.flows.jobs.unreadable_stretches import as_json
+from kempf.workbench.cli.options import json_option, profile_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import one_line, print_json, progress
 
 
 @click.command("ingest")
@@ -25,9 +25,9 @@ def command(paths: tuple[Path, ...], vessel: str | None, profiles: tuple[Path, .
     Each log is read, checked, kept byte for byte and searched for zigzags. A log that is in already changes nothing.
     One that cannot be read stops none of the others, and leaves nothing behind.
     """
-    from flows.files import read_profiles
-    from flows.ingest_logs import ingest
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.ingest_logs import ingest
+    from kempf.warehouse.store import Warehouse
 
     given = read_profiles(profiles) if profiles else None
     with progress() as tell:

@@ -6,9 +6,9 @@ from typing import Any
 
 import click
 
-from schemas.errors import NotFound
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table
+from kempf.schemas.errors import NotFound
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table
 
 
 @click.command("ladder")
@@ -17,8 +17,8 @@ from workbench.terminal import number, print_json, print_table
 @json_option
 def command(vessel: str, uri: str, as_json: bool) -> None:
     """Show the models that lead to the one a vessel stands at, and how the error fell from one to the next."""
-    from flows.vessel_model import rungs_to, standing
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.vessel_model import rungs_to, standing
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     model = standing(warehouse, vessel)

@@ -10,7 +10,7 @@ import click
 
 
 class LazyGroup(click.Group):
-    """Commands by name with their one-line summaries; each lives in ``workbench.cli.<name>`` as ``command``.
+    """Commands by name with their one-line summaries; each lives in ``kempf.workbench.cli.<name>`` as ``command``.
 
     A hyphen in a name is an underscore in its module's.
 
@@ -32,7 +32,7 @@ class LazyGroup(click.Group):
         """Import and return a command, None where there is none of this name."""
         if cmd_name not in self.summaries:
             return None
-        command = import_module(f"workbench.cli.{cmd_name.replace('-', '_')}").command
+        command = import_module(f"kempf.workbench.cli.{cmd_name.replace('-', '_')}").command
         assert isinstance(command, click.Command)
         return command
 

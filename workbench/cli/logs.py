@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import one_line, print_json, print_table
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import one_line, print_json, print_table
 
 if TYPE_CHECKING:
-    from pipeline.ingest.readings import LostStretch
-    from warehouse.examinations import StoredExamination
-    from warehouse.logs import LogRow
+    from kempf.pipeline.ingest.readings import LostStretch
+    from kempf.warehouse.examinations import StoredExamination
+    from kempf.warehouse.logs import LogRow
 
 
 @click.group("logs")
@@ -27,9 +27,9 @@ def command() -> None:
 @json_option
 def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers: records read = kept + rejected, and what the channel doctor says of each."""
-    from flows.lost import as_json as lost_as_json
-    from warehouse import examinations, logs, lost, vessels
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
+    from kempf.warehouse import examinations, logs, lost, vessels
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     warehouse.require()
@@ -64,7 +64,7 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
 
 def _facts(row: LogRow) -> dict[str, Any]:
     """Return what is told of every log."""
-    from warehouse.instant import iso_utc
+    from kempf.warehouse.instant import iso_utc
 
     return {
         "log_id": row.log_id,
@@ -101,9 +101,9 @@ def _brief(channels: Any) -> str:
 @json_option
 def show(log_id: str, uri: str, as_json: bool) -> None:
     """Show one log: how it was read, and what the channel doctor found in it."""
-    from warehouse import examinations, logs
-    from warehouse.store import Warehouse
-    from workbench.cli.doctor import tell
+    from kempf.warehouse import examinations, logs
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.cli.doctor import tell
 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
@@ -138,8 +138,8 @@ def _damage(lost: Sequence[LostStretch]) -> str:
 @json_option
 def rejected(log_id: str, limit: int, uri: str, as_json: bool) -> None:
     """Show the records and values that were refused in one log, each with its reason and raw text."""
-    from warehouse import logs, readings
-    from warehouse.store import Warehouse
+    from kempf.warehouse import logs, readings
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING
 
 import click
 
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table
 
 if TYPE_CHECKING:
-    from pipeline.identify.estimate import Value
-    from pipeline.steering.nomoto import Constant
+    from kempf.pipeline.estimate.result import Value
+    from kempf.pipeline.steering.nomoto import Constant
 
 
 @click.group("params")
@@ -27,9 +27,9 @@ def command() -> None:
 @json_option
 def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
     """List parameter sets, of one vessel or of all."""
-    from warehouse import aliases, parameter_sets, vessels
-    from warehouse.instant import iso_utc
-    from warehouse.store import Warehouse
+    from kempf.warehouse import aliases, parameter_sets, vessels
+    from kempf.warehouse.instant import iso_utc
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     if vessel is not None:
@@ -59,9 +59,9 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
 @json_option
 def show(set_id: str, uri: str, as_json: bool) -> None:
     """Show a parameter set whole; a unique beginning of its id is enough."""
-    from warehouse import parameter_sets
-    from warehouse.store import Warehouse
-    from workbench.cli.identify import tell_set
+    from kempf.warehouse import parameter_sets
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.cli.identify import tell_set
 
     one = parameter_sets.get(Warehouse(uri), set_id)
     if as_json:
@@ -86,9 +86,9 @@ def show(set_id: str, uri: str, as_json: bool) -> None:
 @json_option
 def diff(first: str, second: str, uri: str, as_json: bool) -> None:
     """Compare the parameters of two sets: difference, and the same in standard errors of the difference."""
-    from warehouse import parameter_sets
-    from warehouse.parameter_set import compare
-    from warehouse.store import Warehouse
+    from kempf.warehouse import parameter_sets
+    from kempf.warehouse.parameter_set import compare
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     one, other = parameter_sets.get(warehouse, first), parameter_sets.get(warehouse, second)
@@ -114,9 +114,9 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
 
     --json is short for --format json.
     """
-    from warehouse import parameter_sets
-    from warehouse.store import Warehouse
-    from workbench.export import as_text, write_new
+    from kempf.warehouse import parameter_sets
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.export import as_text, write_new
 
     text = as_text(parameter_sets.get(Warehouse(uri), set_id), "json" if as_json else form)
     if output is None:
@@ -132,10 +132,10 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
 @json_option
 def steering(set_id: str, speed: float | None, uri: str, as_json: bool) -> None:
     """Show Nomoto's constants and whether she holds a straight course, with standard errors."""
-    from flows.known_ship import known_ship
-    from pipeline.steering.nomoto import nomoto
-    from pipeline.steering.stability import stability
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.ship_model import known_ship
+    from kempf.pipeline.steering.nomoto import nomoto
+    from kempf.pipeline.steering.stability import stability
+    from kempf.warehouse.store import Warehouse
 
     ship = known_ship(Warehouse(uri), set_id, speed)
     constants = nomoto(ship.hull, ship.covariance, ship.speed_m_s, ship.length_m)

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import click
 
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import print_json, progress
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import print_json, progress
 
 
 @click.command("report")
@@ -38,12 +38,12 @@ def command(
 
     The file asks for nothing outside itself and can be sent as it is. It diagnoses the vessel as `kempf diagnose` does.
     """
-    from flows.vessel_model import Own
-    from warehouse.store import Warehouse
-    from workbench.chosen_model import chosen_model, read_effect_files
-    from workbench.export import write_new
-    from workbench.new_file import require_new
-    from workbench.report.made import made
+    from kempf.flows.jobs.vessel_model import Own
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.chosen_model import chosen_model, read_effect_files
+    from kempf.workbench.export import write_new
+    from kempf.workbench.new_file import require_new
+    from kempf.workbench.report.build import made
 
     path = _called_after(vessel) if output is None else output
     require_new(path, "--output")

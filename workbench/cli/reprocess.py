@@ -8,9 +8,9 @@ from typing import Any
 
 import click
 
-from schemas.errors import DataRejected
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import print_json, print_table, progress
+from kempf.schemas.errors import DataRejected
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import print_json, print_table, progress
 
 
 @click.command("reprocess")
@@ -30,8 +30,8 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
     process, and no server is started. Vessels of which nothing changed since their last run are not looked at again;
     a single one that is named is.
     """
-    from warehouse import vessels
-    from warehouse.store import Warehouse
+    from kempf.warehouse import vessels
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     warehouse.require()
@@ -40,16 +40,16 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
         vessels.require(warehouse, name)
     reports: list[dict[str, Any]]
     if len(names) == 1:
-        from flows.reprocess_vessel import reprocess_vessel
+        from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 
         with progress() as tell:
             reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=tell).show()]
     elif os.environ.get("PREFECT_API_URL"):
-        from flows.fleet import reports_of
+        from kempf.flows.fleet.flows import reports_of
 
         reports = reports_of(uri, names or None, changed_only=changed_only)
     else:
-        from flows.fleet_plan import do_fleet
+        from kempf.flows.fleet.plan import do_fleet
 
         with progress() as tell:
             reports = do_fleet(warehouse, names or None, changed_only=changed_only, progress=tell)

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import click
 
-from flows.reproduce_paper import Experiment, Reproduction
-from schemas.errors import UsageError
-from workbench.cli.options import json_option
-from workbench.terminal import number, print_json, print_table, progress
+from kempf.flows.jobs.reproduce_paper import Experiment, Reproduction
+from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.options import json_option
+from kempf.workbench.terminal import number, print_json, print_table, progress
 
 
 @click.command("reproduce-paper")
@@ -27,7 +27,7 @@ def command(folder: Path, as_json: bool) -> None:
     A zigzag is simulated under a constant wind force and current; the hull is identified by the paper's 25 iterations
     and by maximum likelihood from the same record, once with little noise and once with that of usual instruments.
     """
-    from flows.reproduce_paper import reproduce_paper
+    from kempf.flows.jobs.reproduce_paper import reproduce_paper
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
@@ -49,8 +49,8 @@ def command(folder: Path, as_json: bool) -> None:
 
 def draw(made: Reproduction, folder: Path) -> list[Path]:
     """Draw the paper's three figures of the experiment with the least noise into a folder; return their paths."""
-    from workbench.figures.disturbed_zigzag import draw_disturbed_zigzag
-    from workbench.figures.iterations import draw_iterations
+    from kempf.workbench.figures.disturbed_zigzag import draw_disturbed_zigzag
+    from kempf.workbench.figures.iterations import draw_iterations
 
     shown = made.experiments[0]
     figures = [folder / f"figure-{k}.png" for k in (1, 2, 3)]

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING
 
 import click
 
-from schemas.errors import DataRejected, ThresholdExceeded, UsageError
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table, progress
+from kempf.schemas.errors import DataRejected, ThresholdExceeded, UsageError
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table, progress
 
 if TYPE_CHECKING:
-    from flows.rerun_all import Verification
-    from flows.rerun_set import Rerun
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.rerun_all import Verification
+    from kempf.flows.jobs.rerun_set import Rerun
+    from kempf.warehouse.store import Warehouse
 
 
 @click.command("rerun")
@@ -48,7 +48,7 @@ def command(
     Exit code 5 where one is different, 3 where one of --all cannot be built again. Interrupted, --all goes on where it
     stopped when it is called again.
     """
-    from warehouse.store import Warehouse
+    from kempf.warehouse.store import Warehouse
 
     if all_sets == (set_id is not None):
         raise UsageError(
@@ -66,13 +66,13 @@ def command(
     elif verify:
         _verify(warehouse, vessels, tolerance, afresh=afresh, as_json=as_json)
     else:
-        from workbench.cli.rerun_preview import preview
+        from kempf.workbench.cli.rerun_preview import preview
 
         preview(warehouse, vessels, fail_above, as_json=as_json)
 
 
 def _one(warehouse: Warehouse, set_id: str, tolerance: float, *, as_json: bool) -> None:
-    from flows.rerun_set import rerun
+    from kempf.flows.jobs.rerun_set import rerun
 
     result = rerun(warehouse, set_id, tolerance)
     if as_json:
@@ -95,7 +95,7 @@ def _tell(result: Rerun) -> None:
 
 
 def _verify(warehouse: Warehouse, vessels: list[str], tolerance: float, *, afresh: bool, as_json: bool) -> None:
-    from flows.rerun_all import verify_all
+    from kempf.flows.jobs.rerun_all import verify_all
 
     with progress() as tell:
         found = verify_all(warehouse, vessels, tolerance, afresh=afresh, progress=tell)

@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from schemas.errors import DataRejected, ThresholdExceeded
-from workbench.terminal import number, print_json, print_table, progress
+from kempf.schemas.errors import DataRejected, ThresholdExceeded
+from kempf.workbench.terminal import number, print_json, print_table, progress
 
 if TYPE_CHECKING:
-    from flows.moves import Move
-    from flows.preview_code import VesselPreview
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.parameter_changes import Move
+    from kempf.flows.jobs.preview_code import VesselPreview
+    from kempf.warehouse.store import Warehouse
 
 #: Lines for a person; --json has all.
 _SHOWN = 20
@@ -23,7 +23,7 @@ _SHOWN = 20
 
 def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, *, as_json: bool) -> None:
     """Show it; exit code 3 where something could not be done, 5 where a parameter moves further than is allowed."""
-    from flows.preview_code import preview_all
+    from kempf.flows.jobs.preview_code import preview_all
 
     with progress() as tell:
         found = preview_all(warehouse, vessels, tell)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import click
 
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, one_line, print_json, print_table
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, one_line, print_json, print_table
 
 
 @click.command("segments")
@@ -14,9 +14,9 @@ from workbench.terminal import number, one_line, print_json, print_table
 @json_option
 def command(vessel: str | None, uri: str, as_json: bool) -> None:
     """List the zigzags found, with their executes, overshoots and IMO criteria."""
-    from warehouse import examinations, logs, segments
-    from warehouse.instant import iso_utc
-    from warehouse.store import Warehouse
+    from kempf.warehouse import examinations, logs, segments
+    from kempf.warehouse.instant import iso_utc
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     warehouse.require()

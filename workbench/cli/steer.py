@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from schemas.errors import UsageError
-from workbench.cli.options import json_option, vessel_option, warehouse_option
-from workbench.terminal import number, print_json, print_table
+from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table
 
 if TYPE_CHECKING:
-    from flows.steer_vessel import Steered, Tried
+    from kempf.flows.jobs.steer_vessel import Steered, Tried
 
 _FIGURES = (".png", ".svg", ".pdf")
 
@@ -52,9 +52,9 @@ def command(
     The ship that is steered has the parameters of the set: the track shows what the law does to her, and what wrong
     parameters cost. It does not show that the parameters are right.
     """
-    from flows.steer_vessel import SteerRequest, steer_vessel
-    from pipeline.steering.course_keeping import LawSettings
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.steer_vessel import SteerRequest, steer_vessel
+    from kempf.pipeline.steering.course_keeping import LawSettings
+    from kempf.warehouse.store import Warehouse
 
     if figure is not None:
         _check_figure(figure)
@@ -79,7 +79,7 @@ def _check_figure(figure: Path) -> None:
 
 
 def _draw(done: Steered, figure: Path) -> None:
-    from workbench.figures.course_keeping import draw_course_keeping
+    from kempf.workbench.figures.course_keeping import draw_course_keeping
 
     labels = ["from the set", "from wrong parameters"]
     tracks = [(label, one.track) for label, one in zip(labels, done.laws, strict=False)]

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import click
 
-from workbench.cli.options import json_option, profile_option, warehouse_option
-from workbench.terminal import number, print_json, print_table
+from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
+from kempf.workbench.terminal import number, print_json, print_table
 
 
 @click.group("vessels")
@@ -20,8 +20,8 @@ def command() -> None:
 @json_option
 def list_vessels(uri: str, as_json: bool) -> None:
     """List the vessels with their logs, zigzags and parameter sets."""
-    from warehouse import logs, parameter_sets, segments, vessels
-    from warehouse.store import Warehouse
+    from kempf.warehouse import logs, parameter_sets, segments, vessels
+    from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     warehouse.require()
@@ -46,8 +46,8 @@ def show(name: str, uri: str, as_json: bool) -> None:
     """Show a vessel's current profile and how often it changed."""
     import yaml
 
-    from warehouse import vessels
-    from warehouse.store import Warehouse
+    from kempf.warehouse import vessels
+    from kempf.warehouse.store import Warehouse
 
     versions = vessels.versions(Warehouse(uri), name)
     profile = versions[-1].profile.model_dump(mode="json", exclude_none=True)
@@ -66,8 +66,8 @@ def show(name: str, uri: str, as_json: bool) -> None:
 @json_option
 def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) -> None:
     """Put a profile in place of the vessel's current one; `kempf reprocess` then applies it to her logs."""
-    from flows.register_vessel import set_vessel
-    from warehouse.store import Warehouse
+    from kempf.flows.jobs.register_vessel import set_vessel
+    from kempf.warehouse.store import Warehouse
 
     changed = set_vessel(Warehouse(uri), name, profiles)
     if as_json:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.steering.track import Track
+from kempf.pipeline.steering.track import Track
 
 _COLOURS = ("tab:blue", "tab:red", "0.35", "tab:green")
 

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.normalise.series import Float
-from workbench.figures.diagnosis_style import FULL, new_figure, style
-from workbench.report.content import AddedVariable
+from kempf.pipeline.channels.series import Float
+from kempf.workbench.figures.diagnosis_style import FULL, new_figure, style
+from kempf.workbench.report.content import AddedVariable
 
 _BINS, _WIDTH_95 = 14, 1.96
 

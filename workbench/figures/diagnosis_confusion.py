@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.diagnose.sets import ALIKE
-from pipeline.normalise.series import Float
-from workbench.figures.diagnosis_style import new_figure, style
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.confusion_sets import ALIKE
+from kempf.workbench.figures.diagnosis_style import new_figure, style
 
 
 def draw_confusion(names: Sequence[str], alike: Float) -> Any:

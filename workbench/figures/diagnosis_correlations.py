@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
+from kempf.workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
 
 #: in the order of the columns; the others stand in the table
 _SHOWN = ("itself", "rudder", "heading_sine", "heading_cosine", "speed", "wind")
@@ -29,7 +29,7 @@ def pairs(correlations: Mapping[str, Any]) -> Pairs:
     Parameters
     ----------
     correlations : mapping
-        Of `pipeline.compare.correlations.correlations`.
+        Of `kempf.pipeline.compare.correlations.correlations`.
     """
     found: Pairs = {}
     for channel in _ORDER:

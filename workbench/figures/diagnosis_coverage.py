@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
-from workbench.report.content import RunView
+from kempf.workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
+from kempf.workbench.report.content import RunView
 
 
 def draw_coverage(runs: Sequence[RunView]) -> Any:

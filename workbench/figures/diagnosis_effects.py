@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from workbench.figures.diagnosis_style import OTHER, SET_COLOURS, new_figure, style
-from workbench.report.content import RankedEffect
-from workbench.report.numbers import with_interval
+from kempf.workbench.figures.diagnosis_style import OTHER, SET_COLOURS, new_figure, style
+from kempf.workbench.report.content import RankedEffect
+from kempf.workbench.report.numbers import with_interval
 
 _SHOWN = 14
 #: expected changes further from 0 than this many standard errors are drawn at the edge

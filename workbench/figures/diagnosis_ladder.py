@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.normalise.series import Float
-from workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
-from workbench.report.content import Rung
+from kempf.pipeline.channels.series import Float
+from kempf.workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
+from kempf.workbench.report.content import Rung
 
 _MARKERS = (("o", "-"), ("s", "--"), ("^", ":"))
 _SHADES = ("black", "#009E73", "#CC79A7")

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from pipeline.normalise.series import Float
-from workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
-from workbench.report.content import MissingForce
+from kempf.pipeline.channels.series import Float
+from kempf.workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
+from kempf.workbench.report.content import MissingForce
 
 _BINS = 12
 #: sway in 1e-3 m/s^2, yaw in 1e-3 deg/s^2

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from workbench.figures.diagnosis_style import CHANNELS, FULL, MEASURED, PLAIN, new_figure, style
-from workbench.report.content import RunView
+from kempf.workbench.figures.diagnosis_style import CHANNELS, FULL, MEASURED, PLAIN, new_figure, style
+from kempf.workbench.report.content import RunView
 
 _NAMES = ("lateral_speed", "yaw_rate", "heading")
 _ORDER = (2, 1, 0)

@@ -6,8 +6,16 @@ from typing import Any
 
 import numpy as np
 
-from workbench.figures.diagnosis_style import CHANNELS, FULL, PHASE_COLOURS, PHASE_WORDS, PLAIN, new_figure, style
-from workbench.report.content import RunView
+from kempf.workbench.figures.diagnosis_style import (
+    CHANNELS,
+    FULL,
+    PHASE_COLOURS,
+    PHASE_WORDS,
+    PLAIN,
+    new_figure,
+    style,
+)
+from kempf.workbench.report.content import RunView
 
 _LIMIT = 5.0
 _ORDER = (2, 1, 0)

@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from flows.examine_log import Examined
-from pipeline.normalise.doctor.log import Log, integral
-from pipeline.normalise.doctor.outcome import Figure
-from pipeline.normalise.series import SECOND_NS, Float, Nanoseconds
+from kempf.flows.jobs.examine_log import Examined
+from kempf.pipeline.channels.doctor.log import Log, integral
+from kempf.pipeline.channels.doctor.outcome import Figure
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

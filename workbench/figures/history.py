@@ -6,10 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
-from pipeline.history.changes import Change, Changes
-from pipeline.history.scan import YEAR_S
-from pipeline.history.sets import ParameterHistory
-from pipeline.normalise.series import Float, Nanoseconds
+from kempf.pipeline.channels.series import Float, Nanoseconds
+from kempf.pipeline.history.changes import Change, Changes
+from kempf.pipeline.history.scan import YEAR_S
+from kempf.pipeline.history.sets import ParameterHistory
 
 
 def draw_history(history: ParameterHistory, found: Changes, path: Path, title: str) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from pipeline.identify.estimate import Value
+from kempf.pipeline.estimate.result import Value
 
 
 def draw_iterations(iterations: Sequence[dict[str, Any]], truth: Sequence[Value], path: Path, title: str) -> None:
@@ -15,7 +15,7 @@ def draw_iterations(iterations: Sequence[dict[str, Any]], truth: Sequence[Value]
     Parameters
     ----------
     iterations : sequence of dict
-        With ``iteration``, ``A`` and ``B``, as `pipeline.identify.paper` records them.
+        With ``iteration``, ``A`` and ``B``, as `kempf.pipeline.estimate.paper.ship` records them.
     truth : sequence of Value
         A11, A12, A21, A22, B1, B2.
     path : Path

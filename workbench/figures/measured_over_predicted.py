@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from pipeline.compare.ahead import WIDTH_95
-from pipeline.compare.comparison import ORDER, ComparedRun
-from pipeline.compare.group import UNITS
-from pipeline.diagnose.held_out import CHANNELS
+from kempf.pipeline.compare.comparison import ORDER, ComparedRun
+from kempf.pipeline.compare.group import UNITS
+from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.predict.linear_ahead import WIDTH_95
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

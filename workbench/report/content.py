@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from pipeline.compare.looked import Looked, PhaseInterval
-from pipeline.compare.overshoot import Overshoot
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.compare.overshoot import Overshoot
+from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
 
 
 @dataclass(frozen=True, eq=False)
@@ -192,7 +192,7 @@ class ReportContent:
         In order of time.
     where_before, where_after, where_held : mapping
         Where the plain model and the last one fail on fitted runs, and the last one on held-out runs, as
-        `pipeline.compare.where.where` has it; the last empty where none is held out.
+        `kempf.pipeline.compare.misfit.where` has it; the last empty where none is held out.
     ship : mapping of str to str
     provenance : tuple of (str, str)
         What and its value, in the order shown.

@@ -6,22 +6,22 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from pipeline.compare.horizon import horizon_of
-from pipeline.compare.looked import Looked, PhaseInterval, phases_s
-from pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
-from pipeline.compare.predicted import of_free_run, predict
-from pipeline.diagnose import sensitivity
-from pipeline.diagnose.diagnosis import Step
-from pipeline.diagnose.filtered import Filtered
-from pipeline.diagnose.held_out import FreeRun
-from pipeline.diagnose.run import Run
-from pipeline.diagnose.sensitivity import Point
-from pipeline.normalise.series import SECOND_NS
-from schemas.errors import DataRejected
-from warehouse.instant import iso_utc
-from warehouse.segments import Segment
-from workbench.report.content import Course, RunView
-from workbench.report.smoothed import smoothed
+from kempf.pipeline.channels.series import SECOND_NS
+from kempf.pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
+from kempf.pipeline.diagnose.diagnosis import Step
+from kempf.pipeline.estimate import sensitivity
+from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.predict.free_run import FreeRun
+from kempf.pipeline.predict.horizon import horizon_of
+from kempf.pipeline.predict.prediction import of_free_run, predict
+from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval, phases_s
+from kempf.schemas.errors import DataRejected
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.segments import Segment
+from kempf.workbench.report.content import Course, RunView
+from kempf.workbench.report.smoothed import smoothed
 
 #: horizons of the table beside the free run; one that a run is too short for is left out
 HORIZONS = ("1", "10s", "60s", "free")

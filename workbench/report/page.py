@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from workbench.report import sections
-from workbench.report.content import ReportContent
-from workbench.report.markup import STYLE, escape, listed, section
+from kempf.workbench.report import sections
+from kempf.workbench.report.content import ReportContent
+from kempf.workbench.report.markup import STYLE, escape, listed, section
 
 _SECTIONS: tuple[tuple[str, str, Callable[[ReportContent], str]], ...] = (
     ("effects", "Which effects are missing", sections.effects),

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from workbench.figures import (
+from kempf.workbench.figures import (
     diagnosis_added_variable,
     diagnosis_confusion,
     diagnosis_correlations,
@@ -19,10 +19,10 @@ from workbench.figures import (
     diagnosis_strip,
     diagnosis_zigzag,
 )
-from workbench.figures.diagnosis_style import CHANNELS, bytes_of
-from workbench.report.content import RankedEffect, ReportContent
-from workbench.report.markup import badge, escape, figure, table
-from workbench.report.numbers import with_interval
+from kempf.workbench.figures.diagnosis_style import CHANNELS, bytes_of
+from kempf.workbench.report.content import RankedEffect, ReportContent
+from kempf.workbench.report.markup import badge, escape, figure, table
+from kempf.workbench.report.numbers import with_interval
 
 _NAMES = ("heading", "yaw_rate", "lateral_speed")
 _VERDICTS = {"present": "present", "negligible": "too small", "not_testable": "not testable", "absent": "absent"}

@@ -1,7 +1,8 @@
 """What must have acted on the ship beside a model for a run to come out as measured: force and moment, smoothed.
 
 About the model's free run, which carries every effect, the ship departs little, and by the linear part of eq. (16); her
-departures, measured less free run, are smoothed with the disturbances that drive them (`pipeline.model.smoother`).
+departures, measured less free run, are smoothed with the disturbances that drive them
+(`pipeline.estimate.filters.smoother`).
 """
 
 from __future__ import annotations
@@ -9,11 +10,11 @@ from __future__ import annotations
 import numpy as np
 from scipy.linalg import expm
 
-from pipeline.diagnose.filtered import INITIAL_STD, Filtered
-from pipeline.diagnose.held_out import FreeRun
-from pipeline.diagnose.sensitivity import Point
-from pipeline.model.smoother import LinearSystem, smooth
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.filtered import INITIAL_STD, Filtered
+from kempf.pipeline.estimate.filters.smoother import LinearSystem, smooth
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.predict.free_run import FreeRun
 
 _V, _R, _PSI, _F, _M, _C1, _C2, _B = range(8)
 

@@ -9,19 +9,19 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap.batch import Batch, joined
-from pipeline.ingest.mcap.payloads import PayloadsBuilder
-from pipeline.ingest.mcap.records import Channel
-from pipeline.ingest.mcap.stream import McapStream
-from pipeline.ingest.mcap.topics import Route
-from pipeline.ingest.messages.columns import NoReaderError
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Spans
-from schemas.errors import DataRejected, UsageError
-from schemas.known_messages import OFFERED, TAKEN, plain_name
-from schemas.profile import ChannelMap, Source
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap.batch import Batch, joined
+from kempf.pipeline.ingest.mcap.payloads import PayloadsBuilder
+from kempf.pipeline.ingest.mcap.records import Channel
+from kempf.pipeline.ingest.mcap.stream import McapStream
+from kempf.pipeline.ingest.mcap.topics import Route
+from kempf.pipeline.ingest.messages.columns import NoReaderError
+from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.spans import Spans
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name
+from kempf.schemas.profile import ChannelMap, Source
 
 T = TypeVar("T", bound=np.generic)
 
@@ -127,7 +127,7 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
     source : Source or None
         Its keys are ``<topic>.<field>``, nested fields with dots; its time, where given, names ``log_time`` (also taken
         where nothing is given), ``publish_time`` or a field of the messages. Without channels the messages are read
-        whose definition says all, see `schemas.known_messages.TAKEN`.
+        whose definition says all, see `kempf.schemas.known_messages.TAKEN`.
     patterns : list of str
         File patterns of the profile, for the message where none fits.
 

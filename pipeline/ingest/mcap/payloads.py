@@ -9,9 +9,9 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap.batch import Batch, Piece
-from pipeline.ingest.spans import RAW_LIMIT, Bytes, Index, Spans
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap.batch import Batch, Piece
+from kempf.pipeline.ingest.spans import RAW_LIMIT, Bytes, Index, Spans
 
 #: Bytes of a payload that is no text which are shown, in hexadecimal digits.
 _SHOWN = 64

@@ -18,11 +18,10 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap.batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
-from pipeline.ingest.mcap.chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
-from pipeline.ingest.mcap.outside import FIRST_WINDOW, WINDOW, believed, chunk_behind
-from pipeline.ingest.mcap.records import (
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap.batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
+from kempf.pipeline.ingest.mcap.chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
+from kempf.pipeline.ingest.mcap.records import (
     CHANNEL,
     CHUNK,
     DATA_END,
@@ -35,12 +34,13 @@ from pipeline.ingest.mcap.records import (
     parse_channel,
     parse_schema,
 )
-from pipeline.ingest.mcap.summary import read_summary
-from pipeline.ingest.mcap.walk import HEAD, walk
-from pipeline.ingest.readings import LostStretch
-from pipeline.ingest.sniff import MCAP_MAGIC
-from pipeline.ingest.spans import Index, as_bytes
-from pipeline.ingest.unpack import allowance, too_large, too_many
+from kempf.pipeline.ingest.mcap.summary import read_summary
+from kempf.pipeline.ingest.mcap.unchunked import FIRST_WINDOW, WINDOW, believed, chunk_behind
+from kempf.pipeline.ingest.mcap.walk import HEAD, walk
+from kempf.pipeline.ingest.readings import LostStretch
+from kempf.pipeline.ingest.sniff import MCAP_MAGIC
+from kempf.pipeline.ingest.spans import Index, as_bytes
+from kempf.pipeline.ingest.unpack import allowance, too_large, too_many
 
 #: Bytes that are known of a message whose chunk is lost: two places, its channel, two times.
 _HEADS = 40

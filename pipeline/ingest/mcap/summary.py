@@ -11,8 +11,8 @@ import struct
 import zlib
 from dataclasses import dataclass, field
 
-from pipeline.ingest.log_file import LogFile
-from pipeline.ingest.mcap.records import (
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap.records import (
     CHANNEL,
     CHUNK_INDEX,
     DATA_END,
@@ -29,9 +29,9 @@ from pipeline.ingest.mcap.records import (
     parse_schema,
     parse_statistics,
 )
-from pipeline.ingest.mcap.walk import HEAD, walk
-from pipeline.ingest.sniff import MCAP_MAGIC
-from pipeline.ingest.spans import as_bytes
+from kempf.pipeline.ingest.mcap.walk import HEAD, walk
+from kempf.pipeline.ingest.sniff import MCAP_MAGIC
+from kempf.pipeline.ingest.spans import as_bytes
 
 #: Largest summary that is read, bytes.
 SUMMARY_LIMIT = 256 << 20

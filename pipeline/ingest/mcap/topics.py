@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.mapping import check_once
-from pipeline.ingest.mcap.records import Channel, Schema
-from pipeline.ingest.messages.columns import Columns, MessageReader, NoReaderError
-from pipeline.ingest.spans import Spans
-from schemas.known_messages import VOID_WHERE_NEGATIVE, plain_name
-from schemas.profile import ChannelMap, TimeColumn, start_ns
+from kempf.pipeline.ingest.mapping import check_once
+from kempf.pipeline.ingest.mcap.records import Channel, Schema
+from kempf.pipeline.ingest.messages.columns import Columns, MessageReader, NoReaderError
+from kempf.pipeline.ingest.spans import Spans
+from kempf.schemas.known_messages import VOID_WHERE_NEGATIVE, plain_name
+from kempf.schemas.profile import ChannelMap, TimeColumn, start_ns
 
 #: Parts of a quaternion, and the angles that are made of it.
 _QUATERNION = ("x", "y", "z", "w")
@@ -159,15 +159,15 @@ def _reader(channel: Channel, schema: Schema | None, wanted: list[str]) -> Messa
     """Return a reader of a channel's encoding; each is imported where it is used, for what it compiles."""
     told = schema.encoding if schema else ""
     if channel.encoding == "json":
-        from pipeline.ingest.messages.json_reader import JsonReader
+        from kempf.pipeline.ingest.messages.json_reader import JsonReader
 
         return JsonReader(wanted)
     if channel.encoding == "cdr" and schema and told == "ros2msg":
-        from pipeline.ingest.messages.cdr_reader import CdrReader
+        from kempf.pipeline.ingest.messages.cdr_reader import CdrReader
 
         return CdrReader(schema.name, schema.data.decode("utf-8", errors="replace"), wanted)
     if channel.encoding == "protobuf" and schema and told == "protobuf":
-        from pipeline.ingest.messages.protobuf_reader import ProtobufReader
+        from kempf.pipeline.ingest.messages.protobuf_reader import ProtobufReader
 
         return ProtobufReader(schema.name, schema.data, wanted)
     if channel.encoding in ("cdr", "protobuf"):

@@ -12,8 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.compiled import njit
-from pipeline.ingest.spans import Bytes, Index
+from kempf.pipeline.compiled import njit
+from kempf.pipeline.ingest.spans import Bytes, Index
 
 #: Bytes of opcode and length in front of the content.
 HEAD = 9

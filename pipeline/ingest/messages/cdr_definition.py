@@ -12,7 +12,7 @@ from __future__ import annotations
 import re
 from dataclasses import dataclass
 
-from pipeline.ingest.messages.columns import NoReaderError
+from kempf.pipeline.ingest.messages.columns import NoReaderError
 
 #: Name of a primitive type -> numpy's name of it.
 PRIMITIVES = {

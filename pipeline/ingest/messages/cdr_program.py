@@ -13,8 +13,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.messages.cdr_definition import PRIMITIVES, Field, Types, full_name
-from pipeline.ingest.messages.columns import NoReaderError
+from kempf.pipeline.ingest.messages.cdr_definition import PRIMITIVES, Field, Types, full_name
+from kempf.pipeline.ingest.messages.columns import NoReaderError
 
 #: Instructions, each with up to four numbers.
 SKIP, READ, STRING, SEQUENCE, PICK, LOOP, END = range(7)
@@ -64,7 +64,7 @@ def program_for(types: Types, name: str, wanted: list[str]) -> Program:
     Parameters
     ----------
     types : dict
-        See `pipeline.ingest.messages.cdr_definition.types_of`.
+        See `kempf.pipeline.ingest.messages.cdr_definition.types_of`.
     name : str
         The message's own type.
     wanted : list of str

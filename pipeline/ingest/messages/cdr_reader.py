@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.ingest.messages.cdr_definition import full_name, types_of
-from pipeline.ingest.messages.cdr_program import program_for
-from pipeline.ingest.messages.cdr_walk import walk
-from pipeline.ingest.messages.columns import Columns, NoReaderError
-from pipeline.ingest.spans import Spans
+from kempf.pipeline.ingest.messages.cdr_definition import full_name, types_of
+from kempf.pipeline.ingest.messages.cdr_program import program_for
+from kempf.pipeline.ingest.messages.cdr_walk import walk
+from kempf.pipeline.ingest.messages.columns import Columns, NoReaderError
+from kempf.pipeline.ingest.spans import Spans
 
 
 class CdrReader:

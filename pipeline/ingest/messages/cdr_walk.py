@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.compiled import njit
-from pipeline.ingest.messages.cdr_program import DEEPEST, END, LOOP, PICK, READ, SKIP, STRING
+from kempf.pipeline.compiled import njit
+from kempf.pipeline.ingest.messages.cdr_program import DEEPEST, END, LOOP, PICK, READ, SKIP, STRING
 
 #: Bytes of the encapsulation in front of a message.
 _ENCAPSULATION = 4

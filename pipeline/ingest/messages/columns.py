@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.spans import Spans
+from kempf.pipeline.ingest.spans import Spans
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.messages.columns import Columns
-from pipeline.ingest.messages.json_walk import ABSENT, NUMBER, OTHER, TEXT, walk
-from pipeline.ingest.spans import Spans
-from pipeline.ingest.text.numerals import number
+from kempf.pipeline.ingest.messages.columns import Columns
+from kempf.pipeline.ingest.messages.json_walk import ABSENT, NUMBER, OTHER, TEXT, walk
+from kempf.pipeline.ingest.spans import Spans
+from kempf.pipeline.ingest.text.numerals import number
 
 #: A tree of field names; the leaves are empty.
 Tree = dict[str, "Tree"]

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.compiled import njit
+from kempf.pipeline.compiled import njit
 
 #: What was found of a field: nothing, something that is no number, a number, text that may be one.
 ABSENT, OTHER, NUMBER, TEXT = range(4)

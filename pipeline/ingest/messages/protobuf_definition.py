@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from pipeline.ingest.messages.columns import NoReaderError
+from kempf.pipeline.ingest.messages.columns import NoReaderError
 
 #: Number of a field type -> how its wire value is read; types that hold no number are not here.
 NUMBERS = {

@@ -10,10 +10,16 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.messages.columns import Columns, NoReaderError
-from pipeline.ingest.messages.protobuf_definition import MESSAGE_TYPE, NUMBERS, ProtoField, ProtoTypes, proto_types_of
-from pipeline.ingest.messages.protobuf_walk import DEEPEST, LENGTH, NARROW, VARINT, WIDE, walk
-from pipeline.ingest.spans import Spans
+from kempf.pipeline.ingest.messages.columns import Columns, NoReaderError
+from kempf.pipeline.ingest.messages.protobuf_definition import (
+    MESSAGE_TYPE,
+    NUMBERS,
+    ProtoField,
+    ProtoTypes,
+    proto_types_of,
+)
+from kempf.pipeline.ingest.messages.protobuf_walk import DEEPEST, LENGTH, NARROW, VARINT, WIDE, walk
+from kempf.pipeline.ingest.spans import Spans
 
 _WIRE = {"f8": WIDE, "u8": WIDE, "i8": WIDE, "f4": NARROW, "u4": NARROW, "i4": NARROW}
 

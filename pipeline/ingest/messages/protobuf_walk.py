@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.compiled import njit
+from kempf.pipeline.compiled import njit
 
 #: Wire types of the encoding; 3 and 4, groups, are not written any more.
 VARINT, WIDE, LENGTH, NARROW = 0, 1, 2, 5

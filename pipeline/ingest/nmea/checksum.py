@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.ingest.decoded import Flag
-from pipeline.ingest.spans import Bytes, Index
+from kempf.pipeline.ingest.decoded import Flag
+from kempf.pipeline.ingest.spans import Bytes, Index
 
 _HEX = np.full(256, -1, dtype=np.int16)
 _HEX[48:58], _HEX[65:71], _HEX[97:103] = np.arange(10), np.arange(10, 16), np.arange(10, 16)

@@ -6,15 +6,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds
-from pipeline.ingest.nmea.dates import date, mend_rollover, time_of_day, year_month_day
-from pipeline.ingest.nmea.fields import Said
-from pipeline.ingest.nmea.frames import Frames
-from pipeline.ingest.nmea.spread import spread
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Index
-from pipeline.ingest.text.iso_time import DAY_NS, SECOND_NS
-from schemas.nmea import SATELLITES, SENTENCES
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds
+from kempf.pipeline.ingest.nmea.dates import date, mend_rollover, time_of_day, year_month_day
+from kempf.pipeline.ingest.nmea.fields import Said
+from kempf.pipeline.ingest.nmea.frames import Frames
+from kempf.pipeline.ingest.nmea.spread import spread
+from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.spans import Index
+from kempf.pipeline.ingest.text.iso_time import DAY_NS, SECOND_NS
+from kempf.schemas.nmea import SATELLITES, SENTENCES
 
 #: Evidence asked for before untimed sentences are given to the fix that follows them.
 _LEAST_AGREEMENTS, _RATIO = 5, 2

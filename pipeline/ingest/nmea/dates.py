@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
-from pipeline.ingest.spans import Index
-from pipeline.ingest.text.cells import Cells, all_digits, eight_digits, first_digits, leading_digits, words
-from pipeline.ingest.text.iso_time import DAY_NS, SECOND_NS, days_since_1970
+from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
+from kempf.pipeline.ingest.spans import Index
+from kempf.pipeline.ingest.text.cells import (
+    Cells,
+    all_digits,
+    eight_digits,
+    first_digits,
+    leading_digits,
+    words,
+)
+from kempf.pipeline.ingest.text.iso_time import DAY_NS, SECOND_NS, days_since_1970
 
 #: Two-digit years from here on are of the last century.
 _CENTURY = 70

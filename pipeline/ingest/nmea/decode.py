@@ -6,19 +6,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from pipeline.ingest.decoded import CODE, NO_TIME, Code, Decoded, Values
-from pipeline.ingest.nmea.clock import clock_of
-from pipeline.ingest.nmea.fields import Said, read_type
-from pipeline.ingest.nmea.frames import Frames, frames_of
-from pipeline.ingest.nmea.magnetic import make_true
-from pipeline.ingest.nmea.rudders import both_rudders
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Bytes, Index, as_bytes
-from schemas.channels import CHANNELS
-from schemas.errors import UsageError
-from schemas.nmea import SENTENCES, SPECIAL
-from schemas.profile import Source
-from schemas.units import factor_to_si
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Decoded, Values
+from kempf.pipeline.ingest.nmea.clock import clock_of
+from kempf.pipeline.ingest.nmea.fields import Said, read_type
+from kempf.pipeline.ingest.nmea.frames import Frames, frames_of
+from kempf.pipeline.ingest.nmea.magnetic import make_true
+from kempf.pipeline.ingest.nmea.rudders import both_rudders
+from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.spans import Bytes, Index, as_bytes
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.errors import UsageError
+from kempf.schemas.nmea import SENTENCES, SPECIAL
+from kempf.schemas.profile import Source
+from kempf.schemas.units import factor_to_si
 
 
 def decode(data: bytes, name: str = "log", source: Source | None = None) -> Decoded:

@@ -1,4 +1,4 @@
-"""What NMEA sentences say: fields by the table in `schemas.nmea`, in columns, one sentence type at a time.
+"""What NMEA sentences say: fields by the table in `kempf.schemas.nmea`, in columns, one sentence type at a time.
 
 When they say it is settled in `clock`; which of two rudders and which magnetic variation holds, by looking at the
 whole log, in `rudders` and `magnetic`.
@@ -13,14 +13,14 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import CODE, Flag, Float
-from pipeline.ingest.nmea.frames import Frames
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Index
-from pipeline.ingest.text.cells import Cells
-from schemas.channels import CHANNELS
-from schemas.nmea import SENTENCES, SILENT, XDR_ANGLES, NmeaField, Sentence
-from schemas.units import factor_to_si
+from kempf.pipeline.ingest.decoded import CODE, Flag, Float
+from kempf.pipeline.ingest.nmea.frames import Frames
+from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.spans import Index
+from kempf.pipeline.ingest.text.cells import Cells
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.nmea import SENTENCES, SILENT, XDR_ANGLES, NmeaField, Sentence
+from kempf.schemas.units import factor_to_si
 
 #: Most transducers that are read of one sentence.
 _TRANSDUCERS = 10
@@ -106,7 +106,7 @@ def read_type(frames: Frames, record: Index, name: str) -> Said:
     record : ndarray of int64, shape (m,)
         Records of the sentences, ascending; whole, with the right checksum.
     name : str
-        Key of `schemas.nmea.SENTENCES`.
+        Key of `kempf.schemas.nmea.SENTENCES`.
 
     Returns
     -------

@@ -11,13 +11,13 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import CODE, NO_TIME, Code, Flag, Nanoseconds
-from pipeline.ingest.nmea.checksum import checksum_right
-from pipeline.ingest.nmea.tags import BACKSLASH, Tags, tags_of
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Bytes, Index, Spans, first_within, is_blank, trimmed
-from pipeline.ingest.text import iso_time
-from pipeline.ingest.text.cells import words
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Flag, Nanoseconds
+from kempf.pipeline.ingest.nmea.checksum import checksum_right
+from kempf.pipeline.ingest.nmea.tags import BACKSLASH, Tags, tags_of
+from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.spans import Bytes, Index, Spans, first_within, is_blank, trimmed
+from kempf.pipeline.ingest.text import iso_time
+from kempf.pipeline.ingest.text.cells import words
 
 _FEED, _RETURN, _BLANK, _DOLLAR, _BANG, _STAR, _COMMA = 10, 13, 32, 36, 33, 42, 44
 

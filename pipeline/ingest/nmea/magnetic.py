@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.ingest.decoded import CODE, Flag, Float
-from pipeline.ingest.nmea.fields import Fields, Said, east
-from pipeline.ingest.nmea.frames import Frames
-from pipeline.ingest.readings import Reason
-from pipeline.ingest.spans import Index
-from schemas.channels import CHANNELS
+from kempf.pipeline.ingest.decoded import CODE, Flag, Float
+from kempf.pipeline.ingest.nmea.fields import Fields, Said, east
+from kempf.pipeline.ingest.nmea.frames import Frames
+from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.spans import Index
+from kempf.schemas.channels import CHANNELS
 
 _DEGREE = np.pi / 180.0
 

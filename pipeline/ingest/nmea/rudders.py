@@ -8,10 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.ingest.decoded import CODE, Flag, Float
-from pipeline.ingest.nmea.fields import Said
-from pipeline.ingest.nmea.frames import Frames
-from pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.decoded import CODE, Flag, Float
+from kempf.pipeline.ingest.nmea.fields import Said
+from kempf.pipeline.ingest.nmea.frames import Frames
+from kempf.pipeline.ingest.readings import Reason
 
 _DEGREE = np.pi / 180.0
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.ingest.decoded import Nanoseconds
-from pipeline.ingest.spans import Index
+from kempf.pipeline.ingest.decoded import Nanoseconds
+from kempf.pipeline.ingest.spans import Index
 
 #: Sentences are spread over so many usual distances of the fixes at most: a longer one is a pause of the log.
 _PAUSE = 3

@@ -14,11 +14,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.ingest.decoded import Flag, Nanoseconds
-from pipeline.ingest.nmea.checksum import checksum_right
-from pipeline.ingest.spans import Bytes, Index, Spans, first_within
-from pipeline.ingest.text.cells import Cells
-from pipeline.ingest.text.iso_time import SECOND_NS
+from kempf.pipeline.ingest.decoded import Flag, Nanoseconds
+from kempf.pipeline.ingest.nmea.checksum import checksum_right
+from kempf.pipeline.ingest.spans import Bytes, Index, Spans, first_within
+from kempf.pipeline.ingest.text.cells import Cells
+from kempf.pipeline.ingest.text.iso_time import SECOND_NS
 
 BACKSLASH = 92
 _COLON, _C, _COMMA, _STAR = 58, 99, 44, 42
@@ -56,7 +56,7 @@ def tags_of(buffer: Bytes, prefix: Bytes, openings: Index, strokes: Index, lines
     Parameters
     ----------
     buffer, prefix : ndarray of uint8
-        See `pipeline.ingest.nmea.checksum.checksum_right`.
+        See `kempf.pipeline.ingest.nmea.checksum.checksum_right`.
     openings, strokes : ndarray of int64
         Places of ``$`` or ``!``, and of backslashes, ascending.
     lines : Spans

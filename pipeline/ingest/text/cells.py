@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.decoded import Flag, Float
-from pipeline.ingest.spans import Bytes, Index, Spans, is_blank, trimmed
-from pipeline.ingest.text.numerals import number
+from kempf.pipeline.ingest.decoded import Flag, Float
+from kempf.pipeline.ingest.spans import Bytes, Index, Spans, is_blank, trimmed
+from kempf.pipeline.ingest.text.numerals import number
 
 Word = NDArray[np.uint64]
 
@@ -186,7 +186,7 @@ class Cells:
         Returns
         -------
         ndarray of float64, shape (n,)
-            The bits that `pipeline.ingest.text.numerals.number` gives.
+            The bits that `kempf.pipeline.ingest.text.numerals.number` gives.
         """
         buffer, stop, length = self.buffer, self.stop, self.stop - self.start
         if buffer.size == 0 or length.size == 0:

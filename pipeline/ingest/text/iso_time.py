@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.ingest.spans import Spans
-from pipeline.ingest.text.cells import Word, all_digits, eight_digits, first_digits, leading_digits, words
+from kempf.pipeline.ingest.spans import Spans
+from kempf.pipeline.ingest.text.cells import (
+    Word,
+    all_digits,
+    eight_digits,
+    first_digits,
+    leading_digits,
+    words,
+)
 
 _Int = NDArray[np.int64]
 _Flag = NDArray[np.bool_]

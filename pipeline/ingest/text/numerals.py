@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import polars as pl
 
-from pipeline.ingest.decoded import Float
+from kempf.pipeline.ingest.decoded import Float
 
 
 def number(text: pl.Series) -> Float:

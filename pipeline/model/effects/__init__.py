@@ -6,11 +6,11 @@ import pkgutil
 from difflib import get_close_matches
 from importlib import import_module
 
-from pipeline.model.terms.content import as_json, digest
-from pipeline.model.terms.effect import Effect
-from pipeline.model.terms.own import from_expression
-from pipeline.model.terms.own_file import from_file
-from schemas.errors import KempfError, NotFound
+from kempf.pipeline.model.terms.content import as_json, digest
+from kempf.pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.terms.own import from_expression
+from kempf.pipeline.model.terms.own_file import from_file
+from kempf.schemas.errors import KempfError, NotFound
 
 __all__ = ["as_json", "catalogue", "digest", "from_expression", "from_file", "get"]
 
@@ -30,7 +30,7 @@ def catalogue() -> dict[str, Effect]:
     found: dict[str, Effect] = {}
     for name in sorted(module.name for module in pkgutil.iter_modules(__path__)):
         try:
-            effect = getattr(import_module(f"pipeline.model.effects.{name}"), "EFFECT", None)
+            effect = getattr(import_module(f"kempf.pipeline.model.effects.{name}"), "EFFECT", None)
         except Exception as error:  # whatever a file does when it is imported, its name must be told
             raise _wrong(name, f"importing it raised {type(error).__name__}: {error}") from error
         if not isinstance(effect, Effect):

@@ -8,7 +8,7 @@ gyration is a quarter of her length.
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 #: inertia in sway times the length squared over that in yaw
 _INERTIA = 16.0

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from pipeline.model.terms.effect import Effect, Parameter
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 
 def rudder_course(time_s: Float, rudder_rad: Float, values: Float) -> Float:

@@ -7,7 +7,7 @@ constant current adds none: y_v = v + V_T - tau (dv/dt + V r).
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
     name="gnss_latency",

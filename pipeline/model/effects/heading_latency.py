@@ -6,7 +6,7 @@ sees V tau r more.
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
     name="heading_latency",

@@ -6,7 +6,7 @@ repeat itself; a12 is left alone, most of it is the ship's own inertia.
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
     name="load_condition",

@@ -6,7 +6,7 @@ is left in steady motion, where the linear damping says it all.
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, ExtraState, Parameter
+from kempf.pipeline.model.terms.effect import Effect, ExtraState, Parameter
 
 EFFECT = Effect(
     name="memory",

@@ -5,7 +5,7 @@ Share c of the rudder's squared inflow goes with the race, the rest with the shi
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
     name="propeller_wash",

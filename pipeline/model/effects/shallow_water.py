@@ -6,7 +6,7 @@ own inertia.
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
     name="shallow_water",

@@ -6,7 +6,7 @@ within some five ship lengths. The rate of recovery is that of a Mariner's linea
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, ExtraState, Parameter
+from kempf.pipeline.model.terms.effect import Effect, ExtraState, Parameter
 
 EFFECT = Effect(
     name="speed_loss",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
     name="sway_cubic",

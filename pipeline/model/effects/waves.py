@@ -6,7 +6,7 @@ yaw rate. Its standard deviation is the parameter, so that 0 is a calm sea.
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, ExtraState, Parameter
+from kempf.pipeline.model.terms.effect import Effect, ExtraState, Parameter
 
 EFFECT = Effect(
     name="waves",

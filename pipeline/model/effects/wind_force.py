@@ -6,7 +6,7 @@ clockwise from the bow: a wind from starboard pushes to port.
 
 from __future__ import annotations
 
-from pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 EFFECT = Effect(
     name="wind_force",

@@ -8,7 +8,7 @@ import json
 import sys
 from typing import Any
 
-from pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.terms.effect import Effect
 
 
 def as_json(effect: Effect) -> dict[str, Any]:

@@ -6,9 +6,9 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal
 
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS, TELLING
-from pipeline.normalise.series import Float
-from schemas.errors import UsageError
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS, TELLING
+from kempf.schemas.errors import UsageError
 
 Group = Literal["hull", "rudder", "propulsion", "environment", "sensor", "other", "own"]
 #: (time in s, rudder in rad, parameters) -> rudder in rad that the hull feels; the times are evenly spaced
@@ -86,7 +86,7 @@ class Effect:
     equation, reference : str
     parameters : tuple of Parameter
     terms : mapping of str to str
-        Expression by target, see `pipeline.model.terms.symbols.TARGETS`.
+        Expression by target, see `kempf.pipeline.model.terms.symbols.TARGETS`.
     rudder_course : callable, optional
         What becomes of the rudder's course before it reaches the hull.
     states : tuple of ExtraState

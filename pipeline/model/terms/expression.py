@@ -9,9 +9,9 @@ from difflib import get_close_matches
 
 import numpy as np
 
-from pipeline.model.terms import program
-from pipeline.model.terms.program import DEPTH, Program
-from schemas.errors import UsageError
+from kempf.pipeline.model.terms import program
+from kempf.pipeline.model.terms.program import DEPTH, Program
+from kempf.schemas.errors import UsageError
 
 _LONGEST = 4000
 _DEEPEST = 60

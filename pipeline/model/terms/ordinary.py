@@ -10,15 +10,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pipeline.model.lanes import ONE
-from pipeline.model.ship import mariner_like
-from pipeline.model.terms.effect import Effect
-from pipeline.model.terms.expression import compiled
-from pipeline.model.terms.places import Place, places, require_in_place
-from pipeline.model.terms.program import DEPTH, Program, evaluate
-from pipeline.model.terms.symbols import STATE_SYMBOLS, SYMBOLS
-from pipeline.normalise.series import Float
-from schemas.errors import UsageError
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.batch import ONE
+from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.terms.expression import compiled
+from kempf.pipeline.model.terms.places import Place, places, require_in_place
+from kempf.pipeline.model.terms.program import DEPTH, Program, evaluate
+from kempf.pipeline.model.terms.symbols import STATE_SYMBOLS, SYMBOLS
+from kempf.schemas.errors import UsageError
 
 _SHIP = {
     **dict(zip(("a11", "a12", "a21", "a22", "b1", "b2"), mariner_like(100.0).array().tolist(), strict=True)),
@@ -94,7 +94,7 @@ def run(program: Program, values: Float) -> Float:
     ----------
     program : Program
     values : ndarray, shape (n,)
-        Of every variable, in the order of `pipeline.model.terms.symbols.SYMBOLS`, then parameters.
+        Of every variable, in the order of `kempf.pipeline.model.terms.symbols.SYMBOLS`, then parameters.
     """
     width = len(STATE_SYMBOLS)
     slopes = np.zeros((values.size, width, 1))

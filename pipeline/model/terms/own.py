@@ -6,13 +6,13 @@ import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-from pipeline.model.terms.effect import Effect, Parameter
-from pipeline.model.terms.expression import compiled, names_in
-from pipeline.model.terms.ordinary import require_ordinary
-from pipeline.model.terms.own_parameters import parameters_of
-from pipeline.model.terms.places import KINDS, Place, allowed, require_in_place
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS
-from schemas.errors import UsageError
+from kempf.pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.expression import compiled, names_in
+from kempf.pipeline.model.terms.ordinary import require_ordinary
+from kempf.pipeline.model.terms.own_parameters import parameters_of
+from kempf.pipeline.model.terms.places import KINDS, Place, allowed, require_in_place
+from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS
+from kempf.schemas.errors import UsageError
 
 #: names that stand for an unknown number: few, so that a slip of the pen does not become one
 _UNKNOWN = re.compile(r"(?:c|k|tau)[1-9]?")

@@ -7,14 +7,14 @@ from typing import Any
 import yaml
 from pydantic import ValidationError
 
-from pipeline.model.terms.effect import Effect, ExtraState, Parameter
-from pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
-from pipeline.model.terms.ordinary import require_ordinary
-from pipeline.model.terms.own import require_name
-from pipeline.model.terms.places import places
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, SYMBOLS
-from schemas.effect import EffectFile
-from schemas.errors import UsageError
+from kempf.pipeline.model.terms.effect import Effect, ExtraState, Parameter
+from kempf.pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
+from kempf.pipeline.model.terms.ordinary import require_ordinary
+from kempf.pipeline.model.terms.own import require_name
+from kempf.pipeline.model.terms.places import places
+from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS, SYMBOLS
+from kempf.schemas.effect import EffectFile
+from kempf.schemas.errors import UsageError
 
 _LONGEST = 50_000
 _DEEPEST = 20

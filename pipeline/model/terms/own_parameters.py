@@ -6,10 +6,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from pipeline.model.terms.effect import Parameter
-from pipeline.model.terms.ordinary import answer
-from pipeline.normalise.series import Float
-from schemas.errors import UsageError
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.terms.effect import Parameter
+from kempf.pipeline.model.terms.ordinary import answer
+from kempf.schemas.errors import UsageError
 
 #: what counts as much on each target, in its unit: a number is tried where it does a tenth of that
 _MUCH = {

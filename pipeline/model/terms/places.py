@@ -6,10 +6,16 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from pipeline.model.terms.effect import Effect
-from pipeline.model.terms.expression import names_in
-from pipeline.model.terms.symbols import CHANNEL_SYMBOLS, COMPUTED_SYMBOLS, RUN_SYMBOLS, SHIP_SYMBOLS, STATE_SYMBOLS
-from schemas.errors import UsageError
+from kempf.pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.terms.expression import names_in
+from kempf.pipeline.model.terms.symbols import (
+    CHANNEL_SYMBOLS,
+    COMPUTED_SYMBOLS,
+    RUN_SYMBOLS,
+    SHIP_SYMBOLS,
+    STATE_SYMBOLS,
+)
+from kempf.schemas.errors import UsageError
 
 Kind = Literal["speed", "rudder", "force", "measured", "noise"]
 

@@ -14,10 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from pipeline.compiled import FILLING, njit
-from pipeline.model.lanes import each
-from pipeline.model.terms.symbols import COMPUTED_SYMBOLS, STATE_SYMBOLS
-from pipeline.normalise.series import Float
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.compiled import FILLING, njit
+from kempf.pipeline.model.batch import each
+from kempf.pipeline.model.terms.symbols import COMPUTED_SYMBOLS, STATE_SYMBOLS
 
 #: variables before this place may move with the states; ship, channels and parameters have no derivatives to carry
 MOVING = len(STATE_SYMBOLS) + len(COMPUTED_SYMBOLS)
@@ -63,7 +63,7 @@ def evaluate(code, constants, values, slopes, stack, by, width, lanes):  # type:
     width : int
         Derivatives that are carried.
     lanes : tuple
-        See `pipeline.model.lanes`.
+        See `kempf.pipeline.model.batch`.
     """
     top, carries = -1, 0
     for k in range(code.shape[0]):

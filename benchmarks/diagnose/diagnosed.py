@@ -1,0 +1,82 @@
+"""What the program says of one vessel's measured logs: the diagnosis in lines of a results page. Knows no answer."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from benchmarks import measured_ships, result_page
+from benchmarks.measured_ships import Ship
+from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
+from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse.store import Warehouse
+
+_DEG = 57.29577951308232
+#: candidates told beside those that were found
+_SHOWN = 8
+
+
+def diagnosed(ship: Ship, spec: ModelSpec) -> Mapping[str, Any]:
+    """Take a ship's logs in and diagnose her, as `kempf ingest` and `kempf diagnose --json` do."""
+    with TemporaryDirectory() as place:
+        warehouse = Warehouse(str(Path(place)))
+        measured_ships.take_in(warehouse, ship)
+        return diagnose_vessel(warehouse, ship.name, spec)[0].show()
+
+
+def section(told: Mapping[str, Any]) -> list[str]:
+    """Return a vessel's part of the page."""
+    lines = [f"## {told['vessel']}: {told['verdict'].replace('_', ' ')}", ""]
+    lines += [f"- {sentence}" for sentence in told["sentences"]]
+    lines += ["", *result_page.table(_LADDER, [_rung(told, one) for one in told["ladder"]]), ""]
+    shown = [c for c in told["candidates"] if c["verdict"] == "present"]
+    shown += [c for c in told["candidates"] if c["verdict"] != "present" and c["score"] is not None][:_SHOWN]
+    rows = [
+        [c["effect"], _number(c["score"], ".1f"), _change(c), _number(c["absorption"], ".4f"), c["verdict"], c["why"]]
+        for c in shown
+    ]
+    lines += result_page.table(["effect", "score", "expected change", "absorbed", "verdict", "why"], rows)
+    blind = [c["effect"] for c in told["candidates"] if c["verdict"] == "not_testable"]
+    if blind:
+        lines += ["", f"Not testable with these data: {', '.join(blind)}."]
+    return [*lines, ""]
+
+
+_LADDER = (
+    *("step", "added", "fitted, %", "held out, %", "yaw rate, deg/s", "heading, deg", "lateral speed, m/s"),
+    *("wind, m/s²/√s", "log-likelihood"),
+)
+
+
+def _rung(told: Mapping[str, Any], one: Mapping[str, Any]) -> list[str]:
+    runs = one["held_out"] or one["in_sample"]
+    rms = {
+        channel: (sum((run[channel] or 0.0) ** 2 for run in runs.values()) / len(runs)) ** 0.5
+        for channel in ("yaw_rate", "heading", "lateral_speed")
+    }
+    return [
+        str(one["step"]),
+        one["added"] or "plain model",
+        f"{100 * one['in_sample_error']:.2f}",
+        "none held out" if one["held_out_error"] is None else f"{100 * one['held_out_error']:.2f}",
+        f"{rms['yaw_rate'] * _DEG:.4f}",
+        f"{rms['heading'] * _DEG:.3f}",
+        f"{rms['lateral_speed']:.4f}",
+        f"{one['disturbance_intensity']['wind_force_m_s2_per_sqrt_s']:.2g}",
+        f"{one['log_likelihood']:.1f}",
+    ]
+
+
+def _number(value: float | None, form: str) -> str:
+    return "" if value is None else format(value, form)
+
+
+def _change(candidate: Mapping[str, Any]) -> str:
+    told = []
+    for name, c in candidate["expected_change"].items():
+        std = "" if c["std"] is None else f" ± {c['std']:.2g}"
+        value = "" if c["value"] is None else f"{c['value']:.3g}"
+        told.append(f"{name} {value}{std} {c['unit']}".rstrip())
+    return ", ".join(told)

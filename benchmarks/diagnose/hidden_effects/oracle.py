@@ -1,0 +1,79 @@
+"""What a fit with the true structure attains: made after the answers are opened, never before.
+
+For every case with an effect of the catalogue: the model with that effect alone, fitted to the runs that the program
+fitted too, and its free-run error on those that it held out.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from concurrent.futures import ThreadPoolExecutor
+from os import cpu_count
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.flows.jobs.vessel_runs import vessel_runs
+from kempf.pipeline.diagnose.forward_selection import staged
+from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.model.effects import catalogue
+from kempf.pipeline.predict.free_run import free_run
+from kempf.schemas.errors import KempfError
+from kempf.warehouse.store import Warehouse
+
+
+def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
+    """Return the fit with the true structure as JSON content; ``error`` where it cannot be made.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the case.
+    effect : str
+        Its name in the catalogue.
+    """
+    with TemporaryDirectory() as place:
+        warehouse = Warehouse(place)
+        logs = sorted(p for p in folder.iterdir() if p.name != "profile.yaml")
+        ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
+        try:
+            found = vessel_runs(warehouse, folder.name, PLAIN)
+            chosen, left = split(found.runs)
+            fitted, start = [found.runs[i] for i in chosen], found.start.of(chosen)
+            with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
+                fits, _ = staged(fitted, found.spec, start, [catalogue()[effect]], workers)
+            held = [found.runs[i] for i in left]
+            return {
+                "plain_held_out": float(np.mean([free_run(fits[0], run).score for run in held])),
+                "held_out": float(np.mean([free_run(fits[1], run).score for run in held])),
+                "likelihood_ratio": 2.0 * (fits[1].log_likelihood - fits[0].log_likelihood),
+                "value": float(fits[1].values[0]),
+                "std": float(fits[1].std[6]),
+            }
+        except KempfError as error:
+            return error.to_json()
+
+
+def all_with_the_truth(cases: Path, truth: Mapping[str, Mapping[str, Any]], out: Path) -> None:
+    """Make the fits of every case that the catalogue holds; one that is there is not made again.
+
+    Parameters
+    ----------
+    cases : Path
+        Folder of the cases.
+    truth : mapping
+        Opened answers by case.
+    out : Path
+        Gets one JSON file a case.
+    """
+    out.mkdir(parents=True, exist_ok=True)
+    for name, one in sorted(truth.items()):
+        path = out / f"{name}.json"
+        if one["kind"] == "catalogue" and not path.exists():
+            path.write_text(json.dumps(with_the_truth(cases / name, one["effect"])), encoding="utf-8")

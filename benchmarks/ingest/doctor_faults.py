@@ -1,0 +1,173 @@
+"""The lies that are told about honest logs, each as a change to the channels and the truth that is to be found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from kempf.pipeline.channels.doctor.faults import Fault
+from kempf.pipeline.channels.doctor.log import Log
+from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.schemas.channels import CHANNELS
+
+_FASTEST = 0.015
+_CIRCLE = ("heading", "course_over_ground")
+_GNSS = ("latitude", "longitude", "speed_over_ground", "course_over_ground")
+
+
+@dataclass(frozen=True)
+class Told:
+    """A lie: the log that tells it, the kind of fault and the channels that should be named."""
+
+    log: Log
+    kind: str
+    channels: tuple[str, ...]
+    size: float = 0.0
+
+
+Lie = Callable[[Log, np.random.Generator], Told]
+
+#: What a log must have for a lie to be told about it, beside the channels of every log here.
+NEEDS = {"rudder order, zero at 25 to 45 deg": "rudder_order"}
+
+
+def _changed(log: Log, name: str, change: Callable[[np.ndarray], np.ndarray]) -> Log:
+    one = log.series[name]
+    value = np.mod(one.value, 2 * np.pi) if name in _CIRCLE else one.value
+    value = change(value)
+    channel = CHANNELS[name]
+    keep = (value >= channel.low) & (value <= channel.high) if name not in _CIRCLE else np.abs(value) <= 4 * np.pi
+    value = np.unwrap(value[keep]) if name in _CIRCLE else value[keep]
+    return log.with_series({name: Series(one.time_utc_ns[keep], value)})
+
+
+def _shifted(log: Log, names: tuple[str, ...], change: Callable[[np.ndarray], np.ndarray]) -> Log:
+    moved = {}
+    for name in names:
+        one = log.series[name]
+        first = int(one.time_utc_ns[0])
+        since = np.rint(change(one.seconds_since(first)) * SECOND_NS).astype(np.int64)
+        moved[name] = Series(first + since, one.value)
+    return log.with_series(moved)
+
+
+def with_velocities(log: Log) -> Log:
+    """The same log with earth-fixed velocities in place of speed and course."""
+    velocity = log.velocity("course")
+    assert velocity is not None
+    time = velocity.time_utc_ns
+    return log.with_series(
+        {
+            "speed_over_ground": None,
+            "course_over_ground": None,
+            "velocity_north": Series(time, velocity.value.real),
+            "velocity_east": Series(time, velocity.value.imag),
+        }
+    )
+
+
+def with_body_velocities(log: Log) -> Log:
+    """The same log with body-fixed velocities in place of speed and course."""
+    velocity, heading = log.velocity("course"), log.series["heading"]
+    assert velocity is not None
+    bow = heading.at(velocity.time_utc_ns, gap_limit_s(heading))
+    known = np.isfinite(bow)
+    time, value = velocity.time_utc_ns[known], velocity.value[known] * np.exp(-1j * bow[known])
+    return log.with_series(
+        {
+            "speed_over_ground": None,
+            "course_over_ground": None,
+            "velocity_forward": Series(time, value.real),
+            "velocity_starboard": Series(time, value.imag),
+        }
+    )
+
+
+def _sign(name: str) -> Lie:
+    return lambda log, _: Told(_changed(log, name, np.negative), "sign", (name,))
+
+
+def _times(name: str, factor: float) -> Lie:
+    return lambda log, _: Told(_changed(log, name, lambda v: v * factor), "unit", (name,), factor)
+
+
+def _turned(name: str) -> Lie:
+    def lie(log: Log, random: np.random.Generator) -> Told:
+        angle = float(np.deg2rad(random.uniform(20.0, 160.0)) * random.choice([-1.0, 1.0]))
+        return Told(_changed(log, name, lambda v: v + angle), "offset", (name,), angle)
+
+    return lie
+
+
+def _anticlockwise(log: Log, _: np.random.Generator) -> Told:
+    return Told(_changed(log, "heading", lambda v: np.pi / 2 - v), "offset", ("heading",))
+
+
+def _swapped(first: str, second: str, prepare: Callable[[Log], Log] = lambda log: log) -> Lie:
+    def lie(log: Log, _: np.random.Generator) -> Told:
+        log = prepare(log)
+        return Told(log.with_series({first: log.series[second], second: log.series[first]}), "swap", (first, second))
+
+    return lie
+
+
+def _frame(prepare: Callable[[Log], Log], log: Log) -> Told:
+    log = prepare(log)
+    earth = ("velocity_north", "velocity_east")
+    channels = earth if "velocity_north" in log.series else ("velocity_forward", "velocity_starboard")
+    lying = Fault("frame", channels).mended(log)
+    other = ("velocity_forward", "velocity_starboard") if channels == earth else earth
+    return Told(lying, "frame", other)
+
+
+def _late(*names: str) -> Lie:
+    def lie(log: Log, random: np.random.Generator) -> Told:
+        late = float(random.uniform(3.0, 12.0))
+        return Told(_shifted(log, names, lambda t: t + late), "latency", names, late)
+
+    return lie
+
+
+def _fast(*names: str) -> Lie:
+    def lie(log: Log, random: np.random.Generator) -> Told:
+        one = log.series[names[0]]
+        span = float(one.time_utc_ns[-1] - one.time_utc_ns[0]) / SECOND_NS
+        # no clock that ran at all is out by more than a hundredth or two
+        rate = min(float(random.uniform(5.0, 20.0)) / span, _FASTEST) * float(random.choice([-1.0, 1.0]))
+        return Told(_shifted(log, names, lambda t: t * (1.0 + rate)), "clock_scale", names, rate)
+
+    return lie
+
+
+def _zero_elsewhere(log: Log, random: np.random.Generator) -> Told:
+    angle = float(np.deg2rad(random.uniform(25.0, 45.0)))
+    return Told(_changed(log, "rudder_order", lambda v: v + angle), "offset", ("rudder_order",), angle)
+
+
+#: Every lie by name, in the order of the page.
+LIES: dict[str, Lie] = {
+    "yaw rate, sign": _sign("yaw_rate"),
+    "yaw rate, deg/s as deg/min": _times("yaw_rate", 1.0 / 60.0),
+    "yaw rate, rad/s as deg/s": _times("yaw_rate", np.pi / 180.0),
+    "heading, anticlockwise from east": _anticlockwise,
+    "heading, turned by 20 to 160 deg": _turned("heading"),
+    "course, turned by 20 to 160 deg": _turned("course_over_ground"),
+    "rudder, positive to port": _sign("rudder_angle"),
+    "rudder, rad as deg": _times("rudder_angle", np.pi / 180.0),
+    "rudder order, zero at 25 to 45 deg": _zero_elsewhere,
+    "speed over ground, kn as m/s": _times("speed_over_ground", 3600.0 / 1852.0),
+    "speed through water, kn as m/s": _times("speed_through_water", 3600.0 / 1852.0),
+    "speed through water, km/h as m/s": _times("speed_through_water", 3.6),
+    "latitude and longitude swapped": _swapped("latitude", "longitude"),
+    "longitude, west positive": _sign("longitude"),
+    "velocities north and east swapped": _swapped("velocity_north", "velocity_east", with_velocities),
+    "earth-fixed velocities as body-fixed": lambda log, _: _frame(with_velocities, log),
+    "body-fixed velocities as earth-fixed": lambda log, _: _frame(with_body_velocities, log),
+    "yaw rate, 3 to 12 s late": _late("yaw_rate"),
+    "heading, 3 to 12 s late": _late("heading"),
+    "heading, clock gains or loses 5 to 20 s": _fast("heading"),
+    "yaw rate, clock gains or loses 5 to 20 s": _fast("yaw_rate"),
+}

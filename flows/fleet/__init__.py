@@ -1,0 +1,1 @@
+"""Many vessels at once: the plan, the Prefect flows, the report."""

@@ -1,0 +1,45 @@
+"""The summary of a fleet's diagnoses: which vessels lack which effect, since when."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from kempf.warehouse.instant import iso_utc
+
+
+def summary(diagnoses: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return one row for every set of effects found, and one for every vessel without any.
+
+    Parameters
+    ----------
+    diagnoses : sequence of mapping
+        As `kempf.warehouse.diagnoses.StoredDiagnosis.show` gives them, or ``{vessel, verdict, error}``.
+
+    Returns
+    -------
+    list of dict
+        ``vessel``, ``verdict``, ``effects`` (those that the data do not tell apart), ``since`` (ISO 8601, the first
+        manoeuvre in which they are seen), ``held_out_before``, ``held_out_after`` (free-run errors), ``note``.
+    """
+    rows = []
+    for one in diagnoses:
+        ladder = one.get("ladder", [])
+        ends = (ladder[0]["held_out_error"], ladder[-1]["held_out_error"]) if ladder else (None, None)
+        told = {"vessel": one["vessel"], "verdict": one["verdict"]}
+        error = {"held_out_before": ends[0], "held_out_after": ends[1]}
+        note = one["error"]["message"] if "error" in one else ""
+        for found in one.get("sets", []):
+            since = found["since_utc_ns"]
+            rows.append(
+                {
+                    **told,
+                    "effects": " or ".join(found["effects"]),
+                    "since": "" if since is None else iso_utc(since),
+                    **error,
+                    "note": note,
+                }
+            )
+        if not one.get("sets"):
+            rows.append({**told, "effects": "", "since": "", **error, "note": note})
+    return rows

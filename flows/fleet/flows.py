@@ -1,0 +1,287 @@
+"""The Prefect flows: ``ingest``, ``identify``, ``reprocess``, ``diagnose``. Few fat tasks; all leave a table artifact.
+
+The work is in the jobs beside this file; here it is only put into batches, retried and reported.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from uuid import UUID
+
+from kempf.flows.fleet.engine import task_runner, workers  # isort: skip - before Prefect, which reads its settings once
+
+from prefect import flow, get_run_logger, task
+from prefect.artifacts import (
+    create_markdown_artifact,
+    create_progress_artifact,
+    create_table_artifact,
+    update_progress_artifact,
+)
+from prefect.client.schemas.objects import State
+from prefect.futures import as_completed
+from prefect.runtime import flow_run
+from prefect.states import Failed
+
+from kempf.flows.fleet import plan
+from kempf.flows.fleet import report as fleet_report
+from kempf.flows.fleet.diagnosis_summary import summary
+from kempf.flows.fleet.state import responsible_code
+from kempf.flows.jobs import ingest_logs
+from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.pool_vessel import pool_vessel
+from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.flows.process.wrap_error import as_told
+from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse import vessels as vessel_table
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.store import Warehouse
+
+
+@task(name="ingest-batch", retries=1, retry_delay_seconds=5)
+def ingest_batch(warehouse: str, paths: list[str], vessel: str | None, profiles: list[str]) -> list[dict[str, Any]]:
+    """Take a batch of logs in."""
+    given = read_profiles([Path(p) for p in profiles]) if profiles else None
+    found = ingest_logs.ingest(Warehouse(warehouse), [Path(p) for p in paths], vessel, given)
+    return [outcome.show() for outcome in found]
+
+
+@flow(name="ingest")
+def ingest(
+    paths: list[str], warehouse: str = "kempf-data", vessel: str | None = None, profiles: Sequence[str] = ()
+) -> list[dict[str, Any]]:
+    """Take raw logs of one vessel in.
+
+    Parameters
+    ----------
+    paths : list of str
+        Raw logs.
+    warehouse : str, optional
+        Its address.
+    vessel : str, optional
+        Whose they are; else the profile tells.
+    profiles : sequence of str, optional
+        Profile files.
+    """
+    outcomes = ingest_batch(warehouse, paths, vessel, list(profiles))
+    rows = [
+        {
+            "log": Path(o["path"]).name,
+            "outcome": o["outcome"],
+            "zigzags": len(o["segments"]),
+            "rejected": (o["records"] or {}).get("rejected"),
+            "error": o.get("error", {}).get("message", ""),
+        }
+        for o in outcomes
+    ]
+    create_table_artifact(key="kempf-ingest", table=rows, description="Logs taken in")
+    return outcomes
+
+
+@task(name="identify-vessel", retries=1, retry_delay_seconds=5)
+def identify_task(warehouse: str, vessel: str, estimator: str, spec: dict[str, Any]) -> list[dict[str, Any]]:
+    """Identify every zigzag of one vessel."""
+    request = Request(ModelSpec.model_validate(spec), estimator)
+    run = flow_run.get_id()
+    told = str(run) if run else None
+    outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=told)
+    pool_vessel(Warehouse(warehouse), vessel, request, outcomes, flow_run=told)
+    return [
+        {
+            "segment": o.segment.segment_id,
+            "start": iso_utc(o.segment.start_utc_ns),
+            "parameter_set": o.parameter_set.parameter_set_id if o.parameter_set else None,
+            "converged": bool(o.parameter_set and o.parameter_set.convergence.get("converged")),
+            "error": o.error.message if o.error else "",
+        }
+        for o in outcomes
+    ]
+
+
+@flow(name="identify")
+def identify(
+    vessel: str, warehouse: str = "kempf-data", estimator: str = "ml", spec: dict[str, Any] | None = None
+) -> list[dict[str, Any]]:
+    """Identify a model from every zigzag of one vessel.
+
+    Parameters
+    ----------
+    vessel : str
+        Her name.
+    warehouse : str, optional
+        Its address.
+    estimator : str, optional
+        One of `kempf.pipeline.estimate.names.NAMES`.
+    spec : dict, optional
+        Model specification.
+    """
+    rows = identify_task(warehouse, vessel, estimator, spec or {})
+    create_table_artifact(key="kempf-identify", table=rows, description=vessel)
+    return rows
+
+
+def _names(warehouse: str, vessels: Sequence[str] | None) -> list[str]:
+    """Return the vessels asked for, or all of a warehouse that must be there; sorted."""
+    store = Warehouse(warehouse)
+    store.require()
+    return sorted(set(vessels)) if vessels else vessel_table.names(store)
+
+
+@task(name="reprocess-batch", retries=1, retry_delay_seconds=5, persist_result=False, result_serializer="json")
+def reprocess_batch(
+    warehouse: str, vessels: list[str], changed_only: bool, run: str | None, code: list[str] | None = None
+) -> list[dict[str, Any]]:
+    """Bring a batch of vessels up to date; a vessel that fails is reported, the others are done."""
+    log = get_run_logger()
+    return plan.do_batch(
+        Warehouse(warehouse),
+        vessels,
+        changed_only=changed_only,
+        flow_run=run,
+        code=code,
+        tell=lambda vessel, status: log.info("%s: %s", vessel, status),
+    )
+
+
+@dataclass(frozen=True)
+class _Run:
+    """What is the same for every batch of one run."""
+
+    warehouse: str
+    changed_only: bool
+    run: str | None
+
+    def do(self, batches: Sequence[list[str]], tell: Callable[[int], None]) -> list[dict[str, Any]]:
+        """Run batches as tasks, tell how many vessels are done; those of a lost batch are reported as failed."""
+        code = responsible_code()
+        futures: dict[Any, list[str]] = {
+            reprocess_batch.submit(self.warehouse, batch, self.changed_only, self.run, code): batch for batch in batches
+        }
+        reports: list[dict[str, Any]] = []
+        for future in as_completed(list(futures)):
+            try:
+                reports += future.result()
+            except Exception as error:  # noqa: BLE001 - a worker that died must not take the others' work with it
+                reports += plan.lost(futures[future], error)
+            tell(len(reports))
+        return reports
+
+
+@flow(name="reprocess", task_runner=task_runner(), persist_result=False, result_serializer="json")
+def reprocess(
+    warehouse: str = "kempf-data", vessels: list[str] | None = None, changed_only: bool = True
+) -> list[dict[str, Any]] | State[Any]:
+    """Bring the fleet up to date with its profiles and the code.
+
+    Vessels whose inputs did not change since their last run are not looked at again. The run ends as Failed where a
+    vessel failed in a way that is new, or that another attempt may mend; all others are done all the same. Failures
+    that the run before told of already, of data that are refused, leave it Completed.
+
+    Parameters
+    ----------
+    warehouse : str, optional
+        Its address.
+    vessels : list of str, optional
+        Only these; the whole fleet by default.
+    changed_only : bool, optional
+        False also verifies every kept parameter set from the raw bytes.
+
+    Returns
+    -------
+    list of dict or State
+        One report a vessel, sorted by name; where the run ends as Failed a caller gets the error
+        `kempf.flows.fleet.report.VesselsFailed`, which has them too.
+    """
+    told = flow_run.get_id()
+    one = _Run(warehouse, changed_only, str(told) if told else None)
+    todo = plan.plan(Warehouse(warehouse), vessels, changed_only=changed_only)
+    get_run_logger().info("%d vessels, %d with something to do", todo.vessels, len(todo.due))
+    shown = create_progress_artifact(_percent(len(todo.kept), todo.vessels), "kempf-progress", _PROGRESS)
+    assert isinstance(shown, UUID)  # it is a coroutine only where a loop runs
+
+    def tell(done: int) -> None:
+        update_progress_artifact(shown, _percent(len(todo.kept) + done, todo.vessels))
+
+    reports = {report["vessel"]: report for report in todo.kept}
+    if todo.due:
+        reports |= {report["vessel"]: report for report in one.do(todo.batches(workers()), tell)}
+    # each alone: a vessel that takes her worker down takes no other with her
+    for report in one.do([[name] for name in plan.to_try_again(reports.values())], lambda done: None):
+        reports[report["vessel"]] = plan.together(reports[report["vessel"]], report)
+    ordered = [reports[name] for name in sorted(reports)]
+    sentence = fleet_report.sentence(ordered)
+    create_table_artifact(key="kempf-reprocess", table=fleet_report.table(ordered), description=sentence)
+    create_markdown_artifact(key="kempf-fleet", markdown=fleet_report.markdown(ordered), description=sentence)
+    if any(map(fleet_report.alarming, ordered)):
+        return Failed(message=sentence, data=fleet_report.VesselsFailed(ordered))
+    return ordered
+
+
+def reports_of(warehouse: str, vessels: list[str] | None = None, *, changed_only: bool = True) -> list[dict[str, Any]]:
+    """Run the flow `reprocess` and return its reports, whichever way it ended.
+
+    Parameters
+    ----------
+    warehouse : str
+    vessels : list of str or None
+    changed_only : bool
+    """
+    state = reprocess(warehouse, vessels, changed_only, return_state=True)
+    found: Any = state.result(raise_on_failure=False)
+    if isinstance(found, fleet_report.VesselsFailed):
+        found = found.details["reports"]
+    if isinstance(found, Exception):
+        raise found
+    reports: list[dict[str, Any]] = found
+    return reports
+
+
+_PROGRESS = "Vessels that are up to date, percent"
+
+
+def _percent(done: int, total: int) -> float:
+    return 100.0 * done / total if total else 100.0
+
+
+@task(name="diagnose-batch", retries=1, retry_delay_seconds=5)
+def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any]) -> list[dict[str, Any]]:
+    """Diagnose vessels one after the other, each on all cores; one that fails is reported, the others are done."""
+    model, told = ModelSpec.model_validate(spec), []
+    for vessel in vessels:
+        try:
+            found, _ = diagnose_vessel(Warehouse(warehouse), vessel, model)
+            told.append(found.show())
+        except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
+            told.append({"vessel": vessel, "verdict": "failed", "error": as_told(error).to_json()["error"]})
+        get_run_logger().info("%s: %s", vessel, told[-1]["verdict"])
+    return told
+
+
+@flow(name="diagnose")
+def diagnose(
+    warehouse: str = "kempf-data", vessels: list[str] | None = None, spec: dict[str, Any] | None = None
+) -> list[dict[str, Any]]:
+    """Find what the models of the fleet lack.
+
+    Parameters
+    ----------
+    warehouse : str, optional
+        Its address.
+    vessels : list of str, optional
+        Only these; the whole fleet by default.
+    spec : dict, optional
+        Model to begin from; the plain one by default.
+
+    Returns
+    -------
+    list of dict
+        One row an effect and vessel, see `kempf.flows.fleet.diagnosis_summary.summary`.
+    """
+    names = _names(warehouse, vessels)
+    rows = summary(diagnose_batch(warehouse, names, spec or PLAIN.model_dump(mode="json")))
+    create_table_artifact(key="kempf-diagnose", table=rows, description="What the models of the fleet lack")
+    return rows

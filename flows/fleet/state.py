@@ -1,0 +1,114 @@
+"""What each vessel's results rest on, told by a few reads of whole tables instead of many reads a vessel.
+
+A vessel whose state is the one that her last reprocessing left has nothing to do: the same bytes, profile and code
+give the same sets. The state is compared by its digest, never by a time.
+"""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from typing import Any
+
+import kempf.warehouse as storage
+from kempf import flows
+from kempf.warehouse import code_version, delta
+from kempf.warehouse.canonical import canonical_json, sha256
+from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.store import Warehouse
+
+#: Sorted, so that the order of rows in the tables does not count.
+_Rows = Sequence[Mapping[str, Any]]
+
+
+@dataclass(frozen=True)
+class VesselState:
+    """What one vessel stands at.
+
+    Attributes
+    ----------
+    vessel : str
+    profile_sha256 : str
+        Of her current profile; blank where she has none.
+    log_ids, ingest_ids : tuple of str
+        Her logs by their bytes, and how each was last read; sorted.
+    set_ids : tuple of str
+        Her parameter sets, sorted.
+    aliases : tuple of (str, str)
+        What her aliases point to, sorted.
+    """
+
+    vessel: str
+    profile_sha256: str = ""
+    log_ids: tuple[str, ...] = ()
+    ingest_ids: tuple[str, ...] = ()
+    set_ids: tuple[str, ...] = ()
+    aliases: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def inputs(self) -> tuple[str, tuple[str, ...]]:
+        """What reprocessing starts from and does not change itself."""
+        return self.profile_sha256, self.log_ids
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 of the state and of the code that is responsible for it, 64 hex digits."""
+        told = [self.vessel, *self.inputs, self.ingest_ids, self.set_ids, self.aliases]
+        return sha256(canonical_json([responsible_code(), *told]))
+
+
+@cache
+def responsible_code() -> list[str]:
+    """Return the fingerprints of the code that makes results, and of the code that decides which are made."""
+    return [code_version.fingerprint(), code_version.fingerprint_of_packages(flows, storage)]
+
+
+def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> dict[str, VesselState]:
+    """Return the state of some vessels or of all, from four reads.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessels : iterable of str, optional
+        Also those that the warehouse does not know; all of its vessels by default.
+
+    Returns
+    -------
+    dict of str to VesselState
+        By vessel, sorted by name.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    asked = None if vessels is None else sorted(set(vessels))
+    where = {} if asked is None else {"vessel_key": [vessel_key(name) for name in asked]}
+
+    def rows(table: str, *columns: str) -> dict[str, list[dict[str, Any]]]:
+        found: dict[str, list[dict[str, Any]]] = defaultdict(list)
+        frame = delta.read(warehouse, table, where, ("vessel", *columns))
+        for row in frame.sort(frame.columns, nulls_last=True).rows(named=True):
+            found[row["vessel"]].append(row)
+        return found
+
+    profiles = rows("vessels", "revision", "profile_sha256")
+    ingests = rows("logs", "revision", "log_id", "ingest_id")
+    sets = rows("parameter_sets", "parameter_set_id")
+    pointers = rows("aliases", "alias", "parameter_set_id")
+    names = sorted(profiles) if asked is None else asked
+    return {name: _state(name, profiles[name], ingests[name], sets[name], pointers[name]) for name in names}
+
+
+def _state(vessel: str, profiles: _Rows, ingests: _Rows, sets: _Rows, pointers: _Rows) -> VesselState:
+    current = {row["log_id"]: row["ingest_id"] for row in ingests}  # the highest revision stays
+    return VesselState(
+        vessel,
+        profiles[-1]["profile_sha256"] if profiles else "",
+        tuple(sorted(current)),
+        tuple(sorted(current.values())),
+        tuple(row["parameter_set_id"] for row in sets),
+        tuple((row["alias"], row["parameter_set_id"]) for row in pointers),
+    )

@@ -1,0 +1,288 @@
+"""The job that puts a vessel's runs beside what a parameter set predicts of them. Nothing is stored."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kempf.flows.jobs.pool_vessel import ALIAS as POOLED_ALIAS
+from kempf.flows.jobs.vessel_model import ALIAS, Own, known_effects, named
+from kempf.flows.jobs.vessel_runs import assembled, choose
+from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.compare.compared_run import compare_run
+from kempf.pipeline.compare.comparison import ComparedRun, judged, summary
+from kempf.pipeline.compare.misfit import where
+from kempf.pipeline.compare.overshoot import Turn, turns_of
+from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.levels import fit_levels
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.search.pooled_start import Start
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.predict.horizon import Horizon, horizon_of
+from kempf.pipeline.predict.run_residuals import phases_s
+from kempf.schemas.errors import DataRejected, NotFound, UsageError
+from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from kempf.warehouse import aliases, parameter_sets, segments, vessels
+from kempf.warehouse.deduplicate import once, same
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
+
+#: aliases asked for in this order where no set is named: a model with effects, one hull of all runs, one of a run
+ALIASES = (ALIAS, POOLED_ALIAS, aliases.CURRENT)
+
+
+@dataclass(frozen=True, eq=False)
+class Comparison:
+    """A vessel's runs beside what a parameter set predicts of them.
+
+    Attributes
+    ----------
+    vessel : str
+    parameter_set : ParameterSet
+    alias : str or None
+        By which the set was chosen; None where it was named.
+    horizon : Horizon
+    runs : tuple of ComparedRun
+        In order of time.
+    found : tuple of Segment
+        One a run.
+    skipped : dict of str to str
+        Why a segment is not among them, by its id.
+    """
+
+    vessel: str
+    parameter_set: ParameterSet
+    alias: str | None
+    horizon: Horizon
+    runs: tuple[ComparedRun, ...]
+    found: tuple[Segment, ...]
+    skipped: dict[str, str]
+
+    def show(self) -> dict[str, Any]:
+        """Return the comparison as the command line's JSON object."""
+        sample, error = judged(self.runs)
+        return {
+            "vessel": self.vessel,
+            "parameter_set_id": self.parameter_set.parameter_set_id,
+            "alias": self.alias,
+            "estimator": self.parameter_set.estimator,
+            "effects": list(self.parameter_set.model_spec.get("effects", ())),
+            "horizon": self.horizon.name,
+            "horizon_words": self.horizon.words,
+            "runs": [
+                {
+                    **run.show(),
+                    "psi0_deg": segment.psi0_deg,
+                    "delta0_deg": segment.delta0_deg,
+                    "start": segment.show("")["start"],
+                    "end": segment.show("")["end"],
+                }
+                for run, segment in zip(self.runs, self.found, strict=True)
+            ],
+            "summary": summary(self.runs),
+            "judged": {"sample": sample, "free_run_error_percent": error},
+            "skipped": self.skipped,
+        }
+
+    def where(self) -> dict[str, Any]:
+        """Say where the model fails, on fitted and on held-out runs apart; None where there are no such runs."""
+        found: dict[str, Any] = {}
+        for sample in ("fitted", "held_out"):
+            looked = [run.looked for run in self.runs if run.sample == sample]
+            found[sample] = where(looked) if looked else None
+        return found
+
+
+def compare_vessel(
+    warehouse: Warehouse,
+    vessel: str,
+    set_id: str | None = None,
+    horizon: str = "free",
+    progress: Progress = silent,
+) -> Comparison:
+    """Put every usable run of a vessel beside what a parameter set predicts of it.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    set_id : str, optional
+        Parameter set; by default that of the first of `ALIASES` that the vessel has.
+    horizon : str, optional
+        See `kempf.pipeline.predict.horizon.horizon_of`.
+    progress : Progress, optional
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter_set``, ``no_runs``, ``no_segments``, ``effect_unknown``.
+    UsageError
+        ``set_of_another_vessel``, ``horizon_unknown``.
+    DataRejected
+        ``set_without_parameters``, ``nothing_to_compare``.
+    """
+    asked = horizon_of(horizon)
+    vessels.require(warehouse, vessel)
+    chosen, alias = _chosen(warehouse, vessel, set_id)
+    hull, values, model = _parameters(chosen)
+    usable = choose(warehouse, vessel, progress)
+    data = assembled(warehouse, usable, ModelSpec.model_validate(dict(chosen.model_spec)), progress)
+    by_name = {segment.segment_id: segment for segment in usable.segments}
+    ordered = [by_name[run.name] for run in data.runs]
+    seen = _seen(warehouse, vessel, chosen)
+    held = [not _is_seen(segment, seen) for segment in ordered]
+    filtered = [Filtered(run, model, data.spec) for run in data.runs]
+    progress(0, len(filtered), "predicting")
+    levels = _levels(filtered, held, hull, values, chosen, data.start)
+    runs, found, skipped = [], [], dict(data.skipped)
+    for k, (one, segment) in enumerate(zip(filtered, ordered, strict=True)):
+        progress(k, len(filtered), f"predicting {segment.segment_id}")
+        try:
+            compared = compare_run(
+                *(one, Point(hull, values, levels[k].foreseen), asked),
+                held_out=held[k],
+                levels_from=levels[k].told,
+                own_levels=levels[k].own,
+                phases=phases_s(segment.detail.get("phases", ()), one.run.start_utc_ns),
+                turns=_turns(segment, one.run),
+            )
+        except DataRejected as error:
+            skipped[segment.segment_id] = error.message
+            continue
+        runs.append(compared)
+        found.append(segment)
+    progress(len(filtered), len(filtered), "predicted")
+    if not runs:
+        raise DataRejected(
+            "nothing_to_compare",
+            f"{chosen.parameter_set_id} predicts none of the {len(filtered)} runs of {vessel!r}: "
+            + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:3]),
+            "Ask for another horizon, or compare another parameter set with --set.",
+            {"skipped": skipped},
+        )
+    return Comparison(vessel, chosen, alias, asked, tuple(runs), tuple(found), skipped)
+
+
+def _chosen(warehouse: Warehouse, vessel: str, set_id: str | None) -> tuple[ParameterSet, str | None]:
+    if set_id is not None:
+        found = parameter_sets.get(warehouse, set_id)
+        if found.vessel != vessel:
+            raise UsageError(
+                "set_of_another_vessel",
+                f"{found.parameter_set_id} is a parameter set of {found.vessel!r}, not of {vessel!r}.",
+                f"List hers with `kempf params list --vessel {vessel!r}`.",
+                {"parameter_set_id": found.parameter_set_id, "vessel": found.vessel},
+            )
+        return found, None
+    pointed = aliases.of_vessel(warehouse, vessel)
+    for alias in ALIASES:
+        if alias in pointed:
+            return parameter_sets.get(warehouse, pointed[alias]), alias
+    raise NotFound(
+        "no_parameter_set",
+        f"{vessel!r} has no parameter set to compare with her runs.",
+        f"Make one with `kempf identify --vessel {vessel!r}`.",
+        {"vessel": vessel},
+    )
+
+
+def _parameters(chosen: ParameterSet) -> tuple[Float, Float, Augmented]:
+    """Return hull, parameters of the effects, and the model that they belong to."""
+    known = known_effects(Own.from_json(chosen.settings.get("own") or {}))
+    model = Augmented(named(chosen.model_spec.get("effects", ()), known))
+    found = {p.name: p.value for p in chosen.parameters}
+    names = (*HULL_PARAMETERS, *model.names)
+    lacking = [name for name in names if not np.isfinite(found.get(name, np.nan))]
+    if lacking:
+        raise DataRejected(
+            "set_without_parameters",
+            f"{chosen.parameter_set_id} has no value for {', '.join(lacking)}, which a prediction needs.",
+            "Compare a set with all six parameters; `kempf params list` names them.",
+            {"lacking": lacking},
+        )
+    values = np.array([found[name] for name in names])
+    return values[: len(HULL_PARAMETERS)], values[len(HULL_PARAMETERS) :], model
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """What a set was identified from: ids, bounds by log, and those of its segments that are still found."""
+
+    ids: frozenset[str]
+    bounds: tuple[tuple[str, int, int], ...]
+    found: tuple[Segment, ...]
+
+
+def _seen(warehouse: Warehouse, vessel: str, chosen: ParameterSet) -> _Seen:
+    inputs: Mapping[str, Any] = chosen.provenance.get("inputs") or {}
+    told = chosen.convergence
+    unseen = {*(told.get("held_out") or ()), *(told.get("left_out") or ())}
+    bounds = list(inputs.get("segments", ()))
+    # a model with effects names its held-out runs among its segments, in the order of the bounds
+    names = chosen.settings.get("segments") or [""] * len(bounds)
+    kept = [b for name, b in zip(names, bounds, strict=True) if name not in unseen]
+    ids = frozenset(chosen.segment_ids) - unseen
+    found = tuple(s for s in segments.current(warehouse, vessel) if s.segment_id in ids)
+    return _Seen(ids, tuple((b["log_id"], b["start_utc_ns"], b["end_utc_ns"]) for b in kept), found)
+
+
+def _is_seen(segment: Segment, seen: _Seen) -> bool:
+    """Tell whether a set was identified from a segment, under this id, with other bounds, or from another log of it."""
+    return (
+        segment.segment_id in seen.ids
+        or any(
+            log_id == segment.log_id and start < segment.end_utc_ns and segment.start_utc_ns < end
+            for log_id, start, end in seen.bounds
+        )
+        or any(len(once([segment, other], same)[0]) == 1 for other in seen.found)
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Levels:
+    """Noise levels of one run, logarithms, shape (6,): to predict with, and fitted to the run itself."""
+
+    foreseen: Float
+    own: Float
+    told: str
+
+
+def _levels(
+    filtered: list[Filtered], held: list[bool], hull: Float, values: Float, chosen: ParameterSet, start: Start
+) -> list[_Levels]:
+    """Return the noise levels of each run; a held-out run is predicted with the mean of the fitted ones' logarithms."""
+    kept: Mapping[str, Any] = chosen.convergence.get("levels") or {}
+    own, told = [], []
+    for k, one in enumerate(filtered):
+        if one.run.name in kept and not held[k]:
+            own.append(np.array(kept[one.run.name], dtype=np.float64))
+            told.append("fitted with the parameters")
+        else:
+            found = fit_levels(one, hull, values, start.levels[k])
+            own.append(found.levels)
+            told.append("fitted to this run, parameters held" + ("" if found.converged else "; not converged"))
+    seen = [levels for levels, out in zip(own, held, strict=True) if not out]
+    mean = np.mean(seen, axis=0) if seen else None
+    return [
+        _Levels(levels, levels, words)
+        if mean is None or not out
+        else _Levels(mean, levels, "mean of the fitted runs' logarithms; in where: fitted to this run, parameters held")
+        for levels, out, words in zip(own, held, told, strict=True)
+    ]
+
+
+def _turns(segment: Segment, run: Run) -> tuple[Turn, ...]:
+    def seconds(ns: int) -> float:
+        return (ns - run.start_utc_ns) / SECOND_NS
+
+    overshoots = [
+        (o["number"], 1 if o["side"] == "starboard" else -1, seconds(o["peak_utc_ns"]), o["beyond_nominal_deg"])
+        for o in segment.detail.get("overshoots", ())
+    ]
+    return turns_of(overshoots, [seconds(t) for t in segment.executes_utc_ns], seconds(segment.end_utc_ns))

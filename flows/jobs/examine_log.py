@@ -1,0 +1,86 @@
+"""The job of the channel doctor: one log read with a profile, examined, its verdict with the profile lines."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kempf.flows.jobs.files import opened_log
+from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.spool import spooled
+from kempf.pipeline.channels.doctor.corrections import entries
+from kempf.pipeline.channels.doctor.examine import Examination, examine
+from kempf.pipeline.channels.doctor.log import Log
+from kempf.pipeline.channels.doctor.verdict import told
+from kempf.pipeline.channels.instruments import Instruments, from_readings
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import logs, vessels
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True, eq=False)
+class Examined:
+    """One log and what the doctor found.
+
+    Attributes
+    ----------
+    file_name, format : str
+    log : Log
+        The channels as they came.
+    examination : Examination
+    content : dict
+        The same as JSON content, with the profile lines.
+    """
+
+    file_name: str
+    format: str
+    log: Log
+    examination: Examination
+    content: dict[str, Any]
+
+
+def examine_instruments(instruments: Instruments, profile: VesselProfile, file_name: str, log_format: str) -> Examined:
+    """Examine the channels of one log; nothing is stored.
+
+    Parameters
+    ----------
+    instruments : Instruments
+    profile : VesselProfile
+        With which they were read.
+    file_name : str
+    log_format : {"delimited", "mcap", "nmea"}
+    """
+    known = entries(profile.source_for(file_name), log_format, instruments.sources)
+    units = {channel: mapped.unit for channel, (_, mapped) in known.items()}
+    log = Log.of(instruments, profile.length_m, units)
+    found = examine(log)
+    return Examined(file_name, log_format, log, found, told(found, known, log_format))
+
+
+def examine_file(path: Path, profile: VesselProfile) -> Examined:
+    """Read and examine a raw log that no warehouse knows.
+
+    Raises
+    ------
+    KempfError
+        The log cannot be read.
+    """
+    with opened_log(path) as log, spooled(path.name, log, profile) as read:
+        return examine_instruments(from_readings(read.lazy()), profile, path.name, read.format)
+
+
+def examine_held(warehouse: Warehouse, name: str) -> Examined:
+    """Examine a log of the warehouse, by a beginning of its id or by its file name.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_log``.
+    UsageError
+        ``ambiguous_log``.
+    """
+    row = logs.by_prefix(warehouse, name)
+    profile = vessels.get(warehouse, row.profile_sha256)
+    channels = channels_of(warehouse, row.ingest_id)
+    return examine_instruments(channels, profile, row.file_name, row.format)

@@ -1,0 +1,215 @@
+"""The files a person hands over: vessel profiles and model specifications in YAML, raw logs as bytes."""
+
+from __future__ import annotations
+
+import stat
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any, BinaryIO
+
+import yaml
+from pydantic import ValidationError
+
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas import profile as profiles
+from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
+from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.profile import VesselProfile
+
+#: Keys and values in a file that a person wrote; a few hundred bytes of nested aliases can stand for billions.
+_MOST_NODES = 100_000
+
+#: Brackets that may stand within each other; a profile has two or three.
+_DEEPEST = 32
+
+
+#: Largest file that is read whole, bytes: a person writes some thousand, and what takes the parser of YAML a second is
+#: refused. A raw log is opened, and its reader says what is too much.
+LARGEST_BYTES = 1 << 16
+
+
+def read_bytes(path: Path, what: str) -> bytes:
+    """Return the bytes of a file.
+
+    Raises
+    ------
+    KempfError
+        What `_opened` raises.
+    DataRejected
+        ``file_too_large``.
+    """
+    with _opened(path, what) as stream:
+        file = LogFile(stream)
+        if file.size > LARGEST_BYTES:
+            raise DataRejected(
+                "file_too_large",
+                f"{path} has {file.size} bytes; a {what} of more than {LARGEST_BYTES} is not read.",
+                "Look whether it is the right file; a long profile may be given as several files.",
+                {"path": str(path), "bytes": file.size},
+            )
+        return file.whole()
+
+
+@contextmanager
+def opened_log(path: Path) -> Iterator[LogFile]:
+    """Open a raw log; its reader takes of it what it needs at a time.
+
+    Raises
+    ------
+    KempfError
+        What `_opened` raises.
+    """
+    with _opened(path, "raw log") as stream:
+        yield LogFile(stream)
+
+
+@contextmanager
+def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
+    """Open a file.
+
+    Raises
+    ------
+    NotFound
+        ``no_such_file``.
+    UsageError
+        ``path_is_directory``, ``not_a_file``: a folder, a device or a pipe was given where a file is expected.
+    KempfError
+        ``file_unreadable``: it is there but cannot be opened.
+    """
+    try:
+        found = path.stat()
+        if stat.S_ISDIR(found.st_mode):
+            raise IsADirectoryError
+        if not stat.S_ISREG(found.st_mode):
+            raise UsageError(
+                "not_a_file",
+                f"{path} is a device, a pipe or a socket; a {what} is a file.",
+                "Write it to a file first and give that.",
+                {"path": str(path)},
+            )
+        stream = path.open("rb")
+    except FileNotFoundError as error:
+        beside = sorted(p.name for p in path.parent.iterdir())[:5] if path.parent.is_dir() else []
+        raise NotFound(
+            "no_such_file",
+            f"There is no {what} at {path}.",
+            f"Check the path; the folder holds {', '.join(beside)}." if beside else "Check the path.",
+            {"path": str(path)},
+        ) from error
+    except IsADirectoryError as error:
+        raise UsageError(
+            "path_is_directory",
+            f"{path} is a folder; a {what} is a file.",
+            f"Give its files, as in {path}/*.",
+            {"path": str(path)},
+        ) from error
+    except OSError as error:
+        raise KempfError(
+            "file_unreadable",
+            f"Reading the {what} {path} failed: {error.strerror or error}.",
+            "Look at the path and at the file's permissions.",
+            {"path": str(path)},
+        ) from error
+    with stream:
+        yield stream
+
+
+def read_yaml(path: Path, what: str) -> Any:
+    """Return what a YAML file says.
+
+    Raises
+    ------
+    UsageError
+        ``not_yaml``: it is no YAML; the place is named. ``yaml_too_large``: its aliases stand for more than a person
+        writes.
+    """
+    data = read_bytes(path, what)
+    try:
+        loader = _Loader(data)
+        root = loader.get_single_node()
+        too_large = root is not None and _written_out(root, {}) > _MOST_NODES
+        content = None if root is None or too_large else loader.construct_document(root)
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError) as error:
+        told = " ".join(str(error).split())
+        raise UsageError(
+            "not_yaml",
+            f"The {what} {path} is not valid YAML: {told}.",
+            "Mend the line it names.",
+            {"path": str(path)},
+        ) from error
+    except RecursionError as error:
+        raise UsageError(
+            "not_yaml", f"The {what} {path} is nested too deep to be read.", "Write it flat.", {"path": str(path)}
+        ) from error
+    if too_large:
+        raise UsageError(
+            "yaml_too_large",
+            f"The {what} {path} stands for more than {_MOST_NODES} keys and values once its aliases are written out.",
+            "Write it without nested aliases.",
+            {"path": str(path)},
+        )
+    return content
+
+
+class _Loader(yaml.SafeLoader):
+    """Refuses deep nesting at once: each further level costs the parser more than the one before."""
+
+    def fetch_flow_collection_start(self, token_class: type[yaml.Token]) -> None:
+        if self.flow_level >= _DEEPEST:
+            raise yaml.scanner.ScannerError(None, None, f"nested deeper than {_DEEPEST} brackets", self.get_mark())
+        super().fetch_flow_collection_start(token_class)
+
+
+def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
+    """Return how many keys and values a node stands for, each alias counted as what it stands for."""
+    if id(node) not in known:
+        known[id(node)] = _MOST_NODES + 1  # what a node counts for that holds itself
+        below = node.value if isinstance(node, yaml.SequenceNode) else []
+        if isinstance(node, yaml.MappingNode):
+            below = [one for pair in node.value for one in pair]
+        known[id(node)] = 1 + sum(_written_out(one, known) for one in below)
+    return known[id(node)]
+
+
+def read_profiles(paths: Sequence[Path]) -> VesselProfile:
+    """Read vessel profiles and lay them over each other.
+
+    Raises
+    ------
+    UsageError
+        One is no profile, or two disagree.
+    """
+    return profiles.merge([(str(p), profiles.parse(read_yaml(p, "vessel profile"), str(p))) for p in paths])
+
+
+def read_model(path: Path) -> ModelSpec:
+    """Read a model specification.
+
+    Raises
+    ------
+    UsageError
+        ``model_invalid``: every fault is named with its place. ``model_unknown``: it asks for a
+        base or an effect that is not there.
+    """
+    content = read_yaml(path, "model specification")
+    try:
+        spec = ModelSpec.model_validate(content)
+    except ValidationError as error:
+        faults = [f"{'.'.join(str(p) for p in e['loc']) or 'model'}: {e['msg']}" for e in error.errors()]
+        raise UsageError(
+            "model_invalid",
+            f"{path} is not a valid model specification: {'; '.join(faults)}.",
+            f"Its keys are {', '.join(ModelSpec.model_fields)}.",
+            {"faults": faults},
+        ) from error
+    known = ModelSpec()
+    if spec.base != known.base or spec.effects:
+        asked = [f"base {spec.base!r}"] * (spec.base != known.base) + [f"effect {name!r}" for name in spec.effects]
+        raise UsageError(
+            "model_unknown",
+            f"{path} asks for {', '.join(asked)}, which this version cannot identify.",
+            f"Use base {known.base!r} without effects.",
+            {"base": spec.base, "effects": list(spec.effects)},
+        )
+    return spec

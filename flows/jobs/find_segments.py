@@ -1,0 +1,92 @@
+"""The job that finds the zigzags of one ingest, as they are stored."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.estimate.no_log.companions import has_log, shaft_speed
+from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.imo import judge
+from kempf.pipeline.segment.lateral import lateral_summary
+from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse.code_version import fingerprint
+from kempf.warehouse.segments import Segment, segment_id
+
+
+@dataclass(frozen=True)
+class Ingest:
+    """Whose log it is, and the ids of the log and of this reading of it."""
+
+    vessel: str
+    log_id: str
+    ingest_id: str
+
+
+def find_segments(
+    ingest: Ingest, profile: VesselProfile, instruments: Instruments
+) -> tuple[list[Segment], tuple[str, ...]]:
+    """Find the zigzags of one ingest; nothing is stored.
+
+    Parameters
+    ----------
+    ingest : Ingest
+    profile : VesselProfile
+    instruments : Instruments
+        Its channels.
+
+    Returns
+    -------
+    list of Segment
+    tuple of str
+        What a person should know: choices made in normalising, or the channel whose absence forbids the search.
+    """
+    heading, rudder = instruments.get("heading"), instruments.get("rudder_angle")
+    absent = [name for name, series in (("heading", heading), ("rudder_angle", rudder)) if series is None]
+    if heading is None or rudder is None:
+        missing = " and ".join(absent)
+        note = f"no {missing} in this log: zigzags cannot be looked for; map it in the profile if the log has it"
+        return [], (*instruments.notes, note)
+    speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
+    found = [_segment(zigzag, ingest, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)]
+    return found, instruments.notes
+
+
+def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
+    criteria = judge(zigzag, profile.length_m, profile.trial_speed_m_s)
+    return Segment(
+        segment_id=segment_id(ingest.log_id, zigzag.kind, zigzag.start_utc_ns, zigzag.end_utc_ns),
+        vessel=ingest.vessel,
+        log_id=ingest.log_id,
+        ingest_id=ingest.ingest_id,
+        kind=zigzag.kind,
+        psi0_deg=zigzag.psi0_deg,
+        delta0_deg=zigzag.delta0_deg,
+        first_side=zigzag.first_side,
+        base_heading_deg=zigzag.base_heading_deg,
+        start_utc_ns=zigzag.start_utc_ns,
+        end_utc_ns=zigzag.end_utc_ns,
+        executes_utc_ns=zigzag.executes_utc_ns,
+        overshoots_deg=tuple(o.beyond_nominal_deg for o in zigzag.overshoots),
+        code_version=fingerprint(),
+        imo={criterion.name: _without_name(asdict(criterion)) for criterion in criteria},
+        quality=asdict(zigzag.quality),
+        detail={
+            "psi0_measured_deg": zigzag.psi0_measured_deg,
+            "delta0_measured_deg": zigzag.delta0_measured_deg,
+            "executes": [asdict(execute) for execute in zigzag.executes],
+            "overshoots": [asdict(overshoot) for overshoot in zigzag.overshoots],
+            "phases": [asdict(phase) for phase in zigzag.phases],
+            "speed": asdict(zigzag.speed) if zigzag.speed else None,
+            "lateral_speed": lateral_summary(instruments, zigzag),
+            # which other zigzags may help one without a log is decided before any is read again
+            "has_log": has_log(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
+            "shaft_speed_per_s": shaft_speed(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
+        },
+    )
+
+
+def _without_name(criterion: dict[str, Any]) -> dict[str, Any]:
+    return {key: value for key, value in criterion.items() if key != "name"}

@@ -1,0 +1,265 @@
+"""The job that takes raw logs in: read, deposit, find the zigzags."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kempf.flows.jobs.examine_log import examine_instruments
+from kempf.flows.jobs.files import opened_log
+from kempf.flows.jobs.find_segments import Ingest, find_segments
+from kempf.flows.jobs.spool import spooled
+from kempf.flows.jobs.unreadable_stretches import as_json
+from kempf.flows.process.progress import Progress, silent
+from kempf.flows.process.release_memory import give_back
+from kempf.flows.process.wrap_error import as_told
+from kempf.pipeline.channels.instruments import Instruments, from_readings
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.readings import LogReadings, LostStretch, Tally
+from kempf.schemas.errors import KempfError, UsageError
+from kempf.schemas.profile import VesselProfile, overlay
+from kempf.warehouse import code_version, examinations, logs, lost, segments, vessels
+from kempf.warehouse.deposit import Delivery, Deposit, deposit, held
+from kempf.warehouse.examinations import StoredExamination
+from kempf.warehouse.keys import ingest_id, vessel_key
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class IngestOutcome:
+    """What became of one file.
+
+    Attributes
+    ----------
+    path : str
+        As given.
+    outcome : str
+        ``new``, ``reread``, ``unchanged`` or ``failed``.
+    log_id, ingest_id : str or None
+    tally : Tally or None
+        Records and values read, kept and rejected.
+    notes : tuple of str
+        How it was read, and why zigzags could not be looked for, where that is so.
+    segments : tuple of Segment
+        Found in this log.
+    lost : tuple of LostStretch
+        What of a damaged log could not be read.
+    examination : StoredExamination or None
+        What the channel doctor found in it.
+    error : KempfError or None
+        Why it failed; then nothing of the log was stored.
+    """
+
+    path: str
+    outcome: str
+    log_id: str | None = None
+    ingest_id: str | None = None
+    tally: Tally | None = None
+    notes: tuple[str, ...] = ()
+    segments: tuple[Segment, ...] = ()
+    lost: tuple[LostStretch, ...] = ()
+    examination: StoredExamination | None = None
+    error: KempfError | None = None
+
+    def show(self) -> dict[str, Any]:
+        """Return the outcome as JSON content."""
+        return {
+            "path": self.path,
+            "outcome": self.outcome,
+            "log_id": self.log_id,
+            "ingest_id": self.ingest_id,
+            "records": _ledger(self.tally, "records"),
+            "values": _ledger(self.tally, "values"),
+            "rejected_by_reason": dict(self.tally.by_reason) if self.tally else {},
+            "notes": list(self.notes),
+            "partial": bool(self.lost),
+            "lost": as_json(self.lost),
+            "segments": [segment.segment_id for segment in self.segments],
+            "channels": _channels(self.examination),
+            **(self.error.to_json() if self.error else {}),
+        }
+
+
+def _ledger(tally: Tally | None, of: str) -> dict[str, int] | None:
+    if tally is None:
+        return None
+    return {part: getattr(tally, f"{of}_{part}") for part in ("read", "kept", "rejected")}
+
+
+def _channels(examination: StoredExamination | None) -> dict[str, Any] | None:
+    if examination is None:
+        return None
+    return {"verdict": examination.verdict, "findings": examination.content.get("findings", [])}
+
+
+def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile | None) -> tuple[str, VesselProfile]:
+    """Say whose logs they are and with which profile they are read.
+
+    A given profile is laid over the stored one: what it says is new, what it leaves out stays.
+
+    Raises
+    ------
+    UsageError
+        ``no_vessel_named``, ``vessel_name``: the name is blank, or ``profiles_disagree``: the option and the profile
+        name different vessels.
+    """
+    told = given.vessel if given else None
+    if vessel is not None and told is not None and vessel != told:
+        raise UsageError(
+            "profiles_disagree",
+            f"--vessel says {vessel!r}, the profile says {told!r}.",
+            "Make them agree, or leave one of them out.",
+            {"option": vessel, "profile": told},
+        )
+    name = vessel if vessel is not None else told
+    if name is None:
+        raise UsageError(
+            "no_vessel_named",
+            "Whose logs are these? Neither --vessel nor a profile names the vessel.",
+            "Add --vessel NAME.",
+        )
+    vessel_key(name)  # refuses a name that is none once, not for every log
+    known = warehouse.exists() and name in vessels.names(warehouse)
+    stored = vessels.current(warehouse, name) if known else VesselProfile()
+    return name, overlay(stored, given or VesselProfile()).model_copy(update={"vessel": name})
+
+
+def ingest(
+    warehouse: Warehouse,
+    paths: Sequence[Path],
+    vessel: str | None = None,
+    given: VesselProfile | None = None,
+    progress: Progress = silent,
+) -> list[IngestOutcome]:
+    """Take logs in; one that fails does not stop the others, and leaves nothing behind.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none, with the first log that can be read.
+    paths : sequence of Path
+        Raw logs.
+    vessel : str, optional
+        Whose they are; else the profile tells.
+    given : VesselProfile, optional
+        Laid over the stored profile of the vessel.
+    progress : Progress, optional
+
+    Returns
+    -------
+    list of IngestOutcome
+        One a path, in order.
+
+    Raises
+    ------
+    UsageError
+        Nobody says whose the logs are, or two say different things.
+    """
+    name, profile = settle_vessel(warehouse, vessel, given)
+    outcomes = []
+    for done, path in enumerate(paths):
+        progress(done, len(paths), f"reading {path.name}")
+        try:
+            with opened_log(path) as log:
+                outcomes.append(ingest_log(warehouse, name, path.name, log, profile, str(path)))
+        except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
+            outcomes.append(IngestOutcome(str(path), "failed", error=as_told(error)))
+    progress(len(paths), len(paths), "done")
+    return outcomes
+
+
+def ingest_log(
+    warehouse: Warehouse, vessel: str, file_name: str, log: LogFile, profile: VesselProfile, path: str
+) -> IngestOutcome:
+    """Take one log in.
+
+    Raises
+    ------
+    KempfError
+        The log cannot be read, or is another vessel's; nothing of it was stored.
+    """
+    code = code_version.fingerprint()
+    there = held(warehouse, vessel, file_name, log, profile_sha256=profile.sha256, code_version=code)
+    if there is not None:
+        row = logs.of_ingest(warehouse, there.ingest_id)
+        found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
+        seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
+        gone = _lost(warehouse, row)
+        return IngestOutcome(
+            path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, lost=gone, examination=seen
+        )
+    with spooled(file_name, log, profile) as readings:
+        give_back(readings.tally.records_read)
+        read = look_through(vessel, file_name, log, profile, readings)
+        give_back(readings.tally.records_read)
+        (stored,) = store(warehouse, [read])
+    row = logs.of_ingest(warehouse, stored.ingest_id)
+    return IngestOutcome(
+        path,
+        stored.outcome,
+        row.log_id,
+        row.ingest_id,
+        row.tally,
+        row.notes,
+        read.segments,
+        lost=_lost(warehouse, row),
+        examination=read.examination,
+    )
+
+
+def _lost(warehouse: Warehouse, row: logs.LogRow) -> tuple[LostStretch, ...]:
+    return lost.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id, ())
+
+
+@dataclass(frozen=True, eq=False)
+class ReadLog:
+    """A log that was read and looked through; nothing of it is stored yet."""
+
+    delivery: Delivery
+    ingest_id: str
+    segments: tuple[Segment, ...]
+    examination: StoredExamination
+
+
+def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfile, readings: LogReadings) -> ReadLog:
+    """Find the zigzags of a log that was read, and compare its channels."""
+    code = code_version.fingerprint()
+    one = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code))
+    instruments = from_readings(readings.lazy())
+    give_back(readings.tally.records_read)
+    zigzags, notes = find_segments(one, profile, instruments)
+    give_back(readings.tally.records_read)
+    seen = _examined(one, profile, file_name, instruments, readings.format)
+    delivery = Delivery(vessel, file_name, log, profile, readings, code, notes)
+    return ReadLog(delivery, one.ingest_id, tuple(zigzags), seen)
+
+
+def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
+    """Store logs that were read, all of them in one commit a table.
+
+    Raises
+    ------
+    KempfError
+        One is another vessel's, or the warehouse cannot be written; then none of them counts.
+    """
+    # zigzags and verdicts before the rows that make the logs count: what a crash leaves in between is not seen, and not
+    # missed
+    segments.replace(warehouse, {(one.delivery.vessel, one.ingest_id): one.segments for one in read})
+    examinations.replace(warehouse, [one.examination for one in read])
+    return deposit(warehouse, [one.delivery for one in read])
+
+
+def _examined(
+    one: Ingest, profile: VesselProfile, file_name: str, instruments: Instruments, log_format: str
+) -> StoredExamination:
+    """Examine a log; should the doctor fail, that is the verdict, and the log is in all the same."""
+    try:
+        content = examine_instruments(instruments, profile, file_name, log_format).content
+    except Exception as error:  # noqa: BLE001 - a log is not lost because its channels could not be compared
+        content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(as_told(error))}
+    findings = tuple(finding["words"] for finding in content["findings"])
+    code = code_version.fingerprint()
+    return StoredExamination(one.vessel, one.ingest_id, one.log_id, code, content["verdict"], findings, content)

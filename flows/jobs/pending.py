@@ -1,0 +1,67 @@
+"""What was made and is not stored yet: parameter sets and what aliases shall point to, for one commit a table."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from kempf.warehouse import aliases, parameter_sets
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+#: New sets of a vessel that wait for one commit: less than a minute of work, which is what a crash may cost.
+_SETS_A_COMMIT = 8
+
+
+class Waiting:
+    """New sets of one vessel, and her aliases; a long list of sets is stored on the way.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    """
+
+    def __init__(self, warehouse: Warehouse, vessel: str) -> None:
+        self._warehouse, self._vessel = warehouse, vessel
+        self.sets: list[ParameterSet] = []
+        #: by vessel and alias
+        self.aliases: dict[tuple[str, str], str] = {}
+
+    def keep(self, made: Sequence[ParameterSet]) -> None:
+        """Take new sets."""
+        self.sets.extend(made)
+        if len(self.sets) >= _SETS_A_COMMIT:
+            # what cannot be stored is not tried again on the way out
+            made, self.sets = self.sets, []
+            parameter_sets.insert(self._warehouse, made)
+
+    def standing(self, alias: str = aliases.CURRENT) -> ParameterSet | None:
+        """Return the set that an alias points to, or will."""
+        stored = aliases.of_vessel(self._warehouse, self._vessel).get(alias)
+        name = self.aliases.get((self._vessel, alias), stored)
+        if name is None:
+            return None
+        made = next((one for one in self.sets if one.parameter_set_id == name), None)
+        return made or parameter_sets.get(self._warehouse, name)
+
+    def point(self, parameter_set_id: str, alias: str = aliases.CURRENT) -> None:
+        """Let an alias point to one of her sets, once that is stored."""
+        self.aliases[self._vessel, alias] = parameter_set_id
+
+
+@contextmanager
+def waiting(warehouse: Warehouse, vessel: str) -> Iterator[Waiting]:
+    """Lend a list, and store what is in it also where the block is left by an error."""
+    one = Waiting(warehouse, vessel)
+    try:
+        yield one
+    finally:
+        store(warehouse, [one])
+
+
+def store(warehouse: Warehouse, lists: Sequence[Waiting]) -> None:
+    """Store what waits of several vessels, in one commit a table."""
+    parameter_sets.insert(warehouse, [made for one in lists for made in one.sets])
+    # behind the sets: an alias never points to what is not there
+    aliases.point_all(warehouse, {key: name for one in lists for key, name in one.aliases.items()})

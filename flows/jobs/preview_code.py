@@ -1,0 +1,183 @@
+"""The job that says which parameter sets the present code would move, and by how much, before it is adopted.
+
+It is the very job of `flows.jobs.reprocess_vessel`, done in a warehouse that is thrown away: what adopting the code
+would do is done, not guessed. The warehouse that is asked about is only read.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any
+
+from kempf.flows.jobs.parameter_changes import Move, NewSet, paired
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.vessel_model import ALIAS, standing
+from kempf.flows.process.progress import Progress, silent
+from kempf.flows.process.wrap_error import as_told
+from kempf.schemas.errors import KempfError
+from kempf.warehouse import aliases, code_version, logs, parameter_sets, raw
+from kempf.warehouse import vessels as vessel_table
+from kempf.warehouse.keys import ingest_id
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class VesselPreview:
+    """What adopting the present code would do to the parameter sets of one vessel that stand.
+
+    Attributes
+    ----------
+    vessel : str
+    sets : int
+        Sets that stand: those of the logs as they were read last.
+    up_to_date : int
+        Of these, made by the present code already.
+    identical : int
+        Of the others, those that would say the same, bit for bit.
+    moves : tuple of Move
+        One a parameter of each of the others.
+    new : tuple of NewSet
+        Sets that would come with no counterpart, such as those of a zigzag that was not found before.
+    gone : tuple of str
+        Sets that would have no counterpart any more.
+    failures : tuple of dict
+        What the present code cannot do that is to be done, each with the error's JSON.
+    """
+
+    vessel: str
+    sets: int
+    up_to_date: int
+    identical: int = 0
+    moves: tuple[Move, ...] = ()
+    new: tuple[NewSet, ...] = ()
+    gone: tuple[str, ...] = ()
+    failures: tuple[dict[str, Any], ...] = field(default=())
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content, without the moves, which stand together for all vessels."""
+        return {
+            "vessel": self.vessel,
+            "sets": self.sets,
+            "up_to_date": self.up_to_date,
+            "identical": self.identical,
+            "moved": len({move.parameter_set_id for move in self.moves}),
+            "new": [one.show() for one in self.new],
+            "gone": list(self.gone),
+            "failures": list(self.failures),
+        }
+
+
+def preview_all(warehouse: Warehouse, vessels: Sequence[str] = (), progress: Progress = silent) -> list[VesselPreview]:
+    """Say what the present code would make of the parameter sets that stand; nothing is stored.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Only read.
+    vessels : sequence of str, optional
+        Only these; all by default.
+    progress : Progress, optional
+
+    Returns
+    -------
+    list of VesselPreview
+        Sorted by name. A vessel that cannot be done says why; the others are done.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    warehouse.require()
+    for vessel in vessels:
+        vessel_table.require(warehouse, vessel)
+    names = sorted(set(vessels)) or vessel_table.names(warehouse)
+    found = []
+    for done, vessel in enumerate(names):
+        progress(done, len(names), f"{vessel}: what would the present code make of her?")
+        try:
+            found.append(preview(warehouse, vessel))
+        except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
+            found.append(VesselPreview(vessel, 0, 0, failures=(_failure(vessel, as_told(error)),)))
+    progress(len(names), len(names), "done")
+    return found
+
+
+def preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
+    """Say what the present code would make of the parameter sets of one vessel that stand; nothing is stored.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    vessel_table.require(warehouse, vessel)
+    code = code_version.fingerprint()
+    stand = standing_sets(warehouse, vessel)
+    old = [one for one in stand if one.provenance["code_version"] != code]
+    ready = len(stand) - len(old)
+    if not old and all(row.code_version == code for row in logs.current(warehouse, vessel)):
+        return VesselPreview(vessel, ready, ready)
+    with _scratch() as scratch:
+        failures = _seed(warehouse, scratch, vessel)
+        report = reprocess_vessel(scratch, vessel)
+        now = [one for one in standing_sets(scratch, vessel) if one.provenance["code_version"] == code]
+    there = {one.parameter_set_id for one in parameter_sets.get_all(warehouse, vessel)}
+    found = paired(old, now)
+    return VesselPreview(
+        vessel,
+        sets=len(old) + ready,
+        up_to_date=ready,
+        identical=found.identical,
+        moves=found.moves,
+        new=tuple(one for one in found.new if one.parameter_set_id not in there),
+        gone=found.gone,
+        failures=(*failures, *report.failures),
+    )
+
+
+def standing_sets(warehouse: Warehouse, vessel: str) -> list[ParameterSet]:
+    """Return the parameter sets of a vessel that no newer reading of a log has superseded, by start, then id."""
+    present = {row.ingest_id for row in logs.current(warehouse, vessel)}
+    every = parameter_sets.get_all(warehouse, vessel)
+    return [one for one in every if present.issuperset(one.provenance["ingest_ids"])]
+
+
+@contextmanager
+def _scratch() -> Iterator[Warehouse]:
+    with TemporaryDirectory(prefix="kempf-preview-", ignore_cleanup_errors=True) as name:
+        scratch = Warehouse(str(Path(name) / "warehouse"))
+        scratch.create()
+        yield scratch
+
+
+def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[str, Any]]:
+    """Put into an empty warehouse what reprocessing starts from: profiles, logs, sets, models, aliases."""
+    failures = []
+    versions = vessel_table.versions(warehouse, vessel)
+    vessel_table.register_all(scratch, [(vessel, one.profile) for one in versions])
+    kept = []
+    for row in logs.current(warehouse, vessel):
+        try:
+            with raw.opened(warehouse, row.log_id) as log:
+                raw.put(scratch, log)
+            # as read by no code: what the present one has read there has no readings here
+            kept.append(replace(row, ingest_id=ingest_id(row.log_id, row.profile_sha256, ""), code_version=""))
+        except KempfError as error:
+            failures.append(_failure(row.file_name, error))
+    logs.record(scratch, kept)
+    # those that no longer stand, too: their models are brought up to date with the others
+    parameter_sets.insert(scratch, parameter_sets.get_all(warehouse, vessel))
+    model = standing(warehouse, vessel)
+    if model is not None:
+        aliases.point(scratch, vessel, model.parameter_set_id, alias=ALIAS)
+    return failures
+
+
+def _failure(what: str, error: KempfError) -> dict[str, Any]:
+    return {"what": what, **error.to_json()}

@@ -1,0 +1,297 @@
+"""The job that brings vessels up to date: logs read anew, zigzags found anew, parameter sets identified.
+
+What is new of several vessels is stored in one commit a table: a table of a large fleet has a file for every vessel,
+and each commit looks at all of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from functools import partial
+
+from kempf.flows.fleet.state import VesselState, fleet_state
+from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_segments
+from kempf.flows.jobs.pending import Waiting, store
+from kempf.flows.jobs.pool_vessel import POOLED, pool_segments
+from kempf.flows.jobs.refresh_logs import Refreshed, Stale, read_anew, stale_logs
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.vessel_model import ALIAS, ESTIMATOR, model_of, point, standing, store_model
+from kempf.flows.jobs.vessel_report import VesselReport, remember_all
+from kempf.flows.jobs.vessel_runs import choose
+from kempf.flows.process.commit_batch import together_or_each
+from kempf.flows.process.progress import Progress, silent
+from kempf.flows.process.wrap_error import as_told
+from kempf.schemas.errors import KempfError
+from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse import aliases, code_version, logs, parameter_sets, segments
+from kempf.warehouse.store import Warehouse
+
+
+def reprocess_vessel(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request | None = None,
+    *,
+    changed_only: bool = True,
+    flow_run: str | None = None,
+    progress: Progress = silent,
+) -> VesselReport:
+    """Bring one vessel up to date; parameters and result are those of `reprocess_vessels`."""
+    (report,) = reprocess_vessels(
+        warehouse, [vessel], request, changed_only=changed_only, flow_run=flow_run, progress=progress
+    )
+    return report
+
+
+def reprocess_vessels(
+    warehouse: Warehouse,
+    vessels: Sequence[str],
+    request: Request | None = None,
+    *,
+    changed_only: bool = True,
+    flow_run: str | None = None,
+    progress: Progress = silent,
+) -> list[VesselReport]:
+    """Bring vessels up to date with their profiles and the code.
+
+    A log read with the current profile and code is not read again, a set that is there is not identified again.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessels : sequence of str
+        Their logs and sets are held in memory together until they are stored: some, not a fleet.
+    request : Request, optional
+        Only this model and estimator; by default every one that a vessel was identified with before.
+    changed_only : bool, optional
+        False also builds every kept set again from the raw bytes and counts the verdicts.
+    flow_run : str, optional
+    progress : Progress, optional
+
+    Returns
+    -------
+    list of VesselReport
+        One a vessel, in the order given. Failures are in them: one bad log stops nothing, one bad vessel no other.
+    """
+    job = _Job(warehouse, request, flow_run, progress)
+    works = {vessel: _Work(VesselReport(vessel), Waiting(warehouse, vessel)) for vessel in vessels}
+    all_of_them = list(works.values())
+
+    def begin() -> None:
+        for vessel, state in fleet_state(warehouse, vessels).items():
+            works[vessel].before = state
+
+    def read() -> None:
+        stale = {w.vessel: w.stale for w in _going(all_of_them) if w.stale is not None}
+        for vessel, refreshed in read_anew(warehouse, stale, progress).items():
+            works[vessel].refreshed = refreshed
+
+    _together(all_of_them, begin)
+    _each(all_of_them, job.look)
+    _together(all_of_them, read)
+    try:
+        _each(all_of_them, job.identify)
+    finally:  # also where it is interrupted: what was identified need not be so again
+        new = {vessel: work.new for vessel, work in works.items()}
+        for vessel, error in together_or_each(new, partial(store, warehouse)).items():
+            works[vessel].report.new_sets -= len(new[vessel].sets)
+            works[vessel].stop(error)
+    _each(all_of_them, job.finish)
+    if not changed_only:
+        _each(all_of_them, lambda work: _verify(warehouse, work.vessel, work.report))
+    if request is None:
+        _together(all_of_them, lambda: _leave(warehouse, _going(all_of_them)))
+    estimator = request.estimator if request else None
+    runs = [(w.report, w.report.as_run(w.left, changed_only=changed_only, estimator=estimator)) for w in all_of_them]
+    _together(all_of_them, lambda: remember_all(warehouse, runs))
+    return [work.report for work in all_of_them]
+
+
+@dataclass
+class _Work:
+    """What is known of one vessel while she is brought up to date.
+
+    Attributes
+    ----------
+    left : str or None
+        Digest of the state in which nothing is left to do.
+    over : bool
+        Whether something failed after which there is nothing more to do for her.
+    """
+
+    report: VesselReport
+    new: Waiting
+    before: VesselState | None = None
+    requests: Sequence[Request] = ()
+    stale: Stale | None = None
+    refreshed: Refreshed | None = None
+    left: str | None = None
+    over: bool = False
+
+    @property
+    def vessel(self) -> str:
+        return self.report.vessel
+
+    def stop(self, error: Exception) -> None:
+        """Write a failure down after which the others go on without her."""
+        self.report.fail(self.vessel, as_told(error))
+        self.over = True
+
+
+def _going(works: Iterable[_Work]) -> list[_Work]:
+    return [work for work in works if not work.over]
+
+
+def _each(works: Iterable[_Work], step: Callable[[_Work], None]) -> None:
+    """Take a step for every vessel; where it fails the others go on."""
+    for work in _going(works):
+        try:
+            step(work)
+        except Exception as error:  # noqa: BLE001 - whatever it is, it is reported and the fleet goes on
+            work.stop(error)
+
+
+def _together(works: Sequence[_Work], step: Callable[[], None]) -> None:
+    """Take a step for all vessels at once; where it fails it has failed for each."""
+    try:
+        step()
+    except Exception as error:  # noqa: BLE001 - whatever it is, it is reported
+        for work in _going(works):
+            work.stop(error)
+
+
+@dataclass(frozen=True)
+class _Job:
+    """What is the same for every vessel."""
+
+    warehouse: Warehouse
+    request: Request | None
+    flow_run: str | None
+    progress: Progress
+
+    def look(self, work: _Work) -> None:
+        """See what there is to do."""
+        work.requests = _requests(self.warehouse, work.vessel, self.request)
+        work.stale = stale_logs(self.warehouse, work.vessel)
+
+    def identify(self, work: _Work) -> None:
+        """Identify what is not identified yet, every segment and all of them together."""
+        report, refreshed = work.report, work.refreshed
+        assert refreshed is not None and work.stale is not None
+        names = {row.ingest_id: row.file_name for row in work.stale.rows}
+        report.logs, report.reread = refreshed.logs, refreshed.reread
+        for ingest, error in refreshed.failed.items():
+            report.fail(names[ingest], error)
+        report.segments = len(segments.current(self.warehouse, work.vessel))
+        for one in work.requests if report.segments else ():
+            outcomes = identify_segments(
+                self.warehouse,
+                work.vessel,
+                one,
+                refreshed,
+                work.new,
+                adopt=False,
+                flow_run=self.flow_run,
+                progress=self.progress,
+            )
+            for outcome in outcomes:
+                if outcome.error is not None and outcome.segment.ingest_id not in refreshed.failed:
+                    report.fail(outcome.segment.segment_id, outcome.error)
+                report.new_sets += outcome.new
+                report.kept_sets += outcome.parameter_set is not None and not outcome.new
+            self._pool(work, one, outcomes)
+
+    def _pool(self, work: _Work, request: Request, outcomes: list[IdentifyOutcome]) -> None:
+        """Pool what was identified; that segments have nothing in common is no failure of the separate ones."""
+        try:
+            pooled = pool_segments(
+                self.warehouse,
+                work.vessel,
+                request,
+                outcomes,
+                work.new,
+                flow_run=self.flow_run,
+                progress=self.progress,
+            )
+        except KempfError as error:
+            work.report.fail(POOLED, error)
+            return
+        if pooled is not None:
+            work.report.new_sets += pooled[1]
+            work.report.kept_sets += not pooled[1]
+
+    def finish(self, work: _Work) -> None:
+        """Bring up to date what rests on the sets that are stored now."""
+        if work.report.segments and self.request is None:
+            self._model(work)
+        _withdraw(self.warehouse, work.vessel, work.report)
+
+    def _model(self, work: _Work) -> None:
+        """Bring the model with effects that she stands at up to date; where that fails she stands where she was."""
+        now = standing(self.warehouse, work.vessel)
+        if now is None:
+            return
+        spec, own = model_of(now)
+        try:
+            chosen = choose(self.warehouse, work.vessel)
+            made, new = store_model(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
+        except KempfError as error:
+            work.report.fail(ALIAS, error)
+            return
+        point(self.warehouse, made)
+        work.report.new_sets += new
+        work.report.kept_sets += not new
+
+
+def _leave(warehouse: Warehouse, works: Sequence[_Work]) -> None:
+    """Note the digest of the state in which nothing is left to do, where that is sure.
+
+    Not sure: a failure that another attempt may mend; a log, a profile or a set that somebody else added meanwhile.
+    """
+    sure = [work for work in works if all(failure["lasting"] for failure in work.report.failures)]
+    after = fleet_state(warehouse, [work.vessel for work in sure]) if sure else {}
+    for work in sure:
+        assert work.before is not None
+        now = after[work.vessel]
+        made = len(set(now.set_ids) - set(work.before.set_ids))
+        if now.inputs == work.before.inputs and made == work.report.new_sets:
+            work.left = now.digest
+
+
+def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> list[Request]:
+    """Return every model and estimator that the vessel was ever identified with: all of them are kept up to date."""
+    if default is not None:
+        return [default]
+    asked: dict[str, Request] = {}
+    known = parameter_sets.models(warehouse, vessel)
+    for spec, estimator in known:
+        if estimator in (POOLED, ESTIMATOR):
+            continue  # the one comes of the separate ones, the other is a model of all runs at once
+        request = Request(ModelSpec.model_validate(spec), estimator)
+        asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
+    return [asked[key] for key in sorted(asked)] if known else [Request()]
+
+
+def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
+    """Withdraw ``current`` where its set is of a profile or code that no longer stands."""
+    pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    if pointed is None:
+        return
+    standing = {row.ingest_id for row in logs.current(warehouse, vessel)}
+    if not standing.intersection(parameter_sets.get(warehouse, pointed).provenance["ingest_ids"]):
+        aliases.withdraw(warehouse, vessel)
+        report.withdrawn = pointed
+
+
+def _verify(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
+    code = code_version.fingerprint()
+    for name in parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list():
+        if parameter_sets.get(warehouse, name).provenance["code_version"] != code:
+            continue
+        try:
+            verdict = rerun(warehouse, name).verdict
+        except KempfError as error:
+            report.fail(name, error)
+            continue
+        report.verified[verdict] = report.verified.get(verdict, 0) + 1

@@ -1,0 +1,240 @@
+"""The job that builds every stored parameter set again from the raw bytes and writes down each verdict.
+
+A verdict is a run in the table ``runs``, under the set, the code, the packages and the tolerance it was reached with:
+so a job that was interrupted goes on where it stopped. A log is read once for all the sets of its segments.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from itertools import groupby
+from os import cpu_count
+from typing import Any
+
+from kempf.flows.fleet.state import responsible_code
+from kempf.flows.jobs.rerun_set import Rerun, inputs_of, judged, raw_inputs, rebuilt
+from kempf.flows.process.progress import Progress, silent
+from kempf.flows.process.wrap_error import as_told
+from kempf.schemas.errors import KempfError
+from kempf.warehouse import code_version, parameter_sets, runs
+from kempf.warehouse import vessels as vessel_table
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+FLOW = "rerun"
+#: Besides the three verdicts: it could not be built again, and why; not written down, so that it is tried again.
+FAILED = "failed"
+VERDICTS = ("bit-identical", "equal within tolerance", "different", FAILED)
+#: Differences of one set that are written down; the rest is counted.
+_TOLD = 20
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What became of one parameter set.
+
+    Attributes
+    ----------
+    vessel, parameter_set_id : str
+    verdict : str
+        One of `VERDICTS`.
+    code_changed : bool
+        Whether other code made the set.
+    known_before : bool
+        Whether an earlier call had reached the verdict.
+    differences : int
+        Fields that differ.
+    told : tuple of dict
+        The first of these fields, as JSON content.
+    packages_changed : dict
+        Versions then and now, of those that differ.
+    error : KempfError or None
+        Why it could not be built again.
+    """
+
+    vessel: str
+    parameter_set_id: str
+    verdict: str
+    code_changed: bool
+    known_before: bool = False
+    differences: int = 0
+    told: tuple[dict[str, Any], ...] = ()
+    packages_changed: dict[str, list[str | None]] | None = None
+    error: KempfError | None = None
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return {
+            "vessel": self.vessel,
+            "parameter_set_id": self.parameter_set_id,
+            "verdict": self.verdict,
+            "code_changed": self.code_changed,
+            "packages_changed": self.packages_changed or {},
+            "differing_fields": self.differences,
+            "differences": list(self.told),
+            **(self.error.to_json() if self.error else {}),
+        }
+
+
+@dataclass(frozen=True)
+class Verification:
+    """Every verdict, sorted by vessel, start and id."""
+
+    verdicts: tuple[Verdict, ...]
+
+    def counts(self, *, code_changed: bool | None = None) -> dict[str, int]:
+        """Return how many sets there are of each verdict, of all or of those whose code is, or is not, another now."""
+        of = Counter(v.verdict for v in self.verdicts if code_changed is None or v.code_changed == code_changed)
+        return {verdict: of[verdict] for verdict in VERDICTS}
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content; sets that are bit-identical are counted and not listed."""
+        return {
+            "sets": len(self.verdicts),
+            "known_before": sum(v.known_before for v in self.verdicts),
+            "verdicts": self.counts(),
+            "of_this_code": self.counts(code_changed=False),
+            "of_other_code": self.counts(code_changed=True),
+            "not_identical": [v.show() for v in self.verdicts if v.verdict != VERDICTS[0]],
+        }
+
+
+def verify_all(
+    warehouse: Warehouse,
+    vessels: Sequence[str] = (),
+    tolerance: float = 1e-9,
+    *,
+    afresh: bool = False,
+    progress: Progress = silent,
+) -> Verification:
+    """Build every parameter set again from the raw bytes; the verdicts are written down, nothing else is stored.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessels : sequence of str, optional
+        Only theirs; all by default.
+    tolerance : float, optional
+        Largest relative difference that still counts as equal.
+    afresh : bool, optional
+        Also sets on which this code, with these packages, has reached a verdict before.
+    progress : Progress, optional
+
+    Returns
+    -------
+    Verification
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    for vessel in vessels:
+        vessel_table.require(warehouse, vessel)
+    listed = parameter_sets.summaries(warehouse).select("vessel", "parameter_set_id").rows()
+    asked = [(vessel, name) for vessel, name in listed if not vessels or vessel in vessels]
+    known = {} if afresh else {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
+    found: dict[str, Verdict] = {}
+    for _, name in asked:
+        before = known.get(_run_id(name, tolerance))
+        if before is not None:
+            found[name] = _remembered(before)
+    done = len(found)
+    for vessel, of_hers in groupby(asked, key=lambda pair: pair[0]):
+        names = [name for _, name in of_hers if name not in found]
+        for group in _groups(parameter_sets.get_all(warehouse, vessel, names)):
+            progress(done, len(asked), f"{vessel}: building {len(group)} parameter sets again")
+            verdicts = _verify(warehouse, group, tolerance)
+            # what is finished is kept even if the next moment is the last
+            runs.record_all(warehouse, [_as_run(v, tolerance) for v in verdicts if v.error is None])
+            found.update((v.parameter_set_id, v) for v in verdicts)
+            done += len(group)
+    progress(len(asked), len(asked), "done")
+    return Verification(tuple(found[name] for _, name in asked))
+
+
+def _groups(sets: Sequence[ParameterSet]) -> Iterator[list[ParameterSet]]:
+    """Give sets of the same logs together, a few at a time."""
+    batch = 4 * (cpu_count() or 1)
+
+    def sources(one: ParameterSet) -> tuple[str, ...]:
+        return (str(one.provenance["inputs"]["profile_sha256"]), *map(str, one.provenance["ingest_ids"]))
+
+    for _, same in groupby(sorted(sets, key=sources), key=sources):
+        together = list(same)
+        for first in range(0, len(together), batch):
+            yield together[first : first + batch]
+
+
+def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: float) -> list[Verdict]:
+    """Build sets of the same logs again, one a thread: the likelihood runs outside the interpreter's lock."""
+    try:
+        instruments, profile = raw_inputs(warehouse, group[0])
+    except Exception as error:  # noqa: BLE001 - whatever it is, the other logs must not pay for it
+        return [_failed(one, as_told(error)) for one in group]
+
+    def verdict_on(one: ParameterSet) -> Verdict:
+        try:
+            return _verdict(one, judged(one, rebuilt(one, instruments, profile), tolerance))
+        except Exception as error:  # noqa: BLE001 - whatever it is, the other sets must not pay for it
+            return _failed(one, as_told(error))
+
+    if len(inputs_of(group[0]).bounds) > 1:  # such a set takes all cores for itself
+        return [verdict_on(one) for one in group]
+    workers = ThreadPoolExecutor(max_workers=cpu_count())
+    try:
+        return list(workers.map(verdict_on, group))
+    finally:
+        workers.shutdown(cancel_futures=True)
+
+
+def _verdict(one: ParameterSet, result: Rerun) -> Verdict:
+    told = tuple(difference.as_json() for difference in result.differences[:_TOLD])
+    count = len(result.differences)
+    return Verdict(
+        vessel=one.vessel,
+        parameter_set_id=one.parameter_set_id,
+        verdict=result.verdict,
+        code_changed=result.code_changed,
+        differences=count,
+        told=told,
+        packages_changed=result.packages_changed,
+    )
+
+
+def _failed(one: ParameterSet, error: KempfError) -> Verdict:
+    changed = inputs_of(one).code_version != code_version.fingerprint()
+    return Verdict(one.vessel, one.parameter_set_id, FAILED, changed, error=error)
+
+
+def _run_id(parameter_set_id: str, tolerance: float) -> str:
+    """Return the id of the run that judges a set with the present code and packages."""
+    what = {"parameter_set_id": parameter_set_id, "tolerance": tolerance}
+    return runs.run_id(FLOW, {**what, "code": responsible_code(), "packages": code_version.packages()})
+
+
+def _as_run(one: Verdict, tolerance: float) -> runs.Run:
+    message = {
+        "parameter_set_id": one.parameter_set_id,
+        "code_changed": one.code_changed,
+        "packages_changed": one.packages_changed or {},
+        "differences": list(one.told),
+    }
+    name = _run_id(one.parameter_set_id, tolerance)
+    return runs.Run(name, FLOW, one.vessel, one.verdict, {"differences": one.differences}, message)
+
+
+def _remembered(run: runs.Run) -> Verdict:
+    return Verdict(
+        vessel=str(run.vessel),
+        parameter_set_id=str(run.message["parameter_set_id"]),
+        verdict=run.status,
+        code_changed=bool(run.message["code_changed"]),
+        known_before=True,
+        differences=run.counts["differences"],
+        told=tuple(run.message["differences"]),
+        packages_changed=dict(run.message["packages_changed"]),
+    )

@@ -1,0 +1,171 @@
+"""The job that builds a stored parameter set again from the raw bytes and compares every bit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from kempf.flows.jobs.identify_vessel import build
+from kempf.flows.jobs.pool_vessel import POOLED, build_pooled
+from kempf.flows.jobs.spool import spooled
+from kempf.flows.jobs.vessel_model import ESTIMATOR, build_model
+from kempf.pipeline.channels.instruments import Instruments, from_readings
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
+from kempf.warehouse.agreement import Difference
+from kempf.warehouse.logs import LogRow
+from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class Rerun:
+    """The verdict on one parameter set.
+
+    Attributes
+    ----------
+    parameter_set_id : str
+    verdict : str
+        ``bit-identical``, ``equal within tolerance`` or ``different``.
+    differences : list of Difference
+        Fields that differ.
+    code_changed, packages_changed : bool, dict
+        Whether the code, and which packages, are others than when the set was made.
+    """
+
+    parameter_set_id: str
+    verdict: str
+    differences: list[Difference]
+    code_changed: bool
+    packages_changed: dict[str, list[str | None]]
+
+    def show(self) -> dict[str, Any]:
+        """Return the verdict as JSON content."""
+        return {
+            "parameter_set_id": self.parameter_set_id,
+            "verdict": self.verdict,
+            "differences": [difference.as_json() for difference in self.differences],
+            "code_changed": self.code_changed,
+            "packages_changed": self.packages_changed,
+        }
+
+
+def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
+    """Build a parameter set again from the raw bytes; nothing is stored.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    name : str
+        Its id, or a beginning of it.
+    tolerance : float, optional
+        Largest relative difference that still counts as equal.
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter_set``, ``no_raw_log``, ``no_profile``.
+    KempfError
+        ``raw_bytes_damaged``.
+    """
+    stored = parameter_sets.get(warehouse, name)
+    return judged(stored, rebuilt(stored, *raw_inputs(warehouse, stored)), tolerance)
+
+
+def raw_inputs(
+    warehouse: Warehouse, stored: ParameterSet, known: Mapping[tuple[str, str], Instruments] | None = None
+) -> tuple[dict[str, Instruments], VesselProfile]:
+    """Read what a parameter set was made from again from the raw bytes.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    stored : ParameterSet
+    known : mapping of (str, str) to Instruments, optional
+        Logs that were read already, by ingest and hash of the profile.
+
+    Returns
+    -------
+    dict of str to Instruments
+        Series by log.
+    VesselProfile
+
+    Raises
+    ------
+    NotFound
+        ``no_raw_log``, ``no_profile``, ``no_ingest``.
+    KempfError
+        ``raw_bytes_damaged``.
+    """
+    profile_sha256 = str(stored.provenance["inputs"]["profile_sha256"])
+    profile = vessels.get(warehouse, profile_sha256)
+    instruments = {}
+    for ingest_id in stored.provenance["ingest_ids"]:
+        row = logs.of_ingest(warehouse, str(ingest_id))
+        there = (known or {}).get((row.ingest_id, profile_sha256))
+        instruments[row.log_id] = there or read_again(warehouse, row, profile)
+    return instruments, profile
+
+
+def read_again(warehouse: Warehouse, row: LogRow, profile: VesselProfile) -> Instruments:
+    """Read one log again from its raw bytes.
+
+    Raises
+    ------
+    NotFound
+        ``no_raw_log``.
+    KempfError
+        ``raw_bytes_damaged``.
+    """
+    with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as readings:
+        return from_readings(readings.lazy())
+
+
+def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profile: VesselProfile) -> ParameterSet:
+    """Compute a stored parameter set again with the present code.
+
+    Parameters
+    ----------
+    stored : ParameterSet
+    instruments : mapping of str to Instruments
+        Series by log, see `raw_inputs`.
+    profile : VesselProfile
+        The one it was made with.
+
+    Raises
+    ------
+    KempfError
+        It can no longer be identified; the reason says why.
+    """
+    inputs, told = inputs_of(stored), dict(stored.provenance)
+    if inputs.estimator == POOLED:
+        return build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, told)
+    if inputs.estimator == ESTIMATOR:
+        return build_model(instruments, profile, inputs, stored.vessel, told, stored.parent)
+    one = instruments[inputs.bounds[0].log_id]
+    return build(one, profile, inputs, stored.vessel, stored.segment_ids, told, instruments)
+
+
+def judged(stored: ParameterSet, again: ParameterSet, tolerance: float = 1e-9) -> Rerun:
+    """Return the verdict on a parameter set that was computed again."""
+    verdict, differences = agreement.verdict(stored, again, tolerance)
+    now, then = code_version.packages(), dict(stored.provenance.get("packages") or {})
+    changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}
+    other_code = inputs_of(stored).code_version != code_version.fingerprint()
+    return Rerun(stored.parameter_set_id, verdict, differences, other_code, changed)
+
+
+def inputs_of(stored: ParameterSet) -> Inputs:
+    """Return all that a stored parameter set is a function of."""
+    told = stored.provenance["inputs"]
+    return Inputs(
+        log_ids=tuple(told["log_ids"]),
+        profile_sha256=told["profile_sha256"],
+        bounds=tuple(Bounds(**bounds) for bounds in told["segments"]),
+        model_spec=told["model"],
+        estimator=told["estimator"],
+        settings=told["settings"],
+        code_version=told["code_version"],
+        companions=tuple(Bounds(**bounds) for bounds in told.get("companions", ())),
+    )

@@ -1,0 +1,22 @@
+"""Lost stretches of a log as a person and a program are told of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from kempf.pipeline.ingest.readings import LostStretch
+from kempf.warehouse.instant import iso_utc
+
+
+def as_json(lost: Sequence[LostStretch]) -> list[dict[str, Any]]:
+    """Return stretches as JSON content, times in ISO 8601."""
+    return [
+        {
+            "since": None if one.since_ns is None else iso_utc(one.since_ns),
+            "until": None if one.until_ns is None else iso_utc(one.until_ns),
+            "messages": one.messages,
+            "why": one.why,
+        }
+        for one in lost
+    ]

@@ -1,0 +1,146 @@
+"""What reprocessing did for one vessel, as it is told and as it is remembered for the next time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from kempf.schemas.errors import DataRejected, KempfError
+from kempf.warehouse import runs
+from kempf.warehouse.runs import Run
+from kempf.warehouse.store import Warehouse
+
+#: Codes of errors that come of the storage and may be gone at the next attempt.
+PASSING = ("warehouse_unreachable", "warehouse_busy", "warehouse_not_writable", "table_unreadable", "batch_lost")
+FLOW = "reprocess"
+
+
+@dataclass
+class VesselReport:
+    """What reprocessing did for one vessel.
+
+    Attributes
+    ----------
+    vessel : str
+    logs, reread, segments, new_sets, kept_sets : int
+        Logs in all, logs read anew, zigzags found, parameter sets made and kept.
+    verified : dict of str to int
+        Verdicts on the kept sets, where everything was asked for.
+    withdrawn : str or None
+        Parameter set that ``current`` pointed to, where it no longer stands and nothing took its place.
+    failures : list of dict
+        What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
+        refused, so that the same data are refused again; ``known`` that the run before told of it already.
+    """
+
+    vessel: str
+    logs: int = 0
+    reread: int = 0
+    segments: int = 0
+    new_sets: int = 0
+    kept_sets: int = 0
+    verified: dict[str, int] = field(default_factory=dict)
+    withdrawn: str | None = None
+    failures: list[dict[str, Any]] = field(default_factory=list)
+
+    @property
+    def status(self) -> str:
+        """``failed`` where something did, else ``changed`` or ``unchanged``."""
+        if self.failures:
+            return "failed"
+        return "changed" if self.reread or self.new_sets else "unchanged"
+
+    def show(self) -> dict[str, Any]:
+        """Return the report as JSON content."""
+        return {"vessel": self.vessel, "status": self.status, **{k: v for k, v in vars(self).items() if k != "vessel"}}
+
+    def fail(self, what: str, error: KempfError) -> None:
+        """Write down a failure and go on."""
+        lasting = isinstance(error, DataRejected)
+        self.failures.append({"what": what, "lasting": lasting, "known": False, **error.to_json()})
+
+    def as_run(self, state: str | None, *, changed_only: bool, estimator: str | None) -> Run:
+        """Return the line of the table ``runs``.
+
+        Parameters
+        ----------
+        state : str or None
+            Digest of the state that the vessel was left in, where nothing is left to do in it.
+        changed_only : bool
+        estimator : str or None
+            What was asked for; both are part of the run's id.
+        """
+        counts = {k: v for k, v in vars(self).items() if isinstance(v, int)}
+        message = {"failures": self.failures, **({"state": state} if state else {})}
+        return Run(
+            run_id_of(self.vessel, changed_only=changed_only, estimator=estimator),
+            FLOW,
+            self.vessel,
+            self.status,
+            counts,
+            message,
+        )
+
+
+def run_id_of(vessel: str, *, changed_only: bool, estimator: str | None = None) -> str:
+    """Return the id under which the reprocessing of a vessel is remembered."""
+    return runs.run_id(FLOW, {"vessel": vessel, "changed_only": changed_only, "estimator": estimator})
+
+
+def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, Run]]) -> None:
+    """Store runs in one commit; failures that stood there before are marked as known in the reports and in the runs.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    found : sequence of (VesselReport, Run)
+        Each with the run of its `VesselReport.as_run`.
+    """
+    every = [
+        run_id_of(report.vessel, changed_only=changed_only) for report, _ in found for changed_only in (True, False)
+    ]
+    stored = {run.run_id: run for run in runs.some(warehouse, [*every, *(run.run_id for _, run in found)])}
+    told = []
+    for report, run in found:
+        before = {_what(f) for f in stored[run.run_id].message["failures"]} if run.run_id in stored else set()
+        for failure in report.failures:
+            failure["known"] = _what(failure) in before
+        told.append(replace(run, message={**run.message, "failures": report.failures}))
+        told += _forgotten(run, stored)
+    runs.record_all(warehouse, told)
+
+
+def _forgotten(run: Run, stored: Mapping[str, Run]) -> list[Run]:
+    """Return the runs of the same vessel whose state no longer tells that nothing is left to do."""
+    if "state" in run.message:
+        return []
+    names = [run_id_of(str(run.vessel), changed_only=changed_only) for changed_only in (True, False)]
+    stale = [stored[name] for name in names if name in stored and name != run.run_id]
+    return [
+        replace(one, message={k: v for k, v in one.message.items() if k != "state"})
+        for one in stale
+        if "state" in one.message
+    ]
+
+
+def from_run(run: Run) -> VesselReport:
+    """Return the report of a vessel that has nothing to do, from what her last run left.
+
+    Parameters
+    ----------
+    run : Run
+        Its failures are all lasting.
+    """
+    told = run.counts
+    return VesselReport(
+        str(run.vessel),
+        logs=told["logs"],
+        segments=told["segments"],
+        kept_sets=told["new_sets"] + told["kept_sets"],
+        failures=[{**failure, "known": True} for failure in run.message["failures"]],
+    )
+
+
+def _what(failure: Mapping[str, Any]) -> tuple[str, str]:
+    return str(failure["what"]), str(failure["error"]["code"])

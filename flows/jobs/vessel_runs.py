@@ -1,0 +1,206 @@
+"""All zigzags of a vessel as diagnosis and comparison take them, with ships to start from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.parameter_set_of import arm_of
+from kempf.flows.jobs.refresh_logs import refresh_logs
+from kempf.flows.process.cores import usable
+from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.estimate.record.grid_run import Run, Ship, make_run, step_of
+from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.search.pooled_start import Start, start_of
+from kempf.schemas.errors import KempfError, NotFound
+from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import logs, segments, vessels
+from kempf.warehouse.deduplicate import once, same
+from kempf.warehouse.parameter_set import Bounds
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
+
+#: where the profile does not tell a length; only the scale of non-dimensional coefficients hangs on it
+_LENGTH_M = 100.0
+
+
+@dataclass(frozen=True, eq=False)
+class VesselRuns:
+    """What a vessel's logs hold, ready for a model.
+
+    Attributes
+    ----------
+    spec : ModelSpec
+        With the arm and the moment decided.
+    runs : tuple of Run
+        In order of time; named by their segments.
+    records : tuple of Record
+        What the runs were made of.
+    skipped : dict of str to str
+        Why a segment is no run, by its id.
+    """
+
+    spec: ModelSpec
+    runs: tuple[Run, ...]
+    records: tuple[Record, ...]
+    skipped: dict[str, str]
+
+    @cached_property
+    def start(self) -> Start:
+        """Hull and noise levels to start a fit from; the held-out runs have no part in the hull."""
+        with ThreadPoolExecutor(max_workers=usable()) as workers:
+            return start_of(self.records, self.runs, self.spec, split(self.runs)[0], workers)
+
+
+@dataclass(frozen=True, eq=False)
+class Chosen:
+    """Which segments of a vessel count, and how her logs are read.
+
+    Attributes
+    ----------
+    vessel : str
+    profile_sha256 : str
+    segments : tuple of Segment
+        Sorted by log and time, as the inputs of a parameter set are.
+    ingests : dict of str to str
+        Ingest by log, of these segments.
+    file_names : dict of str to str
+        By log.
+    skipped : dict of str to str
+    """
+
+    vessel: str
+    profile_sha256: str
+    segments: tuple[Segment, ...]
+    ingests: dict[str, str]
+    file_names: dict[str, str]
+    skipped: dict[str, str]
+
+
+def choose(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Chosen:
+    """Choose the zigzags of a vessel: each manoeuvre once, all read with the newest profile.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    progress : Progress, optional
+        Logs that were read by other code are read anew first.
+
+    Raises
+    ------
+    NotFound
+        ``no_segments``.
+    """
+    refreshed = refresh_logs(warehouse, vessel, progress)
+    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel) if row.ingest_id not in refreshed.failed}
+    found = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
+    if not found:
+        raise NotFound(
+            "no_segments",
+            f"No zigzag was found in the {len(rows)} logs of {vessel!r}.",
+            "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
+            {"vessel": vessel},
+        )
+    profile_sha256 = rows[max(found, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
+    # a broken-off zigzag stays: its rudder moved too
+    kept, skipped = once([s for s in found if rows[s.ingest_id].profile_sha256 == profile_sha256], same)
+    for segment in found:
+        if rows[segment.ingest_id].profile_sha256 != profile_sha256:
+            skipped[segment.segment_id] = "its log is read with an older profile"
+    kept.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
+    return Chosen(
+        vessel,
+        profile_sha256,
+        tuple(kept),
+        {s.log_id: s.ingest_id for s in kept},
+        {s.log_id: rows[s.ingest_id].file_name for s in kept},
+        skipped,
+    )
+
+
+def vessel_runs(warehouse: Warehouse, vessel: str, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:
+    """Read every zigzag of a vessel that can be used.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    spec : ModelSpec
+        Disturbances; effects are not looked at.
+    progress : Progress, optional
+
+    Raises
+    ------
+    NotFound
+        ``no_segments``, ``no_runs``: none can be used; the details say why.
+    """
+    chosen = choose(warehouse, vessel, progress)
+    return assembled(warehouse, chosen, spec, progress)
+
+
+def assembled(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:
+    """Read the chosen segments from the warehouse and make runs of them."""
+    instruments = {}
+    for done, (log_id, ingest_id) in enumerate(chosen.ingests.items()):
+        progress(done, len(chosen.ingests), f"reading {chosen.file_names[log_id]}")
+        instruments[log_id] = channels_of(warehouse, ingest_id)
+    progress(len(chosen.ingests), len(chosen.ingests), "laying the manoeuvres out")
+    profile = vessels.get(warehouse, chosen.profile_sha256)
+    bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
+    made = assemble(instruments, profile, bounds, spec)
+    return VesselRuns(made.spec, made.runs, made.records, chosen.skipped | made.skipped)
+
+
+def assemble(
+    instruments: Mapping[str, Instruments],
+    profile: VesselProfile,
+    bounds: Sequence[tuple[str, Bounds]],
+    spec: ModelSpec,
+) -> VesselRuns:
+    """Make runs of segments; a function of its arguments alone, so that a rerun makes the same.
+
+    Parameters
+    ----------
+    instruments : mapping of str to Instruments
+        Series by log.
+    profile : VesselProfile
+    bounds : sequence of (str, Bounds)
+        Segments with their names.
+    spec : ModelSpec
+
+    Raises
+    ------
+    NotFound
+        ``no_runs``.
+    """
+    records, skipped = [], {}
+    for name, one in sorted(bounds, key=lambda entry: (entry[1].start_utc_ns, entry[0])):
+        try:
+            records.append((name, one, make_record(instruments[one.log_id], one.start_utc_ns, one.end_utc_ns)))
+        except KempfError as error:
+            skipped[name] = str(error)
+    if not records:
+        raise NotFound(
+            "no_runs",
+            f"None of the {len(bounds)} zigzags can be used: "
+            + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:5]),
+            "See docs/bad_input.md for every reason and what mends it.",
+            {"skipped": skipped},
+        )
+    arm = arm_of(spec, profile)
+    ready = spec.with_arm(arm)
+    ship = Ship(profile.length_m or _LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
+    step = step_of([record for _, _, record in records], ship.length_m)
+    days = {log_id: k for k, log_id in enumerate(dict.fromkeys(one.log_id for _, one, _ in records))}
+    runs = tuple(
+        make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id])
+        for name, one, record in records
+    )
+    return VesselRuns(ready, runs, tuple(record for _, _, record in records), skipped)

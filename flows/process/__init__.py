@@ -1,0 +1,1 @@
+"""How a job runs on this machine: cores, progress, memory, commits, unexpected errors."""

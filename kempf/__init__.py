@@ -1,0 +1,1 @@
+"""Raw ship sea-trial logs in, versioned manoeuvring models out."""

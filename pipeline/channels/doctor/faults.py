@@ -1,0 +1,138 @@
+"""The lies a channel can tell, each with the change to the readings that takes it back."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import pi
+from typing import Literal
+
+import numpy as np
+
+from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+
+Kind = Literal["sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale"]
+
+#: What may stand in a log under the name of the canonical unit: factor on the reading that mends it, by name.
+UNITS: dict[str, dict[str, float]] = {
+    "rad": {"rad taken for deg": 180.0 / pi, "deg taken for rad": pi / 180.0},
+    "rad/s": {
+        "deg/s taken for deg/min": 60.0,
+        "deg/min taken for deg/s": 1.0 / 60.0,
+        "rad/s taken for deg/s": 180.0 / pi,
+        "deg/s taken for rad/s": pi / 180.0,
+        "rad/s taken for deg/min": 60.0 * 180.0 / pi,
+        "deg/min taken for rad/s": pi / 180.0 / 60.0,
+    },
+    "m/s": {
+        "kn taken for m/s": 1852.0 / 3600.0,
+        "m/s taken for kn": 3600.0 / 1852.0,
+        "km/h taken for m/s": 1.0 / 3.6,
+        "m/s taken for km/h": 3.6,
+        "km/h taken for kn": 1000.0 / 1852.0,
+        "kn taken for km/h": 1852.0 / 1000.0,
+    },
+}
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One lie of one instrument.
+
+    Attributes
+    ----------
+    kind : {"sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale"}
+    channels : tuple of str
+        That lie together.
+    value : float
+        What is done about it: the factor for a unit or a scale, the angle that is added (rad) for an offset, the
+        seconds that are taken off for a latency, the rate (s/s) at which the clock runs too fast for a clock scale.
+    name : str
+        Which fault of the kind, such as ``kn taken for m/s``.
+    std : float
+        Standard error of ``value`` where it was estimated; 0 where it is exact.
+    simplicity : int
+        Smaller is asked first: a wrong sign before a compass turned by 90 degrees and counting backwards.
+    """
+
+    kind: Kind
+    channels: tuple[str, ...]
+    value: float = 1.0
+    name: str = ""
+    std: float = 0.0
+    simplicity: int = 1
+
+    @property
+    def key(self) -> tuple[str, tuple[str, ...], str]:
+        """What tells two faults apart; estimates of one are one."""
+        return self.kind, self.channels, self.name
+
+    def mended(self, log: Log) -> Log:
+        """Return the log without this fault."""
+        own = {name: log.series[name] for name in self.channels if name in log.series}
+        if len(own) < len(self.channels):
+            return log
+        return log.with_series(_MENDS[self.kind](self, own))
+
+
+def _each(own: Mapping[str, Series], change: Mapping[str, Float]) -> dict[str, Series | None]:
+    return {name: Series(own[name].time_utc_ns, value) for name, value in change.items()}
+
+
+def _sign(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    return _each(own, {name: -one.value for name, one in own.items()})
+
+
+def _unit(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    circle = ("heading", "course_over_ground")
+    scaled = {name: one.value * fault.value for name, one in own.items()}
+    return _each(own, {name: np.unwrap(value) if name in circle else value for name, value in scaled.items()})
+
+
+def _offset(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    # "counts from east" turns the sense of rotation too: psi = 90 deg - what is read
+    turn = -1.0 if fault.name.startswith("counted anticlockwise") else 1.0
+    return _each(own, {name: turn * one.value + fault.value for name, one in own.items()})
+
+
+def _swap(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    first, second = fault.channels
+    return {first: own[second], second: own[first]}
+
+
+def _frame(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    kind = next(kind for kind, names in VELOCITIES.items() if names == fault.channels)
+    other = VELOCITIES["body" if kind == "earth" else "earth"]
+    moved: dict[str, Series | None] = dict.fromkeys(fault.channels)
+    return moved | {new: own[old] for old, new in zip(fault.channels, other, strict=True)}
+
+
+def _moved(series: Series, time: Nanoseconds) -> Series:
+    # a clock that is set right never runs backwards, but two readings may fall on one nanosecond
+    rising = np.concatenate([[True], np.diff(time) > 0])
+    return Series(time[rising], series.value[rising])
+
+
+def _latency(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    return {name: _moved(one, one.time_utc_ns - round(fault.value * SECOND_NS)) for name, one in own.items()}
+
+
+def _clock_scale(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    found: dict[str, Series | None] = {}
+    for name, one in own.items():
+        since = (one.time_utc_ns - one.time_utc_ns[0]).astype(np.float64)
+        found[name] = _moved(one, one.time_utc_ns[0] + np.rint(since / (1.0 + fault.value)).astype(np.int64))
+    return found
+
+
+_MENDS = {
+    "sign": _sign,
+    "unit": _unit,
+    "scale": _unit,
+    "offset": _offset,
+    "swap": _swap,
+    "frame": _frame,
+    "latency": _latency,
+    "clock_scale": _clock_scale,
+}

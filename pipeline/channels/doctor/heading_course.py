@@ -1,0 +1,129 @@
+"""Course against heading: a ship goes where her bow points, but for drift in a turn, leeway and stream.
+
+Here the turning is compared - its sense, its amount, its time. Whether the two point the same way on average is asked
+in `kempf.pipeline.channels.doctor.misalignment`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.channels.doctor.align import align
+from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
+from kempf.pipeline.channels.doctor.faults import UNITS, Fault
+from kempf.pipeline.channels.doctor.heading_rate import swing
+from kempf.pipeline.channels.doctor.log import Log, Velocity, turning
+from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.series import Series
+
+#: Components of a stream that is not known, one standard deviation: four of these are faster than any that ships are
+#: tried in, and half of what the ship makes herself - in a faster one nobody tests her.
+STREAM_STD_M_S, STREAM_SHARE = 0.6, 0.125
+#: Slope of the course's changes on the heading's: drift in the quick turns of a zigzag lets the course swing further.
+SLOPES = (0.5, 2.0)
+#: A body-fixed velocity does not turn with the heading; in a turn its drift angle comes and goes.
+_BODY_SLOPES = (-0.5, 0.5)
+#: Largest drift angle in a turn, rad: ships in their tightest circle make about 20 degrees.
+DRIFT_RAD = 0.45
+_LEAST_TURN = float(np.deg2rad(20.0))
+#: How far before the point about which the bow turns an antenna stands, in ship lengths.
+_LEADS = 0.25
+#: What is left over of two motions that go together.
+_TOGETHER = 0.6
+
+
+def examine(log: Log) -> list[Outcome]:
+    """Compare the turning of the bow with that of every velocity that the log has.
+
+    Returns
+    -------
+    list of Outcome
+        ``heading_KIND`` and ``heading_KIND_clock`` for each kind of velocity, see `VELOCITIES`.
+
+    References
+    ----------
+    Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., section 2.5: course, heading
+    and crab angle.
+    """
+    found: list[Outcome] = []
+    heading = log.series.get("heading")
+    for kind in ("course", "earth", "body", "track"):
+        velocity = log.velocity(kind)
+        if velocity is None or heading is None:
+            continue
+        found += _compare(log, kind, heading, velocity)
+    return found
+
+
+def stream_std(speed_m_s: float) -> float:
+    """Return the standard deviation of each component of an unknown stream for a ship of that speed, m/s."""
+    return min(STREAM_STD_M_S, STREAM_SHARE * speed_m_s)
+
+
+def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> list[Outcome]:
+    names = (f"heading_{kind}", f"heading_{kind}_clock")
+    channels = ("heading", *velocity.channels)
+    way = velocity.under_way
+    direction = Series(velocity.time_utc_ns[way], velocity.direction[way])
+    turned = max(swing(heading.value), swing(direction.value)) if len(direction) else 0.0
+    if turned < _LEAST_TURN:
+        return [untestable(name, channels, "the ship hardly turned while she made way") for name in names]
+    speed = float(np.median(np.abs(velocity.value[way])))
+    fast = float(np.percentile(np.abs(turning(heading).value), 95.0)) if len(turning(heading)) else 0.0
+    if velocity.blurred(heading):
+        return [untestable(name, channels, "the fixes are too coarse to show the turns") for name in names]
+    own = _own_lag(log, fast, speed)
+    late = 1.0 + heading.period_s + direction.period_s
+    # the antenna may stand before the point about which she turns: then the course leads
+    honest = (-late - _LEADS * own, late + own)
+    both = align(heading, direction, honest, circle=True)
+    if both is None:
+        return [untestable(name, channels, "too little of it overlaps") for name in names]
+    std = float(np.hypot(both.slope_std, 0.5 * stream_std(speed) / speed))
+    low, high = _BODY_SLOPES if kind == "body" else SLOPES
+    figure = Figure("turned by the velocity for 1 turned by the heading", both.slope, std, low, high)
+    words = f"the {_WORDS[kind]} turns {both.slope:.2f} +- {std:.2g} times as far as the heading"
+    state = figure.state
+    if both.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
+        state = "untestable"  # a slope through noise
+    turn = Outcome(names[0], channels, state, words, (figure,), both.left_over, _suspects(kind, velocity.channels))
+    if kind == "body":
+        return [turn]
+    figures = clock_figures(both, honest, heading, own)
+    return [turn, clock_outcome(names[1], (("heading",), velocity.channels), both, figures)]
+
+
+_WORDS = {
+    "course": "course over ground",
+    "earth": "earth-fixed velocity",
+    "body": "body-fixed velocity",
+    "track": "way from fix to fix",
+}
+
+
+def _own_lag(log: Log, fast: float, speed: float) -> float:
+    """Return by how much the course may lag behind the heading because she drifts in a turn, s."""
+    # the bow turns about a point no farther ahead than the ship is long
+    return DRIFT_RAD / max(fast, 1e-6) if log.length_m is None else log.length_m / speed
+
+
+def _suspects(kind: str, channels: tuple[str, str]) -> tuple[Fault, ...]:
+    ninety = np.pi / 2
+    hers = [
+        Fault("sign", ("heading",)),
+        Fault("offset", ("heading",), ninety, "counted anticlockwise from east", simplicity=2),
+        *(Fault("unit", ("heading",), factor, name) for name, factor in UNITS["rad"].items()),
+    ]
+    if kind == "course":
+        course = (channels[1],)
+        hers += [
+            Fault("sign", course),
+            Fault("offset", course, ninety, "counted anticlockwise from east", simplicity=2),
+            *(Fault("unit", course, factor, name) for name, factor in UNITS["rad"].items()),
+        ]
+    elif kind == "track":
+        hers += [Fault("swap", channels), Fault("sign", channels[:1]), Fault("sign", channels[1:])]
+    else:
+        hers += [Fault("frame", channels, name=f"{'body' if kind == 'earth' else 'earth'}-fixed")]
+        hers += [Fault("swap", channels), Fault("sign", channels[:1]), Fault("sign", channels[1:])]
+    return tuple(hers)

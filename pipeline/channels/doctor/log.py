@@ -1,0 +1,209 @@
+"""What the doctor looks at: the channels of one log, as delivered, and the motions that they tell of."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+
+Complex = NDArray[np.complex128]
+
+#: Pairs of channels that tell the velocity over ground: by speed and course, earth-fixed, body-fixed.
+VELOCITIES: dict[str, tuple[str, str]] = {
+    "course": ("speed_over_ground", "course_over_ground"),
+    "earth": ("velocity_north", "velocity_east"),
+    "body": ("velocity_forward", "velocity_starboard"),
+    "track": ("latitude", "longitude"),
+}
+#: A ship slower than this share of her fast speed makes no way worth a course.
+_UNDER_WAY = 0.4
+#: No GNSS tells a course below this speed, m/s.
+_SLOWEST_M_S = 0.2
+#: Fixes that tell a motion; how many times their noise the way between two of them is; the finest noise that is
+#: believed, m; 90th percentile of a second difference of places with unit noise north and east,
+#: sqrt(6) sqrt(2 ln 10).
+_FEWEST_FIXES, _CLEAR, _FINEST_M, _BEND = 20, 15.0, 0.1, 5.257
+#: Turn within the time of one mean beyond which the mean is blurred, rad.
+_BLURRED = 0.3
+#: Mean radius of the earth, m (IUGG); a distance from it is right within half a per cent.
+EARTH_M = 6_371_008.8
+
+
+@dataclass(frozen=True, eq=False)
+class Velocity:
+    """A velocity at its instants.
+
+    Attributes
+    ----------
+    channels : tuple of str
+        What tells it.
+    time_utc_ns : ndarray, shape (n,)
+    value : ndarray of complex128, shape (n,)
+        Towards north plus i times towards east (ahead plus i times to starboard for a body-fixed one), m/s.
+    direction : ndarray, shape (n,)
+        Its angle, unwrapped, rad.
+    over_s : float
+        Time over which it is a mean, s; 0 for an instrument's own.
+    """
+
+    channels: tuple[str, str]
+    time_utc_ns: Nanoseconds
+    value: Complex
+    direction: Float
+    over_s: float = 0.0
+
+    @property
+    def under_way(self) -> NDArray[np.bool_]:
+        """Where she makes so much way that the direction means something, shape (n,)."""
+        speed = np.abs(self.value)
+        fast = float(np.percentile(speed, 98.0)) if speed.size else 0.0
+        known: NDArray[np.bool_] = speed > max(_UNDER_WAY * fast, _SLOWEST_M_S)
+        return known
+
+    def blurred(self, heading: Series) -> bool:
+        """Return whether she turns so far within the time of one mean that the means do not show it."""
+        rate = turning(heading).value
+        return (
+            self.over_s > 0.0 and bool(rate.size) and float(np.percentile(np.abs(rate), 95.0)) * self.over_s > _BLURRED
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Log:
+    """The channels of one log as the doctor looks at them; a mend makes another log.
+
+    Attributes
+    ----------
+    series : mapping of str to Series
+        By canonical name; SI, angles on the circle unwrapped.
+    length_m : float or None
+        Of the ship, where it is known: how far the course may lag behind the heading in a turn.
+    units : mapping of str to str
+        The unit that each channel is said to be written in, where that is known: what it was taken for.
+    """
+
+    series: Mapping[str, Series]
+    length_m: float | None = None
+    units: Mapping[str, str] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, instruments: Instruments, length_m: float | None = None, units: Mapping[str, str] | None = None) -> Log:
+        """Return the channels that a log has of its own; what was computed from others is no witness."""
+        own = {name: one for name, one in instruments.series.items() if name not in instruments.derived}
+        return cls({name: one for name, one in own.items() if len(one) > 1}, length_m, units or {})
+
+    def has(self, names: Iterable[str]) -> bool:
+        """Return whether all these channels are there."""
+        return all(name in self.series for name in names)
+
+    def with_series(self, changed: Mapping[str, Series | None]) -> Log:
+        """Return the log with some channels exchanged; None takes one out."""
+        series = {**self.series, **changed}
+        return replace(self, series={name: one for name, one in series.items() if one is not None})
+
+    def velocity(self, kind: str) -> Velocity | None:
+        """Return a velocity over ground by a key of `VELOCITIES`, None where the log does not have both channels."""
+        names = VELOCITIES[kind]
+        if not self.has(names):
+            return None
+        if kind == "track":
+            return self._between_fixes()
+        first, second = self.series[names[0]], self.series[names[1]]
+        leading, other = (second, first) if kind == "course" else (first, second)
+        beside = other.at(leading.time_utc_ns, gap_limit_s(other))
+        known = np.isfinite(beside)
+        time, own, beside = leading.time_utc_ns[known], leading.value[known], beside[known]
+        if time.size < 2:
+            return None
+        if kind == "course":
+            return Velocity(names, time, beside * np.exp(1j * own), own)
+        value = own + 1j * beside
+        return Velocity(names, time, value, np.unwrap(np.angle(value)))
+
+    def over_ground(self, kind: str) -> Velocity | None:
+        """Return a velocity in the earth's frame; a body-fixed one is turned by the heading."""
+        found = self.velocity(kind)
+        if kind != "body" or found is None:
+            return found
+        heading = self.series.get("heading")
+        if heading is None:
+            return None
+        bow = heading.at(found.time_utc_ns, gap_limit_s(heading))
+        known = np.isfinite(bow)
+        value = found.value[known] * np.exp(1j * bow[known])
+        return Velocity(
+            found.channels, found.time_utc_ns[known], value, found.direction[known] + bow[known], found.over_s
+        )
+
+    def _between_fixes(self) -> Velocity | None:
+        """Return the velocity of the fixes, over steps so long that their noise does not hide the way."""
+        track = self.track()
+        if track is None or track[0].size < _FEWEST_FIXES:
+            return None
+        time, place = track
+        seconds = (time - time[0]) / SECOND_NS
+        period = float(np.median(np.diff(seconds)))
+        noise = fix_noise(place)
+        coarse = max(round(30.0 / period), 1)
+        gone = np.abs(place[coarse:] - place[:-coarse]) / (seconds[coarse:] - seconds[:-coarse])
+        fast = float(np.percentile(gone, 90.0)) if gone.size else 0.0
+        step = int(np.clip(np.ceil(_CLEAR * noise / max(fast, 1e-3) / period), 1, coarse))
+        long = seconds[step:] - seconds[:-step]
+        near = long < 3.0 * step * period
+        value = ((place[step:] - place[:-step]) / long)[near]
+        middle = (time[:-step] + (time[step:] - time[:-step]) // 2)[near]
+        if value.size < _FEWEST_FIXES:
+            return None
+        return Velocity(VELOCITIES["track"], middle, value, np.unwrap(np.angle(value)), step * period)
+
+    def track(self) -> tuple[Nanoseconds, Complex] | None:
+        """Return the instants and the places of the fixes, north plus i times east of the first one, m."""
+        if not self.has(("latitude", "longitude")):
+            return None
+        latitude, longitude = self.series["latitude"], self.series["longitude"]
+        across = longitude.at(latitude.time_utc_ns, gap_limit_s(longitude))
+        known = np.isfinite(across)
+        if np.count_nonzero(known) < 2:
+            return None
+        north = latitude.value[known] - latitude.value[known][0]
+        east = across[known] - across[known][0]
+        shrink = np.cos(np.median(latitude.value[known]))
+        return latitude.time_utc_ns[known], EARTH_M * (north + 1j * east * shrink)
+
+
+def fix_noise(place: Complex) -> float:
+    """Return the noise of a fix, m: it shows in the second difference of the places, the way hardly does."""
+    if place.size < 3:
+        return _FINEST_M
+    bend = np.abs(place[2:] - 2.0 * place[1:-1] + place[:-2])
+    return max(float(np.percentile(bend, 90.0)) / _BEND, _FINEST_M)
+
+
+def turning(heading: Series) -> Series:
+    """Return how fast a direction changes, rad/s, at the middles between its values one second or more apart."""
+    apart = max(round(1.0 / max(heading.period_s, 1e-3)), 1)
+    time, value = heading.time_utc_ns, heading.value
+    if len(heading) <= apart:
+        return Series(time[:0], value[:0])
+    step = (time[apart:] - time[:-apart]) / SECOND_NS
+    near = step < 3.0 * max(apart * heading.period_s, 1.0)
+    middle = time[:-apart] + (time[apart:] - time[:-apart]) // 2
+    return Series(middle[near], ((value[apart:] - value[:-apart]) / step)[near])
+
+
+def integral(rate: Series) -> Series:
+    """Return the integral of a series by the trapezium rule, at its instants; a gap is bridged by its mean."""
+    step = np.diff(rate.time_utc_ns) / SECOND_NS
+    gained = rate.value[1:] + rate.value[:-1]
+    # in place: of a long log every copy counts
+    gained *= 0.5
+    gained *= step
+    total = np.zeros(gained.size + 1)
+    np.cumsum(gained, out=total[1:])
+    return Series(rate.time_utc_ns, total)

@@ -1,0 +1,121 @@
+"""Course against heading on average: how far an instrument is turned out of its line, stream and drift allowed for."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.channels.doctor.faults import Fault
+from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD, stream_std
+from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity, turning
+from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.robust_regression import posterior
+from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+
+#: Leeway of a ship under way, one standard deviation, rad, and the deviation of a compass that is no gross lie.
+_LEEWAY_RAD, _DEVIATION_DEG = float(np.deg2rad(2.0)), 5.0
+#: Readings are averaged by sectors of heading, and by whether she turns to port, not, or to starboard: this many
+#: sectors, the share of the greatest rate that counts as turning, and the error that one average keeps however many
+#: readings it has - leeway and helm of that heading - as a share of the speed.
+_SECTORS, _TURNING, _SECTOR_STD = 36, 0.3, 0.05
+#: The same of one second, which averages out.
+_SECOND_STD = 0.3
+#: Where the fit leaves more than this share of the velocity, heading and course do not go together at all.
+_TOGETHER = 0.5
+_FEWEST = 12
+
+
+def examine(log: Log) -> list[Outcome]:
+    """Find the angle between the bow and the velocity through the water, as the velocity over ground shows it.
+
+    Seen from the bow, the velocity over ground is a constant A (the way she makes), plus a stream C that turns
+    backwards as she turns, plus a drift S r that goes with the yaw rate: w = A + C exp(-i psi) + S r. The angle of A
+    is how far heading or course are turned. Legs on several headings tell A and C apart; where they do not, what is
+    known of streams beforehand stands in the standard error.
+
+    Returns
+    -------
+    list of Outcome
+        ``legs_KIND`` for each kind of velocity, see `VELOCITIES`.
+    """
+    heading = log.series.get("heading")
+    if heading is None:
+        return []
+    found = []
+    for kind in ("course", "earth", "body", "track"):
+        velocity = log.velocity(kind)
+        if velocity is not None:
+            found.append(_compare(kind, heading, velocity))
+    return found
+
+
+def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
+    name, channels = f"legs_{kind}", ("heading", *velocity.channels)
+    if velocity.blurred(heading):
+        return untestable(name, channels, "the fixes are too coarse to show the turns")
+    seen = _seen_from_the_bow(kind, heading, velocity)
+    if seen is None:
+        return untestable(name, channels, "too few readings while she made way")
+    relative, bow, rate, duration = seen
+    speed = float(np.median(np.abs(relative)))
+    fast = max(float(np.percentile(np.abs(rate), 95.0)), 1e-6)
+    prior = np.array([np.inf, np.inf, *[stream_std(speed)] * 2, *[DRIFT_RAD * speed / fast] * 2])
+    noise = speed * np.hypot(_SECTOR_STD, _SECOND_STD / np.sqrt(duration))
+    observed, noise = np.concatenate([relative.real, relative.imag]), np.concatenate([noise, noise])
+    fitted = posterior(_columns(bow, rate), observed, noise, prior)
+    ahead, across = fitted.value[:2]
+    way = float(np.hypot(ahead, across))
+    if way < 0.3 * speed or fitted.left_over > _TOGETHER:
+        return untestable(name, channels, "heading and velocity do not go together")
+    angle = float(np.arctan2(across, ahead))
+    # of A's standard errors, the part across A
+    own = float(np.hypot(fitted.std[1] * ahead / way, fitted.std[0] * across / way)) / way
+    std = float(np.hypot(own, _LEEWAY_RAD))
+    figure = Figure(
+        "angle from the bow", float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg"
+    )
+    words = f"she goes {figure.value:+.1f} +- {figure.std:.1f} deg off her bow with stream and drift taken out"
+    suspects = [Fault("offset", ("heading",), angle, "turned", std)]
+    if kind == "course":
+        suspects.append(Fault("offset", channels[2:], -angle, "turned", std))
+    elif kind in ("earth", "body"):
+        suspects += [
+            Fault("swap", velocity.channels),
+            Fault("frame", velocity.channels, name=f"{'body' if kind == 'earth' else 'earth'}-fixed"),
+            *(Fault("sign", (one,)) for one in velocity.channels),
+        ]
+    else:
+        suspects += [Fault("swap", velocity.channels), *(Fault("sign", (one,)) for one in velocity.channels)]
+    return Outcome(name, channels, figure.state, words, (figure,), fitted.left_over, tuple(suspects))
+
+
+def _columns(bow: Float, rate: Float) -> Float:
+    """Return the columns of A, C and S (real, imaginary part) for the real parts above the imaginary parts."""
+    one, none, cos, sin = np.ones_like(bow), np.zeros_like(bow), np.cos(bow), np.sin(bow)
+    real = np.column_stack([one, none, cos, sin, rate, none])
+    imaginary = np.column_stack([none, one, -sin, cos, none, rate])
+    return np.concatenate([real, imaginary])
+
+
+def _seen_from_the_bow(kind: str, heading: Series, velocity: Velocity) -> tuple[Complex, Float, Float, Float] | None:
+    """Return the velocity relative to the bow, heading, yaw rate and duration (s) by sectors, each shape (n,)."""
+    rate = turning(heading)
+    bow = heading.at(velocity.time_utc_ns, gap_limit_s(heading))
+    turn = rate.at(velocity.time_utc_ns, max(gap_limit_s(rate), 3.0)) if len(rate) > 1 else np.full(bow.shape, np.nan)
+    good = velocity.under_way & np.isfinite(bow) & np.isfinite(turn)
+    if np.count_nonzero(good) < _FEWEST:
+        return None
+    time, bow, turn = velocity.time_utc_ns[good], bow[good], turn[good]
+    relative = velocity.value[good] * (1.0 if kind == "body" else np.exp(-1j * bow))
+    fast = float(np.percentile(np.abs(turn), 95.0))
+    side = np.where(np.abs(turn) > _TURNING * fast, np.sign(turn), 0.0) + 1.0
+    sector = np.floor(np.mod(bow, 2 * np.pi) / (2 * np.pi / _SECTORS)).astype(np.int64) * 3 + side.astype(np.int64)
+    order = np.argsort(sector, kind="stable")
+    starts = np.flatnonzero(np.concatenate([[True], np.diff(sector[order]) > 0]))
+    count = np.diff(np.append(starts, sector.size))
+    seen = np.asarray(np.add.reduceat(relative[order], starts), dtype=np.complex128) / count
+    ahead = np.angle(np.add.reduceat(np.exp(1j * bow)[order], starts))
+    turned: Float = np.add.reduceat(turn[order], starts) / count
+    kept = count >= max(_FEWEST // 4, sector.size // 500)
+    lasted = count * float(np.median(np.diff(time))) / SECOND_NS
+    return (seen[kept], ahead[kept], turned[kept], lasted[kept]) if kept.any() else None

@@ -1,0 +1,99 @@
+"""What a check says: the channels agree, they disagree, or it cannot be told from them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from math import isfinite
+from typing import Literal
+
+from kempf.pipeline.channels.doctor.faults import Fault
+
+State = Literal["agree", "disagree", "untestable"]
+
+#: How many standard errors outside what is expected a figure must lie: one in 16,000 by chance, a dozen figures a log
+SURE = 4.0
+
+
+@dataclass(frozen=True)
+class Figure:
+    """One measured figure of a check and what is expected of it.
+
+    Attributes
+    ----------
+    name : str
+    value, std : float
+        With the standard error, what is unknown of current and leeway included.
+    low, high : float
+        What honest channels give, their ordinary errors included.
+    unit : str
+    """
+
+    name: str
+    value: float
+    std: float
+    low: float
+    high: float
+    unit: str = "1"
+
+    @property
+    def outside(self) -> float:
+        """By how many standard errors the figure lies outside what is expected; 0 within."""
+        beyond = max(self.low - self.value, self.value - self.high, 0.0)
+        return 0.0 if beyond == 0.0 else beyond / max(self.std, 1e-12)
+
+    @property
+    def state(self) -> State:
+        """Judge the figure: outside beyond doubt, within, or too uncertain to have shown a fault."""
+        if not (isfinite(self.value) and isfinite(self.std)):
+            return "untestable"
+        if self.outside > SURE:
+            return "disagree"
+        # a figure that could not have left the band unless it were absurd has tested nothing
+        return (
+            "agree"
+            if SURE * self.std <= max(self.high - self.low, 1e-12) * 2.0 and self.outside <= SURE
+            else "untestable"
+        )
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one check says of a log.
+
+    Attributes
+    ----------
+    check : str
+        Its name, such as ``heading_rate``.
+    channels : tuple of str
+        That it compares.
+    state : {"agree", "disagree", "untestable"}
+    words : str
+        One sentence with the evidence.
+    figures : tuple of Figure
+    left_over : float
+        Size of what does not go together over the size of what there is; tells which of two mends fits better.
+    suspects : tuple of Fault
+        What could have caused a disagreement.
+    """
+
+    check: str
+    channels: tuple[str, ...]
+    state: State
+    words: str
+    figures: tuple[Figure, ...] = ()
+    left_over: float = 0.0
+    suspects: tuple[Fault, ...] = field(default=(), repr=False)
+
+
+def untestable(check: str, channels: tuple[str, ...], why: str) -> Outcome:
+    """Return the outcome of a check that these data cannot answer."""
+    return Outcome(check, channels, "untestable", why)
+
+
+def worst(states: list[State]) -> State:
+    """Return what several figures say together: one that disagrees decides, else one that tested something."""
+    ordered: tuple[State, State] = ("disagree", "agree")
+    for state in ordered:
+        if state in states:
+            return state
+    return "untestable"

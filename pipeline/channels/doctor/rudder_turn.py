@@ -1,0 +1,211 @@
+"""Rudder against the turn: a rudder to starboard turns her to starboard, after a while.
+
+Nomoto's first-order equation, integrated over windows so that no rate has to be differenced twice.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kempf.pipeline.channels.doctor.align import edges_of
+from kempf.pipeline.channels.doctor.faults import Fault
+from kempf.pipeline.channels.doctor.heading_rate import swing
+from kempf.pipeline.channels.doctor.log import Log, integral, turning
+from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable, worst
+from kempf.pipeline.channels.doctor.robust_regression import Fit, fit
+from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+
+#: A rudder that moves less than this shows nothing, rad; one that moves less than the second while the ship swings so
+#: many times farther is in another unit.
+_LEAST_RUDDER, _FAINT_RUDDER, _SWING = np.deg2rad(1.0), np.deg2rad(2.0), 8.0
+_LEAST_TURN = float(np.deg2rad(10.0))
+#: What wind, propeller and trim ask of the rudder on a straight course, deg, and one standard deviation of it.
+_NEUTRAL_DEG, _NEUTRAL_STD_DEG = 12.0, 3.0
+#: The turn may answer so late, s, at most: the rudder's own shift that is tried.
+_SHIFTS = np.arange(-30.0, 31.0, 1.0)
+#: Shifts that an honest rudder shows: the turn answers at once or after some seconds, and does not foresee the rudder.
+HONEST_S = (-8.0, 4.0)
+_FAR_BETTER = 0.6
+#: What the rudder must explain of the change of the rate beyond what the rate itself explains.
+_EXPLAINS = 0.05
+#: What it must explain to tell when it was put over, and how well that is told then, s.
+_CLOCKED, _SHIFT_STD_S = 0.3, 1.0
+_FEWEST = 16
+
+
+def examine(log: Log) -> list[Outcome]:
+    """Hold each rudder channel against each witness of the turn.
+
+    Returns
+    -------
+    list of Outcome
+        ``rudder_angle_heading``, ``rudder_angle_rate`` and the same with ``rudder_order``.
+
+    References
+    ----------
+    Nomoto, Taguchi, Honda and Hirano (1957), "On the steering qualities of ships", International Shipbuilding
+    Progress 4: T dr/dt + r = K delta, here r(t1) - r(t0) = -(turn)/T + (K/T) int delta + constant.
+    """
+    found = []
+    for rudder in ("rudder_angle", "rudder_order"):
+        if rudder not in log.series:
+            continue
+        for name, channels, turned in _witnesses(log):
+            found += _compare(f"{rudder}_{name}", (rudder, *channels), log, turned)
+    return found
+
+
+def _witnesses(log: Log) -> list[tuple[str, tuple[str, ...], tuple[Series, Series]]]:
+    """Return what tells the turn: name, channels, the angle turned and the rate of turn."""
+    found: list[tuple[str, tuple[str, ...], tuple[Series, Series]]] = []
+    heading, rate = log.series.get("heading"), log.series.get("yaw_rate")
+    if heading is not None and len(turning(heading)) > 1:
+        found.append(("heading", ("heading",), (heading, turning(heading))))
+    if rate is not None:
+        found.append(("rate", ("yaw_rate",), (integral(rate), rate)))
+    return found
+
+
+def _compare(name: str, channels: tuple[str, ...], log: Log, turned: tuple[Series, Series]) -> list[Outcome]:
+    rudder = log.series[channels[0]]
+    angle, rate = turned
+    moved, swung = swing(rudder.value), swing(angle.value)
+    if moved < _FAINT_RUDDER and swung > max(_SWING * moved, 4.0 * _LEAST_TURN) and moved > 0.0:
+        # no ship turns so far on so little rudder
+        figure = Figure(
+            "rudder's range", np.rad2deg(moved), 0.1 * np.rad2deg(moved), np.rad2deg(_FAINT_RUDDER), 180.0, "deg"
+        )
+        words = f"the rudder moves within {figure.value:.2g} deg while she turns through {np.rad2deg(swung):.0f} deg"
+        suspects = (Fault("unit", channels[:1], 180.0 / np.pi, "rad taken for deg"),)
+        return [Outcome(name, channels, "disagree", words, (figure,), 1.0, suspects)]
+    if moved < _LEAST_RUDDER or swung < _LEAST_TURN:
+        return [untestable(name, channels, "the rudder was hardly used, or she hardly turned")]
+    edges = edges_of(rudder, angle, rate, window_s=_window(rudder))
+    if edges.size < _FEWEST:
+        return [untestable(name, channels, "too short to tell her answer from chance")]
+    answered = _best(edges, rudder, angle, rate, _makes_way(log, edges))
+    if answered is None:
+        return [untestable(name, channels, "too little of it overlaps")]
+    found, shift, explains = answered
+    return [_judged(name, channels, found, explains), _clock(f"{name}_clock", channels, found, shift, explains)]
+
+
+def _window(rudder: Series) -> float:
+    """Return a window a fraction of the time between two rudder movements, s."""
+    middle = 0.5 * sum(np.percentile(rudder.value, [5.0, 95.0]))
+    side = np.sign(rudder.value - middle)
+    crossings = np.flatnonzero(np.diff(side[side != 0]) != 0).size
+    span = float(rudder.time_utc_ns[-1] - rudder.time_utc_ns[0]) / SECOND_NS
+    return float(np.clip(min(span / max(crossings, 1) / 12.0, span / 80.0), 1.0, 10.0))
+
+
+def _makes_way(log: Log, edges: Nanoseconds) -> NDArray[np.bool_]:
+    """Tell in which windows she makes so much way that the rudder acts, shape (n,); all where no speed is known."""
+    for name in ("speed_through_water", "speed_over_ground"):
+        speed = log.series.get(name)
+        if speed is not None:
+            at = np.abs(speed.at(edges, np.inf))
+            slow = at < 0.5 * float(np.percentile(np.abs(speed.value), 90.0))
+            return ~(slow[1:] | slow[:-1])
+    return np.ones(max(edges.size - 1, 0), dtype=np.bool_)
+
+
+def _table(edges: Nanoseconds, rudder: Series, angle: Series, rate: Series) -> tuple[Float, Float, Series]:
+    smooth = _averaged(rate, float(np.median(np.diff(edges))) / SECOND_NS / 4.0)
+    jump = np.diff(smooth.at(edges, max(gap_limit_s(smooth), 3.0)))
+    turn = np.diff(angle.at(edges, gap_limit_s(angle)))
+    return turn, jump, integral(rudder)
+
+
+def _averaged(series: Series, over_s: float) -> Series:
+    """Return running means over so long, at the middles; less noise where the rate is read quickly."""
+    width = int(over_s / series.period_s) if series.period_s > 0 else 0
+    if width < 2 or len(series) < 2 * width:
+        return series
+    total = np.concatenate([[0.0], np.cumsum(series.value)])
+    mean = (total[width:] - total[:-width]) / width
+    first, last = series.time_utc_ns[: mean.size], series.time_utc_ns[width - 1 : width - 1 + mean.size]
+    return Series(first + (last - first) // 2, mean)
+
+
+def _best(
+    edges: Nanoseconds, rudder: Series, angle: Series, rate: Series, way: NDArray[np.bool_]
+) -> tuple[Fit, float, float] | None:
+    """Return the fit at the shift of the rudder that explains most, that shift (s) and what the rudder explains."""
+    turn, jump, total = _table(edges, rudder, angle, rate)
+    jump = np.where(way, jump, np.nan)
+    long = np.diff(edges) / SECOND_NS
+    gap = gap_limit_s(rudder)
+    without = _residual(np.column_stack([turn, long]), jump)
+    if not without:
+        return None
+    left = np.full(_SHIFTS.size, np.inf)
+    moved = edges[None, :] + np.rint(_SHIFTS * SECOND_NS).astype(np.int64)[:, None]
+    for k, put in enumerate(np.diff(total.at(moved.reshape(-1), gap).reshape(moved.shape))):
+        left[k] = _residual(np.column_stack([put, turn, long]), jump) or np.inf
+    honest = (HONEST_S[0] <= _SHIFTS) & (HONEST_S[1] >= _SHIFTS)
+    usual = float(np.min(left[honest]))
+    # a shift that no gear and no hull makes has to be far better than one that they do
+    k = int(np.argmin(left)) if np.min(left) < _FAR_BETTER * usual else int(np.argmin(np.where(honest, left, np.inf)))
+    if not np.isfinite(left[k]):
+        return None
+    put = np.diff(total.at(edges + round(_SHIFTS[k] * SECOND_NS), gap))
+    found = fit(np.column_stack([put, turn, long]), jump)
+    return None if found is None else (found, float(_SHIFTS[k]), 1.0 - float(left[k]) / without)
+
+
+def _residual(columns: Float, observed: Float) -> float | None:
+    good = np.isfinite(observed) & np.all(np.isfinite(columns), axis=1)
+    if np.count_nonzero(good) < _FEWEST:
+        return None
+    A, y = columns[good], observed[good]
+    unit = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
+    value = np.linalg.lstsq(A / unit, y, rcond=1e-10)[0]
+    return float(np.mean((y - (A / unit) @ value) ** 2))
+
+
+def _clock(name: str, channels: tuple[str, ...], found: Fit, shift: float, explains: float) -> Outcome:
+    """Judge the shift of the rudder at which she answers best."""
+    if explains < _CLOCKED or abs(found.value[0]) < SURE * found.std[0]:
+        return untestable(name, channels, "her answer to the rudder is too faint to tell when it was put over")
+    figure = Figure("time of the rudder behind that of her answer", shift, _SHIFT_STD_S, *HONEST_S, "s")
+    when = "before" if shift > 0 else "after"
+    words = f"she turns as if the rudder had been put over {abs(shift):.0f} s {when} the log says"
+    middle = 0.5 * (HONEST_S[0] + HONEST_S[1])
+    late, std = shift - middle, 0.5 * (HONEST_S[1] - HONEST_S[0])
+    suspects = (
+        Fault("latency", channels[:1], late, "late" if late > 0 else "early", std),
+        Fault("latency", channels[1:], -late, "early" if late > 0 else "late", std),
+    )
+    return Outcome(name, channels, figure.state, words, (figure,), min(1.0 - explains, 1.0), suspects)
+
+
+def _judged(name: str, channels: tuple[str, ...], found: Fit, explains: float) -> Outcome:
+    answer, std = float(found.value[0]), float(found.std[0])
+    if explains < _EXPLAINS or abs(answer) < SURE * std:
+        return untestable(name, channels, "her answer to the rudder is lost in what else turns her")
+    neutral = -float(found.value[2]) / answer
+    neutral_std = float(np.hypot(found.std[2] / abs(answer), np.deg2rad(_NEUTRAL_STD_DEG)))
+    figures = (
+        Figure("yaw acceleration for 1 rad of rudder", answer, std, 0.0, np.inf, "1/s^2"),
+        Figure(
+            "rudder on a straight course",
+            np.rad2deg(neutral),
+            np.rad2deg(neutral_std),
+            -_NEUTRAL_DEG,
+            _NEUTRAL_DEG,
+            "deg",
+        ),
+    )
+    words = (
+        f"a radian of rudder turns her by {answer:.2g} +- {std:.1g} 1/s^2, and she goes straight with the rudder at "
+        f"{figures[1].value:.0f} +- {figures[1].std:.0f} deg"
+    )
+    sign = [Fault("sign", (one,)) for one in channels]
+    if channels[1] == "heading":
+        sign.append(Fault("offset", ("heading",), np.pi / 2, "counted anticlockwise from east", simplicity=2))
+    suspects = (*sign, Fault("offset", channels[:1], -neutral, "zero elsewhere", neutral_std))
+    state = "disagree" if answer < 0.0 else worst([figures[1].state, "agree"])
+    return Outcome(name, channels, state, words, figures, min(1.0 - explains, 1.0), suspects)

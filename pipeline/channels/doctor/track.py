@@ -1,0 +1,173 @@
+"""Positions against velocities: the way from fix to fix is the integral of the velocity, in length and in direction."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.channels.doctor.faults import UNITS, Fault
+from kempf.pipeline.channels.doctor.log import VELOCITIES, Complex, Log, fix_noise
+from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable, worst
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+
+#: Ratios of the two ways that are no lie, and angles between them, deg.
+RATIOS, _ANGLES_DEG = (0.85, 1.18), (-6.0, 6.0)
+#: Share of the way that may point elsewhere.
+_ASTRAY = 0.15
+#: Windows: so many at most, over each other by three quarters; the way within each, in noises of a fix; so many at
+#: least.
+_MOST, _OVER, _CLEAR, _FEWEST = 240, 4.0, 30.0, 8
+#: The log is so many windows long at least.
+_LEAST_WINDOWS = 2.5
+
+
+def examine(log: Log) -> list[Outcome]:
+    """Compare the way between the fixes with the integral of every velocity over ground that the log has.
+
+    Returns
+    -------
+    list of Outcome
+        ``path_KIND`` (length) and ``bearing_KIND`` (direction) for each kind of velocity but the track itself.
+    """
+    track = log.track()
+    if track is None:
+        return []
+    found = []
+    for kind in ("course", "earth", "body"):
+        velocity = log.over_ground(kind)
+        if velocity is None or velocity.time_utc_ns.size < _FEWEST:
+            continue
+        ways = _ways(track, velocity.time_utc_ns, velocity.value)
+        channels = ("latitude", "longitude", *velocity.channels, *(("heading",) if kind == "body" else ()))
+        pair = VELOCITIES[kind]
+        speed = pair[:1] if kind == "course" else pair
+        if ways is None:
+            why = "she hardly made way between the fixes"
+            found += [untestable(f"{what}_{kind}", channels, why) for what in ("path", "bearing")]
+            continue
+        length_channels = channels if kind == "body" else ("latitude", "longitude", *speed)
+        # in a turn to one side only, a fix that is late looks turned
+        step = np.diff(velocity.time_utc_ns) / SECOND_NS
+        late = 1.0 + float(np.median(step))
+        one_sided = late * abs(float(np.median(np.diff(velocity.direction) / step)))
+        found += [_length(f"path_{kind}", length_channels, speed, ways), _direction(kind, channels, ways, one_sided)]
+    if not found and "speed_over_ground" in log.series:
+        found += _without_course(log, track)
+    return found
+
+
+def _ways(track: tuple[Nanoseconds, Complex], time: Nanoseconds, velocity: Complex) -> tuple[Complex, Complex] | None:
+    """Return the displacements by the fixes and by the velocity, each shape (n,); None for too few."""
+    start, end = max(int(track[0][0]), int(time[0])), min(int(track[0][-1]), int(time[-1]))
+    span = (end - start) / SECOND_NS
+    fast = float(np.percentile(np.abs(velocity), 75.0))
+    gone = abs(np.diff(track[1])).sum() / max((track[0][-1] - track[0][0]) / SECOND_NS, 1e-9)
+    # whichever of the two is in the wrong unit, the smaller speed makes the window long enough
+    speed = max(min(fast, float(gone)), 1e-3)
+    periods = [float(np.median(np.diff(t))) / SECOND_NS for t in (track[0], time)]
+    way = _CLEAR * fix_noise(track[1])
+    window = max(way / speed, 4.0 * max(periods))
+    if span < _LEAST_WINDOWS * window:
+        return None
+    count = min(int(_OVER * span / window), _MOST)
+    # windows of that length, spread over the log
+    begin = start + np.linspace(0, (span - window) * SECOND_NS, count).astype(np.int64)
+    stop = begin + round(window * SECOND_NS)
+    gap = max(3.0 * max(periods), 1.0)
+    moved = _between(track[0], track[1], begin, stop, gap)
+    step = np.diff(time) / SECOND_NS
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step)])
+    told = _between(time, total, begin, stop, gap)
+    good = np.isfinite(moved) & np.isfinite(told)
+    good &= np.maximum(np.abs(moved), np.abs(told)) > 0.5 * way
+    return (moved[good], told[good]) if np.count_nonzero(good) >= _FEWEST else None
+
+
+def _between(time: Nanoseconds, place: Complex, begin: Nanoseconds, stop: Nanoseconds, gap: float) -> Complex:
+    north, east = Series(time, place.real), Series(time, place.imag)
+    moved: Complex = (north.at(stop, gap) - north.at(begin, gap)) + 1j * (east.at(stop, gap) - east.at(begin, gap))
+    return moved
+
+
+def _length(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ways: tuple[Complex, Complex]) -> Outcome:
+    moved, told = np.abs(ways[0]), np.abs(ways[1])
+    good = (moved > 0.0) & (told > 0.0)
+    if np.count_nonzero(good) < _FEWEST:
+        return untestable(name, channels, "one of the two stands still")
+    return length_outcome(name, channels, speed, np.log(told[good] / moved[good]))
+
+
+def length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ratios: Float) -> Outcome:
+    """Judge the logarithms of the ratios of the way by the velocity to the way by the fixes, shape (n,)."""
+    middle = float(np.median(ratios))
+    spread = 1.4826 * float(np.median(np.abs(ratios - middle)))
+    ratio = float(np.exp(middle))
+    # the windows overlap: a quarter of them is independent
+    std = ratio * spread / np.sqrt(max(ratios.size / 4.0, 1.0))
+    figure = Figure("way by the velocity over way by the fixes", ratio, max(std, 1e-4 * ratio), *RATIOS)
+    words = f"{' and '.join(speed)} add up to {ratio:.3g} +- {std:.1g} times the way between the fixes"
+    suspects = [
+        *(Fault("unit", speed, factor, unit) for unit, factor in UNITS["m/s"].items()),
+        *(Fault("unit", ("latitude", "longitude"), factor, unit) for unit, factor in UNITS["rad"].items()),
+        *((Fault("swap", ("latitude", "longitude")),) if {"latitude", "longitude"} <= set(channels) else ()),
+        Fault("scale", speed, 1.0 / ratio, "scale", std / ratio**2, simplicity=3),
+    ]
+    return Outcome(name, channels, figure.state, words, (figure,), min(spread + abs(middle), 1.0), tuple(suspects))
+
+
+def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, Complex], one_sided: float) -> Outcome:
+    moved, told = ways
+    turn = moved * np.conj(told)
+    unit = turn / np.maximum(np.abs(turn), 1e-300)
+    mean = complex(np.mean(unit))
+    angle = float(np.angle(mean))
+    # what points elsewhere than the mean, of the whole
+    astray = 1.0 - abs(mean)
+    off = np.angle(unit * np.exp(-1j * angle))
+    own = 1.4826 * float(np.median(np.abs(off))) / np.sqrt(max(off.size / 4.0, 1.0))
+    std = float(np.hypot(own, one_sided))
+    figures = (
+        Figure(
+            "bearing of the fixes' way from the velocity's",
+            np.rad2deg(angle),
+            max(np.rad2deg(std), 0.1),
+            *_ANGLES_DEG,
+            "deg",
+        ),
+        Figure("share that points elsewhere", astray, 0.02, 0.0, _ASTRAY),
+    )
+    words = (
+        f"the way between the fixes bears {figures[0].value:+.1f} +- {figures[0].std:.1g} deg off the velocity, and "
+        f"{astray:.2f} of it points elsewhere"
+    )
+    pair = VELOCITIES[kind]
+    positions = ("latitude", "longitude")
+    suspects = [
+        Fault("swap", positions), Fault("sign", positions[:1]), Fault("sign", positions[1:]),
+    ]  # fmt: skip
+    if kind == "course":
+        course = pair[1:]
+        suspects += [
+            Fault("sign", course),
+            Fault("offset", course, np.pi / 2, "counted anticlockwise from east", simplicity=2),
+            Fault("offset", course, angle, "turned", std, simplicity=2),
+            *(Fault("unit", course, factor, unit) for unit, factor in UNITS["rad"].items()),
+        ]
+    else:
+        suspects += [
+            Fault("swap", pair), Fault("sign", pair[:1]), Fault("sign", pair[1:]),
+            Fault("frame", pair, name=f"{'body' if kind == 'earth' else 'earth'}-fixed"),
+        ]  # fmt: skip
+        if kind == "body":
+            suspects += [Fault("offset", ("heading",), angle, "turned", std, simplicity=2), Fault("sign", ("heading",))]
+    state = worst([figure.state for figure in figures])
+    return Outcome(f"bearing_{kind}", channels, state, words, figures, min(astray, 1.0), tuple(suspects))
+
+
+def _without_course(log: Log, track: tuple[Nanoseconds, Complex]) -> list[Outcome]:
+    """Compare lengths alone where the log has a speed but no course."""
+    speed = log.series["speed_over_ground"]
+    channels = ("latitude", "longitude", "speed_over_ground")
+    ways = _ways(track, speed.time_utc_ns, speed.value.astype(np.complex128))
+    if ways is None:
+        return [untestable("path_course", channels, "she hardly made way between the fixes")]
+    return [_length("path_course", channels, ("speed_over_ground",), ways)]

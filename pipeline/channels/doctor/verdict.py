@@ -1,0 +1,136 @@
+"""What the doctor says, in words and as JSON: findings with their evidence and the lines that mend them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from math import pi
+from typing import Any
+
+from kempf.pipeline.channels.doctor.corrections import propose
+from kempf.pipeline.channels.doctor.examine import Examination, Finding
+from kempf.pipeline.channels.doctor.faults import Fault
+from kempf.pipeline.channels.doctor.outcome import Figure, Outcome
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.profile import ChannelMap
+
+_FRAMES = {"body-fixed": "earth-fixed ones are expected", "earth-fixed": "body-fixed ones are expected"}
+
+
+def told(examination: Examination, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> dict[str, Any]:
+    """Return an examination as JSON content.
+
+    Parameters
+    ----------
+    examination : Examination
+    known : mapping of str to (str, ChannelMap)
+        Entry of the profile behind each channel, from `kempf.pipeline.channels.doctor.corrections.entries`.
+    log_format : {"delimited", "mcap", "nmea"}
+
+    Returns
+    -------
+    dict
+        ``verdict``, ``findings``, ``checks``, ``untested``.
+    """
+    return {
+        "verdict": examination.verdict,
+        "findings": [_finding(one, known, log_format) for one in examination.findings],
+        "checks": [_outcome(one) for one in examination.outcomes],
+        "untested": list(examination.untested),
+    }
+
+
+def _finding(finding: Finding, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> dict[str, Any]:
+    faults = []
+    for fault in finding.faults:
+        mends = propose(fault, known, log_format)
+        faults.append(
+            {
+                "kind": fault.kind,
+                "channels": list(fault.channels),
+                "words": words(fault),
+                "value": fault.value,
+                "std": fault.std,
+                "profile": [mend.line for mend in mends],
+                "entries": {mend.key: mend.mapped.model_dump(exclude_defaults=True) for mend in mends},
+            }
+        )
+    return {
+        "words": sentence(finding),
+        "channels": list(finding.channels),
+        "certain": len(finding.faults) == 1,
+        "faults": faults,
+        "evidence": [_outcome(one) for one in finding.evidence],
+    }
+
+
+def _outcome(outcome: Outcome) -> dict[str, Any]:
+    return {
+        "check": outcome.check,
+        "channels": list(outcome.channels),
+        "state": outcome.state,
+        "words": outcome.words,
+        "figures": [_figure(figure) for figure in outcome.figures],
+    }
+
+
+def _figure(figure: Figure) -> dict[str, Any]:
+    return {
+        "name": figure.name,
+        "value": float(figure.value),
+        "std": float(figure.std),
+        "expected": [float(figure.low), float(figure.high)],
+        "unit": figure.unit,
+    }
+
+
+def sentence(finding: Finding) -> str:
+    """Return a finding as one sentence."""
+    if not finding.faults:
+        return f"{_listed(finding.channels)} contradict each other, and no single lie that is known explains it"
+    if len(finding.faults) == 1:
+        return words(finding.faults[0])
+    return "one of these: " + "; or ".join(words(fault) for fault in finding.faults)
+
+
+def words(fault: Fault) -> str:
+    """Return a fault in plain words.
+
+    Examples
+    --------
+    >>> words(Fault("unit", ("speed_over_ground",), 0.514, "kn taken for m/s"))
+    'speed_over_ground is in kn, taken for m/s'
+    >>> words(Fault("latency", ("heading",), 2.5, "late", 0.04))
+    'heading is 2.50 +- 0.04 s late'
+    """
+    return _WORDS[fault.kind](_listed(fault.channels), fault)
+
+
+def _of_offset(names: str, fault: Fault) -> str:
+    if fault.name.startswith("counted"):
+        return f"{names} is {fault.name}"
+    angle = f"{fault.value * 180.0 / pi:+.1f} +- {fault.std * 180.0 / pi:.1g} deg"
+    return f"{names} is turned: {angle} are to be added"
+
+
+def _of_clock(names: str, fault: Fault) -> str:
+    pace = "fast" if fault.value > 0 else "slow"
+    return f"the clock of {names} runs {abs(fault.value) * 1e3:.3g} +- {fault.std * 1e3:.1g} s in 1000 s too {pace}"
+
+
+_WORDS: dict[str, Callable[[str, Fault], str]] = {
+    "unit": lambda names, fault: f"{names} is in {fault.name.replace(' taken', ', taken', 1)}",
+    "sign": lambda names, _: f"{names} has the wrong sign",
+    "swap": lambda names, _: f"{names} are swapped",
+    "frame": lambda names, fault: f"{names} are {fault.name} where {_FRAMES[fault.name]}",
+    "latency": lambda names, fault: (
+        f"{names} is {abs(fault.value):.2f} +- {fault.std:.1g} s {'late' if fault.value > 0 else 'early'}"
+    ),
+    "scale": lambda names, fault: f"{names} is to be multiplied by {fault.value:.4g} +- {fault.std:.1g}",
+    "offset": _of_offset,
+    "clock_scale": _of_clock,
+}
+
+
+def _listed(channels: tuple[str, ...]) -> str:
+    assert all(channel in CHANNELS for channel in channels)
+    return channels[0] if len(channels) == 1 else f"{', '.join(channels[:-1])} and {channels[-1]}"

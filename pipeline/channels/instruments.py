@@ -1,0 +1,191 @@
+"""From the readings of a log to one series a channel: one instrument each, at its instants of measurement.
+
+Which of several instruments serves a channel is decided here, and said; earth-fixed velocities become speed and course
+here, so that later rooms know one form only.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import polars as pl
+
+from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.holds import find_held
+from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.schemas.channels import CHANNELS
+
+#: channels that one instrument measures at one instant, so that they share their rows
+_TOGETHER: tuple[tuple[str, ...], ...] = (
+    ("latitude", "longitude"),
+    ("speed_over_ground", "course_over_ground"),
+    ("velocity_north", "velocity_east"),
+    ("velocity_forward", "velocity_starboard"),
+    ("wind_speed", "wind_angle"),
+)
+#: readings that are held whole: asking the tables for the columns of one instrument after the other costs a short log
+#: more than its readings take
+_SHORT = 1 << 16
+#: sentences that carry the receiver's own time of the fix; preferred where two sources are equally fast
+_OWN_CLOCK = ("RMC", "GGA", "GLL")
+
+
+@dataclass(frozen=True, eq=False)
+class Instruments:
+    """The series of one log.
+
+    Attributes
+    ----------
+    series : dict of str to Series
+        By canonical channel name; only channels that the log has.
+    sources : dict of str to str
+        The log's source that serves each channel.
+    notes : tuple of str
+        Choices made, one sentence each.
+    derived : frozenset of str
+        Channels that the log does not have and that were computed from others.
+    """
+
+    series: dict[str, Series]
+    sources: dict[str, str]
+    notes: tuple[str, ...]
+    derived: frozenset[str] = frozenset()
+
+    def get(self, channel: str) -> Series | None:
+        """Return the series of a channel, or None where the log lacks it."""
+        return self.series.get(channel)
+
+
+def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
+    """Build the series of every channel from the readings of one log.
+
+    Parameters
+    ----------
+    readings : polars.DataFrame or polars.LazyFrame
+        Of one log, sorted by record, schema `pipeline.ingest.readings.READING_SCHEMA`; of a long lazy one the columns
+        of one instrument are held at a time.
+
+    Returns
+    -------
+    Instruments
+    """
+    frame = readings.lazy()
+    there = set(frame.collect_schema().names())
+    grouped = {name for group in _TOGETHER for name in group}
+    groups = [*_TOGETHER, *((name,) for name in CHANNELS if name not in grouped)]
+    groups = [group for group in groups if there.issuperset(_columns(group))]
+    counts = _counts(frame, [*groups, *((name,) for group in groups if len(group) > 1 for name in group)])
+    if counts["readings"].sum() <= _SHORT:
+        frame = frame.collect().lazy()
+    series: dict[str, Series] = {}
+    sources: dict[str, str] = {}
+    notes: list[str] = []
+    for group in groups:
+        offered = counts.filter(pl.col(_name(group)) > 0)
+        if offered.is_empty():
+            # messages of their own, such as a topic for the speed and one for the course
+            groups += [(name,) for name in group if len(group) > 1]
+            continue
+        source = _choose(dict(offered.select("source", _name(group)).iter_rows()), group, notes)
+        rows = frame.filter(pl.col("source") == source).select("time_utc_ns", *_columns(group)).drop_nulls().collect()
+        time = rows["time_utc_ns"].to_numpy().astype(np.int64, copy=False)
+        values = rows.select(_columns(group)).to_numpy().astype(np.float64, copy=False)
+        del rows
+        for name, one in _at_instants(group, time, values, source, notes).items():
+            series[name] = one
+            sources[name] = source
+    own = set(series)
+    _add_speed_and_course(series, sources, notes)
+    _add_from_the_bow(series, sources, notes)
+    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own))
+
+
+def _columns(group: tuple[str, ...]) -> list[str]:
+    return [CHANNELS[name].column for name in group]
+
+
+def _name(group: tuple[str, ...]) -> str:
+    return " ".join(group)
+
+
+def _counts(frame: pl.LazyFrame, groups: list[tuple[str, ...]]) -> pl.DataFrame:
+    """Count the readings, and those that give all channels of a group: a row a source, sorted by name."""
+    whole = [pl.all_horizontal(pl.col(_columns(g)).is_not_null()).sum().alias(_name(g)) for g in groups]
+    return (
+        frame.drop_nulls(["time_utc_ns", "source"])
+        .group_by("source")
+        .agg(pl.len().alias("readings"), *whole)
+        .sort("source")
+        .collect()
+    )
+
+
+def _choose(counts: dict[str, int], group: tuple[str, ...], notes: list[str]) -> str:
+    """Name the source with most readings; among equals (within 2 %) one with its own clock, then by name."""
+    most = max(counts.values())
+    close = [name for name, n in counts.items() if n >= 0.98 * most]
+    chosen = min(close, key=lambda name: (name[-3:] not in _OWN_CLOCK, name))
+    others = [name for name in counts if name != chosen]
+    if others:
+        notes.append(f"{' and '.join(group)} from {chosen}; also in {', '.join(others)}, not used")
+    return chosen
+
+
+def _at_instants(
+    group: tuple[str, ...], time: Nanoseconds, values: Float, source: str, notes: list[str]
+) -> dict[str, Series]:
+    # most logs are in order, and a long one is not copied for nothing
+    if np.any(time[1:] < time[:-1]):
+        order = np.argsort(time, kind="stable")
+        time, values = time[order], values[order]
+    if np.any(time[1:] == time[:-1]):
+        first = np.concatenate(([True], time[1:] > time[:-1]))
+        time, values = time[first], values[first]
+    held = find_held(time, values)
+    if held.rows_per_value > 1:
+        notes.append(
+            f"{' and '.join(group)}: {source} holds each value for {held.rows_per_value} rows; "
+            f"kept {held.time_utc_ns.size} of {time.size} rows, at their instants of measurement"
+        )
+    result = {}
+    for k, name in enumerate(group):
+        value = values[held.rows, k] if held.rows_per_value > 1 else np.ascontiguousarray(values[:, k])
+        if CHANNELS[name].wrap == "circle":
+            value = np.unwrap(value)
+        result[name] = Series(held.time_utc_ns, value)
+    return result
+
+
+def _add_from_the_bow(series: dict[str, Series], sources: dict[str, str], notes: list[str]) -> None:
+    """Turn body-fixed velocities by the heading into speed and course over ground where the log has only these."""
+    ahead, across, heading = (series.get(n) for n in ("velocity_forward", "velocity_starboard", "heading"))
+    if ahead is None or across is None or heading is None or "course_over_ground" in series:
+        return
+    time = ahead.time_utc_ns
+    beside, bow = across.at(time, gap_limit_s(across)), heading.at(time, gap_limit_s(heading))
+    known = np.isfinite(beside) & np.isfinite(bow)
+    if not known.any():
+        return
+    time, forward, beside, bow = time[known], ahead.value[known], beside[known], bow[known]
+    series["speed_over_ground"] = Series(time, np.hypot(forward, beside))
+    series["course_over_ground"] = Series(time, bow + np.unwrap(np.arctan2(beside, forward)))
+    for name in ("speed_over_ground", "course_over_ground"):
+        sources[name] = sources["velocity_forward"]
+    notes.append("speed and course over ground computed from the body-fixed velocities and the heading")
+
+
+def _add_speed_and_course(series: dict[str, Series], sources: dict[str, str], notes: list[str]) -> None:
+    """Turn earth-fixed velocities into speed and course over ground where the log has only these."""
+    north, east = series.get("velocity_north"), series.get("velocity_east")
+    if north is None or east is None or "course_over_ground" in series:
+        return
+    # two topics need not have their values at the same instants
+    across = east.at(north.time_utc_ns, gap_limit_s(east))
+    both = np.isfinite(across)
+    time, ahead, across = north.time_utc_ns[both], north.value[both], across[both]
+    series["speed_over_ground"] = Series(time, np.hypot(ahead, across))
+    series["course_over_ground"] = Series(time, np.unwrap(np.arctan2(across, ahead)))
+    for name in ("speed_over_ground", "course_over_ground"):
+        sources[name] = sources["velocity_north"]
+    notes.append("speed and course over ground computed from the earth-fixed velocities")

@@ -1,0 +1,69 @@
+"""One run compared: prediction at the horizon, free run, overshoots, and what the search for misfits needs."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.compare.comparison import ComparedRun
+from kempf.pipeline.compare.overshoot import Turn, compare_overshoots
+from kempf.pipeline.estimate import sensitivity
+from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.predict.free_run import free_run_of
+from kempf.pipeline.predict.horizon import Horizon, horizon_of
+from kempf.pipeline.predict.prediction import of_free_run, predict
+from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
+
+_HEADING = 2
+
+
+def compare_run(
+    filtered: Filtered,
+    point: Point,
+    horizon: Horizon,
+    *,
+    held_out: bool,
+    levels_from: str = "fitted with the parameters",
+    own_levels: Float | None = None,
+    phases: Sequence[PhaseInterval] = (),
+    turns: Sequence[Turn] = (),
+) -> ComparedRun:
+    """Compare one run with its prediction.
+
+    Parameters
+    ----------
+    filtered : Filtered
+    point : Point
+    horizon : Horizon
+    held_out : bool
+        Whether the parameters have not seen this run.
+    levels_from : str, optional
+        Where the noise levels come from, in words.
+    own_levels : ndarray, shape (6,), optional
+        Logarithms of levels fitted to this run, for the search for misfits; by default those of ``point``: a noisier
+        sensor is no misfit.
+    phases : sequence of PhaseInterval, optional
+    turns : sequence of Turn, optional
+        Its overshoots.
+
+    Raises
+    ------
+    DataRejected
+        ``prediction_diverges``, ``horizon_too_long``.
+    """
+    run = filtered.run
+    own = point if own_levels is None else Point(point.hull, point.values, own_levels)
+    found = free_run_of(filtered, point.hull, point.values)
+    free = of_free_run(filtered, found, horizon_of("free"))
+    return ComparedRun(
+        name=run.name,
+        held_out=held_out,
+        predicted=free if horizon.kind == "free run" else predict(filtered, point, horizon),
+        free=free,
+        overshoots=compare_overshoots(
+            run.time_s, run.measured[:, _HEADING], found.predicted[:, _HEADING], tuple(turns)
+        ),
+        looked=Looked(filtered, sensitivity.passed(filtered, own), found, tuple(phases)),
+        levels_from=levels_from,
+    )

@@ -1,0 +1,74 @@
+"""Where a model fails: by phase of the manoeuvre, side, what the ship did, run and frequency; the worst stretches.
+
+Never fitted and held-out runs in one call: what was fitted says less of the model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+from scipy.stats import chi2
+
+from kempf.pipeline.compare.bands import by_band
+from kempf.pipeline.compare.bins import by_bin, by_phase, by_run, by_side
+from kempf.pipeline.compare.correlations import correlations
+from kempf.pipeline.compare.group import BAND
+from kempf.pipeline.compare.worst_windows import worst
+from kempf.pipeline.predict.run_residuals import Looked, samples_of
+
+#: how many groups are named as those that stand out
+_NAMED = 6
+
+
+def where(looked: Sequence[Looked]) -> dict[str, Any]:
+    """Say where a model fails.
+
+    Parameters
+    ----------
+    looked : sequence of Looked
+        All fitted, or all held out; at least one.
+
+    Returns
+    -------
+    dict
+        ``band_probability``; ``by_phase``, ``by_side``, ``by_bin``, ``by_run`` (see `pipeline.compare.group.group`),
+        ``by_band``, ``correlations``, ``worst``, and ``stands_out``: the groups whose whitened innovations are larger
+        than a right model leaves in any of so many groups with probability 99 % (Bonferroni), the least likely first,
+        with ``of``, ``which``, ``channel``, ``n``, ``whitened_rms``, ``band``, ``p_adjusted``.
+    """
+    samples = samples_of(looked)
+    groups = {"by_phase": by_phase(samples), "by_side": by_side(samples)}
+    bins, runs = by_bin(samples), by_run(samples)
+    return {
+        "band_probability": BAND,
+        **groups,
+        "by_bin": bins,
+        "by_run": runs,
+        "by_band": by_band(looked),
+        "correlations": correlations(looked),
+        "worst": worst(looked),
+        "stands_out": _stands_out({**groups, "by_run": runs}, bins),
+    }
+
+
+def _stands_out(named: dict[str, dict[str, Any]], bins: dict[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:
+    entries = [(of, which, one) for of, groups in named.items() for which, one in groups.items()]
+    entries += [(f"by_bin {of}", _interval(one), one) for of, groups in bins.items() for one in groups]
+    tested = [(of, which, *pair) for of, which, one in entries for pair in one["channels"].items() if pair[1]["n"]]
+    found = []
+    for of, which, channel, told in tested:
+        square = told["n"] * told["whitened_rms"] ** 2
+        adjusted = min(1.0, len(tested) * float(chi2.sf(square, told["n"])))
+        if adjusted < 1.0 - BAND:
+            kept = {key: told[key] for key in ("n", "whitened_rms", "band")}
+            rank = float(chi2.logsf(square, told["n"]))
+            found.append((rank, {"of": of, "which": which, "channel": channel, **kept, "p_adjusted": adjusted}))
+    return [told for _, told in sorted(found, key=lambda pair: pair[0])[:_NAMED]]
+
+
+def _interval(one: dict[str, Any]) -> str:
+    low, high = one["low"], one["high"]
+    if low is None or high is None:
+        return f"below {high:g} {one['unit']}" if low is None else f"above {low:g} {one['unit']}"
+    return f"{low:g} to {high:g} {one['unit']}"

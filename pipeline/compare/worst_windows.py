@@ -1,0 +1,106 @@
+"""The worst stretches: windows of time one can jump to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from scipy.stats import chi2
+
+from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.compare.group import UNITS
+from kempf.pipeline.predict.free_run import CHANNELS
+from kempf.pipeline.predict.run_residuals import Looked
+
+#: a window in instants, and how many windows are told of each kind
+_WINDOW, _TOLD = 20, 5
+_FEWEST = 4
+
+
+def worst(looked: Sequence[Looked]) -> list[dict[str, Any]]:
+    """Return the windows in which the model errs most, worst first, one step ahead and in the free run.
+
+    Parameters
+    ----------
+    looked : sequence of Looked
+
+    Returns
+    -------
+    list of dict
+        ``run``, ``start`` and ``end`` (UTC, ISO 8601), ``start_s`` and ``end_s`` from the first instant of the run,
+        ``channel``, ``phase`` (the commonest in it), ``measure``: ``one step`` with ``whitened_rms`` and the
+        probability ``p_value`` of as much in a window of a right model, or ``free run`` with ``free_run_rms`` in
+        ``unit`` and how many times the channel's own it is. Windows of one channel do not overlap.
+    """
+    found = []
+    for i, name in enumerate(CHANNELS):
+        found += _one_step(looked, i, name) + _free(looked, i, name)
+    told = []
+    for measure in ("one step", "free run"):
+        these = sorted((one for one in found if one["measure"] == measure), key=lambda one: -float(one["_rank"]))
+        told += [{k: v for k, v in one.items() if k != "_rank"} for one in these[:_TOLD]]
+    return told
+
+
+def _one_step(looked: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
+    found = []
+    for one in looked:
+        for at, mean, count in _windows(one.whitened[:, channel] ** 2):
+            probability = float(chi2.sf(mean * count, count))
+            told = {"whitened_rms": float(np.sqrt(mean)), "p_value": probability}
+            rank = -float(chi2.logsf(mean * count, count))
+            found.append({**_window(one, at), "channel": name, "measure": "one step", **told, "_rank": rank})
+    return found
+
+
+def _free(looked: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
+    unit, factor = UNITS[name]
+    whole = np.concatenate([one.free.error[:, channel] for one in looked])
+    if not np.isfinite(whole).any():
+        return []
+    usual, found = float(np.nanmean(whole**2)), []
+    for one in looked:
+        for at, mean, _ in _windows(one.free.error[:, channel] ** 2):
+            times = float(np.sqrt(mean / usual)) if usual > 0.0 else 0.0
+            told = {"free_run_rms": factor * float(np.sqrt(mean)), "unit": unit, "times_its_rms": times}
+            found.append({**_window(one, at), "channel": name, "measure": "free run", **told, "_rank": times})
+    return found
+
+
+def _windows(square: Float) -> list[tuple[int, float, int]]:
+    """Return beginnings, means and counts of the largest windows that do not overlap."""
+    length = min(_WINDOW, square.size)
+    good = np.isfinite(square)
+    kernel = np.ones(length)
+    total = np.convolve(np.where(good, np.nan_to_num(square), 0.0), kernel, "valid")
+    count = np.round(np.convolve(good.astype(np.float64), kernel, "valid"))
+    mean = np.where(count >= _FEWEST, total / np.maximum(count, 1.0), -np.inf)
+    found = []
+    for _ in range(_TOLD):
+        at = int(np.argmax(mean))
+        if not np.isfinite(mean[at]):
+            break
+        found.append((at, float(mean[at]), int(count[at])))
+        mean[max(0, at - length + 1) : at + length] = -np.inf
+    return found
+
+
+def _window(one: Looked, at: int) -> dict[str, Any]:
+    run = one.filtered.run
+    end = min(at + _WINDOW, run.time_s.size) - 1
+    names, counts = np.unique(one.phase_of[at : end + 1], return_counts=True)
+    start_s, end_s = float(run.time_s[at]), float(run.time_s[end])
+    return {
+        "run": run.name,
+        "start": _iso(run.start_utc_ns, start_s),
+        "end": _iso(run.start_utc_ns, end_s),
+        "start_s": start_s,
+        "end_s": end_s,
+        "phase": str(names[int(np.argmax(counts))]) or None,
+    }
+
+
+def _iso(start_utc_ns: int, seconds: float) -> str:
+    instant = np.datetime64(start_utc_ns + round(seconds * SECOND_NS), "ns")
+    return f"{np.datetime_as_string(instant, unit='ms')}Z"

@@ -1,0 +1,41 @@
+"""Confusion sets: effects that these data cannot tell from each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from kempf.pipeline.diagnose.confirm import Confirmation
+from kempf.pipeline.diagnose.screen import Candidate
+
+#: share of what one effect explains that another would explain alike, above which they are put to the same test
+ALIKE = 0.9
+#: refits within this of the best information criterion are not told from it
+WINDOW = 6.0
+
+
+def alike(one: Candidate, other: Candidate) -> float:
+    """Return the squared cosine between what two effects would explain, 0 to 1."""
+    a, b = one.direction, other.direction
+    if a.size != b.size or not a.size:
+        return 0.0
+    both = float(a @ a) * float(b @ b)
+    return float(a @ b) ** 2 / both if both > 0.0 else 0.0
+
+
+def shortlist(candidates: Sequence[Candidate], level: float, count: int) -> list[Candidate]:
+    """Return the candidates worth a refit: significant, the highest scores, and what looks like the highest."""
+    significant = [one for one in candidates if one.p_adjusted < level]
+    if not significant:
+        return []
+    chosen = significant[:count]
+    chosen += [one for one in significant[count : 2 * count] if alike(one, chosen[0]) > ALIKE]
+    return chosen
+
+
+def undecided(confirmed: Sequence[tuple[Candidate, Confirmation]]) -> list[tuple[Candidate, Confirmation]]:
+    """Return the confirmed candidates within `WINDOW` of the best, simplest first, then the best."""
+    if not confirmed:
+        return []
+    best = min(one.bic_change for _, one in confirmed)
+    close = [pair for pair in confirmed if pair[1].bic_change <= best + WINDOW]
+    return sorted(close, key=lambda pair: (len(pair[0].effect.parameters), pair[1].bic_change, pair[0].effect.name))

@@ -1,0 +1,198 @@
+"""Fitting a model effect by effect: the plain ship first, each effect from where the score says it lies.
+
+Every fit of a model goes this way, in a diagnosis, when an effect is added by hand and when a stored set is built
+again, so that all three end at the same bits.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.screen import Candidate, score
+from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.estimate.grid_gating import without_gross_errors
+from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.search.pooled_start import INTENSITIES, Start
+from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.model.terms.effect import Effect
+from kempf.schemas.errors import DataRejected
+from kempf.schemas.model_spec import ModelSpec
+
+#: iterations of an entry of the race, and of the climb to the end
+_RACE, _TO_THE_END = 6, 60
+#: multiples of its typical size with which a lag begins beside an ordinary hull
+_LONGER = (1.0, 10.0, 30.0)
+#: runs that the race goes over
+_RUNS_OF_RACE = 3
+
+
+def plain(runs: Sequence[Run], spec: ModelSpec, start: Start, workers: Executor) -> tuple[Fit, int]:
+    """Fit eq. (16), take gross errors out, fit again.
+
+    Returns
+    -------
+    fit : Fit
+    gross_errors : int
+    """
+    found = pooled_fit.fit(Augmented(), runs, spec, start.hull, start.levels, np.zeros(0), workers)
+    cleaned, gross = without_gross_errors(found)
+    if gross:
+        found = pooled_fit.fit(Augmented(), cleaned, spec, found.hull, found.levels, np.zeros(0), workers)
+    return found, gross
+
+
+def added(base: Fit, candidate: Candidate, workers: Executor, wanted: float = -np.inf) -> Fit:
+    """Fit a model with one effect more.
+
+    A hull fitted without a lag of the rudder has bent itself to stand in for it, and from there the way to the true
+    hull leads through worse ones. So an effect with a threshold races from several sizes and two hulls, and where the
+    hull has bent so far that it is no ship, every effect climbs from an ordinary one too.
+
+    Parameters
+    ----------
+    base : Fit
+    candidate : Candidate
+        Of the screen beside ``base``.
+    workers : Executor
+    wanted : float, optional
+        Log-likelihood without which the fit is of no use: climbs that cannot reach it are given up, not converged.
+    """
+    model = base.model.with_effect(candidate.effect)
+    begin = _begin(candidate)
+    first = candidate.effect.parameters[0]
+    entries = [(base.hull, begin)]
+    ordinary = mariner_like(base.runs[0].run.ship.length_m).array()
+    if len(first.steps) > 1:
+        sizes = [np.concatenate([[size], begin[1:]]) for size in first.steps]
+        entries += [(hull, size) for hull in (base.hull, ordinary) for size in sizes]
+    if len(entries) > 1:
+        few = slice(0, _RUNS_OF_RACE)
+        race = [_climbed(base, model, hull, size, workers, _RACE, few) for hull, size in entries]
+        best = max(race, key=lambda one: one.log_likelihood)
+        hull, begin = best.hull, best.values[base.values.size :]
+    else:
+        hull = base.hull
+    found = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted)
+    if is_ship(base.hull):
+        return found
+    # what the score foretells beside such a hull says little, and the disturbances beside it have eaten the effect
+    levels = base.levels.copy()
+    levels[:, : len(INTENSITIES)] = np.log(INTENSITIES)
+    calm = replace(base, levels=np.clip(levels, pooled_fit.LOWEST, pooled_fit.HIGHEST))
+    for size in _sizes(candidate.effect):
+        # a lower hill need not be climbed to its top
+        least = max(wanted, found.log_likelihood)
+        other = _climbed(calm, model, ordinary, size, workers, _TO_THE_END, wanted=least)
+        found = max(found, other, key=lambda one: one.log_likelihood)
+    return found
+
+
+def _sizes(effect: Effect) -> list[Float]:
+    """Sizes to begin with where the score foretells none: of what delays the rudder several, it has several tops."""
+    first, *rest = (p.steps for p in effect.parameters)
+    if effect.rudder_course is None:
+        chosen = first[:1]
+    else:
+        chosen = first if len(first) > 1 else tuple(k * first[0] for k in _LONGER)
+    return [np.array([size, *(steps[0] for steps in rest)]) for size in chosen]
+
+
+def is_ship(hull: Float) -> bool:
+    """Tell whether sway and yaw are damped and the rudder turns her the way it should.
+
+    A ship that does not keep a straight course by herself is one too.
+
+    Parameters
+    ----------
+    hull : ndarray, shape (6,)
+    """
+    a11, _, _, a22, _, b2 = (float(x) for x in hull)
+    return a11 < 0.0 and a22 < 0.0 and b2 > 0.0
+
+
+def _climbed(
+    base: Fit,
+    model: Augmented,
+    hull: Float,
+    begin: Float,
+    workers: Executor,
+    iterations: int,
+    chosen: slice = slice(None),
+    wanted: float = -np.inf,
+) -> Fit:
+    filtered = tuple(replace(one, model=model) for one in base.runs[chosen])
+    values = np.concatenate([base.values, begin])
+    return pooled_fit.climb(filtered, hull, base.levels[chosen], values, workers, iterations, wanted)
+
+
+def _begin(candidate: Candidate) -> Float:
+    """Where to start: at the expected change, inside the bounds; a threshold from where it was tried."""
+    parameters = candidate.effect.parameters
+    inside = np.clip(candidate.change, [p.low for p in parameters], [p.high for p in parameters])
+    # at 0 a threshold has no slope of its own
+    if len(parameters[0].steps) > 1 and parameters[0].low == 0.0 and inside[0] <= 0.0:
+        inside[0] = candidate.steps[0]
+    return np.asarray(inside, dtype=np.float64)
+
+
+def staged(
+    runs: Sequence[Run], spec: ModelSpec, start: Start, effects: Sequence[Effect], workers: Executor
+) -> tuple[list[Fit], int]:
+    """Fit the plain ship, then with one effect more after the other.
+
+    Parameters
+    ----------
+    runs : sequence of Run
+    spec : ModelSpec
+    start : Start
+    effects : sequence of Effect
+        In the order in which they were added.
+    workers : Executor
+
+    Returns
+    -------
+    fits : list of Fit
+        The last one is the model.
+    gross_errors : int
+
+    Raises
+    ------
+    DataRejected
+        ``effect_not_testable``: nothing can be told of an effect from these runs, or a channel tells it already; the
+        message says which.
+    """
+    first, gross = plain(runs, spec, start, workers)
+    fits = [first]
+    for effect in effects:
+        candidate = score(fits[-1], effect, workers)
+        if candidate.missing:
+            raise DataRejected(
+                "effect_not_testable",
+                f"{effect.title} needs the channel {', '.join(candidate.missing)}, which the logs lack.",
+                "Log it, or map it in the vessel profile if the log has it under another name.",
+                {"effect": effect.name, "missing": list(candidate.missing)},
+            )
+        if candidate.told_by:
+            raise DataRejected(
+                "effect_not_testable",
+                f"The logs have {', '.join(candidate.told_by)}, which tells {effect.title} already.",
+                "The model runs on that channel; nothing need be added.",
+                {"effect": effect.name, "told_by": list(candidate.told_by)},
+            )
+        if np.isnan(candidate.score):
+            raise DataRejected(
+                "effect_not_testable",
+                f"What the model has already imitates {100 * candidate.absorption:.2f} % of {effect.title}: these data "
+                "cannot tell its size.",
+                effect.separated_by or "Sail another kind of manoeuvre.",
+                {"effect": effect.name, "absorption": candidate.absorption},
+            )
+        fits.append(added(fits[-1], candidate, workers))
+    return fits, gross

@@ -1,0 +1,363 @@
+"""The extended Kalman filter of eq. (16) with effects: one pass over one run, compiled.
+
+State x = (v, r, psi, F, M, m_1 .. m_k, c_1, c_2, b): the chain, the states that effects bring along, the current to the
+north and east (or the paper's V_T), the bias of the rate gyro. Between measurements the mean moves by the classical
+fourth-order Runge-Kutta rule with the terms of every effect in it, the covariance by the linearisation at the middle of
+the step (Jazwinski 1970, "Stochastic Processes and Filtering Theory", ch. 8; the exact exponential's series to the
+fourth order). A measurement off the grid by a moment is predicted there to first order in that moment.
+
+Several sets of parameters go through one run side by side, in lanes (`kempf.pipeline.model.batch`): a derivative is the
+difference of two passes, and a fit asks for a dozen at a time.
+
+It shares nothing with `pipeline.estimate.filters.linear_kernel` but eq. (16), and without effects agrees with it: a
+test holds that.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.compiled import FILLING, njit
+from kempf.pipeline.estimate.filters.ekf_covariance import (
+    add_noise,
+    carry_covariance,
+    exponential,
+    mirror,
+    take_in,
+)
+from kempf.pipeline.model.batch import each
+from kempf.pipeline.model.dynamics import (
+    N_AFTER,
+    N_BEFORE,
+    ON_INITIAL,
+    ON_LATERAL,
+    ON_NOISE,
+    PARAMETER,
+    PSI,
+    RDOT,
+    SHIP,
+    SPEED,
+    VDOT,
+    F,
+    M,
+    R,
+    V,
+    add_programs,
+    dynamics,
+)
+from kempf.pipeline.model.terms.program import DEPTH
+
+#: rows of the input table from one instant to the next, and substeps; a substep reads three rows
+ROWS, SUBSTEPS = 4, 2
+_LOG_2PI = float(np.log(2.0 * np.pi))
+
+
+@njit(**FILLING)
+def _begin(P, table, values, slopes, stack, by, total, drive, lanes):  # type: ignore[no-untyped-def]
+    """Add the initial variance of the effects' own states to P, and fill the intensities of what drives them."""
+    width = P.shape[0] - N_AFTER
+    for i in range(width - N_BEFORE):
+        add_programs(ON_INITIAL, i, table, values, slopes, stack, by, width, total, lanes)
+        for b in range(each(lanes)):
+            P[N_BEFORE + i, N_BEFORE + i, b] += total[0, b] ** 2
+        add_programs(ON_NOISE, i, table, values, slopes, stack, by, width, total, lanes)
+        for b in range(each(lanes)):
+            drive[4 + i, b] = total[0, b] ** 2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _live_states(P0, width):  # type: ignore[no-untyped-def]
+    """Return the states of the chain and of effects that there are, and those after them."""
+    before, after = np.empty(width, dtype=np.uint64), np.empty(N_AFTER, dtype=np.uint64)
+    m = k = 0
+    for i in range(P0.shape[0]):
+        if i < width and (i <= PSI or i >= N_BEFORE or P0[i, i] > 0.0):
+            before[m] = i
+            m += 1
+        elif i >= width and P0[i, i] > 0.0:
+            after[k] = i
+            k += 1
+    return before[:m], after[:k]
+
+
+@njit(**FILLING)
+def _substep(  # type: ignore[no-untyped-def]
+    x, P, rows, rudders, h, drive, decay, ship, live, after, table, values, slopes, stack, by, total, room, lanes
+):
+    """Move means and covariances over one substep.
+
+    ``drive`` holds the intensities squared of F, of M, of the rudder's error, of the current, then of effects' states.
+    """
+    k1, k2, k3, k4, xs, A, J, Phi, term, work, nodes, w, W, coupled = room
+    width = k1.shape[0]
+    dynamics(x, rows[0], rudders[0], ship, width, 0, table, values, slopes, stack, by, total, k1, J, lanes)
+    for i in live:
+        for b in range(each(lanes)):
+            xs[i, b] = x[i, b] + 0.5 * h * k1[i, b]
+    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k2, J, lanes)
+    for i in live:
+        for b in range(each(lanes)):
+            xs[i, b] = x[i, b] + 0.5 * h * k2[i, b]
+    dynamics(xs, rows[1], rudders[1], ship, width, width, table, values, slopes, stack, by, total, k3, A, lanes)
+    for b in range(each(lanes)):
+        # what a unit of rudder does at the middle
+        w[V, b], w[R, b] = ship[0][4, b] * values[SPEED, b] ** 2, ship[0][5, b] * values[SPEED, b] ** 2
+    for i in live:
+        for b in range(each(lanes)):
+            xs[i, b] = x[i, b] + h * k3[i, b]
+    dynamics(xs, rows[2], rudders[2], ship, width, 0, table, values, slopes, stack, by, total, k4, J, lanes)
+    for i in live:
+        for b in range(each(lanes)):
+            x[i, b] += h / 6.0 * (k1[i, b] + 2.0 * k2[i, b] + 2.0 * k3[i, b] + k4[i, b])
+    for i in after:
+        for b in range(each(lanes)):
+            x[i, b] *= decay[i]
+    exponential(A, h, live, Phi, term, work, coupled, lanes)
+    carry_covariance(P, Phi, decay, live, after, W, coupled, lanes)
+    for i in after:
+        if i < x.shape[0] - 1:
+            for b in range(each(lanes)):
+                P[i, i, b] += drive[3, b] * h
+    # the rudder's error first, whose direction stands there
+    for turn in range(3 + width - N_BEFORE):
+        source = (2, 0, 1)[turn] if turn < 3 else turn + 1
+        driven = False
+        for b in range(each(lanes)):
+            driven = driven or drive[source, b] > 0.0
+        if turn > 0:
+            state = (F, M)[turn - 1] if turn < 3 else N_BEFORE + turn - 3
+            for i in range(width):
+                for b in range(each(lanes)):
+                    w[i, b] = 1.0 if i == state else 0.0
+        if driven:
+            add_noise(P, A, w, drive[source], h, live, coupled, term, work, nodes, lanes)
+    mirror(P, live, lanes)
+    for i in range(width):
+        for b in range(each(lanes)):
+            w[i, b] = 0.0
+
+
+@njit(**FILLING)
+def _measurements(  # type: ignore[no-untyped-def]
+    k,
+    x,
+    P,
+    row,
+    rudder,
+    measured,
+    offset_s,
+    withheld,
+    current_row,
+    levels,
+    ship,
+    states,
+    table,
+    values,
+    slopes,
+    stack,
+    by,
+    total,
+    room,
+    predicted,
+    variance,
+    log_likelihood,
+    lanes,
+):
+    """Predict the measurements of instant ``k``, take them in, and add theirs to the log-likelihoods."""
+    k1, J, gain, weight, h, stood, value, S = room
+    n, width = x.shape[0], k1.shape[0]
+    # linearised once, where the prediction stands; one measurement after the other moves on from there
+    dynamics(x, row, rudder, ship, width, width, table, values, slopes, stack, by, total, k1, J, lanes)
+    for i in range(n):
+        for b in range(each(lanes)):
+            stood[i, b] = x[i, b]
+    for b in range(each(lanes)):
+        values[VDOT, b], values[RDOT, b] = k1[V, b], k1[R, b]
+        for j in range(width):
+            slopes[VDOT, j, b], slopes[RDOT, j, b] = J[V, j, b], J[R, j, b]
+    for channel in range(3):
+        late, state = offset_s[channel], (V, R, PSI)[channel]
+        for b in range(each(lanes)):
+            value[b] = stood[state, b] + late * k1[state, b]
+            S[b] = levels[3 + channel, b] ** 2
+        for j in range(n):
+            for b in range(each(lanes)):
+                h[j, b] = late * J[state, j, b] if j < width else 0.0
+        for b in range(each(lanes)):
+            h[state, b] += 1.0
+            if channel == 0:
+                h[n - 3, b], h[n - 2, b] = current_row[0], current_row[1]
+                value[b] += h[n - 3, b] * stood[n - 3, b] + h[n - 2, b] * stood[n - 2, b]
+            elif channel == 1:
+                h[n - 1, b] = 1.0
+                value[b] += stood[n - 1, b]
+        if add_programs(ON_LATERAL + channel, 0, table, values, slopes, stack, by, width, total, lanes):
+            for b in range(each(lanes)):
+                value[b] += total[0, b]
+                for j in range(width):
+                    h[j, b] += total[j + 1, b]
+        for i in states:
+            for b in range(each(lanes)):
+                gain[0, i, b] = 0.0
+            for j in states:
+                for b in range(each(lanes)):
+                    gain[0, i, b] += P[i, j, b] * h[j, b]
+            for b in range(each(lanes)):
+                value[b] += h[i, b] * (x[i, b] - stood[i, b])
+                S[b] += h[i, b] * gain[0, i, b]
+        made = not np.isnan(measured[channel])
+        for b in range(each(lanes)):
+            predicted[k, channel, b], variance[k, channel, b] = value[b], S[b]
+            if not np.isfinite(value[b]) or (made and not (S[b] > 0.0)):
+                log_likelihood[b] = -np.inf
+        if made and not withheld:
+            for b in range(each(lanes)):
+                e, precision = measured[channel] - value[b], 1.0 / S[b]
+                # a lane that ran away stays there: what is added is no number, or changes nothing
+                log_likelihood[b] -= 0.5 * (_LOG_2PI + np.log(S[b]) + e * e * precision)
+                value[b], S[b] = e, precision
+            take_in(x, P, value, S, gain, weight, states, lanes)
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def extended(  # type: ignore[no-untyped-def]
+    hull,
+    levels,
+    parameters,
+    step_s,
+    inputs,
+    rudder,
+    rudder_noise,
+    measured,
+    offset_s,
+    withheld,
+    current_row,
+    constants_of_ship,
+    rates,
+    x0,
+    P0,
+    table,
+    kept,
+    lanes,
+):
+    """Run the filter over one run, for several sets of parameters.
+
+    Parameters
+    ----------
+    hull : ndarray, shape (6, lanes)
+        a11, a12, a21, a22, b1, b2.
+    levels : ndarray, shape (6, lanes)
+        Intensities of what drives F, m/s^2 per sqrt s, M, and the current, and standard deviations of the three
+        measurements.
+    parameters : ndarray, shape (p, lanes)
+        Of the effects, in the order of their programs' variables.
+    step_s : float
+        From one instant to the next.
+    inputs : ndarray, shape (ROWS (n - 1) + 1, N_INPUT)
+        V, m/s, delta as it was measured, then the symbols of channels and run, at a quarter of the step.
+    rudder : ndarray, shape (ROWS (n - 1) + 1, lanes)
+        delta, rad, at the same instants, as the effects have it.
+    rudder_noise : ndarray, shape (n,)
+        Intensity of the rudder's error before each instant, rad s^0.5.
+    measured : ndarray, shape (n, 3)
+        y_v, y_r, y_psi, NaN where there is none.
+    offset_s : ndarray, shape (n, 3)
+        How much later than the instant each was measured.
+    withheld : ndarray of bool, shape (n,)
+        Instants whose measurements are predicted and not taken in.
+    current_row : ndarray, shape (n, 2)
+    constants_of_ship : ndarray, shape (6,)
+        l, L, T, V0, n0 and the exponent of V in the rudder's force.
+    rates : ndarray, shape (3,)
+        Correlation rates of F, M and the current, 1/s.
+    x0 : ndarray, shape (8 + k, lanes); P0 : ndarray, shape (8 + k, 8 + k)
+        Mean and covariance of the state at the first instant; effects add to those of their own states.
+    table : tuple
+        ``programs`` int64 (q, 4): kind, place, first and last instruction; ``code`` and ``constants`` of all of them.
+    kept : tuple of ndarray
+        ``predicted`` and ``variance``, shape (n, 3, lanes), to be filled; ``states`` and ``spread``,
+        shape (n, 8 + k, lanes), the filtered states and their variances, or 0 rows.
+    lanes : tuple
+        `ONE` or `LANES` of `kempf.pipeline.model.batch`.
+
+    Returns
+    -------
+    ndarray, shape (lanes,)
+        Log-likelihoods; -inf where the filter runs away.
+    """
+    predicted, variance, states, spread = kept
+    n, width, B = P0.shape[0], P0.shape[0] - N_AFTER, each(lanes)
+    x, P = x0.copy(), np.zeros((n, n, B))
+    for b in range(B):
+        P[:, :, b] = P0
+    arm, length, draught, V0, n0, exponent = constants_of_ship
+    ship = (hull, (arm, rates[0], rates[1], exponent, V0))
+    m = PARAMETER + parameters.shape[0]
+    values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
+    values[SHIP : SHIP + 6] = hull
+    values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
+    values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
+    for i in range(width):
+        slopes[i, i] = 1.0
+    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros((2, B)), np.zeros((width + 1, B))
+    live, after = _live_states(P0, width)
+    there = np.concatenate((live, after))
+    drive = np.zeros((4 + width - N_BEFORE, B))
+    _begin(P, table, values, slopes, stack, by, total, drive, lanes)
+    k1, J = np.zeros((width, B)), np.zeros((width, width, B))
+    vector, matrix = (width, B), (width, width, B)
+    room = (
+        *(k1, np.zeros(vector), np.zeros(vector), np.zeros(vector), np.zeros(vector), np.zeros(matrix), J),
+        *(np.zeros(matrix), np.zeros(matrix), np.zeros(matrix), np.zeros((3, width, B))),
+        *(
+            np.zeros(vector),
+            np.zeros((n, n, B)),
+            np.zeros((width, width), dtype=np.bool_),
+        ),
+    )
+    gain, weight = np.zeros((1, n, B)), np.zeros((1, n, B))
+    h, stood, decay = np.zeros((n, B)), np.zeros((n, B)), np.ones(n)
+    at_measurements = (k1, J, gain, weight, h, stood, np.zeros(B), np.zeros(B))
+    decay[n - 3 : n - 1] = np.exp(-rates[2] * step_s / SUBSTEPS)
+    drive[0], drive[3] = levels[0] ** 2, levels[2] ** 2
+    if P0[M, M] > 0.0:
+        drive[1] = levels[1] ** 2
+    log_likelihood = np.zeros(B)
+    for k in range(measured.shape[0]):
+        if k > 0:
+            drive[2] = rudder_noise[k] ** 2
+            for sub in range(SUBSTEPS):
+                i = ROWS * (k - 1) + 2 * sub
+                _substep(
+                    *(x, P, inputs[i : i + 3], rudder[i : i + 3], step_s / SUBSTEPS, drive, decay, ship),
+                    *(live, after, table, values, slopes, stack, by, total, room, lanes),
+                )
+        _measurements(
+            *(k, x, P, inputs[ROWS * k], rudder[ROWS * k], measured[k], offset_s[k], withheld[k], current_row[k]),
+            *(
+                levels,
+                ship,
+                there,
+                table,
+                values,
+                slopes,
+                stack,
+                by,
+                total,
+                at_measurements,
+                predicted,
+                variance,
+                log_likelihood,
+                lanes,
+            ),
+        )
+        if np.all(~np.isfinite(log_likelihood)):
+            break
+        if states.shape[0] > 0:
+            states[k] = x
+            for i in range(n):
+                spread[k, i] = P[i, i]
+    for b in range(B):
+        if np.isnan(log_likelihood[b]):
+            log_likelihood[b] = -np.inf
+    return log_likelihood

@@ -1,0 +1,40 @@
+"""Gross errors on the grid: single measurements far from their prediction, left out before anything is judged."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.record.grid_run import Run
+
+#: robust standard deviations beyond which a measurement is gross, and within which its neighbours must lie
+_GROSS, _SOUND = 6.0, 4.0
+#: more than this share of a channel is no set of gross errors but a model that does not fit
+_MOST = 0.02
+
+
+def without_gross_errors(fit: Fit) -> tuple[list[Run], int]:
+    """Return the runs of a fit without single gross errors, and how many measurements went.
+
+    A misfit of the model comes in stretches; an error of a reading stands alone. Only the second kind is taken out.
+    """
+    runs, count = [], 0
+    for filtered, line in zip(fit.runs, fit.linearised, strict=True):
+        z = line.passed.innovation / np.sqrt(line.passed.variance)
+        measured = filtered.run.measured.copy()
+        for i in range(3):
+            column = np.abs(z[:, i])
+            made = np.flatnonzero(np.isfinite(column))
+            if made.size < 10:
+                continue
+            scale = max(1.0, float(np.median(column[made])) / 0.6745)
+            size = column[made] / scale
+            beside = np.minimum(np.roll(size, 1), np.roll(size, -1))
+            gross = (size > _GROSS) & (beside < _SOUND)
+            if 0 < np.count_nonzero(gross) <= max(1, _MOST * made.size):
+                measured[made[gross], i] = np.nan
+                count += int(np.count_nonzero(gross))
+        runs.append(replace(filtered.run, measured=measured))
+    return runs, count

@@ -1,0 +1,1 @@
+"""Identification without a speed log: the speed from the longitudinal equation."""

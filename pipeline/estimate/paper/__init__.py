@@ -1,0 +1,1 @@
+"""The paper's own procedure, eqs. (11)-(15)."""

@@ -1,0 +1,75 @@
+"""What speaks against an estimate although the search converged, in words for the person who is to trust it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kempf.pipeline.channels.series import Float
+from kempf.schemas.model_spec import HULL_PARAMETERS
+
+#: lag-1 autocorrelation of whitened innovations above which the standard errors are not to be believed
+_NOT_WHITE = 0.3
+#: a 95 % interval that holds fewer than this share of the measurements is too narrow
+_TOO_FEW = 0.90
+
+
+def not_white(fit: dict[str, Any]) -> tuple[str, ...]:
+    """Return the measurements whose prediction errors resemble their predecessors.
+
+    Parameters
+    ----------
+    fit : dict
+        See `kempf.pipeline.estimate.one_step_fit.one_step_fit`.
+
+    Returns
+    -------
+    tuple of str
+    """
+    channels = fit.get("channels", {})
+    return tuple(name for name, channel in channels.items() if abs(channel["lag1_autocorrelation"]) > _NOT_WHITE)
+
+
+def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
+    """Name what is implausible about an estimate.
+
+    Parameters
+    ----------
+    hull : ndarray, shape (6,)
+        a11, a12, a21, a22, b1, b2.
+    std : ndarray, shape (6,)
+        Their standard errors, NaN where there is none.
+    fit : dict
+        See `kempf.pipeline.estimate.one_step_fit.one_step_fit`.
+
+    Returns
+    -------
+    tuple of str
+        One sentence each; empty where nothing speaks against it.
+    """
+    a11, _, a21, a22, b1, b2 = (float(p) for p in hull)
+    vague = [name for name, value, error in zip(HULL_PARAMETERS, hull, std, strict=True) if error >= abs(value)]
+    found = []
+    if vague:
+        cure = "a zigzag of other angles or more legs, or several pooled, would tell"
+        found.append(f"not determined, error as large as the value ({cure}): {', '.join(vague)}")
+    if a11 > 0:
+        found.append("a11 is positive: sway would feed itself, no hull does; something acts that the model lacks")
+    if a22 > 0:
+        found.append("a22 is positive: yaw would feed itself, no hull does; something acts that the model lacks")
+    if a21 > 0:
+        found.append("a21 is positive: drifting turns the bow into the flow, few hulls do; something acts unmodelled")
+    if b2 < 0:
+        found.append("b2 is negative: the rudder turns the ship the wrong way; check the sign of the rudder channel")
+    elif b1 > 0:
+        found.append("b1 is positive: the rudder pushes the stern the wrong way; sway and yaw are hardly told apart")
+    unlike_noise = not_white(fit)
+    for name, channel in fit.get("channels", {}).items():
+        lag, inside = channel["lag1_autocorrelation"], channel["inside_95_percent"]
+        if name in unlike_noise:
+            found.append(
+                f"the prediction errors of {name} are not white (lag-1 autocorrelation {lag:.2f}): "
+                "the model lacks something, or the instrument's noise is not independent"
+            )
+        if inside < _TOO_FEW:
+            found.append(f"only {100 * inside:.0f} % of {name} lie in their 95 % prediction interval")
+    return tuple(found)

@@ -1,0 +1,45 @@
+"""The rudder as it acts: in the race of a propeller that keeps turning, its force falls less than with V^2.
+
+With a constant shaft speed the water at the rudder is part ship's speed, part propeller race; as the ship slows in a
+turn the race grows stronger. In between lies a force with V to a power below 2. Reference: Yasukawa & Yoshimura
+(2015), "Introduction of MMG standard method for ship maneuvering predictions", J. Mar. Sci. Technol. 20.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from kempf.pipeline.estimate.record.record import Record
+from kempf.schemas.model_spec import ModelSpec
+
+_APPROACH_S = 5.0
+_SLOWEST = 0.1
+
+
+def with_rudder_inflow(record: Record, spec: ModelSpec) -> Record:
+    """Return the record with the rudder that, through b V^2 delta, does what the true one does in the race.
+
+    Parameters
+    ----------
+    record : Record
+    spec : ModelSpec
+        ``rudder_speed_exponent`` n: the force goes with V^n V_0^(2 - n), V_0 the speed of the approach.
+
+    Returns
+    -------
+    Record
+        The same where n is 2, eq. (16).
+    """
+    if spec.rudder_speed_exponent == 2.0:
+        return record
+    approach = float(np.median(record.speed_m_s[record.time_s <= record.time_s[0] + _APPROACH_S]))
+    share = np.maximum(np.abs(record.speed_m_s / approach), _SLOWEST)
+    factor = share ** (spec.rudder_speed_exponent - 2.0)
+    return replace(
+        record,
+        rudder_rad=record.rudder_rad * factor,
+        rudder_noise_rad_sqrt_s=record.rudder_noise_rad_sqrt_s * factor,
+        speed_error=record.speed_error.scaled(factor),
+    )

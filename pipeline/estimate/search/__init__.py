@@ -1,0 +1,1 @@
+"""The search for a maximum: where it begins and how it climbs."""

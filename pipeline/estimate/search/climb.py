@@ -1,0 +1,202 @@
+"""The climb to a maximum of a log-likelihood: damped Fisher scoring far away, quasi-Newton near the top.
+
+Where the model lacks something the expected information is not the curvature, and scoring alone creeps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.search.scoring import DenseSteps, Mask
+
+#: with less log-likelihood than this to gain, steps tell more of the curvature than the expected information
+_NEAR = 5.0
+#: share of its promise that a step must keep for the expected information to be trusted with the next one
+_KEPT = 0.1
+#: damping after a step that did not rise: less changes only the weakest directions, and steps fail along others too
+_DAMPED = 0.1
+#: a step that does not rise is shortened so, so many times, before the damping grows: its direction is mostly good,
+#: and damping turns it towards the steepest rise, which creeps
+_SHORTER, _TRIES = 0.3, 3
+#: a logarithm that falls by more than this in a step, with less than so much left to gain, is on its way to nothing
+_SINKING, _LITTLE = 0.2, 0.05
+#: a climb that is to reach a height is given up where so many times its promise would not take it there: promises are
+#: kept within a factor of two or so, but for those of the first steps
+_HOPE, _FIRST = 4.0, 3
+_HULL = 6
+
+
+#: the form that information and curvature have
+C = TypeVar("C")
+C_co = TypeVar("C_co", covariant=True)
+
+
+class Objective(Protocol[C_co]):
+    """What can be climbed: theta begins with the six hull parameters, the rest are logarithms."""
+
+    active: Mask
+    low: Float
+    high: Float
+
+    def full(self, theta: Float) -> tuple[float, Float, C_co]:
+        """Log-likelihood, score and expected information."""
+
+
+class Steps(Protocol[C]):
+    """How steps are made from a curvature of this form."""
+
+    def damped(self, score: Float, curvature: C, free: Mask, damping: float) -> Float:
+        """Solve (I + damping diag I) step = score over what is free; 0 for the rest."""
+
+    def updated(self, curvature: C, step: Float, fall: Float, free: Mask) -> C:
+        """Return the curvature corrected by what one step showed: by so much the score fell."""
+
+
+@dataclass(frozen=True, eq=False)
+class Pass:
+    """One step of a search: where it stood, and what it promised before (NaN for the start)."""
+
+    theta: Float
+    log_likelihood: float
+    expected_gain: float
+    damping: float
+
+
+@dataclass(frozen=True, eq=False)
+class Search(Generic[C]):
+    """Where a search ended and how it got there."""
+
+    theta: Float
+    log_likelihood: float
+    score: Float
+    information: C
+    converged: bool
+    reason: str
+    passes: tuple[Pass, ...]
+
+
+def free(objective: Objective[C], theta: Float, score: Float) -> Mask:
+    """Return which elements may move: active and not pressed against a bound."""
+    pressed: Mask = ((theta <= objective.low) & (score < 0)) | ((theta >= objective.high) & (score > 0))
+    return objective.active & ~pressed
+
+
+def climb(
+    objective: Objective[Float], start: Float, max_iterations: int, decrement: float, wanted: float = -np.inf
+) -> Search[Float]:
+    """Climb from one start, the information a matrix; see `climb_by`."""
+    return climb_by(DenseSteps(), objective, start, max_iterations, decrement, wanted)
+
+
+def climb_by(
+    steps: Steps[C],
+    objective: Objective[C],
+    start: Float,
+    max_iterations: int,
+    decrement: float,
+    wanted: float = -np.inf,
+) -> Search[C]:
+    """Climb from one start.
+
+    Parameters
+    ----------
+    steps : Steps
+    objective : Objective
+    start : ndarray, shape (n_theta,)
+    max_iterations : int
+    decrement : float
+        Converged when half the squared Newton decrement, the log-likelihood still to be gained, falls below this.
+    wanted : float, optional
+        Log-likelihood without which the end is of no use: where it is out of reach the climb is given up.
+
+    Returns
+    -------
+    Search
+        With a log-likelihood of -inf where the start has none.
+    """
+    theta = np.clip(start, objective.low, objective.high)
+    value, score, information = objective.full(theta)
+    if not np.isfinite(value):
+        reason = "the start has no likelihood"
+        return Search(theta, -np.inf, score, information, converged=False, reason=reason, passes=())
+    curvature, damping, scale = information, 1e-3, np.abs(theta[:_HULL])
+    converged, reason = False, "the iterations allowed ran out"
+    passes = [Pass(theta, value, np.nan, damping)]
+    for _ in range(max_iterations):
+        movable = free(objective, theta, score)
+        # the log-likelihood that the quadratic model still promises
+        gain = float(0.5 * score @ steps.damped(score, curvature, movable, 0.0))
+        if gain < decrement:
+            converged, reason = True, "the log-likelihood still to be gained is below the limit"
+            break
+        if len(passes) > _FIRST and value + _HOPE * gain < wanted:
+            reason = "what is wanted is out of reach"
+            break
+        found = None
+        while damping < 1e9:
+            step = _bounded(steps.damped(score, curvature, movable, damping), theta, scale)
+            found, there = _risen(objective, theta, value, step)
+            if found is not None:
+                break
+            damping = max(10.0 * damping, _DAMPED)
+        if found is None:
+            converged, reason = gain < 1e-3, "no step raises the log-likelihood any more"
+            break
+        damping, far = damping / 10.0 if damping > 1e-9 else 0.0, gain > _NEAR
+        if gain < _LITTLE:
+            found, there = _sunk(objective, theta, found, there)
+        step, before, rise = found - theta, score, there[0] - value
+        theta, (value, score, information) = found, there
+        if far and rise > _KEPT * gain:
+            curvature = information
+        else:
+            curvature = steps.updated(information if far else curvature, step, before - score, movable)
+        passes.append(Pass(theta, value, gain, damping))
+    return Search(theta, value, score, information, converged, reason, tuple(passes))
+
+
+def _risen(
+    objective: Objective[C], theta: Float, value: float, step: Float
+) -> tuple[Float | None, tuple[float, Float, C]]:
+    """Return where along a step the log-likelihood has risen, None if nowhere tried, and what it is there."""
+    for shortened in range(_TRIES + 1):
+        candidate = np.clip(theta + _SHORTER**shortened * step, objective.low, objective.high)
+        # with derivatives at once: nearly every step rises, and then they are wanted
+        there = objective.full(candidate)
+        if there[0] > value:
+            return candidate, there
+    return None, there
+
+
+def _sunk(
+    objective: Objective[C], theta: Float, found: Float, there: tuple[float, Float, C]
+) -> tuple[Float, tuple[float, Float, C]]:
+    """Let levels that sink go to their lower bounds at once, where that is higher still.
+
+    The log-likelihood goes with the square of a level near nothing, so that by its logarithm every step goes only a
+    part of the way, and the same part again.
+    """
+    sinking: Mask = (found - theta < -_SINKING) & (there[1] < 0.0) & (found > objective.low)
+    sinking[:_HULL] = False
+    if not sinking.any():
+        return found, there
+    bottom = np.where(sinking, objective.low, found)
+    lower = objective.full(bottom)
+    return (bottom, lower) if lower[0] > there[0] else (found, there)
+
+
+def _bounded(step: Float, theta: Float, scale: Float) -> Float:
+    """Shorten a step that would at once double a hull parameter or leave the scale of the start.
+
+    Far from the maximum the quadratic model sends the ship into regions where she answers absurdly fast.
+    """
+    reach = np.maximum(np.abs(theta[:_HULL]), scale)
+    # a parameter that began at nothing and is still there has no scale to leave
+    large = np.max(np.abs(step[:_HULL]) / np.where(reach > 0.0, reach, np.inf))
+    bounded = step * min(1.0, 1.0 / float(large + 1e-300))
+    bounded[_HULL:] = np.clip(step[_HULL:], -1.0, 1.0)
+    return bounded

@@ -1,0 +1,119 @@
+"""How the whitened innovations of a run move with every parameter: differences of whole passes of the filter.
+
+For Gaussian innovations e with variance S the log-likelihood is -(log S + e^2 / S) / 2 a measurement. With
+u = (e / sqrt S, (e^2 / S - 1) / sqrt 2) and J = (-de / sqrt S, d log S / sqrt 2) the score is J' u and the expected
+information J' J (Harvey 1989, "Forecasting, structural time series models and the Kalman filter", sec. 3.4).
+Whatever an effect is (a term, a lag of the rudder, an error of a sensor), its J is the difference of two passes: built
+from predicted states, with the filter's own way of swallowing it, by no formula that could be wrong for it alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.filtered import Filtered, Passed
+
+_ROOT_2 = float(np.sqrt(2.0))
+N_HULL, N_LEVELS = 6, 6
+#: steps of the differences: of hull parameters and effects in parts of a typical value, of a noise level's logarithm
+_HULL_STEP, _EFFECT_STEP, _LEVEL_STEP = 1e-4, 1e-2, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """Where a model stands: parameters of one run.
+
+    Attributes
+    ----------
+    hull : ndarray, shape (6,)
+    values : ndarray, shape (p,)
+        Of the effects.
+    levels : ndarray, shape (6,)
+        Logarithms of the noise levels.
+    """
+
+    hull: Float
+    values: Float
+    levels: Float
+
+    def vector(self) -> Float:
+        """Return all of it, shape (12 + p,)."""
+        return np.concatenate([self.hull, self.values, self.levels])
+
+    def moved(self, index: int, by: float) -> Point:
+        """Return the point with one number of `vector` changed."""
+        vector = self.vector()
+        vector[index] += by
+        p = self.values.size
+        return Point(vector[:N_HULL], vector[N_HULL : N_HULL + p], vector[N_HULL + p :])
+
+
+def passed(filtered: Filtered, point: Point) -> Passed:
+    """Run the filter at a point."""
+    return filtered.run_filter(point.hull, np.exp(point.levels), point.values)
+
+
+def passes(filtered: Filtered, points: Sequence[Point]) -> list[Passed]:
+    """Run the filter at several points at once."""
+    hulls, levels = (np.stack(part, axis=-1) for part in ([p.hull for p in points], [p.levels for p in points]))
+    return filtered.run_filters(hulls, np.exp(levels), np.stack([p.values for p in points], axis=-1))
+
+
+def whitened(one: Passed) -> Float:
+    """Return u, shape (2 m,): over the measurements made, whitened innovations, then what tells of their spread."""
+    made = np.isfinite(one.innovation)
+    z = one.innovation[made] / np.sqrt(one.variance[made])
+    return np.concatenate([z, (z * z - 1.0) / _ROOT_2])
+
+
+def difference(base: Passed, other: Passed, step: float) -> Float:
+    """Return one column of J, shape (2 m,), from a pass a step away."""
+    made = np.isfinite(base.innovation)
+    S = base.variance[made]
+    first = -(other.innovation[made] - base.innovation[made]) / np.sqrt(S)
+    return np.concatenate([first, np.log(other.variance[made] / S) / _ROOT_2]) / step
+
+
+def active(filtered: Filtered) -> list[int]:
+    """Return which numbers of `Point.vector` this run has."""
+    shared = N_HULL + len(filtered.model.names)
+    return [*range(shared), *(shared + i for i, used in enumerate(filtered.levels_used()) if used)]
+
+
+def steps(filtered: Filtered, point: Point) -> Float:
+    """Return the step of every number of `Point.vector`; away from a bound where one is near."""
+    hull = _HULL_STEP * _typical(filtered, point)
+    effects = []
+    for (_, parameter), value in zip(filtered.model.parameters, point.values, strict=True):
+        step = _EFFECT_STEP * abs(parameter.steps[0])
+        effects.append(-step if value + step > parameter.high else step)
+    return np.concatenate([hull, np.array(effects), np.full(N_LEVELS, _LEVEL_STEP)])
+
+
+def _typical(filtered: Filtered, point: Point) -> Float:
+    """Size of the hull parameters, also of one that happens to be near 0."""
+    L = filtered.run.ship.length_m
+    typical: Float = np.maximum(np.abs(point.hull), 0.02 * np.array([1 / L, 1.0, 1 / L**2, 1 / L, 1 / L, 1 / L**2]))
+    return typical
+
+
+def columns(filtered: Filtered, point: Point, base: Passed, wanted: Sequence[int]) -> list[Float]:
+    """Return columns of J, each of shape (2 m,), by a pass of the filter for each, several passes at once.
+
+    Parameters
+    ----------
+    filtered : Filtered
+    point : Point
+    base : Passed
+        The pass there.
+    wanted : sequence of int
+        Places in `Point.vector`.
+    """
+    by = steps(filtered, point)[list(wanted)]
+    moved = [point.moved(index, step) for index, step in zip(wanted, by.tolist(), strict=True)]
+    others = passes(filtered, moved)
+    return [difference(base, other, step) for other, step in zip(others, by.tolist(), strict=True)]

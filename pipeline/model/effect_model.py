@@ -1,0 +1,135 @@
+"""Eq. (16) with effects as one model: the programs of their terms laid out for the filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model import dynamics
+from kempf.pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.terms.expression import compiled
+from kempf.pipeline.model.terms.symbols import SYMBOLS
+from kempf.schemas.errors import UsageError
+
+_PLACE = {
+    "speed": dynamics.ON_SPEED,
+    "rudder": dynamics.ON_RUDDER,
+    "sway": dynamics.ON_SWAY,
+    "yaw": dynamics.ON_YAW,
+    "lateral_speed": dynamics.ON_LATERAL,
+    "yaw_rate": dynamics.ON_YAW_RATE,
+    "heading": dynamics.ON_HEADING,
+}
+_INDEX = {name: i for i, name in enumerate(SYMBOLS)}
+
+Table = tuple[NDArray[np.int64], NDArray[np.int64], Float]
+
+
+@dataclass(frozen=True, eq=False)
+class Augmented:
+    """A model: eq. (16) and effects in order.
+
+    Parameters
+    ----------
+    effects : tuple of Effect
+        None twice.
+    """
+
+    effects: tuple[Effect, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = [effect.name for effect in self.effects]
+        twice = sorted({name for name in names if names.count(name) > 1})
+        if twice:
+            raise UsageError("effect_twice", f"The model holds {twice[0]!r} twice.", "Name every effect once.")
+        if self.extra > dynamics.MOST_EXTRA:
+            raise UsageError(
+                "too_many_states",
+                f"The effects {', '.join(names)} bring {self.extra} states along; {dynamics.MOST_EXTRA} is the most.",
+                "Leave one of those with states of their own out.",
+            )
+
+    @property
+    def extra(self) -> int:
+        """How many states the effects bring along."""
+        return sum(len(effect.states) for effect in self.effects)
+
+    @property
+    def parameters(self) -> tuple[tuple[Effect, Parameter], ...]:
+        """Every parameter with its effect, in the order of the parameter vector."""
+        return tuple((effect, parameter) for effect in self.effects for parameter in effect.parameters)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """``effect.parameter`` of every parameter."""
+        return tuple(f"{effect.name}.{parameter.name}" for effect, parameter in self.parameters)
+
+    @property
+    def low(self) -> Float:
+        """Lower bounds of the parameters, shape (p,)."""
+        return np.array([p.low for _, p in self.parameters])
+
+    @property
+    def high(self) -> Float:
+        """Upper bounds, shape (p,)."""
+        return np.array([p.high for _, p in self.parameters])
+
+    def with_effect(self, effect: Effect) -> Augmented:
+        """Return the model with one more effect at its end."""
+        return Augmented((*self.effects, effect))
+
+    @cached_property
+    def table(self) -> Table:
+        """Programs, their code and their constants, as `kempf.pipeline.estimate.filters.ekf` takes them."""
+        programs, codes, constants = [], [], []
+        start, held, slot, first = 0, 0, 0, dynamics.PARAMETER
+        for effect in self.effects:
+            variables = dict(_INDEX)
+            for name in ("m1", "m2", "m3", "m4"):
+                del variables[name]
+            for i, state in enumerate(effect.states):
+                variables[state.name] = dynamics.N_BEFORE + slot + i
+            variables |= {p.name: first + i for i, p in enumerate(effect.parameters)}
+            texts = [(_PLACE[target], 0, text) for target, text in effect.terms.items()]
+            for i, state in enumerate(effect.states):
+                texts.append((dynamics.ON_EXTRA, slot + i, state.derivative))
+                texts.append((dynamics.ON_NOISE, slot + i, state.noise))
+                texts.append((dynamics.ON_INITIAL, slot + i, state.initial_std))
+            for kind, place, text in texts:
+                program = compiled(text, variables)
+                code = program.code.copy()
+                code[code[:, 0] == 0, 1] += held
+                programs.append((kind, place, start, start + len(code)))
+                codes.append(code)
+                constants.append(program.constants)
+                start, held = start + len(code), held + len(program.constants)
+            slot, first = slot + len(effect.states), first + len(effect.parameters)
+        return (
+            np.array(programs, dtype=np.int64).reshape(-1, 4),
+            np.concatenate([*codes, np.zeros((0, 2), dtype=np.int64)]),
+            np.concatenate([*constants, np.zeros(0)]),
+        )
+
+    def split(self, values: Float) -> list[Float]:
+        """Cut the parameter vector into those of the single effects."""
+        counts = np.cumsum([len(effect.parameters) for effect in self.effects])
+        return [np.asarray(part) for part in np.split(values, counts[:-1])] if self.effects else []
+
+    def rudder(self, time_s: Float, rudder_rad: Float, values: Float) -> Float:
+        """Return what the effects make of the rudder's course.
+
+        Parameters
+        ----------
+        time_s, rudder_rad : ndarray, shape (n,)
+            Evenly spaced.
+        values : ndarray, shape (p,)
+            Parameters.
+        """
+        for effect, own in zip(self.effects, self.split(values), strict=True):
+            if effect.rudder_course is not None:
+                rudder_rad = effect.rudder_course(time_s, rudder_rad, own)
+        return rudder_rad

@@ -1,0 +1,124 @@
+"""One run as the search for where a model fails takes it, and all runs' samples in one column."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.estimate.filtered import Filtered, Passed
+from kempf.pipeline.predict.free_run import FreeRun
+from kempf.pipeline.predict.prediction import settled
+
+
+@dataclass(frozen=True)
+class PhaseInterval:
+    """One phase of a manoeuvre, s from the first instant of the run."""
+
+    name: str
+    start_s: float
+    end_s: float
+
+
+@dataclass(frozen=True, eq=False)
+class Looked:
+    """One run under one model.
+
+    Attributes
+    ----------
+    filtered : Filtered
+    passed : Passed
+        Of the fitted model, with the run's noise levels.
+    free : FreeRun
+    phases : tuple of PhaseInterval
+        None where they are not known.
+    """
+
+    filtered: Filtered
+    passed: Passed
+    free: FreeRun
+    phases: tuple[PhaseInterval, ...] = ()
+
+    @property
+    def whitened(self) -> Float:
+        """Innovations over their standard deviations, NaN until the initial state is known, shape (n, 3)."""
+        innovation, std = settled(self.passed)
+        result: Float = innovation / std
+        return result
+
+    @property
+    def phase_of(self) -> NDArray[np.str_]:
+        """Name of the phase at every instant, ``""`` outside, shape (n,)."""
+        time = self.filtered.run.time_s
+        names = np.full(time.size, "", dtype="<U24")
+        for phase in self.phases:
+            names[(time >= phase.start_s) & (time < phase.end_s)] = phase.name
+        return names
+
+
+def phases_s(detail: Sequence[Mapping[str, Any]], start_utc_ns: int) -> tuple[PhaseInterval, ...]:
+    """Return phases as a segment tells them on the clock of a run.
+
+    Parameters
+    ----------
+    detail : sequence of mapping
+        With ``name``, ``start_utc_ns`` and ``end_utc_ns``: ``phases`` of a segment's detail.
+    start_utc_ns : int
+        First instant of the run.
+    """
+
+    def seconds(ns: int) -> float:
+        return (ns - start_utc_ns) / SECOND_NS
+
+    return tuple(PhaseInterval(p["name"], seconds(p["start_utc_ns"]), seconds(p["end_utc_ns"])) for p in detail)
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """The instants of all runs one after the other.
+
+    Attributes
+    ----------
+    whitened, free_error : ndarray, shape (N, 3)
+    phase, run : ndarray of str, shape (N,)
+    lateral_speed_m_s, yaw_rate_rad_s : ndarray, shape (N,)
+        As the filter predicted them: measured ones would err with the innovations (a false alarm by construction).
+    rudder_rad, heading_rad, speed_m_s : ndarray, shape (N,)
+    """
+
+    whitened: Float
+    free_error: Float
+    phase: NDArray[np.str_]
+    run: NDArray[np.str_]
+    lateral_speed_m_s: Float
+    yaw_rate_rad_s: Float
+    rudder_rad: Float
+    heading_rad: Float
+    speed_m_s: Float
+
+
+def samples_of(looked: Sequence[Looked]) -> Samples:
+    """Put the instants of all runs one after the other.
+
+    Parameters
+    ----------
+    looked : sequence of Looked
+        At least one.
+    """
+    runs = [one.filtered.run for one in looked]
+    predicted = np.concatenate([one.passed.predicted for one in looked])
+    return Samples(
+        whitened=np.concatenate([one.whitened for one in looked]),
+        free_error=np.concatenate([one.free.error for one in looked]),
+        phase=np.concatenate([one.phase_of for one in looked]),
+        run=np.concatenate([np.full(run.measured.shape[0], run.name) for run in runs]),
+        lateral_speed_m_s=predicted[:, 0],
+        yaw_rate_rad_s=predicted[:, 1],
+        rudder_rad=np.concatenate([run.rudder_rad for run in runs]),
+        heading_rad=np.concatenate([run.heading_rad for run in runs]),
+        speed_m_s=np.concatenate([run.speed_m_s for run in runs]),
+    )

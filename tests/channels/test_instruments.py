@@ -1,0 +1,185 @@
+"""Which instrument serves a channel, and the forms its values take."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import polars as pl
+import pytest
+import yaml
+
+from kempf.pipeline.channels import instruments
+from kempf.pipeline.channels.instruments import from_readings
+from kempf.pipeline.ingest.read import read_log
+from kempf.pipeline.ingest.readings import READING_SCHEMA
+from kempf.schemas.profile import parse
+
+ROOT = Path(__file__).parents[2]
+START = 1_746_252_000_000_000_000
+SECOND = 1_000_000_000
+
+
+def frame(*blocks: tuple[str, np.ndarray, dict[str, np.ndarray]]) -> pl.DataFrame:
+    """Readings of several sources: (source, seconds, values by column)."""
+    parts = [
+        pl.DataFrame(
+            {"time_utc_ns": START + np.round(t * SECOND).astype(np.int64), "source": [source] * t.size, **values}
+        )
+        for source, t, values in blocks
+    ]
+    rows = pl.concat(parts, how="diagonal").with_row_index("record").with_columns(pl.col("record").cast(pl.Int64))
+    missing = [pl.lit(None, dtype=kind).alias(n) for n, kind in READING_SCHEMA.items() if n not in rows.columns]
+    return rows.with_columns(missing).select(*READING_SCHEMA)
+
+
+def gnss(t: np.ndarray, seed: int = 0) -> dict[str, np.ndarray]:
+    random = np.random.default_rng(seed)
+    return {
+        "speed_over_ground_m_s": 7.0 + 0.1 * random.standard_normal(t.size),
+        "course_over_ground_rad": np.mod(0.01 * random.standard_normal(t.size), 2 * np.pi),
+    }
+
+
+def test_the_source_with_most_readings_serves_the_channel() -> None:
+    fast, slow = np.arange(0.0, 100.0, 0.2), np.arange(0.0, 100.0, 1.0)
+    found = from_readings(
+        frame(("HCHDG", slow, {"heading_rad": 0.1 + 0.0 * slow}), ("HEHDT", fast, {"heading_rad": 0.2 + 0.001 * fast}))
+    )
+    assert found.sources["heading"] == "HEHDT"
+    assert len(found.series["heading"]) == fast.size
+    assert any("HCHDG" in note and "not used" in note for note in found.notes)
+
+
+def test_rmc_comes_before_vtg_where_both_are_equally_fast() -> None:
+    t = np.arange(0.0, 200.0)
+    # one RMC in a hundred was damaged
+    whole = np.arange(t.size) % 100 != 7
+    rmc = {name: value[whole] for name, value in gnss(t).items()}
+    found = from_readings(frame(("GPRMC", t[whole], rmc), ("GPVTG", t + 0.02, gnss(t))))
+    assert found.sources["course_over_ground"] == found.sources["speed_over_ground"] == "GPRMC"
+    assert len(found.series["speed_over_ground"]) == np.count_nonzero(whole)
+
+
+def test_a_much_faster_vtg_comes_before_rmc() -> None:
+    slow, fast = np.arange(0.0, 100.0), np.arange(0.0, 100.0, 0.2)
+    found = from_readings(frame(("GPRMC", slow, gnss(slow)), ("GPVTG", fast, gnss(fast))))
+    assert found.sources["course_over_ground"] == "GPVTG"
+
+
+def test_a_long_log_is_asked_column_by_column_and_says_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    slow, fast = np.arange(0.0, 100.0), np.arange(0.0, 100.0, 0.2)
+    rows = frame(("GPRMC", slow, gnss(slow)), ("GPVTG", fast, gnss(fast)), ("HEHDT", fast, {"heading_rad": 0.1 * fast}))
+    heights: list[int] = []
+    collect = pl.LazyFrame.collect
+
+    def told(frame: pl.LazyFrame) -> pl.DataFrame:
+        found = collect(frame)
+        heights.append(found.height)
+        return found
+
+    monkeypatch.setattr(pl.LazyFrame, "collect", told)
+    short = from_readings(rows.lazy())
+    assert rows.height in heights
+    heights.clear()
+    monkeypatch.setattr(instruments, "_SHORT", rows.height - 1)
+    long = from_readings(rows.lazy())
+    assert heights and rows.height not in heights
+    assert (long.sources, long.notes, set(long.series)) == (short.sources, short.notes, set(short.series))
+    for name, one in long.series.items():
+        np.testing.assert_array_equal(one.time_utc_ns, short.series[name].time_utc_ns)
+        np.testing.assert_array_equal(one.value, short.series[name].value)
+
+
+def test_angles_are_unwrapped_across_north_both_ways() -> None:
+    t = np.arange(0.0, 400.0)
+    true = 0.5 * np.sin(0.02 * t) + 0.003 * t - 0.6
+    found = from_readings(frame(("HEHDT", t, {"heading_rad": true % (2 * np.pi)}))).series["heading"]
+    assert np.max(np.abs(np.diff(found.value))) < 0.1
+    np.testing.assert_allclose(found.value - found.value[0], true - true[0], atol=1e-12)
+
+
+def test_values_that_do_not_wrap_are_not_unwrapped() -> None:
+    t = np.arange(0.0, 100.0)
+    jumpy = np.where(np.arange(t.size) % 2 == 0, 4.0, -4.0) + 0.001 * t
+    found = from_readings(frame(("log", t, {"speed_through_water_m_s": jumpy})))
+    np.testing.assert_array_equal(found.series["speed_through_water"].value, jumpy)
+
+
+def test_speed_and_course_come_from_velocities_where_there_is_nothing_else() -> None:
+    t = np.arange(0.0, 100.0, 0.5)
+    course = 3.0 + 0.01 * t  # through south, where arctan2 jumps
+    north, east = 5.0 * np.cos(course), 5.0 * np.sin(course)
+    found = from_readings(frame(("row", t, {"velocity_north_m_s": north, "velocity_east_m_s": east})))
+    np.testing.assert_allclose(found.series["speed_over_ground"].value, 5.0)
+    np.testing.assert_allclose(np.diff(found.series["course_over_ground"].value), 0.005, atol=1e-12)
+    assert found.sources["course_over_ground"] == "row"
+    assert any("earth-fixed" in note for note in found.notes)
+
+
+def test_a_course_of_its_own_is_not_replaced_by_velocities() -> None:
+    t = np.arange(0.0, 100.0)
+    values = gnss(t) | {"velocity_north_m_s": 1.0 + 0.01 * t, "velocity_east_m_s": 2.0 - 0.01 * t}
+    found = from_readings(frame(("row", t, values)))
+    np.testing.assert_array_equal(found.series["speed_over_ground"].value, values["speed_over_ground_m_s"])
+
+
+def test_speed_and_course_in_separate_messages_are_both_found() -> None:
+    t = np.arange(0.0, 100.0)
+    values = gnss(t)
+    speed = {"speed_over_ground_m_s": values["speed_over_ground_m_s"]}
+    course = {"course_over_ground_rad": values["course_over_ground_rad"]}
+    found = from_readings(frame(("/gnss/sog", t, speed), ("/gnss/cog", t + 0.01, course)))
+    assert found.sources["speed_over_ground"] == "/gnss/sog"
+    assert found.sources["course_over_ground"] == "/gnss/cog"
+
+
+def test_messages_out_of_order_and_repeated_instants_become_a_series() -> None:
+    t = np.array([0.0, 2.0, 1.0, 1.0, 3.0])
+    found = from_readings(frame(("ROT", t, {"yaw_rate_rad_s": np.array([0.0, 0.2, 0.1, 0.9, 0.3])})))
+    assert found.series["yaw_rate"].value.tolist() == [0.0, 0.1, 0.2, 0.3]
+
+
+def test_a_channel_the_log_lacks_is_absent() -> None:
+    found = from_readings(frame(("HEHDT", np.arange(50.0), {"heading_rad": 0.01 * np.arange(50.0)})))
+    assert found.get("rudder_angle") is None
+    assert set(found.series) == {"heading"}
+
+
+def test_the_towing_tank_gives_speed_and_course_from_its_velocities() -> None:
+    path = ROOT.parent / "shared" / "data" / "kvlcc2_hsva" / "HSVA_CPMC_KVLCC2_Z_20_10_P.dat"
+    if not path.exists():
+        pytest.skip(f"{path.parent} is absent: the towing tank data are not part of the project")
+    text = (ROOT / "docs" / "profiles" / "hsva_kvlcc2.yaml").read_text(encoding="utf-8")
+    readings = read_log(path.name, path.read_bytes(), parse(yaml.safe_load(text), "hsva_kvlcc2.yaml"))
+    found = from_readings(readings.frame)
+    speed = found.series["speed_over_ground"]
+    assert speed.value[0] == pytest.approx(1.179, abs=0.01)
+    assert 0.8 < np.median(speed.value) < 1.0  # the zigzag costs a quarter of it
+    drift = found.series["course_over_ground"].at(speed.time_utc_ns, 1.0) - found.series["heading"].at(
+        speed.time_utc_ns, 1.0
+    )
+    drift = np.arctan2(np.sin(drift), np.cos(drift))
+    assert np.nanmax(np.abs(drift[200:])) < np.deg2rad(30.0)
+    assert found.series["rudder_angle"].period_s == pytest.approx(0.05)
+
+
+def test_readings_in_files_out_of_order_give_the_same_series(tmp_path: Path) -> None:
+    random = np.random.default_rng(5)
+    t = np.arange(0.0, 300.0, 0.5)
+    t[[40, 41, 200]] = t[[41, 40, 199]]  # two exchanged, one instant twice: the first reading counts
+    rows = frame(("HEHDT", t, {"heading_rad": random.uniform(1.0, 1.2, t.size)}), ("GPRMC", t, gnss(t)))
+    rows = rows.sort("time_utc_ns", maintain_order=True).with_columns(record=pl.int_range(rows.height))
+    rows = pl.concat([rows[500:], rows[:500]])
+    for k, part in enumerate(rows.iter_slices(97)):
+        part.write_parquet(tmp_path / f"{k:03d}.parquet")
+    held, lazy = from_readings(rows), from_readings(pl.scan_parquet(sorted(tmp_path.glob("*.parquet"))))
+    order = np.argsort(rows["time_utc_ns"].to_numpy(), kind="stable")
+    own = (
+        rows[order].filter(pl.col("heading_rad").is_not_null()).unique("time_utc_ns", keep="first", maintain_order=True)
+    )
+    for found in (held, lazy):
+        heading = found.series["heading"]
+        assert np.array_equal(heading.time_utc_ns, own["time_utc_ns"].to_numpy())
+        assert np.array_equal(heading.value, own["heading_rad"].to_numpy())
+    assert held.sources == lazy.sources and held.notes == lazy.notes

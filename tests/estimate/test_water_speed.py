@@ -1,0 +1,67 @@
+"""The speed through the water beside what turning costs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.channels.lateral_speed import noise_std
+from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.smooth import smoothed
+from kempf.pipeline.estimate.record.water_speed import water_speed
+
+LEG_S = 100.0
+
+
+def series(time: np.ndarray, value: np.ndarray) -> Series:
+    return Series((time * SECOND_NS).astype(np.int64), value)
+
+
+def sailed(loss: float, seed: int) -> tuple[Series, Series, Series, np.ndarray]:
+    """Log, heading and rudder of a zigzag, the speed integrated every 10 ms: it is lost with r^2, won back in 60 s."""
+    fine = np.arange(0.0, 800.0, 0.01)
+    rate = 0.01 * np.tanh(3.0 * np.sin(np.pi * fine / LEG_S))
+    heading, speed = np.cumsum(rate) * 0.01, np.empty(fine.size)
+    v, wind = 8.0, 0.0006 * np.sin(2 * np.pi * fine / 700.0)
+    for k in range(fine.size):
+        speed[k] = v
+        v += 0.01 * ((8.0 - v) / 60.0 + wind[k] - loss * rate[k] ** 2)
+    every, random = slice(0, None, 100), np.random.default_rng(seed)
+    time, truth = fine[every], speed[every]
+    log = series(time, truth + 0.05 * random.standard_normal(time.size))
+    psi = series(time, heading[every] + 1e-3 * random.standard_normal(time.size))
+    return log, psi, series(time, 0.3 * np.sign(np.sin(np.pi * (time + 10.0) / LEG_S))), truth
+
+
+def test_the_loss_in_the_turns_is_not_smoothed_away() -> None:
+    beside, alone, told, dips = [], [], [], []
+    for seed in range(12):
+        log, heading, rudder, truth = sailed(loss=80.0, seed=seed)
+        found = water_speed(log, heading, rudder)
+        error = found.series.value - truth
+        beside.append(np.std(error))
+        alone.append(np.std(smoothed(log, noise_std(log)).series.value - truth))
+        told.append(found.error_std)
+        dips.append((error - error.mean()) @ (truth - truth.mean()) / np.sum((truth - truth.mean()) ** 2))
+    assert np.mean(beside) < 0.7 * np.mean(alone)
+    assert np.mean(beside) == pytest.approx(np.mean(told), rel=0.35)
+    assert abs(np.mean(dips)) < 0.03
+
+
+def test_a_speed_that_turning_does_not_touch_is_left_alone() -> None:
+    slope = []
+    for seed in range(12):
+        log, heading, rudder, truth = sailed(loss=0.0, seed=seed)
+        found = water_speed(log, heading, rudder).series.value
+        square = np.gradient(heading.value) ** 2
+        slope.append(np.std(found - truth))
+        assert np.corrcoef(found - truth, square)[0, 1] < 0.6
+    assert np.mean(slope) < 0.02
+
+
+def test_without_a_turn_it_is_the_spline_alone() -> None:
+    log, heading, _, _ = sailed(loss=80.0, seed=0)
+    still = Series(log.time_utc_ns, np.zeros(len(log)))
+    np.testing.assert_array_equal(
+        water_speed(log, heading, still).series.value, smoothed(log, float(noise_std(log))).series.value
+    )
