@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.vessel_model import PLAIN, Own, model_of
+from kempf.flows.jobs.standing_model import PLAIN, Own, model_of
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import parameter_sets

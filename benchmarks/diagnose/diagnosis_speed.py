@@ -14,7 +14,7 @@ from benchmarks.diagnose.hidden_effects.write import logs_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import vessel_runs
 from kempf.pipeline.diagnose.forward_selection import plain
 from kempf.pipeline.diagnose.screen import screen

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from benchmarks import measured_ships, result_page
 from benchmarks.diagnose.diagnosed import diagnosed, section
-from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.flows.jobs.standing_model import PLAIN
 
 
 def main() -> None:

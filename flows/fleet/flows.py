@@ -34,7 +34,7 @@ from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.pool_vessel import pool_vessel
-from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.process.wrap_error import as_told
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import vessels as vessel_table

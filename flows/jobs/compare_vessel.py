@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.pool_vessel import ALIAS as POOLED_ALIAS
-from kempf.flows.jobs.vessel_model import ALIAS, Own, known_effects, named
-from kempf.flows.jobs.vessel_runs import assembled, choose
+from kempf.flows.jobs.standing_model import ALIAS, Own, known_effects, named
+from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import SECOND_NS, Float
 from kempf.pipeline.compare.compared_run import compare_run

@@ -6,16 +6,10 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from kempf.flows.jobs.vessel_model import (
-    NONE_OF_ONES_OWN,
-    Fitted,
-    Own,
-    inputs_of,
-    known_effects,
-    named,
-    store_model,
-)
-from kempf.flows.jobs.vessel_runs import Chosen, VesselRuns, assembled, choose
+from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, Own, inputs_of, known_effects, named
+from kempf.flows.jobs.vessel_model import Fitted, store_model
+from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose

@@ -15,7 +15,7 @@ from typing import Any
 
 from kempf.flows.jobs.parameter_changes import Move, NewSet, paired
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.vessel_model import ALIAS, standing
+from kempf.flows.jobs.standing_model import ALIAS, standing
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import as_told
 from kempf.schemas.errors import KempfError

@@ -6,9 +6,8 @@ from collections.abc import Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from typing import TYPE_CHECKING
 
-from kempf.flows.jobs.ingest_logs import ReadLog, look_through, store
-from kempf.flows.jobs.spool import spooled
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import as_told
@@ -17,6 +16,9 @@ from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, logs, raw, vessels
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.ingest_logs import ReadLog
 
 #: Logs that are stored together, at most; and their bytes as delivered, which compression may hide twentyfold.
 _MOST_LOGS, _MOST_BYTES = 60, 8 << 20
@@ -100,6 +102,12 @@ def read_anew(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Progre
         By vessel.
     """
     rows = [row for hers in stale.values() for row in hers.rows]
+    if not rows:
+        return {vessel: Refreshed(hers.logs, 0, {}) for vessel, hers in stale.items()}
+    # the readers, the finder of zigzags and the doctor, which a vessel whose logs are up to date needs none of
+    from kempf.flows.jobs.ingest_logs import look_through, store
+    from kempf.flows.jobs.spool import spooled
+
     failed: dict[str, KempfError] = {}
     done = 0
     for chunk in _chunks(rows):

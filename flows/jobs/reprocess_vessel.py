@@ -11,14 +11,15 @@ from dataclasses import dataclass
 from functools import partial
 
 from kempf.flows.fleet.state import VesselState, fleet_state
+from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_segments
 from kempf.flows.jobs.pending import Waiting, store
 from kempf.flows.jobs.pool_vessel import POOLED, pool_segments
 from kempf.flows.jobs.refresh_logs import Refreshed, Stale, read_anew, stale_logs
 from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.vessel_model import ALIAS, ESTIMATOR, model_of, point, standing, store_model
+from kempf.flows.jobs.standing_model import ALIAS, ESTIMATOR, model_of, point, standing
+from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all
-from kempf.flows.jobs.vessel_runs import choose
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import as_told

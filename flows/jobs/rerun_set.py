@@ -9,7 +9,8 @@ from typing import Any
 from kempf.flows.jobs.identify_vessel import build
 from kempf.flows.jobs.pool_vessel import POOLED, build_pooled
 from kempf.flows.jobs.spool import spooled
-from kempf.flows.jobs.vessel_model import ESTIMATOR, build_model
+from kempf.flows.jobs.standing_model import ESTIMATOR
+from kempf.flows.jobs.vessel_model import build_model
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import agreement, code_version, logs, parameter_sets, raw, vessels

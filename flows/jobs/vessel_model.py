@@ -5,15 +5,17 @@ A model's parent is the model with one effect less, so a vessel's ladder is the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.parameter_set_of import arm_of, channel_warnings, stored, without_arm
-from kempf.flows.jobs.vessel_runs import Chosen, VesselRuns, assemble, assembled
+from kempf.flows.jobs.standing_model import Own, inputs_of, known_effects, named, stored_model
+from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
@@ -23,104 +25,15 @@ from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import rung
 from kempf.pipeline.estimate.pooled_fit import Fit
 from kempf.pipeline.estimate.result import discrete_values
-from kempf.pipeline.model import effects
-from kempf.pipeline.model.effects import digest
-from kempf.pipeline.model.terms.effect import Effect
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, code_version, parameter_sets, provenance, vessels
-from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse import parameter_sets, provenance, vessels
 from kempf.warehouse.parameter_set import Estimate as Stored
+from kempf.warehouse.parameter_set import Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
 
-#: the estimator of these sets, and the alias of the model that a vessel stands at
-ESTIMATOR, ALIAS = "ml-effects", "model"
 _STEP_S = 1.0
-#: eq. (16) with the bias of the rate gyro left to the catalogue, which names it where there is one
-PLAIN = ModelSpec(name="plain", rate_bias=False)
-
-
-@dataclass(frozen=True)
-class Own:
-    """Effects of a person's own: their text by name, formulas or a whole file."""
-
-    formulas: Mapping[str, Sequence[str]] = field(default_factory=dict)
-    files: Mapping[str, str] = field(default_factory=dict)
-
-    def effects(self) -> dict[str, Effect]:
-        """Return the effects that the texts describe."""
-        made = {name: effects.from_expression(tuple(texts), name) for name, texts in self.formulas.items()}
-        return made | {name: effects.from_file(text, name) for name, text in self.files.items()}
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the texts as JSON content."""
-        return {
-            "formulas": {name: list(texts) for name, texts in sorted(self.formulas.items())},
-            "files": dict(sorted(self.files.items())),
-        }
-
-    @staticmethod
-    def from_json(content: Mapping[str, Any]) -> Own:
-        """Return what `as_json` gave."""
-        return Own(
-            {name: tuple(texts) for name, texts in content.get("formulas", {}).items()}, dict(content.get("files", {}))
-        )
-
-    def beside(self, other: Own) -> Own:
-        """Return the effects of both; of one name the other's."""
-        return Own({**self.formulas, **other.formulas}, {**self.files, **other.files})
-
-
-NONE_OF_ONES_OWN = Own()
-
-
-def known_effects(own: Own) -> dict[str, Effect]:
-    """Return the catalogue and a person's own effects by name."""
-    return {**effects.catalogue(), **own.effects()}
-
-
-def named(names: Sequence[str], known: Mapping[str, Effect]) -> tuple[Effect, ...]:
-    """Return effects by name, in order.
-
-    Raises
-    ------
-    NotFound
-        ``effect_unknown``.
-    """
-    return tuple(known[name] if name in known else effects.get(name) for name in names)
-
-
-def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
-    """Return all that a model's parameter set is a function of.
-
-    Parameters
-    ----------
-    chosen : Chosen
-    spec : ModelSpec
-        ``effects`` names them in order.
-    own : Own
-        Those that are not in the catalogue.
-    """
-    known = known_effects(own)
-    used = named(spec.effects, known)
-    mine = Own(
-        {n: t for n, t in own.formulas.items() if n in spec.effects},
-        {n: t for n, t in own.files.items() if n in spec.effects},
-    )
-    return Inputs(
-        log_ids=tuple(s.log_id for s in chosen.segments),
-        profile_sha256=chosen.profile_sha256,
-        bounds=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in chosen.segments),
-        model_spec=spec.model_dump(mode="json"),
-        estimator=ESTIMATOR,
-        settings={
-            "segments": [s.segment_id for s in chosen.segments],
-            "effects": {effect.name: digest(effect) for effect in used},
-            "own": mine.as_json(),
-        },
-        code_version=code_version.fingerprint(),
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -178,12 +91,13 @@ def store_model(
     (ParameterSet, bool)
         The model, and whether it is new.
     """
+    found = stored_model(warehouse, chosen, spec, own)
+    if found is not None:
+        return found, False
     way = [spec.model_copy(update={"effects": spec.effects[:k]}) for k in range(len(spec.effects) + 1)]
     wanted = [inputs_of(chosen, one, own) for one in way]
     names = [parameter_set_id(inputs) for inputs in wanted]
     there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
-    if names[-1] in there:
-        return parameter_sets.get(warehouse, names[-1]), False
     if fitted is None:
         runs = assembled(warehouse, chosen, spec, progress)
         progress(0, 1, f"fitting {spec.effects[-1] if spec.effects else 'the plain model'}")
@@ -196,65 +110,6 @@ def store_model(
             made.append(_as_parameter_set(fit, fitted, profile, inputs, chosen.vessel, told, parent))
     parameter_sets.insert(warehouse, made)
     return made[-1], True
-
-
-def point(warehouse: Warehouse, model: ParameterSet) -> None:
-    """Let the vessel stand at a model."""
-    aliases.point(warehouse, model.vessel, model.parameter_set_id, alias=ALIAS)
-
-
-def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
-    """Return the model that a vessel stands at, None where she has none yet."""
-    pointed = aliases.of_vessel(warehouse, vessel).get(ALIAS)
-    return parameter_sets.get(warehouse, pointed) if pointed else None
-
-
-def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:
-    """Return the model of a stored set and the effects of a person's own in it."""
-    spec = ModelSpec.model_validate(dict(one.model_spec))
-    return spec, Own.from_json(one.settings["own"]) if one.estimator == ESTIMATOR else Own()
-
-
-def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:
-    """Return the model that a vessel stands at, the plain one where she has none yet."""
-    now = standing(warehouse, vessel)
-    return model_of(now) if now else (PLAIN, Own())
-
-
-def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
-    """Let the vessel stand at the parent of her model; nothing is deleted.
-
-    Raises
-    ------
-    NotFound
-        ``no_parent``.
-    """
-    now = standing(warehouse, vessel)
-    if now is None or now.parent is None:
-        raise NotFound(
-            "no_parent",
-            f"{vessel!r} stands at {'no model' if now is None else 'the plain model'}: there is nothing to undo.",
-            f"See `kempf ladder --vessel {vessel}`.",
-        )
-    before = parameter_sets.get(warehouse, now.parent)
-    point(warehouse, before)
-    return before
-
-
-def chain(warehouse: Warehouse, model: ParameterSet) -> list[ParameterSet]:
-    """Return a model and its parents, the plain one first."""
-    found = [model]
-    while found[0].parent is not None:
-        found.insert(0, parameter_sets.get(warehouse, found[0].parent))
-    return found
-
-
-def rungs_to(warehouse: Warehouse, model: ParameterSet) -> list[dict[str, Any]]:
-    """Return the rungs of the ladder that lead to a model, the plain one first, as JSON content."""
-    return [
-        {**one.fit["rung"], "step": step, "parameter_set_id": one.parameter_set_id}
-        for step, one in enumerate(chain(warehouse, model))
-    ]
 
 
 def build_model(

@@ -7,9 +7,9 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
+from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.parameter_set_of import arm_of
-from kempf.flows.jobs.refresh_logs import refresh_logs
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
@@ -20,10 +20,8 @@ from kempf.pipeline.estimate.search.pooled_start import Start, start_of
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import logs, segments, vessels
-from kempf.warehouse.deduplicate import once, same
+from kempf.warehouse import vessels
 from kempf.warehouse.parameter_set import Bounds
-from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
 #: where the profile does not tell a length; only the scale of non-dimensional coefficients hangs on it
@@ -56,73 +54,6 @@ class VesselRuns:
         """Hull and noise levels to start a fit from; the held-out runs have no part in the hull."""
         with ThreadPoolExecutor(max_workers=usable()) as workers:
             return start_of(self.records, self.runs, self.spec, split(self.runs)[0], workers)
-
-
-@dataclass(frozen=True, eq=False)
-class Chosen:
-    """Which segments of a vessel count, and how her logs are read.
-
-    Attributes
-    ----------
-    vessel : str
-    profile_sha256 : str
-    segments : tuple of Segment
-        Sorted by log and time, as the inputs of a parameter set are.
-    ingests : dict of str to str
-        Ingest by log, of these segments.
-    file_names : dict of str to str
-        By log.
-    skipped : dict of str to str
-    """
-
-    vessel: str
-    profile_sha256: str
-    segments: tuple[Segment, ...]
-    ingests: dict[str, str]
-    file_names: dict[str, str]
-    skipped: dict[str, str]
-
-
-def choose(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Chosen:
-    """Choose the zigzags of a vessel: each manoeuvre once, all read with the newest profile.
-
-    Parameters
-    ----------
-    warehouse : Warehouse
-    vessel : str
-    progress : Progress, optional
-        Logs that were read by other code are read anew first.
-
-    Raises
-    ------
-    NotFound
-        ``no_segments``.
-    """
-    refreshed = refresh_logs(warehouse, vessel, progress)
-    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel) if row.ingest_id not in refreshed.failed}
-    found = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
-    if not found:
-        raise NotFound(
-            "no_segments",
-            f"No zigzag was found in the {len(rows)} logs of {vessel!r}.",
-            "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
-            {"vessel": vessel},
-        )
-    profile_sha256 = rows[max(found, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
-    # a broken-off zigzag stays: its rudder moved too
-    kept, skipped = once([s for s in found if rows[s.ingest_id].profile_sha256 == profile_sha256], same)
-    for segment in found:
-        if rows[segment.ingest_id].profile_sha256 != profile_sha256:
-            skipped[segment.segment_id] = "its log is read with an older profile"
-    kept.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
-    return Chosen(
-        vessel,
-        profile_sha256,
-        tuple(kept),
-        {s.log_id: s.ingest_id for s in kept},
-        {s.log_id: rows[s.ingest_id].file_name for s in kept},
-        skipped,
-    )
 
 
 def vessel_runs(warehouse: Warehouse, vessel: str, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:

@@ -18,7 +18,7 @@ from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.flows.jobs.standing_model import PLAIN
 from kempf.pipeline.model import effects
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.store import Warehouse

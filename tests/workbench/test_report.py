@@ -13,7 +13,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from kempf.flows.jobs.vessel_model import Own
+from kempf.flows.jobs.standing_model import Own
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.chosen_model import PLAIN
 from kempf.workbench.figures import (

@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from kempf.flows.jobs.demonstrate import Demonstration
-from kempf.warehouse.parameter_set import ParameterSet
 from kempf.workbench.cli.options import json_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.demonstrate import Demonstration
+    from kempf.warehouse.parameter_set import ParameterSet
 
 
 @click.command("demo")

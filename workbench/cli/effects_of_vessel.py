@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -12,6 +12,14 @@ from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.ladder import tell_rungs
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.chosen_manoeuvres import Chosen
+    from kempf.flows.jobs.standing_model import Own
+    from kempf.flows.process.progress import Progress
+    from kempf.schemas.model_spec import ModelSpec
+    from kempf.warehouse.parameter_set import ParameterSet
+    from kempf.warehouse.store import Warehouse
 
 
 @click.command("try")
@@ -25,9 +33,9 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
 
     Beside the model that the vessel stands at; nothing is stored.
     """
+    from kempf.flows.jobs.chosen_manoeuvres import choose
     from kempf.flows.jobs.diagnose_vessel import examine
-    from kempf.flows.jobs.vessel_model import Own, standing_model
-    from kempf.flows.jobs.vessel_runs import choose
+    from kempf.flows.jobs.standing_model import Own, standing_model
     from kempf.pipeline.diagnose.diagnosis import DiagnosisSettings
     from kempf.pipeline.diagnose.verdict import as_json as told_as_json
     from kempf.warehouse.canonical import plain
@@ -79,8 +87,8 @@ def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
 @json_option
 def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str, as_json: bool) -> None:
     """Add an effect to the model that a vessel stands at, refit, and show the error before and after."""
-    from kempf.flows.jobs.vessel_model import Own, point, rungs_to, standing_model, store_model
-    from kempf.flows.jobs.vessel_runs import choose
+    from kempf.flows.jobs.chosen_manoeuvres import choose
+    from kempf.flows.jobs.standing_model import Own, point, rungs_to, standing_model, stored_model
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import read_effect_files
 
@@ -101,7 +109,8 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
         )
     wanted = spec.model_copy(update={"effects": (*spec.effects, name)})
     with progress() as tell:
-        made, _ = store_model(warehouse, choose(warehouse, vessel, tell), wanted, own.beside(mine), tell)
+        chosen, beside = choose(warehouse, vessel, tell), own.beside(mine)
+        made = stored_model(warehouse, chosen, wanted, beside) or _fitted(warehouse, chosen, wanted, beside, tell)
     point(warehouse, made)
     rungs = rungs_to(warehouse, made)
     if as_json:
@@ -112,6 +121,13 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
     for warning in made.warnings:
         click.echo(f"  {warning}")
     click.echo(f"next: kempf ladder --vessel {vessel}, kempf effects undo --vessel {vessel}")
+
+
+def _fitted(warehouse: Warehouse, chosen: Chosen, wanted: ModelSpec, own: Own, tell: Progress) -> ParameterSet:
+    """Fit a model that is not stored yet, and store it; only this needs the estimators."""
+    from kempf.flows.jobs.vessel_model import store_model
+
+    return store_model(warehouse, chosen, wanted, own, tell)[0]
 
 
 def _require_known(name: str) -> None:
@@ -151,7 +167,7 @@ def _scaled(value: float | None, factor: float) -> float | None:
 @json_option
 def undo(vessel: str, uri: str, as_json: bool) -> None:
     """Go back to the model before the last effect was added; nothing is deleted."""
-    from kempf.flows.jobs.vessel_model import undo as go_back
+    from kempf.flows.jobs.standing_model import undo as go_back
     from kempf.warehouse.store import Warehouse
 
     now = go_back(Warehouse(uri), vessel)

@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
 from kempf.flows.process.progress import Progress
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import KempfError
-from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.parameter_set_table import tell_set
+from kempf.workbench.terminal import print_json, progress
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
+    from kempf.warehouse.parameter_set import ParameterSet
+    from kempf.warehouse.store import Warehouse
 
 
 @click.command("identify")
@@ -31,8 +35,9 @@ def command(vessel: str, model: Path | None, estimator: str, uri: str, as_json: 
     What was identified before from the same inputs, with the same code and settings, is not computed again.
     """
     from kempf.flows.jobs.files import read_model
-    from kempf.flows.jobs.identify_vessel import identify_vessel
+    from kempf.flows.jobs.identify_vessel import Request, identify_vessel
     from kempf.schemas.model_spec import ModelSpec
+    from kempf.warehouse.store import Warehouse
 
     request = Request(read_model(model) if model else ModelSpec(), estimator)
     with progress() as tell:
@@ -85,18 +90,3 @@ def _tell(outcome: IdentifyOutcome) -> None:
         click.echo(f"{named}: not identified [{outcome.error.code}] {outcome.error}", err=True)
         return
     tell_set(outcome.parameter_set, f"{named}: {outcome.parameter_set.parameter_set_id}")
-
-
-def tell_set(one: ParameterSet, title: str) -> None:
-    """Print a parameter set for a person: values with standard errors, noise levels, fit, warnings."""
-    rows = [[p.name, number(p.value), number(p.std, 2), p.unit] for p in (*one.parameters, *one.noise)]
-    print_table(["", "value", "std", "unit"], rows, title)
-    converged = one.convergence.get("converged")
-    click.echo(f"  {'converged' if converged else 'NOT CONVERGED'}: {one.convergence.get('reason')}")
-    for name, fit in dict(one.fit.get("channels", {})).items():
-        click.echo(
-            f"  {name}: fit {fit['fit_percent']:.1f} % one step ahead, in sample; "
-            f"{100 * fit['inside_95_percent']:.0f} % inside the 95 % interval"
-        )
-    for warning in one.warnings:
-        click.echo(f"  warning: {warning}")

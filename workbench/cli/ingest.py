@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from kempf.flows.jobs.ingest_logs import IngestOutcome
-from kempf.flows.jobs.unreadable_stretches import as_json
 from kempf.workbench.cli.options import json_option, profile_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import one_line, print_json, progress
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.ingest_logs import IngestOutcome
 
 
 @click.command("ingest")
@@ -60,6 +62,8 @@ def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
         f"{tally.records_rejected} rejected{f' ({reasons})' if reasons else ''}; {_zigzags(outcome)}"
     )
     if outcome.lost:
+        from kempf.flows.jobs.unreadable_stretches import as_json
+
         times = [one["since"] or one["until"] for one in as_json(outcome.lost) if one["since"] or one["until"]]
         many = f"{len(outcome.lost)} stretch{'es' if len(outcome.lost) > 1 else ''} of this log could not be read"
         from_then = f", the first from {times[0]} on" if times else ""

@@ -17,7 +17,7 @@ from kempf.workbench.terminal import number, print_json, print_table
 @json_option
 def command(vessel: str, uri: str, as_json: bool) -> None:
     """Show the models that lead to the one a vessel stands at, and how the error fell from one to the next."""
-    from kempf.flows.jobs.vessel_model import rungs_to, standing
+    from kempf.flows.jobs.standing_model import rungs_to, standing
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)

@@ -61,7 +61,7 @@ def show(set_id: str, uri: str, as_json: bool) -> None:
     """Show a parameter set whole; a unique beginning of its id is enough."""
     from kempf.warehouse import parameter_sets
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.cli.identify import tell_set
+    from kempf.workbench.parameter_set_table import tell_set
 
     one = parameter_sets.get(Warehouse(uri), set_id)
     if as_json:

@@ -38,7 +38,7 @@ def command(
 
     The file asks for nothing outside itself and can be sent as it is. It diagnoses the vessel as `kempf diagnose` does.
     """
-    from kempf.flows.jobs.vessel_model import Own
+    from kempf.flows.jobs.standing_model import Own
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
     from kempf.workbench.export import write_new

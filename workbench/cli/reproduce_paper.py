@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from kempf.flows.jobs.reproduce_paper import Experiment, Reproduction
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.options import json_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.reproduce_paper import Experiment, Reproduction
 
 
 @click.command("reproduce-paper")

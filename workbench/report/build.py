@@ -6,7 +6,7 @@ from dataclasses import asdict, dataclass, replace
 
 from kempf.flows.jobs.diagnose_vessel import diagnose_in_full
 from kempf.flows.jobs.parameter_set_of import channel_warnings
-from kempf.flows.jobs.vessel_model import Own
+from kempf.flows.jobs.standing_model import Own
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.diagnose.diagnosis import DiagnosisSettings
 from kempf.schemas.model_spec import ModelSpec

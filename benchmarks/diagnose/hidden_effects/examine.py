@@ -18,7 +18,7 @@ from typing import Any
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.flows.jobs.standing_model import PLAIN
 from kempf.schemas.errors import KempfError
 from kempf.warehouse.store import Warehouse
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.vessel_model import PLAIN
+from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import vessel_runs
 from kempf.pipeline.diagnose.forward_selection import staged
 from kempf.pipeline.diagnose.split import split

@@ -1,0 +1,181 @@
+"""The model with effects that a vessel stands at, read and pointed to: aliases, parents, a person's own effects.
+
+What is stored is read here; nothing is fitted, so that to show a model costs no more than to read it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.schemas.errors import NotFound
+from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse import aliases, code_version, parameter_sets
+from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    from kempf.pipeline.model.terms.effect import Effect
+
+#: the estimator of these sets, and the alias of the model that a vessel stands at
+ESTIMATOR, ALIAS = "ml-effects", "model"
+#: eq. (16) with the bias of the rate gyro left to the catalogue, which names it where there is one
+PLAIN = ModelSpec(name="plain", rate_bias=False)
+
+
+@dataclass(frozen=True)
+class Own:
+    """Effects of a person's own: their text by name, formulas or a whole file."""
+
+    formulas: Mapping[str, Sequence[str]] = field(default_factory=dict)
+    files: Mapping[str, str] = field(default_factory=dict)
+
+    def effects(self) -> dict[str, Effect]:
+        """Return the effects that the texts describe."""
+        from kempf.pipeline.model import effects
+
+        made = {name: effects.from_expression(tuple(texts), name) for name, texts in self.formulas.items()}
+        return made | {name: effects.from_file(text, name) for name, text in self.files.items()}
+
+    def as_json(self) -> dict[str, Any]:
+        """Return the texts as JSON content."""
+        return {
+            "formulas": {name: list(texts) for name, texts in sorted(self.formulas.items())},
+            "files": dict(sorted(self.files.items())),
+        }
+
+    @staticmethod
+    def from_json(content: Mapping[str, Any]) -> Own:
+        """Return what `as_json` gave."""
+        return Own(
+            {name: tuple(texts) for name, texts in content.get("formulas", {}).items()}, dict(content.get("files", {}))
+        )
+
+    def beside(self, other: Own) -> Own:
+        """Return the effects of both; of one name the other's."""
+        return Own({**self.formulas, **other.formulas}, {**self.files, **other.files})
+
+
+NONE_OF_ONES_OWN = Own()
+
+
+def known_effects(own: Own) -> dict[str, Effect]:
+    """Return the catalogue and a person's own effects by name."""
+    from kempf.pipeline.model import effects
+
+    return {**effects.catalogue(), **own.effects()}
+
+
+def named(names: Sequence[str], known: Mapping[str, Effect]) -> tuple[Effect, ...]:
+    """Return effects by name, in order.
+
+    Raises
+    ------
+    NotFound
+        ``effect_unknown``.
+    """
+    from kempf.pipeline.model import effects
+
+    return tuple(known[name] if name in known else effects.get(name) for name in names)
+
+
+def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
+    """Return all that a model's parameter set is a function of.
+
+    Parameters
+    ----------
+    chosen : Chosen
+    spec : ModelSpec
+        ``effects`` names them in order.
+    own : Own
+        Those that are not in the catalogue.
+    """
+    from kempf.pipeline.model.effects import digest
+
+    known = known_effects(own)
+    used = named(spec.effects, known)
+    mine = Own(
+        {n: t for n, t in own.formulas.items() if n in spec.effects},
+        {n: t for n, t in own.files.items() if n in spec.effects},
+    )
+    return Inputs(
+        log_ids=tuple(s.log_id for s in chosen.segments),
+        profile_sha256=chosen.profile_sha256,
+        bounds=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in chosen.segments),
+        model_spec=spec.model_dump(mode="json"),
+        estimator=ESTIMATOR,
+        settings={
+            "segments": [s.segment_id for s in chosen.segments],
+            "effects": {effect.name: digest(effect) for effect in used},
+            "own": mine.as_json(),
+        },
+        code_version=code_version.fingerprint(),
+    )
+
+
+def stored_model(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, own: Own) -> ParameterSet | None:
+    """Return the parameter set of a model of these manoeuvres, None where it is not stored yet."""
+    name = parameter_set_id(inputs_of(chosen, spec, own))
+    there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
+    return parameter_sets.get(warehouse, name) if name in there else None
+
+
+def point(warehouse: Warehouse, model: ParameterSet) -> None:
+    """Let the vessel stand at a model."""
+    aliases.point(warehouse, model.vessel, model.parameter_set_id, alias=ALIAS)
+
+
+def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
+    """Return the model that a vessel stands at, None where she has none yet."""
+    pointed = aliases.of_vessel(warehouse, vessel).get(ALIAS)
+    return parameter_sets.get(warehouse, pointed) if pointed else None
+
+
+def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:
+    """Return the model of a stored set and the effects of a person's own in it."""
+    spec = ModelSpec.model_validate(dict(one.model_spec))
+    return spec, Own.from_json(one.settings["own"]) if one.estimator == ESTIMATOR else Own()
+
+
+def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:
+    """Return the model that a vessel stands at, the plain one where she has none yet."""
+    now = standing(warehouse, vessel)
+    return model_of(now) if now else (PLAIN, Own())
+
+
+def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
+    """Let the vessel stand at the parent of her model; nothing is deleted.
+
+    Raises
+    ------
+    NotFound
+        ``no_parent``.
+    """
+    now = standing(warehouse, vessel)
+    if now is None or now.parent is None:
+        raise NotFound(
+            "no_parent",
+            f"{vessel!r} stands at {'no model' if now is None else 'the plain model'}: there is nothing to undo.",
+            f"See `kempf ladder --vessel {vessel}`.",
+        )
+    before = parameter_sets.get(warehouse, now.parent)
+    point(warehouse, before)
+    return before
+
+
+def chain(warehouse: Warehouse, model: ParameterSet) -> list[ParameterSet]:
+    """Return a model and its parents, the plain one first."""
+    found = [model]
+    while found[0].parent is not None:
+        found.insert(0, parameter_sets.get(warehouse, found[0].parent))
+    return found
+
+
+def rungs_to(warehouse: Warehouse, model: ParameterSet) -> list[dict[str, Any]]:
+    """Return the rungs of the ladder that lead to a model, the plain one first, as JSON content."""
+    return [
+        {**one.fit["rung"], "step": step, "parameter_set_id": one.parameter_set_id}
+        for step, one in enumerate(chain(warehouse, model))
+    ]

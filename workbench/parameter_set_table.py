@@ -1,0 +1,27 @@
+"""A parameter set as a person reads it at a terminal."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from kempf.workbench.terminal import number, print_table
+
+if TYPE_CHECKING:
+    from kempf.warehouse.parameter_set import ParameterSet
+
+
+def tell_set(one: ParameterSet, title: str) -> None:
+    """Print a parameter set for a person: values with standard errors, noise levels, fit, warnings."""
+    rows = [[p.name, number(p.value), number(p.std, 2), p.unit] for p in (*one.parameters, *one.noise)]
+    print_table(["", "value", "std", "unit"], rows, title)
+    converged = one.convergence.get("converged")
+    click.echo(f"  {'converged' if converged else 'NOT CONVERGED'}: {one.convergence.get('reason')}")
+    for name, fit in dict(one.fit.get("channels", {})).items():
+        click.echo(
+            f"  {name}: fit {fit['fit_percent']:.1f} % one step ahead, in sample; "
+            f"{100 * fit['inside_95_percent']:.0f} % inside the 95 % interval"
+        )
+    for warning in one.warnings:
+        click.echo(f"  warning: {warning}")
