@@ -1,34 +1,61 @@
-"""The effect file: an effect of a person's own as YAML, no code in it."""
+"""What an effect is: formulas, parameters with bounds, and words for the user.
+
+The catalogue's files (`schemas/effects`) and a user's own are all of this form; no code in them is ever run.
+"""
 
 from __future__ import annotations
 
+import hashlib
+import json
 import re
-from typing import Annotated
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, model_validator
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+
+from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS, OWN_STATES, TARGETS
+
+Group = Literal["hull", "rudder", "propulsion", "environment", "sensor", "other", "own"]
+#: what may become of the rudder's course before it reaches the hull: compiled code, `pipeline/model/effects`
+RudderCourse = Literal["backlash", "dead_time", "rate_limit", "rudder_lag"]
 
 _Line = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=500)]
+_Words = Annotated[str, StringConstraints(strip_whitespace=True, max_length=500)]
 _Formula = Annotated[str, StringConstraints(strip_whitespace=True, min_length=1, max_length=4000)]
-_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,19}")
+_PARAMETER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,19}")
+_WORD = re.compile(r"[A-Za-z_]\w*")
 
 
 class _Frozen(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
-class ParameterEntry(_Frozen):
-    """One number of the effect: 0 is where it is absent, or lies outside the bounds of what only shapes it."""
+class Parameter(_Frozen):
+    """One number of an effect.
 
+    Either it makes the effect, which is absent with 0, or it shapes what others make, such as a frequency: then 0 lies
+    outside its bounds.
+
+    Attributes
+    ----------
+    name, unit, meaning : str
+    low, high : float
+        Bounds that are physical.
+    steps : tuple of float
+        Values at which the effect is tried. One is enough for what goes linearly with the parameter; a threshold
+        (backlash, dead time) needs several.
+    """
+
+    name: str
     unit: str = Field(default="", max_length=40)
-    #: bounds that are physical
     low: float
     high: float
-    #: values at which the effect is tried; one, unless it has a threshold
     steps: tuple[float, ...] = Field(min_length=1, max_length=9)
-    meaning: str = Field(default="", max_length=500)
+    meaning: _Words = ""
 
     @model_validator(mode="after")
-    def _ordered(self) -> ParameterEntry:
+    def _sound(self) -> Parameter:
+        if not _PARAMETER.fullmatch(self.name):
+            raise ValueError(f"{self.name[:40]!r} is no name of a parameter: take letters, digits and underscores")
         if not self.low < self.high:
             raise ValueError(f"low must be less than high; they are {self.low:g} and {self.high:g}")
         outside = [step for step in self.steps if step == 0.0 or not self.low <= step <= self.high]
@@ -36,47 +63,169 @@ class ParameterEntry(_Frozen):
             raise ValueError(f"the step {outside[0]:g} must not be 0 and must lie between low and high")
         return self
 
+    @property
+    def shapes(self) -> bool:
+        """Whether it shapes the effect and does not make it."""
+        return not self.low <= 0.0 <= self.high
 
-class StateEntry(_Frozen):
-    """A state that the effect brings along: a formula each."""
+    @property
+    def absent(self) -> float:
+        """Its value where the effect is absent: 0, or any where it only shapes."""
+        return self.steps[0] if self.shapes else 0.0
 
+
+class ExtraState(_Frozen):
+    """A state that an effect brings along, such as a memory of the sway: all three are formulas.
+
+    Attributes
+    ----------
+    name : str
+        ``m1`` to ``m4``.
+    derivative : str
+        Of time.
+    noise : str
+        Intensity of the white noise that drives it.
+    initial_std : str
+        Standard deviation at the first instant.
+    """
+
+    name: str
     derivative: _Formula
     noise: _Formula = "0"
     initial_std: _Formula = "0"
 
 
-class EffectFile(_Frozen):
-    """What an effect file says."""
+class Effect(_Frozen):
+    """One physical effect that eq. (16) lacks.
+
+    Attributes
+    ----------
+    name, title : str
+        The key, and how it is called in a sentence.
+    group : str
+    plain : str
+        What it does, for a naval architect: one sentence without symbols.
+    equation, reference : str
+    parameters : tuple of Parameter
+    terms : mapping of str to str
+        Formula by target, see `kempf.schemas.symbols.TARGETS`.
+    rudder_course : str, optional
+        What becomes of the rudder's course before it reaches the hull; the first parameter is its size.
+    states : tuple of ExtraState
+    needs : tuple of str
+        Canonical channels without which it cannot be tested: those that its formulas speak of, and any that are named.
+    measured_by : tuple of str
+        Canonical channels that show it already: where every run has one of them there is nothing left to look for.
+    confounded_with, separated_by : str
+        What looks alike, and the manoeuvre or channel that distinguishes the two.
+    """
 
     name: _Line
-    title: _Line | None = None
-    #: what it does, one sentence for a naval architect
+    title: _Line = ""
+    group: Group = "own"
     plain: _Line
-    #: formula by what it acts on
-    terms: dict[str, _Formula] = Field(min_length=1, max_length=7)
-    parameters: dict[str, ParameterEntry] = Field(min_length=1, max_length=9)
-    #: m1 to m4
-    states: dict[str, StateEntry] = Field(default_factory=dict, max_length=4)
-    #: canonical channels without which it cannot be tested, beside those its formulas speak of
-    needs: tuple[_Line, ...] = ()
-    equation: _Line | None = None
+    equation: str = ""
     reference: _Line
-    confounded_with: str = Field(default="", max_length=500)
-    separated_by: str = Field(default="", max_length=500)
+    parameters: tuple[Parameter, ...] = Field(min_length=1, max_length=9)
+    terms: dict[str, _Formula] = Field(default_factory=dict, max_length=len(TARGETS))
+    rudder_course: RudderCourse | None = None
+    states: tuple[ExtraState, ...] = Field(default=(), max_length=len(OWN_STATES))
+    needs: tuple[_Line, ...] = Field(default=(), validate_default=True)
+    measured_by: tuple[_Line, ...] = ()
+    confounded_with: _Words = ""
+    separated_by: _Words = ""
+
+    @model_validator(mode="before")
+    @classmethod
+    def _with_words(cls, content: Any) -> Any:
+        """Make the words that a file may leave out from the rest."""
+        if not isinstance(content, dict):
+            return content
+        terms = content.get("terms")
+        written = "; ".join(f"{k}: {v}" for k, v in terms.items()) if isinstance(terms, dict) else ""
+        return {"title": str(content.get("name") or "-").replace("_", " "), "equation": written, **content}
+
+    @field_validator("parameters", "states", mode="before")
+    @classmethod
+    def _by_name(cls, entries: Any) -> Any:
+        """Take a mapping by name, as a file has it."""
+        if not isinstance(entries, dict):
+            return entries
+        return tuple({**e, "name": n} if isinstance(e, dict) else {"name": n} for n, e in entries.items())
+
+    @field_validator("parameters")
+    @classmethod
+    def _first_makes_it(cls, parameters: tuple[Parameter, ...]) -> tuple[Parameter, ...]:
+        if parameters[0].shapes:
+            raise ValueError(
+                f"0 must lie between low and high of {parameters[0].name}, the first parameter: it makes the effect"
+            )
+        return parameters
+
+    @field_validator("states")
+    @classmethod
+    def _numbered(cls, states: tuple[ExtraState, ...]) -> tuple[ExtraState, ...]:
+        if tuple(state.name for state in states) != OWN_STATES[: len(states)]:
+            raise ValueError(f"states are numbered through, {', '.join(OWN_STATES)}; found {states[0].name[:40]!r}")
+        return states
+
+    @field_validator("needs")
+    @classmethod
+    def _spoken_of(cls, named: tuple[str, ...], others: ValidationInfo) -> tuple[str, ...]:
+        """Add the channels that the formulas speak of."""
+        strange = [channel for channel in named if channel not in CHANNEL_SYMBOLS.values()]
+        if strange:
+            raise ValueError(f"take {', '.join(CHANNEL_SYMBOLS.values())}; found {strange[0][:40]!r}")
+        states = others.data.get("states", ())
+        formulas = (*others.data.get("terms", {}).values(), *(f for s in states for f in (s.derivative, s.noise)))
+        words = {word for formula in formulas for word in _WORD.findall(formula)}
+        return tuple(dict.fromkeys([*(c for symbol, c in CHANNEL_SYMBOLS.items() if symbol in words), *named]))
+
+    @field_validator("measured_by")
+    @classmethod
+    def _logged(cls, named: tuple[str, ...]) -> tuple[str, ...]:
+        strange = [channel for channel in named if channel not in LOGGED_CHANNELS]
+        if strange:
+            raise ValueError(f"take {', '.join(LOGGED_CHANNELS)}; found {strange[0][:40]!r}")
+        return named
 
     @model_validator(mode="after")
-    def _named(self) -> EffectFile:
-        for name in self.parameters:
-            if not _NAME.fullmatch(name):
-                raise ValueError(f"{name[:40]!r} is no name of a parameter: take letters, digits and underscores")
-        first, entry = next(iter(self.parameters.items()))
-        if not entry.low <= 0.0 <= entry.high:
-            raise ValueError(
-                f"0 must lie between low and high of {first[:40]}, the first parameter: it makes the effect"
-            )
-        strange = [name for name in self.states if name not in ("m1", "m2", "m3", "m4")]
-        if strange:
-            raise ValueError(f"states are called m1, m2, m3, m4; found {strange[0][:40]!r}")
-        if list(self.states) != ["m1", "m2", "m3", "m4"][: len(self.states)]:
-            raise ValueError("states are numbered through: m1, then m2")
+    def _acts(self) -> Effect:
+        for target in self.terms:
+            if target not in TARGETS:
+                raise ValueError(f"terms act on {', '.join(TARGETS)}; found {target[:40]!r}")
+        if not self.terms and self.rudder_course is None:
+            raise ValueError("it has no term: give it terms or a rudder_course")
         return self
+
+    @property
+    def sha256(self) -> str:
+        """Hash of what the effect computes, by which a model's provenance pins it.
+
+        The words about it are left out: a better sentence makes no other model. A rudder course counts by its name, and
+        its code with the rest of the code.
+        """
+        content = {
+            "name": self.name,
+            "parameters": [[p.name, p.unit, p.low, p.high, list(p.steps)] for p in self.parameters],
+            "terms": sorted(self.terms.items()),
+            "states": [[s.name, s.derivative, s.noise, s.initial_std] for s in self.states],
+            "needs": list(self.needs),
+            "rudder_course": self.rudder_course,
+        }
+        if self.measured_by:
+            # by the key's first name, so that the models that hold such an effect keep theirs
+            content["told_by"] = list(self.measured_by)
+        return hashlib.sha256(json.dumps(content, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+    def as_json(self) -> dict[str, Any]:
+        """Return all fields as JSON content, and the hash.
+
+        ``rudder_course`` says whether there is one; ``told_by`` is the old name of ``measured_by``.
+        """
+        return {
+            **self.model_dump(mode="json"),
+            "rudder_course": self.rudder_course is not None,
+            "told_by": list(self.measured_by),
+            "sha256": self.sha256,
+        }

@@ -58,7 +58,7 @@ def read_effect_files(paths: Sequence[Path]) -> dict[str, str]:
     KempfError
         What is wrong in it, with its name.
     """
-    from kempf.pipeline.model.effects import from_file
+    from kempf.pipeline.model.terms.own import from_file
 
     found = {}
     for path in paths:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
-from kempf.pipeline.model.terms.effect import Effect
+from kempf.schemas.effect import Effect
 
 _HEAD = "| effect | group | what it does | equation | needs |\n|---|---|---|---|---|\n"
 

@@ -18,7 +18,7 @@ from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import vessel_runs
 from kempf.pipeline.diagnose.forward_selection import plain
 from kempf.pipeline.diagnose.screen import screen
-from kempf.pipeline.model.effects import catalogue
+from kempf.schemas.effects import catalogue
 from kempf.warehouse.store import Warehouse
 
 _CANDIDATES, _REPEATS, _CORES = 30, 5, 2

@@ -15,7 +15,6 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
 from kempf.pipeline.diagnose.misfit import where_left
 from kempf.pipeline.diagnose.verdict import as_json
-from kempf.pipeline.model.effects import digest
 from kempf.pipeline.predict.run_residuals import PhaseInterval, phases_s
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import code_version, diagnoses
@@ -151,5 +150,5 @@ def _inputs(chosen: Chosen, spec: ModelSpec, own: Own, settings: DiagnosisSettin
         "estimator": "diagnosis",
         "settings": asdict(settings),
         "own": own.as_json(),
-        "catalogue": {name: digest(effect) for name, effect in known_effects(own).items()},
+        "catalogue": {name: effect.sha256 for name, effect in known_effects(own).items()},
     }

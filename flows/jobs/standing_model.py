@@ -7,17 +7,17 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.schemas import effects
+from kempf.schemas.effect import Effect
+from kempf.schemas.effect_file import read
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, code_version, parameter_sets
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
-
-if TYPE_CHECKING:
-    from kempf.pipeline.model.terms.effect import Effect
 
 #: the estimator of these sets, and the alias of the model that a vessel stands at
 ESTIMATOR, ALIAS = "ml-effects", "model"
@@ -34,10 +34,12 @@ class Own:
 
     def effects(self) -> dict[str, Effect]:
         """Return the effects that the texts describe."""
-        from kempf.pipeline.model import effects
+        made = {name: read(text, name) for name, text in self.files.items()}
+        if self.formulas:
+            from kempf.pipeline.model.terms.own import from_expression
 
-        made = {name: effects.from_expression(tuple(texts), name) for name, texts in self.formulas.items()}
-        return made | {name: effects.from_file(text, name) for name, text in self.files.items()}
+            made |= {name: from_expression(tuple(texts), name) for name, texts in self.formulas.items()}
+        return made
 
     def as_json(self) -> dict[str, Any]:
         """Return the texts as JSON content."""
@@ -54,7 +56,15 @@ class Own:
         )
 
     def beside(self, other: Own) -> Own:
-        """Return the effects of both; of one name the other's."""
+        """Return the effects of both; of one name the other's.
+
+        Raises
+        ------
+        UsageError
+            ``effect_name``: one of the other's is called as one of the catalogue is.
+        """
+        for name in (*other.formulas, *other.files):
+            effects.require_free(name)
         return Own({**self.formulas, **other.formulas}, {**self.files, **other.files})
 
 
@@ -63,8 +73,6 @@ NONE_OF_ONES_OWN = Own()
 
 def known_effects(own: Own) -> dict[str, Effect]:
     """Return the catalogue and a person's own effects by name."""
-    from kempf.pipeline.model import effects
-
     return {**effects.catalogue(), **own.effects()}
 
 
@@ -76,8 +84,6 @@ def named(names: Sequence[str], known: Mapping[str, Effect]) -> tuple[Effect, ..
     NotFound
         ``effect_unknown``.
     """
-    from kempf.pipeline.model import effects
-
     return tuple(known[name] if name in known else effects.get(name) for name in names)
 
 
@@ -92,8 +98,6 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
     own : Own
         Those that are not in the catalogue.
     """
-    from kempf.pipeline.model.effects import digest
-
     known = known_effects(own)
     used = named(spec.effects, known)
     mine = Own(
@@ -108,7 +112,7 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
         estimator=ESTIMATOR,
         settings={
             "segments": [s.segment_id for s in chosen.segments],
-            "effects": {effect.name: digest(effect) for effect in used},
+            "effects": {effect.name: effect.sha256 for effect in used},
             "own": mine.as_json(),
         },
         code_version=code_version.fingerprint(),

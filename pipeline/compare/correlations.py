@@ -15,9 +15,9 @@ from scipy.stats import chi2, norm
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.group import BAND
 from kempf.pipeline.estimate.record.grid_run import Run
-from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import Looked
+from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 #: lags go up to this time, and to so many steps at most
 _LONGEST_S, _MOST = 60.0, 120

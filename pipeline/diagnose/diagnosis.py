@@ -22,8 +22,8 @@ from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.pooled_fit import Fit
 from kempf.pipeline.estimate.record.grid_run import Run
 from kempf.pipeline.estimate.search.pooled_start import Start
-from kempf.pipeline.model.terms.effect import Effect
 from kempf.pipeline.predict.free_run import FreeRun, free_run
+from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import ModelSpec
 
 Told = Callable[[str], None]

@@ -17,7 +17,7 @@ from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import Filtered
 from kempf.pipeline.estimate.pooled_fit import Fit
 from kempf.pipeline.model.batch import MOST
-from kempf.pipeline.model.terms.effect import Effect
+from kempf.schemas.effect import Effect
 
 
 @dataclass(frozen=True)

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.model.terms.effect import Effect
+from kempf.schemas.effect import Effect
 
 #: terms of a formula at most, and the log-likelihood that one more must gain in runs that did not fit it
 _MOST, _EARNED = 3, 8.0

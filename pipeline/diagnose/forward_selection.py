@@ -21,7 +21,7 @@ from kempf.pipeline.estimate.record.grid_run import Run
 from kempf.pipeline.estimate.search.pooled_start import INTENSITIES, Start
 from kempf.pipeline.model.effect_model import Augmented
 from kempf.pipeline.model.ship import mariner_like
-from kempf.pipeline.model.terms.effect import Effect
+from kempf.schemas.effect import Effect
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
 

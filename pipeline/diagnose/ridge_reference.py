@@ -20,7 +20,7 @@ from kempf.pipeline.diagnose.formula_search import Term, search
 from kempf.pipeline.diagnose.screen import Nuisance, nuisance
 from kempf.pipeline.estimate.pooled_fit import Fit
 from kempf.pipeline.estimate.sensitivity import N_HULL
-from kempf.pipeline.model.terms.effect import Effect, Parameter
+from kempf.schemas.effect import Effect, Parameter
 
 _BOTH = {
     "v|v|": "v*abs(v)/L",
@@ -59,9 +59,10 @@ _SHRINKAGE = (1.0, 3.0, 10.0, 30.0, 100.0, 300.0)
 
 def _term(target: str, name: str, text: str) -> Effect:
     scale = "*c" if target == "sway" else "*c/L"
-    parameter = Parameter("c", "1", -1e3, 1e3, (_SIZE,), "size")
+    parameter = Parameter(name="c", unit="1", low=-1e3, high=1e3, steps=(_SIZE,), meaning="size")
     words = f"{name} in {target}"
-    return Effect(f"{target} {name}", words, "own", words, words, "", (parameter,), {target: f"({text}){scale}"})
+    terms = {target: f"({text}){scale}"}
+    return Effect(name=f"{target} {name}", plain=words, reference=words, parameters=(parameter,), terms=terms)
 
 
 TERMS: tuple[Effect, ...] = tuple(_term(t, n, text) for t in ("sway", "yaw") for n, text in _BOTH.items())

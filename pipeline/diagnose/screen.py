@@ -22,7 +22,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.effect_responses import Trial, responses
 from kempf.pipeline.estimate.pooled_fit import Fit, Linearised
 from kempf.pipeline.estimate.sensitivity import N_HULL
-from kempf.pipeline.model.terms.effect import Effect
+from kempf.schemas.effect import Effect
 
 #: share of an effect that the fitted parameters imitate, above which nothing can be told of it
 NOT_TESTABLE = 0.999
@@ -150,7 +150,7 @@ def missing_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
 
 def telling_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
     """Return the channels that show an effect already in every run."""
-    return tuple(c for c in effect.told_by if all(c in one.run.channels for one in base.runs))
+    return tuple(c for c in effect.measured_by if all(c in one.run.channels for one in base.runs))
 
 
 def score(base: Fit, effect: Effect, workers: Executor) -> Candidate:

@@ -11,7 +11,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, Step
 from kempf.pipeline.diagnose.screen import Candidate
-from kempf.pipeline.model.terms.effect import Effect
+from kempf.schemas.effect import Effect
 
 Verdict = Literal["adequate", "explained", "ambiguous", "unexplained", "insufficient_data"]
 #: log-likelihood that the flexible reference must still gain, in runs that did not fit it: something is left

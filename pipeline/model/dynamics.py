@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from kempf.pipeline.compiled import FILLING, njit
 from kempf.pipeline.model.batch import each
-from kempf.pipeline.model.terms.program import evaluate
-from kempf.pipeline.model.terms.symbols import SYMBOLS
+from kempf.pipeline.model.terms.evaluation import evaluate
+from kempf.schemas.symbols import SYMBOLS
 
 #: places of symbols among the variables; states come first, in the filter's order
 DELTA, SPEED, VDOT, RDOT = (SYMBOLS.index(name) for name in ("delta", "V", "vdot", "rdot"))

@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model import dynamics
-from kempf.pipeline.model.terms.effect import Effect, Parameter
+from kempf.pipeline.model.effects import RUDDER_COURSES
 from kempf.pipeline.model.terms.expression import compiled
-from kempf.pipeline.model.terms.symbols import SYMBOLS
+from kempf.schemas.effect import Effect, Parameter
 from kempf.schemas.errors import UsageError
+from kempf.schemas.symbols import OWN_STATES, SYMBOLS
 
 _PLACE = {
     "speed": dynamics.ON_SPEED,
@@ -89,7 +90,7 @@ class Augmented:
         start, held, slot, first = 0, 0, 0, dynamics.PARAMETER
         for effect in self.effects:
             variables = dict(_INDEX)
-            for name in ("m1", "m2", "m3", "m4"):
+            for name in OWN_STATES:
                 del variables[name]
             for i, state in enumerate(effect.states):
                 variables[state.name] = dynamics.N_BEFORE + slot + i
@@ -131,5 +132,5 @@ class Augmented:
         """
         for effect, own in zip(self.effects, self.split(values), strict=True):
             if effect.rudder_course is not None:
-                rudder_rad = effect.rudder_course(time_s, rudder_rad, own)
+                rudder_rad = RUDDER_COURSES[effect.rudder_course](time_s, rudder_rad, own)
         return rudder_rad

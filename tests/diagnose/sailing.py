@@ -20,9 +20,9 @@ from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.record.grid_run import Run, Ship, make_run
 from kempf.pipeline.estimate.record.record import make_record
 from kempf.pipeline.estimate.search.pooled_start import Start, start_of
-from kempf.pipeline.model.effects import catalogue
 from kempf.pipeline.simulate.trial import Trial, TrialSettings
 from kempf.schemas.channels import CHANNELS
+from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec
 
 CHANNEL_OF = {channel.column: channel for channel in CHANNELS.values()}

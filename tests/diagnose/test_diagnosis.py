@@ -12,7 +12,8 @@ from kempf.pipeline.diagnose.forward_selection import added, is_ship, plain, sta
 from kempf.pipeline.diagnose.screen import score
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import as_json, finding, sentences, verdict
-from kempf.pipeline.model import effects
+from kempf.pipeline.model.terms.own import from_expression
+from kempf.schemas import effects
 from kempf.schemas.errors import DataRejected
 from tests.diagnose.sailing import SOME, WORKERS, Sailed, sailed
 
@@ -184,7 +185,7 @@ def test_zigzags_to_one_side_alone_claim_no_asymmetry() -> None:
 def test_an_effect_that_runs_away_is_no_crash() -> None:
     """A division by what the ship's own motion takes through zero."""
     ship = sailed("none")
-    wild = effects.from_expression(("yaw: c*V/(v - 0.31)",), "wild")
+    wild = from_expression(("yaw: c*V/(v - 0.31)",), "wild")
     found = diagnose(
         *(ship.runs[:2], ship.spec, ship.start.of([0, 1]), {"wild": wild}, WORKERS),
         settings=DiagnosisSettings(level=1.0, refits=1, most_steps=1),

@@ -17,7 +17,7 @@ from kempf.pipeline.estimate.filtered import Filtered, Passed
 from kempf.pipeline.estimate.pooled_fit import Fit, Linearised, linearise
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.effect_model import Augmented
-from kempf.pipeline.model.effects import get
+from kempf.schemas.effects import get
 from tests.diagnose.sailing import WORKERS, Sailed, sailed
 
 

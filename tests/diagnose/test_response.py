@@ -14,9 +14,9 @@ from kempf.pipeline.estimate.pooled_fit import Fit, linearise
 from kempf.pipeline.estimate.sensitivity import Point, passed
 from kempf.pipeline.model.batch import MOST
 from kempf.pipeline.model.effect_model import Augmented
-from kempf.pipeline.model.effects import catalogue
 from kempf.pipeline.model.ship import mariner_like
-from kempf.pipeline.model.terms.effect import Effect, Parameter
+from kempf.schemas.effect import Effect, Parameter
+from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec
 from tests.diagnose.sailing import WORKERS, sailed
 
@@ -65,8 +65,8 @@ def test_no_bundle_is_wider_than_the_lanes_and_none_is_lost() -> None:
 
 
 def test_one_that_is_no_number_takes_no_other_with_it(base: Fit) -> None:
-    size = Parameter("c", "1", -1.0, 1.0, (0.01,), "size")
-    wild = Effect("wild", "wild", "own", "wild", "wild", "", (size,), {"yaw": "c/(r-r)"})
+    size = Parameter(name="c", unit="1", low=-1.0, high=1.0, steps=(0.01,), meaning="size")
+    wild = Effect(name="wild", plain="wild", reference="none", parameters=(size,), terms={"yaw": "c/(r-r)"})
     tame = catalogue()["yaw_quadratic"]
     trials = [Trial(effect, steps) for effect in (wild, tame) for steps in _grid(effect)]
     first, *others = responses(base, trials, WORKERS)

@@ -15,8 +15,8 @@ from kempf.pipeline.estimate.pooled_fit import Fit, linearise
 from kempf.pipeline.estimate.record.grid_run import Run
 from kempf.pipeline.estimate.sensitivity import Point, passed
 from kempf.pipeline.model.effect_model import Augmented
-from kempf.pipeline.model.effects import catalogue
 from kempf.pipeline.model.ship import mariner_like
+from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec
 from tests.diagnose.sailing import WORKERS, sailed
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,7 +20,7 @@ from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.standing_model import PLAIN
-from kempf.pipeline.model import effects
+from kempf.schemas import effects
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
@@ -205,3 +206,13 @@ def test_an_effect_file_that_is_none_is_refused(late: Late, tmp_path: Path) -> N
     refused(late.kempf("effects", "add", "x", "--vessel", VESSEL, "--file", tmp_path / "no.yaml", "--json"), 2,
             "effect_file")  # fmt: skip
     refused(late.kempf("effects", "add", "no_such", "--vessel", VESSEL, "--json"), 4, "effect_unknown")
+
+
+def test_an_effect_of_ones_own_with_a_name_of_the_catalogue_is_refused(late: Late, tmp_path: Path) -> None:
+    file = tmp_path / "copied.yaml"
+    shutil.copy(Path(__file__).parents[2] / "schemas" / "effects" / "yaw_cubic.yaml", file)
+    vessel = ("yaw_cubic", "--vessel", VESSEL, "--json")
+    refused(late.kempf("effects", "add", *vessel, "--file", file), 2, "effect_name")
+    refused(late.kempf("effects", "add", *vessel, "--formula", "yaw: r**3"), 2, "effect_name")
+    refused(late.kempf("effects", "try", "yaw: r**3", "--name", *vessel), 2, "effect_name")
+    refused(late.kempf("diagnose", "--vessel", VESSEL, "--effect-file", file, "--json"), 2, "effect_name")

@@ -203,7 +203,7 @@ def test_the_command_runs_the_flow_and_prints_one_document(own: Warehouse):
 
 def test_the_fleet_is_diagnosed_as_a_flow(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
     from kempf.flows.fleet.flows import diagnose
-    from kempf.pipeline.model import effects
+    from kempf.schemas import effects
 
     few = {name: effects.catalogue()[name] for name in ("rudder_lag", "cross_flow_drag")}
     monkeypatch.setattr(effects, "catalogue", lambda: few)

@@ -12,13 +12,14 @@ from benchmarks.diagnose.hidden_effects import plant, programme, sail
 from benchmarks.diagnose.hidden_effects.effects import CATALOGUE, theta
 from benchmarks.diagnose.hidden_effects.outsiders import OUTSIDERS
 from kempf.pipeline.model.batch import ONE
-from kempf.pipeline.model.effects import catalogue
+from kempf.pipeline.model.terms.evaluation import evaluate
 from kempf.pipeline.model.terms.expression import compiled
-from kempf.pipeline.model.terms.program import DEPTH, evaluate
+from kempf.pipeline.model.terms.program import DEPTH
 from kempf.pipeline.simulate import programme as other
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
+from kempf.schemas.effects import catalogue
 
 MOVING = {name: e for name, e in (CATALOGUE | OUTSIDERS).items() if not e.sensor}
 WEATHER = Environment(Disturbance(4e-3, 1e-3), Disturbance(0.2, 0.05), Disturbance(-0.1, 0.05))

@@ -12,11 +12,11 @@ from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.grid_run import Run, Ship
 from kempf.pipeline.model.dynamics import N_INPUT
 from kempf.pipeline.model.effect_model import Augmented
-from kempf.pipeline.model.effects import catalogue
 from kempf.pipeline.model.ship import mariner_like
-from kempf.pipeline.model.terms.effect import Effect
-from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS
+from kempf.schemas.effect import Effect
+from kempf.schemas.effects import catalogue
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 HULL = mariner_like(100.0).array()
 LEVELS = np.array([1e-4, 1e-5, 1e-3, 0.05, 5e-4, 2e-3])

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 from kempf.pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
 from kempf.pipeline.model.terms.ordinary import run
 from kempf.pipeline.model.terms.program import DEPTH
-from kempf.pipeline.model.terms.symbols import STATE_SYMBOLS, SYMBOLS
 from kempf.schemas.errors import UsageError
+from kempf.schemas.symbols import STATE_SYMBOLS, SYMBOLS
 
 STATES = tuple(STATE_SYMBOLS)
 INDEX = {name: i for i, name in enumerate(SYMBOLS)}

@@ -11,8 +11,8 @@ from collections.abc import Callable
 
 import pytest
 
-from kempf.pipeline.model.effects import from_expression, from_file
 from kempf.pipeline.model.terms.expression import compiled, names_in
+from kempf.pipeline.model.terms.own import from_expression, from_file
 from kempf.schemas.errors import UsageError
 
 VARIABLES = {"v": 0, "r": 1, "V": 2}

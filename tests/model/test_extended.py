@@ -15,8 +15,8 @@ from kempf.pipeline.estimate.record.grid_run import Run, Ship
 from kempf.pipeline.model.discretise import LONGEST
 from kempf.pipeline.model.dynamics import N_INPUT
 from kempf.pipeline.model.effect_model import Augmented
-from kempf.pipeline.model.effects import from_expression
-from kempf.pipeline.model.terms.effect import Effect, ExtraState, Parameter
+from kempf.pipeline.model.terms.own import from_expression
+from kempf.schemas.effect import Effect, ExtraState, Parameter
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
 
@@ -143,9 +143,9 @@ def test_an_effect_with_a_state_of_its_own_remembers():
         plain="m",
         equation="m",
         reference="m",
-        parameters=(Parameter("c", "1/s", -1.0, 1.0, (0.01,), "m"),),
+        parameters=(Parameter(name="c", unit="1/s", low=-1.0, high=1.0, steps=(0.01,), meaning="m"),),
         terms={"sway": "-c*m1"},
-        states=(ExtraState("m1", "(v - m1)/20"),),
+        states=(ExtraState(name="m1", derivative="(v - m1)/20"),),
     )
     start = np.array([0.2, 0.003, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
     found = Filtered(run, Augmented((memory,)), SPEC).free(HULL, np.array([0.02]), start)

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
-from kempf.pipeline.model.effects import catalogue, digest, from_expression, from_file
-from kempf.pipeline.model.terms.effect import ExtraState, Parameter
 from kempf.pipeline.model.terms.ordinary import require_ordinary
+from kempf.pipeline.model.terms.own import from_expression, from_file
+from kempf.schemas.effect import ExtraState, Parameter
+from kempf.schemas.effects import catalogue, require_free
 from kempf.schemas.errors import UsageError
 
 ALL = catalogue()
 
 
 def test_effects_that_cannot_be_computed_are_refused() -> None:
-    good = ALL["yaw_quadratic"]
+    good, noisy = ALL["yaw_quadratic"], ExtraState(name="m1", derivative="v", noise="c*r")
     for change, code in (
         ({"terms": {"yaw": "c*v/r"}}, "effect_not_finite"),
         ({"terms": {"yaw": "c*sqrt(abs(v))"}}, "effect_not_finite"),
@@ -23,15 +22,15 @@ def test_effects_that_cannot_be_computed_are_refused() -> None:
         ({"terms": {"yaw": "c*m1"}}, "symbol_out_of_place"),
         ({"terms": {"yaw": "c*rdot"}}, "symbol_out_of_place"),
         ({"terms": {"speed": "c*delta"}}, "symbol_out_of_place"),
-        ({"terms": {"yaw": "c*m1"}, "states": (ExtraState("m1", "v", "c*r"),)}, "symbol_out_of_place"),
-        ({"terms": {"yaw": "m1"}, "states": (ExtraState("m1", "v - m1"),)}, "effect_not_absent"),
-        ({"parameters": (Parameter("k", "1", -1.0, 1.0, (0.1,), "m"),)}, "expression_invalid"),
+        ({"terms": {"yaw": "c*m1"}, "states": (noisy,)}, "symbol_out_of_place"),
+        ({"terms": {"yaw": "m1"}, "states": (ExtraState(name="m1", derivative="v - m1"),)}, "effect_not_absent"),
+        ({"parameters": (Parameter(name="k", low=-1.0, high=1.0, steps=(0.1,)),)}, "expression_invalid"),
     ):
         with pytest.raises(UsageError) as caught:
-            require_ordinary(replace(good, **change))
+            require_ordinary(good.model_copy(update=change))
         assert caught.value.code == code
     with pytest.raises(UsageError, match="at v = 0, r = 0"):
-        require_ordinary(replace(good, terms={"yaw": "c*v/r"}))
+        require_ordinary(good.model_copy(update={"terms": {"yaw": "c*v/r"}}))
 
 
 def test_own_expressions() -> None:
@@ -128,10 +127,28 @@ parameters:
 def test_an_effect_file() -> None:
     effect = from_file(FILE, "mine.yaml")
     assert (effect.name, effect.group, effect.title) == ("mine", "own", "mine")
-    assert effect.parameters == (Parameter("c", "1", -1.0, 5.0, (0.5,), ""),)
-    assert digest(effect) == digest(from_file(FILE, "elsewhere.yaml"))
+    assert effect.parameters == (Parameter(name="c", unit="1", low=-1.0, high=5.0, steps=(0.5,)),)
+    assert effect.sha256 == from_file(FILE, "elsewhere.yaml").sha256
     with_state = FILE.replace('"-c*r*abs(r)"}', '"c*(r - m1)"}\nstates: {m1: {derivative: "(r - m1)*V/L"}}')
-    assert from_file(with_state, "x").states == (ExtraState("m1", "(r - m1)*V/L"),)
+    assert from_file(with_state, "x").states == (ExtraState(name="m1", derivative="(r - m1)*V/L"),)
+
+
+def test_an_effect_file_says_all_that_the_catalogues_say() -> None:
+    text = FILE.replace("terms:", "rudder_course: rudder_lag\nmeasured_by: [roll]\ngroup: hull\ntitle: drag\nterms:")
+    effect = from_file(text, "mine.yaml")
+    assert (effect.rudder_course, effect.measured_by) == ("rudder_lag", ("roll",))
+    assert (effect.group, effect.title) == ("hull", "drag")
+    alone = from_file(FILE.replace('terms: {yaw: "-c*r*abs(r)"}', "rudder_course: dead_time"), "mine.yaml")
+    assert alone.terms == {} and alone.rudder_course == "dead_time"
+    with pytest.raises(UsageError, match="it has no term"):
+        from_file(FILE.replace('terms: {yaw: "-c*r*abs(r)"}', ""), "mine.yaml")
+
+
+def test_a_user_s_own_effect_bears_no_name_of_the_catalogue() -> None:
+    require_free("my_yaw_cubic")
+    with pytest.raises(UsageError, match="'yaw_cubic' is an effect of the catalogue") as caught:
+        require_free("yaw_cubic")
+    assert caught.value.code == "effect_name" and "my_yaw_cubic" in caught.value.next_step
 
 
 @pytest.mark.parametrize(
@@ -139,7 +156,7 @@ def test_an_effect_file() -> None:
     [
         (("name: mine", "name: My effect"), "cannot be called"),
         (("plain: My own drag.", ""), "plain: Field required"),
-        (("terms:", "term:"), "terms: Field required"),
+        (("terms:", "term:"), "term: Extra inputs are not permitted"),
         (("r*abs(r)", "rr"), "terms.yaw"),
         (("-c*r*abs(r)", "-c*v/r"), "no finite value"),
         (("-c*r*abs(r)", "r*abs(r)"), "parameters.c: no formula speaks of it"),
@@ -159,6 +176,11 @@ def test_an_effect_file() -> None:
         (("terms:", "more: !!python/object/apply:os.system [ls]\nterms:"), "not valid YAML"),
         (("plain: My own drag.", "plain: &a My own drag.\ntitle: *a"), "alias"),
         (("terms: {", "terms: {{"), "not valid YAML"),
+        (("name: mine", "name: mine\nname: yours"), "'name' is written twice, in lines 2 and 3"),
+        (("low: -1", "low: -1, low: -2"), "'low' is written twice, in lines 7 and 7"),
+        (("terms:", "rudder_course: swing\nterms:"), "rudder_course: Input should be 'backlash', 'dead_time'"),
+        (("terms:", "measured_by: [barometer]\nterms:"), "barometer"),
+        (("terms:", "group: colour\nterms:"), "group: Input should be 'hull'"),
     ],
 )
 def test_a_wrong_effect_file_is_one_clear_error_with_file_and_key(change: tuple[str, str], told: str) -> None:

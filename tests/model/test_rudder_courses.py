@@ -2,14 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 import pytest
 
-from kempf.pipeline.model.effects import catalogue
-from kempf.pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.effects import RUDDER_COURSES
+from kempf.schemas.effect import Effect
+from kempf.schemas.effects import catalogue
 
-ALL = catalogue()
-courses = pytest.mark.parametrize("effect", [e for e in ALL.values() if e.rudder_course], ids=lambda e: e.name)
+Course = Callable[[np.ndarray, np.ndarray, np.ndarray], np.ndarray]
+courses = pytest.mark.parametrize(
+    ("effect", "course"),
+    [(e, RUDDER_COURSES[e.rudder_course]) for e in catalogue().values() if e.rudder_course],
+    ids=lambda one: getattr(one, "name", ""),
+)
 
 
 def zigzag(step: float = 0.1) -> tuple[np.ndarray, np.ndarray]:
@@ -24,36 +31,33 @@ def one(effect: Effect, k: int) -> np.ndarray:
 
 
 @courses
-def test_without_its_parameter_the_course_is_unchanged(effect: Effect) -> None:
+def test_without_its_parameter_the_course_is_unchanged(effect: Effect, course: Course) -> None:
     time, rudder = zigzag()
-    assert effect.rudder_course is not None
-    assert np.array_equal(effect.rudder_course(time, rudder, np.zeros(1)), rudder)
-    assert np.allclose(effect.rudder_course(time, rudder, np.full(1, 1e-9)), rudder, atol=1e-8)
+    assert np.array_equal(course(time, rudder, np.zeros(1)), rudder)
+    assert np.allclose(course(time, rudder, np.full(1, 1e-9)), rudder, atol=1e-8)
 
 
 @courses
-def test_a_course_is_deterministic_causal_and_leaves_its_input_alone(effect: Effect) -> None:
+def test_a_course_is_deterministic_causal_and_leaves_its_input_alone(effect: Effect, course: Course) -> None:
     time, rudder = zigzag()
     kept = rudder.copy()
-    assert effect.rudder_course is not None
     for k in range(3):
-        first = effect.rudder_course(time, rudder, one(effect, k))
+        first = course(time, rudder, one(effect, k))
         assert first.shape == rudder.shape and np.all(np.isfinite(first))
-        assert np.array_equal(first, effect.rudder_course(time, rudder, one(effect, k)))
+        assert np.array_equal(first, course(time, rudder, one(effect, k)))
         later = rudder.copy()
         later[400:] = 0.1
-        assert np.array_equal(effect.rudder_course(time, later, one(effect, k))[:400], first[:400])
+        assert np.array_equal(course(time, later, one(effect, k))[:400], first[:400])
         assert np.max(np.abs(first)) <= np.max(np.abs(rudder)) + 1e-12
-        assert np.allclose(effect.rudder_course(time, -rudder, one(effect, k)), -first, atol=1e-15)
+        assert np.allclose(course(time, -rudder, one(effect, k)), -first, atol=1e-15)
     assert np.array_equal(rudder, kept)
     still = np.full(time.size, 0.2)
-    assert np.allclose(effect.rudder_course(time, still, one(effect, 0)), still, atol=1e-15)
-    assert effect.rudder_course(time[:1], rudder[:1], one(effect, 0)).shape == (1,)
+    assert np.allclose(course(time, still, one(effect, 0)), still, atol=1e-15)
+    assert course(time[:1], rudder[:1], one(effect, 0)).shape == (1,)
 
 
 def test_lag_is_the_exact_response_to_a_ramp() -> None:
-    course = ALL["rudder_lag"].rudder_course
-    assert course is not None
+    course = RUDDER_COURSES["rudder_lag"]
     time = np.arange(0.0, 20.0, 0.25)
     for tau in (0.05, 0.7, 4.0):
         exact = 0.03 * (time - tau * (1.0 - np.exp(-time / tau)))
@@ -61,16 +65,14 @@ def test_lag_is_the_exact_response_to_a_ramp() -> None:
 
 
 def test_lag_does_not_depend_on_the_step() -> None:
-    course = ALL["rudder_lag"].rudder_course
-    assert course is not None
+    course = RUDDER_COURSES["rudder_lag"]
     fine, coarse = zigzag(0.025), zigzag(0.1)
     told = np.array([1.5])
     assert np.allclose(course(*fine, told)[::4], course(coarse[0], fine[1][::4], told), atol=1e-12)
 
 
 def test_dead_time_shifts() -> None:
-    course = ALL["dead_time"].rudder_course
-    assert course is not None
+    course = RUDDER_COURSES["dead_time"]
     time, rudder = zigzag()
     late = course(time, rudder, np.array([1.2]))
     assert np.allclose(late[12:], rudder[:-12], atol=1e-12)
@@ -78,8 +80,7 @@ def test_dead_time_shifts() -> None:
 
 
 def test_backlash_is_a_play() -> None:
-    course = ALL["backlash"].rudder_course
-    assert course is not None
+    course = RUDDER_COURSES["backlash"]
     time, rudder = zigzag()
     taken = course(time, rudder, np.array([0.05]))
     assert np.max(np.abs(taken - rudder)) == pytest.approx(0.025)
@@ -89,8 +90,7 @@ def test_backlash_is_a_play() -> None:
 
 
 def test_rate_limit_is_exact_between_the_instants() -> None:
-    course = ALL["rate_limit"].rudder_course
-    assert course is not None
+    course = RUDDER_COURSES["rate_limit"]
     rng = np.random.default_rng(7)
     knots = np.cumsum(rng.normal(0.0, 0.05, 40))
     coarse = np.arange(0.0, 40.0)

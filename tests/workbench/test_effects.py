@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from kempf.pipeline.model.effects import catalogue
-from kempf.pipeline.model.terms.symbols import SYMBOLS, TARGETS
+from kempf.schemas.effects import catalogue
+from kempf.schemas.symbols import SYMBOLS, TARGETS
 from tests.workbench.driving import kempf, refused
 
 DOCUMENT = Path(__file__).parents[2] / "docs" / "effects.md"

@@ -11,7 +11,7 @@ from kempf.workbench.cli.options import json_option
 from kempf.workbench.terminal import print_json, print_table
 
 if TYPE_CHECKING:
-    from kempf.pipeline.model.terms.effect import Effect
+    from kempf.schemas.effect import Effect
 
 
 @click.group("effects")
@@ -30,13 +30,12 @@ command.add_command(effects_of_vessel.undo)
 @json_option
 def list_effects(group: str | None, markdown: bool, as_json: bool) -> None:
     """List the catalogue: what each effect is and which channels it needs."""
-    from kempf.pipeline.model.effects import as_json as told
-    from kempf.pipeline.model.effects import catalogue
+    from kempf.schemas.effects import catalogue
     from kempf.workbench.effects_table import effects_table
 
     found = [effect for effect in catalogue().values() if group in (None, effect.group)]
     if as_json:
-        print_json([told(effect) for effect in found])
+        print_json([effect.as_json() for effect in found])
     elif markdown:
         click.echo(effects_table(found), nl=False)
     else:
@@ -50,14 +49,13 @@ def list_effects(group: str | None, markdown: bool, as_json: bool) -> None:
 @json_option
 def show(name: str | None, symbols: bool, as_json: bool) -> None:
     """Show an effect whole, or what may stand in a formula."""
-    from kempf.pipeline.model.effects import as_json as told
-    from kempf.pipeline.model.effects import get
+    from kempf.schemas.effects import get
 
     if name is None and not symbols:
         raise click.UsageError("Name an effect, or give --symbols.")
     effect = None if name is None else get(name)
     if as_json:
-        shown = {} if effect is None else told(effect)
+        shown = {} if effect is None else effect.as_json()
         print_json({**shown, **(_symbols() if symbols else {})})
         return
     if effect is not None:
@@ -71,8 +69,8 @@ def _tell(effect: Effect) -> None:
     click.echo(f"  {effect.plain}")
     click.echo(f"  equation: {effect.equation}")
     click.echo(f"  needs: {', '.join(effect.needs) or 'no channel beyond those of every trial'}")
-    if effect.told_by:
-        click.echo(f"  not looked for where the logs have: {', '.join(effect.told_by)}")
+    if effect.measured_by:
+        click.echo(f"  not looked for where the logs have: {', '.join(effect.measured_by)}")
     click.echo(f"  looks like: {effect.confounded_with}")
     click.echo(f"  told apart by: {effect.separated_by}")
     click.echo(f"  reference: {effect.reference}")
@@ -85,7 +83,8 @@ def _tell(effect: Effect) -> None:
 
 def _symbols() -> dict[str, Any]:
     from kempf.pipeline.model.terms.expression import FUNCTIONS
-    from kempf.pipeline.model.terms.symbols import (
+    from kempf.schemas.channels import CHANNELS
+    from kempf.schemas.symbols import (
         CHANNEL_SYMBOLS,
         COMPUTED_SYMBOLS,
         RUN_SYMBOLS,
@@ -93,7 +92,6 @@ def _symbols() -> dict[str, Any]:
         STATE_SYMBOLS,
         TARGETS,
     )
-    from kempf.schemas.channels import CHANNELS
 
     channels = {s: f"{CHANNELS[c].words}, {CHANNELS[c].unit}; channel {c}" for s, c in CHANNEL_SYMBOLS.items()}
     return {

@@ -45,10 +45,11 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     mine.effects()  # a slip of the pen is told before anything is read
     warehouse = Warehouse(uri)
     spec, own = standing_model(warehouse, vessel)
+    own = own.beside(mine)
     with progress() as tell:
         chosen = choose(warehouse, vessel, tell)
         settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
-        found = examine(warehouse, chosen, spec, own.beside(mine), settings, tell, only=(name,))
+        found = examine(warehouse, chosen, spec, own, settings, tell, only=(name,))
     told = told_as_json(found.diagnosis)
     told = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **told})
     if as_json:
@@ -107,10 +108,11 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
         raise UsageError(
             "effect_there", f"The model of {vessel!r} holds {name!r} already.", f"See `kempf ladder --vessel {vessel}`."
         )
+    own = own.beside(mine)
     wanted = spec.model_copy(update={"effects": (*spec.effects, name)})
     with progress() as tell:
-        chosen, beside = choose(warehouse, vessel, tell), own.beside(mine)
-        made = stored_model(warehouse, chosen, wanted, beside) or _fitted(warehouse, chosen, wanted, beside, tell)
+        chosen = choose(warehouse, vessel, tell)
+        made = stored_model(warehouse, chosen, wanted, own) or _fitted(warehouse, chosen, wanted, own, tell)
     point(warehouse, made)
     rungs = rungs_to(warehouse, made)
     if as_json:
@@ -131,7 +133,7 @@ def _fitted(warehouse: Warehouse, chosen: Chosen, wanted: ModelSpec, own: Own, t
 
 
 def _require_known(name: str) -> None:
-    from kempf.pipeline.model.effects import get
+    from kempf.schemas.effects import get
 
     get(name)
 

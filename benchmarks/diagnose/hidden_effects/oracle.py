@@ -22,8 +22,8 @@ from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import vessel_runs
 from kempf.pipeline.diagnose.forward_selection import staged
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.model.effects import catalogue
 from kempf.pipeline.predict.free_run import free_run
+from kempf.schemas.effects import catalogue
 from kempf.schemas.errors import KempfError
 from kempf.warehouse.store import Warehouse
 

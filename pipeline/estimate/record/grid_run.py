@@ -12,8 +12,8 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.model.dynamics import N_INPUT
-from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TELLING
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS
 
 #: the grid's step in times that the ship needs for her length, and its bounds, s
 _STEP_LENGTHS, _FINEST_S, _COARSEST_S = 0.06, 0.05, 1.0
@@ -164,7 +164,7 @@ def make_run(
         if column is not None:
             inputs[:, 2 + k] = column
             have.add(channel)
-    for channel in TELLING:
+    for channel in LOGGED_CHANNELS:
         if channel not in have and _channel(instruments.get(channel), record.start_utc_ns, fine) is not None:
             have.add(channel)
     heading: Float = 0.0 * fine

@@ -1,77 +1,23 @@
-"""The catalogue: one file an effect, each with an ``EFFECT`` of the file's name. Adding one is adding a file here."""
+"""What effects do to the rudder's course before it reaches the hull: the part of the catalogue that no formula can say.
+
+Each maps (time in s, rudder in rad, the effect's parameters) to the rudder in rad that the hull feels; the times are
+evenly spaced, and the first parameter is the size, with 0 for an unchanged course.
+"""
 
 from __future__ import annotations
 
-import pkgutil
-from difflib import get_close_matches
-from importlib import import_module
+from collections.abc import Callable, Mapping
 
-from kempf.pipeline.model.terms.content import as_json, digest
-from kempf.pipeline.model.terms.effect import Effect
-from kempf.pipeline.model.terms.own import from_expression
-from kempf.pipeline.model.terms.own_file import from_file
-from kempf.schemas.errors import KempfError, NotFound
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.effects import backlash, dead_time, rate_limit, rudder_lag
+from kempf.schemas.effect import RudderCourse
 
-__all__ = ["as_json", "catalogue", "digest", "from_expression", "from_file", "get"]
+__all__ = ["RUDDER_COURSES"]
 
-
-def catalogue() -> dict[str, Effect]:
-    """Return every effect of this folder by name, in alphabetical order.
-
-    Returns
-    -------
-    dict of str to Effect
-
-    Raises
-    ------
-    KempfError
-        ``catalogue_invalid``: a file cannot be imported, has no ``EFFECT``, or one whose name is not the file's.
-    """
-    found: dict[str, Effect] = {}
-    for name in sorted(module.name for module in pkgutil.iter_modules(__path__)):
-        try:
-            effect = getattr(import_module(f"kempf.pipeline.model.effects.{name}"), "EFFECT", None)
-        except Exception as error:  # whatever a file does when it is imported, its name must be told
-            raise _wrong(name, f"importing it raised {type(error).__name__}: {error}") from error
-        if not isinstance(effect, Effect):
-            raise _wrong(name, "it defines no EFFECT = Effect(...)")
-        if effect.name in found:
-            raise _wrong(name, f"its effect is called {effect.name!r}, as another file's is")
-        if effect.name != name:
-            raise _wrong(name, f"its effect is called {effect.name!r}; a file bears the name of its effect")
-        found[name] = effect
-    return found
-
-
-def get(name: str) -> Effect:
-    """Return an effect of the catalogue.
-
-    Parameters
-    ----------
-    name : str
-
-    Raises
-    ------
-    NotFound
-        ``effect_unknown``.
-    """
-    known = catalogue()
-    if name not in known:
-        close = get_close_matches(name[:60], known, n=1)
-        hint = f"; did you mean {close[0]!r}?" if close else "."
-        raise NotFound(
-            "effect_unknown",
-            f"The catalogue has no effect {name[:60]!r}{hint}",
-            "`kempf effects list` names them all.",
-            {"effect": name[:60]},
-        )
-    return known[name]
-
-
-def _wrong(name: str, why: str) -> KempfError:
-    return KempfError(
-        "catalogue_invalid",
-        f"The effect file pipeline/model/effects/{name}.py cannot be used: {why}.",
-        "Mend the file, or take it out of the folder; docs/effects.md shows one that works.",
-        {"file": f"{name}.py"},
-    )
+#: by the name that an effect gives as its ``rudder_course``
+RUDDER_COURSES: Mapping[RudderCourse, Callable[[Float, Float, Float], Float]] = {
+    "backlash": backlash.rudder_course,
+    "dead_time": dead_time.rudder_course,
+    "rate_limit": rate_limit.rudder_course,
+    "rudder_lag": rudder_lag.rudder_course,
+}

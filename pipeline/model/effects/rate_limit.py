@@ -11,7 +11,6 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import njit
-from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 
 def rudder_course(time_s: Float, rudder_rad: Float, values: Float) -> Float:
@@ -53,23 +52,3 @@ def _chased(rudder, most):  # type: ignore[no-untyped-def]
             place, left = place + side * most * met, 1.0 - met
         out[k] = rudder[k] if abs(rate) <= most else place + np.sign(rate) * most * left
     return out
-
-
-EFFECT = Effect(
-    name="rate_limit",
-    title="rate limit of the steering gear",
-    group="rudder",
-    plain="The rudder turns no faster than its steering engine can, however fast its reading or order moves.",
-    equation="|d(delta)/dt| <= 1 / c",
-    reference=(
-        "van Amerongen 1982, Adaptive steering of ships, thesis, TU Delft; IMO SOLAS II-1 reg. 29 (35 deg to 30 "
-        "deg on the other side within 28 s)"
-    ),
-    parameters=(Parameter("c", "s/rad", 0.0, 120.0, (12.0, 25.0, 45.0), "time that the rudder takes for one radian"),),
-    rudder_course=rudder_course,
-    confounded_with="rudder_lag, dead_time, rudder_stall",
-    separated_by=(
-        "A rudder feedback logged at 1 Hz or faster: a limited rudder moves along a straight line, and longer for "
-        "a 20/20 than for a 10/10."
-    ),
-)

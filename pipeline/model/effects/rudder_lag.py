@@ -10,7 +10,6 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import njit
-from kempf.pipeline.model.terms.effect import Effect, Parameter
 
 
 def rudder_course(time_s: Float, rudder_rad: Float, values: Float) -> Float:
@@ -44,23 +43,3 @@ def _followed(rudder, ratio):  # type: ignore[no-untyped-def]
         behind = (rudder[k] - rudder[k - 1]) / ratio
         out[k] = rudder[k] - behind + (out[k - 1] - rudder[k - 1] + behind) * left
     return out
-
-
-EFFECT = Effect(
-    name="rudder_lag",
-    title="first-order rudder lag",
-    group="rudder",
-    plain="The rudder follows its reading late and gradually, as a steering engine or a filtered sensor does.",
-    equation="tau d(delta)/dt + delta = delta logged",
-    reference=(
-        "van Amerongen 1982, Adaptive steering of ships, thesis, TU Delft; Fossen 2021, Handbook of marine craft "
-        "hydrodynamics and motion control, 2nd ed."
-    ),
-    parameters=(Parameter("tau", "s", 0.0, 30.0, (0.3,), "time constant of the lag"),),
-    rudder_course=rudder_course,
-    confounded_with="dead_time, rate_limit, heading_latency, gyro_latency",
-    separated_by=(
-        "A rudder feedback logged at 1 Hz or faster beside the rudder order: its course after an execute shows "
-        "whether it creeps, waits or runs at a fixed rate."
-    ),
-)

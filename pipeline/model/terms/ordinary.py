@@ -13,12 +13,13 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.batch import ONE
 from kempf.pipeline.model.ship import mariner_like
-from kempf.pipeline.model.terms.effect import Effect
+from kempf.pipeline.model.terms.evaluation import evaluate
 from kempf.pipeline.model.terms.expression import compiled
 from kempf.pipeline.model.terms.places import Place, places, require_in_place
-from kempf.pipeline.model.terms.program import DEPTH, Program, evaluate
-from kempf.pipeline.model.terms.symbols import STATE_SYMBOLS, SYMBOLS
+from kempf.pipeline.model.terms.program import DEPTH, Program
+from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
+from kempf.schemas.symbols import OWN_STATES, STATE_SYMBOLS, SYMBOLS
 
 _SHIP = {
     **dict(zip(("a11", "a12", "a21", "a22", "b1", "b2"), mariner_like(100.0).array().tolist(), strict=True)),
@@ -76,7 +77,7 @@ def answer(text: str, parameters: Mapping[str, float], own_states: tuple[str, ..
     UsageError
         ``expression_invalid``.
     """
-    known = {name: i for name, i in _INDEX.items() if name not in ("m1", "m2", "m3", "m4") or name in own_states}
+    known = {name: i for name, i in _INDEX.items() if name not in OWN_STATES or name in own_states}
     places_of = known | {name: len(SYMBOLS) + i for i, name in enumerate(parameters)}
     program = compiled(text, places_of)
     values = np.zeros(len(SYMBOLS) + len(parameters))
@@ -94,7 +95,7 @@ def run(program: Program, values: Float) -> Float:
     ----------
     program : Program
     values : ndarray, shape (n,)
-        Of every variable, in the order of `kempf.pipeline.model.terms.symbols.SYMBOLS`, then parameters.
+        Of every variable, in the order of `kempf.schemas.symbols.SYMBOLS`, then parameters.
     """
     width = len(STATE_SYMBOLS)
     slopes = np.zeros((values.size, width, 1))

@@ -1,4 +1,7 @@
-"""An effect of a person's own, written as a formula: ``yaw: r*abs(r)``."""
+"""An effect of a user's own, as a formula, ``yaw: r*abs(r)``, or as a file.
+
+Both are checked here for what the tests ask of the catalogue's files.
+"""
 
 from __future__ import annotations
 
@@ -6,13 +9,14 @@ import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 
-from kempf.pipeline.model.terms.effect import Effect, Parameter
-from kempf.pipeline.model.terms.expression import compiled, names_in
+from kempf.pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
 from kempf.pipeline.model.terms.ordinary import require_ordinary
 from kempf.pipeline.model.terms.own_parameters import parameters_of
-from kempf.pipeline.model.terms.places import KINDS, Place, allowed, require_in_place
-from kempf.pipeline.model.terms.symbols import CHANNEL_SYMBOLS, TARGETS
+from kempf.pipeline.model.terms.places import KINDS, Place, allowed, places, require_in_place
+from kempf.schemas.effect import Effect
+from kempf.schemas.effect_file import invalid, read
 from kempf.schemas.errors import UsageError
+from kempf.schemas.symbols import OWN_STATES, SYMBOLS, TARGETS
 
 #: names that stand for an unknown number: few, so that a slip of the pen does not become one
 _UNKNOWN = re.compile(r"(?:c|k|tau)[1-9]?")
@@ -63,24 +67,41 @@ def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
             f"The formula has {len(unknown)} unknown numbers, {_MOST_UNKNOWN} is the most.",
             "Try it in parts: a trial tells few numbers apart.",
         )
-    needs = tuple(channel for symbol, channel in CHANNEL_SYMBOLS.items() if symbol in found)
-    written = "; ".join(f"{target}: {text}" for target, text in terms.items())
-
-    def made(parameters: tuple[Parameter, ...]) -> Effect:
-        return Effect(
-            name=name,
-            title=f"your own effect {name}",
-            group="own",
-            plain=f"A term of your own on {_joined([TARGETS[target][1] for target in terms])}.",
-            equation=written,
-            reference="written by the user",
-            parameters=parameters,
-            terms=terms,
-            needs=needs,
-        )
-
-    effect = made(parameters_of(terms, unknown))
+    effect = Effect(
+        name=name,
+        title=f"your own effect {name}",
+        plain=f"A term of your own on {_joined([TARGETS[target][1] for target in terms])}.",
+        reference="written by the user",
+        parameters=parameters_of(terms, unknown),
+        terms=terms,
+    )
     require_ordinary(effect)
+    return effect
+
+
+def from_file(text: str, where: str) -> Effect:
+    """Make an effect from a file, and check it as the tests check those of the catalogue.
+
+    Parameters
+    ----------
+    text : str
+        Its content, YAML of the form of `kempf.schemas.effect.Effect`.
+    where : str
+        Its name, for the messages.
+
+    Raises
+    ------
+    UsageError
+        ``effect_file_invalid``: one message that names the file and the key, whatever is wrong with it.
+    """
+    effect = read(text, where)
+    try:
+        require_name(effect.name)
+        _check_formulas(effect)
+        require_ordinary(effect)
+    except UsageError as error:
+        details = {"code": error.code, **error.details}
+        raise invalid(where, error.message.rstrip("."), details, error.next_step) from error
     return effect
 
 
@@ -101,6 +122,36 @@ def require_name(name: str) -> None:
             "effect_name",
             f"An effect cannot be called {str(name)[:60]!r}.",
             "Take small letters, digits and underscores, a letter first, 40 at most: my_drag.",
+        )
+
+
+def _check_formulas(effect: Effect) -> None:
+    """Compile every formula, so that a message names its key, and see that every parameter is used."""
+    own = [state.name for state in effect.states]
+    known = [name for name in SYMBOLS if name not in OWN_STATES or name in own]
+    for parameter in effect.parameters:
+        if parameter.name in SYMBOLS or parameter.name in FUNCTIONS:
+            raise UsageError(
+                "effect_parameter",
+                f"parameters.{parameter.name}: {parameter.name!r} already stands for something else in a formula.",
+                "Call the parameter c, k or tau, say.",
+            )
+    variables = {name: i for i, name in enumerate([*known, *(p.name for p in effect.parameters)])}
+    # the first parameter is the size of a rudder course
+    used = {effect.parameters[0].name} if effect.rudder_course else set()
+    for place in places(effect):
+        key = f"states.{place.name}" if "." in place.name else f"terms.{place.name}"
+        try:
+            compiled(place.text, variables)
+        except UsageError as error:
+            raise UsageError(error.code, f"{key}: {error.message}", error.next_step, error.details) from error
+        used |= set(names_in(place.text))
+    idle = [p.name for p in effect.parameters if p.name not in used]
+    if idle:
+        raise UsageError(
+            "effect_parameter",
+            f"parameters.{idle[0]}: no formula speaks of it.",
+            "Use it in a formula, or leave it out.",
         )
 
 
@@ -138,8 +189,8 @@ def _require_known(target: str, text: str) -> None:
     """Compile a formula as it was written, before it is joined to others: the message points into it."""
     place = Place(target, KINDS[target], text)
     require_in_place(place)
-    names = dict.fromkeys([*allowed(place.kind), *(n for n in names_in(text) if _UNKNOWN.fullmatch(n))])
-    compiled(text, {name: i for i, name in enumerate(names)})
+    variables = dict.fromkeys([*allowed(place.kind), *(n for n in names_in(text) if _UNKNOWN.fullmatch(n))])
+    compiled(text, {name: i for i, name in enumerate(variables)})
 
 
 def _text(text: str) -> str:

@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.model.terms.effect import Parameter
 from kempf.pipeline.model.terms.ordinary import answer
+from kempf.schemas.effect import Parameter
 from kempf.schemas.errors import UsageError
 
 #: what counts as much on each target, in its unit: a number is tried where it does a tenth of that
@@ -20,6 +20,8 @@ _MUCH = {
 _REACH = 1000.0
 #: where a number that shapes is looked for
 _TRIED = 10.0 ** np.arange(-4.0, 4.5, 0.5)
+#: what is less, or its inverse more, than any number of a ship
+_SMALLEST = 1e-100
 _MEANING = "a number of your own formula, in SI units"
 
 
@@ -48,7 +50,8 @@ def parameters_of(terms: Mapping[str, str], names: Sequence[str]) -> tuple[Param
     found = [_maker(terms, name, {**dict.fromkeys(names, 0.0), **best}) for name in makers]
     for name in (n for n in names if n in shapes):
         steps = tuple(_rounded(best[name] * factor) for factor in (0.3, 1.0, 3.0))
-        found.append(Parameter(name, "", steps[1] / _REACH, steps[1] * _REACH, steps, f"{_MEANING}, positive"))
+        low, high = steps[1] / _REACH, steps[1] * _REACH
+        found.append(Parameter(name=name, low=low, high=high, steps=steps, meaning=f"{_MEANING}, positive"))
     return tuple(found)
 
 
@@ -70,8 +73,8 @@ def _moves(terms: Mapping[str, str], name: str, values: Mapping[str, float]) -> 
 def _maker(terms: Mapping[str, str], name: str, values: Mapping[str, float]) -> Parameter:
     change = _given(terms, {**values, name: 1.0}) - _given(terms, {**values, name: 0.0})
     size = float(np.sqrt(np.mean(change**2))) if np.all(np.isfinite(change)) else 0.0
-    step = _rounded(0.1 / size) if size > 0.0 else 1.0
-    return Parameter(name, "", -_REACH * step, _REACH * step, (step,), _MEANING)
+    step = _rounded(0.1 / size) if _SMALLEST < size < 1.0 / _SMALLEST else 1.0
+    return Parameter(name=name, low=-_REACH * step, high=_REACH * step, steps=(step,), meaning=_MEANING)
 
 
 def _telling(terms: Mapping[str, str], name: str, names: Sequence[str]) -> float:

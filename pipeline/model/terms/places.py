@@ -6,20 +6,20 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Literal
 
-from kempf.pipeline.model.terms.effect import Effect
 from kempf.pipeline.model.terms.expression import names_in
-from kempf.pipeline.model.terms.symbols import (
+from kempf.schemas.effect import Effect
+from kempf.schemas.errors import UsageError
+from kempf.schemas.symbols import (
     CHANNEL_SYMBOLS,
     COMPUTED_SYMBOLS,
+    OWN_STATES,
     RUN_SYMBOLS,
     SHIP_SYMBOLS,
     STATE_SYMBOLS,
 )
-from kempf.schemas.errors import UsageError
 
 Kind = Literal["speed", "rudder", "force", "measured", "noise"]
 
-_OWN_STATES = ("m1", "m2", "m3", "m4")
 #: what a term of each kind may not ask for beyond the states of other effects
 _LATER: Mapping[Kind, frozenset[str]] = {
     "speed": frozenset({"delta", "vdot", "rdot"}),
@@ -78,7 +78,7 @@ def allowed(kind: Kind, own_states: tuple[str, ...] = ()) -> tuple[str, ...]:
         States that its effect brings along.
     """
     every = (*STATE_SYMBOLS, *COMPUTED_SYMBOLS, *SHIP_SYMBOLS, *CHANNEL_SYMBOLS, *RUN_SYMBOLS)
-    strange = set(_OWN_STATES) - set(own_states)
+    strange = set(OWN_STATES) - set(own_states)
     return tuple(name for name in every if name not in _LATER[kind] and name not in strange)
 
 
@@ -100,7 +100,7 @@ def require_in_place(place: Place, own_states: tuple[str, ...] = ()) -> None:
     everywhere = {*STATE_SYMBOLS, *COMPUTED_SYMBOLS, *SHIP_SYMBOLS, *CHANNEL_SYMBOLS, *RUN_SYMBOLS}
     for name in names_in(place.text):
         if name in everywhere and name not in known:
-            why = "belongs to no state of this effect" if name in _OWN_STATES else "is not known yet where it stands"
+            why = "belongs to no state of this effect" if name in OWN_STATES else "is not known yet where it stands"
             raise UsageError(
                 "symbol_out_of_place",
                 f"The expression for {place.name} asks for {name!r}, which {why}.",

@@ -1,0 +1,111 @@
+"""Reading an effect file: YAML of the form of `kempf.schemas.effect.Effect`, the catalogue's and a user's own alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import yaml
+from pydantic import ValidationError
+
+from kempf.schemas.effect import Effect
+from kempf.schemas.errors import UsageError
+
+_LONGEST = 50_000
+_DEEPEST = 20
+#: libyaml's, ten times as fast, where PyYAML was built with it
+_Safe: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_NEXT = "Correct it; docs/effects.md shows an effect file that works."
+
+
+class _Loader(_Safe):  # type: ignore[misc]
+    """Refuses a key that is written twice, where YAML would take the last."""
+
+    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
+        """Return the mapping of a node."""
+        lines: dict[str, int] = {}
+        for key, _ in node.value:
+            line = key.start_mark.line + 1
+            if str(key.value) in lines:
+                raise ValueError(f"{key.value!r} is written twice, in lines {lines[key.value]} and {line}")
+            lines[str(key.value)] = line
+        made: dict[Any, Any] = super().construct_mapping(node, deep)
+        return made
+
+
+def read(text: str, where: str) -> Effect:
+    """Read an effect file; whether its formulas can be computed is not looked at here.
+
+    Parameters
+    ----------
+    text : str
+        Its content, YAML.
+    where : str
+        Its name, for the messages.
+
+    Returns
+    -------
+    Effect
+
+    Raises
+    ------
+    UsageError
+        ``effect_file_invalid``: one message that names the file and the key, whatever is wrong with it.
+    """
+    content = _content(text, where)
+    try:
+        return Effect.model_validate(content)
+    except ValidationError as error:
+        faults = [_fault(e, content) for e in error.errors()]
+        raise invalid(where, "; ".join(faults[:5]), {"faults": faults}) from error
+
+
+def invalid(where: str, why: str, details: Mapping[str, Any] | None = None, next_step: str = _NEXT) -> UsageError:
+    """Return the error of an effect file that cannot be used.
+
+    Parameters
+    ----------
+    where, why : str
+        Name of the file, and what is wrong with it.
+    details : mapping, optional
+    next_step : str, optional
+    """
+    return UsageError(
+        "effect_file_invalid",
+        f"{where} is not a valid effect file: {why}.",
+        next_step,
+        {"file": where, **(details or {})},
+    )
+
+
+def _content(text: str, where: str) -> dict[str, Any]:
+    if len(text) > _LONGEST:
+        raise invalid(where, f"it is {len(text)} characters long, {_LONGEST} is the most")
+    try:
+        _check_shape(text)
+        content = yaml.load(text, Loader=_Loader)  # noqa: S506 - made of a safe loader
+    except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError, TypeError) as error:
+        raise invalid(where, f"it is not valid YAML: {' '.join(str(error).split())[:300]}") from error
+    if not isinstance(content, dict):
+        raise invalid(where, f"expected keys such as 'name' and 'terms', found {type(content).__name__}")
+    return content
+
+
+def _check_shape(text: str) -> None:
+    """Refuse what takes more memory or stack than its length: aliases of aliases, brackets within brackets."""
+    depth = 0
+    for event in yaml.parse(text, Loader=_Safe):
+        if isinstance(event, yaml.AliasEvent):
+            raise ValueError("it holds an alias ('*name')")
+        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
+        if depth > _DEEPEST:
+            raise ValueError("it is nested too deep to be read")
+
+
+def _fault(error: Any, content: Mapping[str, Any]) -> str:
+    """Say what is wrong and where, parameters and states by name."""
+    place = list(error["loc"])
+    entries = content.get(place[0]) if len(place) > 1 else None
+    if isinstance(entries, dict) and isinstance(place[1], int):
+        place[1] = list(entries)[place[1]]
+    return f"{'.'.join(map(str, place))[:80] or 'file'}: {error['msg'].removeprefix('Value error, ')}"
