@@ -15,11 +15,11 @@ from kempf.pipeline.model.batch import ONE
 from kempf.pipeline.model.ship import mariner_like
 from kempf.pipeline.model.terms.evaluation import evaluate
 from kempf.pipeline.model.terms.expression import compiled
-from kempf.pipeline.model.terms.places import Place, places, require_in_place
+from kempf.pipeline.model.terms.places import Place, places, require_in_place, symbols_beside
 from kempf.pipeline.model.terms.program import DEPTH, Program
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
-from kempf.schemas.symbols import OWN_STATES, STATE_SYMBOLS, SYMBOLS
+from kempf.schemas.symbols import STATE_SYMBOLS, SYMBOLS
 
 _SHIP = {
     **dict(zip(("a11", "a12", "a21", "a22", "b1", "b2"), mariner_like(100.0).array().tolist(), strict=True)),
@@ -43,7 +43,7 @@ _STATES = (
     (-0.02, -0.002, 0.02, -0.02, 0.5, 0.5, -0.1, 0.0, 30.0, -0.01, 0.9, 900.0, 0.0),
 )
 _INDEX = {name: i for i, name in enumerate(SYMBOLS)}
-_TOLD = ("v", "r", "delta", "V", "psi")
+_SHOWN = ("v", "r", "delta", "V", "psi")
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,9 +77,8 @@ def answer(text: str, parameters: Mapping[str, float], own_states: tuple[str, ..
     UsageError
         ``expression_invalid``.
     """
-    known = {name: i for name, i in _INDEX.items() if name not in OWN_STATES or name in own_states}
-    places_of = known | {name: len(SYMBOLS) + i for i, name in enumerate(parameters)}
-    program = compiled(text, places_of)
+    index = {name: _INDEX[name] for name in symbols_beside(own_states)}
+    program = compiled(text, index | {name: len(SYMBOLS) + i for i, name in enumerate(parameters)})
     values = np.zeros(len(SYMBOLS) + len(parameters))
     values[len(SYMBOLS) :] = list(parameters.values())
     for name, number in {**_SHIP, **dict.fromkeys(own_states, level)}.items():
@@ -167,7 +166,7 @@ def _require_finite(effect: Effect, place: Place, found: Answer, parameters: Map
     what = "value" if not good_value[k] else "slope"
     state = dict(zip(_COLUMNS, _STATES[k], strict=True))
     at = ", ".join(
-        [f"{name} = {state[name]:g}" for name in _TOLD] + [f"{n} = {x:g}" for n, x in parameters.items() if x != 0.0]
+        [f"{name} = {state[name]:g}" for name in _SHOWN] + [f"{n} = {x:g}" for n, x in parameters.items() if x != 0.0]
     )
     raise UsageError(
         "effect_not_finite",

@@ -12,11 +12,11 @@ from difflib import get_close_matches
 from kempf.pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
 from kempf.pipeline.model.terms.ordinary import require_ordinary
 from kempf.pipeline.model.terms.own_parameters import parameters_of
-from kempf.pipeline.model.terms.places import KINDS, Place, allowed, places, require_in_place
+from kempf.pipeline.model.terms.places import KINDS, Place, allowed, places, require_in_place, symbols_beside
 from kempf.schemas.effect import Effect
 from kempf.schemas.effect_file import invalid, read
 from kempf.schemas.errors import UsageError
-from kempf.schemas.symbols import OWN_STATES, SYMBOLS, TARGETS
+from kempf.schemas.symbols import SYMBOLS, TARGETS
 
 #: names that stand for an unknown number: few, so that a slip of the pen does not become one
 _UNKNOWN = re.compile(r"(?:c|k|tau)[1-9]?")
@@ -128,7 +128,6 @@ def require_name(name: str) -> None:
 def _check_formulas(effect: Effect) -> None:
     """Compile every formula, so that a message names its key, and see that every parameter is used."""
     own = [state.name for state in effect.states]
-    known = [name for name in SYMBOLS if name not in OWN_STATES or name in own]
     for parameter in effect.parameters:
         if parameter.name in SYMBOLS or parameter.name in FUNCTIONS:
             raise UsageError(
@@ -136,7 +135,7 @@ def _check_formulas(effect: Effect) -> None:
                 f"parameters.{parameter.name}: {parameter.name!r} already stands for something else in a formula.",
                 "Call the parameter c, k or tau, say.",
             )
-    variables = {name: i for i, name in enumerate([*known, *(p.name for p in effect.parameters)])}
+    variables = {name: i for i, name in enumerate([*symbols_beside(own), *(p.name for p in effect.parameters)])}
     # the first parameter is the size of a rudder course
     used = {effect.parameters[0].name} if effect.rudder_course else set()
     for place in places(effect):

@@ -2,21 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
 from kempf.pipeline.model.terms.expression import names_in
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
-from kempf.schemas.symbols import (
-    CHANNEL_SYMBOLS,
-    COMPUTED_SYMBOLS,
-    OWN_STATES,
-    RUN_SYMBOLS,
-    SHIP_SYMBOLS,
-    STATE_SYMBOLS,
-)
+from kempf.schemas.symbols import CHANNEL_SYMBOLS, OWN_STATES, RUN_SYMBOLS, STATE_SYMBOLS, SYMBOLS
 
 Kind = Literal["speed", "rudder", "force", "measured", "noise"]
 
@@ -77,9 +70,18 @@ def allowed(kind: Kind, own_states: tuple[str, ...] = ()) -> tuple[str, ...]:
     own_states : tuple of str, optional
         States that its effect brings along.
     """
-    every = (*STATE_SYMBOLS, *COMPUTED_SYMBOLS, *SHIP_SYMBOLS, *CHANNEL_SYMBOLS, *RUN_SYMBOLS)
-    strange = set(OWN_STATES) - set(own_states)
-    return tuple(name for name in every if name not in _LATER[kind] and name not in strange)
+    return tuple(name for name in symbols_beside(own_states) if name not in _LATER[kind])
+
+
+def symbols_beside(own_states: Sequence[str]) -> list[str]:
+    """Return all symbols but the states that other effects bring along.
+
+    Parameters
+    ----------
+    own_states : sequence of str
+        States that the effect in question brings along.
+    """
+    return [name for name in SYMBOLS if name not in OWN_STATES or name in own_states]
 
 
 def require_in_place(place: Place, own_states: tuple[str, ...] = ()) -> None:
@@ -97,9 +99,8 @@ def require_in_place(place: Place, own_states: tuple[str, ...] = ()) -> None:
         ``symbol_out_of_place``.
     """
     known = allowed(place.kind, own_states)
-    everywhere = {*STATE_SYMBOLS, *COMPUTED_SYMBOLS, *SHIP_SYMBOLS, *CHANNEL_SYMBOLS, *RUN_SYMBOLS}
     for name in names_in(place.text):
-        if name in everywhere and name not in known:
+        if name in SYMBOLS and name not in known:
             why = "belongs to no state of this effect" if name in OWN_STATES else "is not known yet where it stands"
             raise UsageError(
                 "symbol_out_of_place",
