@@ -26,7 +26,7 @@ bench: $(RIVALS)
 	for name in identify.hsva identify.hsva_held_out identify.usv identify.trials fleet.rerun_demo ingest.speed \
 		identify.monte_carlo identify.current_frame documents.draw_paper identify.course_keeping identify.estimator_speed \
 		identify.estimators baselines.vessel_models diagnose.trials_diagnosis diagnose.hsva_ladder diagnose.diagnosis_speed \
-		ingest.mcap_speed ingest.nmea_speed fleet.adopt; \
+		ingest.mcap_speed ingest.nmea_speed fleet.adopt fleet.command_speed; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 # The long ones, half an hour and more each on two cores.

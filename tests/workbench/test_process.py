@@ -44,10 +44,6 @@ def test_help_is_instant_because_it_loads_nothing_heavy(arguments: tuple[str, ..
     assert loaded_by(*arguments) & HEAVY == set()
 
 
-def test_the_help_of_a_command_loads_no_engine():
-    assert loaded_by("ingest", "--help") & {"prefect", "numba", "deltalake"} == set()
-
-
 @pytest.mark.parametrize(
     "arguments",
     [
