@@ -34,7 +34,7 @@ def test_the_table_of_the_document() -> None:
 def test_show() -> None:
     told = kempf("effects", "show", "rudder_lag")
     assert told.code == 0
-    for words in ("first-order rudder lag", "told apart by:", "dead_time", "tau", "time constant of the lag"):
+    for words in ("first-order rudder lag", "distinguished by:", "dead_time", "tau", "time constant of the lag"):
         assert words in told.out
     assert kempf("effects", "show", "rudder_lag", "--json").json["parameters"][0]["unit"] == "s"
     assert "not looked for" not in told.out

@@ -72,7 +72,7 @@ def _tell(effect: Effect) -> None:
     if effect.measured_by:
         click.echo(f"  not looked for where the logs have: {', '.join(effect.measured_by)}")
     click.echo(f"  looks like: {effect.confounded_with}")
-    click.echo(f"  told apart by: {effect.separated_by}")
+    click.echo(f"  distinguished by: {effect.separated_by}")
     click.echo(f"  reference: {effect.reference}")
     rows = [
         [p.name, p.unit, f"{p.low:g}", f"{p.high:g}", ", ".join(f"{step:g}" for step in p.steps), p.meaning]
