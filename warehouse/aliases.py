@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 
 from kempf.schemas.errors import UsageError
@@ -10,7 +11,12 @@ from kempf.warehouse.keys import one_of, quoted, vessel_key
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
+#: the set that every command takes unless another is named
 CURRENT = "current"
+#: what earlier versions pointed to the model with effects and to the pooled set, before there was one ``current``; they
+#: come first where a warehouse still has them, and go when ``current`` is pointed anew
+EARLIER = ("model", "pooled")
+_NAME = re.compile(r"[A-Za-z][A-Za-z0-9._-]{0,63}")
 
 
 def point(warehouse: Warehouse, vessel: str, parameter_set_id: str, alias: str = CURRENT) -> bool:
@@ -53,6 +59,8 @@ def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tu
     tuple of (str, str)
         Those that pointed elsewhere before, sorted.
     """
+    for alias in sorted({alias for _, alias in wanted}):
+        _require_name(alias)
     rows = {
         (vessel, alias): {"vessel_key": vessel_key(vessel), "vessel": vessel, "alias": alias, "parameter_set_id": name}
         for (vessel, alias), name in sorted(wanted.items())
@@ -63,10 +71,15 @@ def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tu
             keys = sorted({row["vessel_key"] for row in rows.values()})
             known = delta.rows(table, "aliases", {"vessel_key": keys}).rows(named=True)
             stored = {(row["vessel"], row["alias"]): row["parameter_set_id"] for row in known}
-            changed = tuple(key for key in rows if stored.get(key) != wanted[key])
+            dated = {vessel for vessel, alias in stored if alias in EARLIER}
+            changed = tuple(
+                key for key in rows if stored.get(key) != wanted[key] or (key[1] == CURRENT and key[0] in dated)
+            )
             if changed:
                 # of one name only: several would also name what is not among them
                 of = {alias: [rows[key]["vessel_key"] for key in changed if key[1] == alias] for _, alias in changed}
+                if CURRENT in of:
+                    of |= dict.fromkeys(EARLIER, of[CURRENT])
                 predicate = " OR ".join(
                     f"({one_of('vessel_key', whose)} AND alias = {quoted(alias)})" for alias, whose in of.items()
                 )
@@ -79,7 +92,27 @@ def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tu
 def of_vessel(warehouse: Warehouse, vessel: str) -> dict[str, str]:
     """Return the parameter set id of every alias of a vessel, sorted by alias."""
     frame = delta.read(warehouse, "aliases", {"vessel_key": vessel_key(vessel)})
-    return dict(sorted(zip(frame["alias"].to_list(), frame["parameter_set_id"].to_list(), strict=True)))
+    stored = dict(zip(frame["alias"].to_list(), frame["parameter_set_id"].to_list(), strict=True))
+    dated = [stored.pop(alias) for alias in EARLIER if alias in stored]
+    return dict(sorted((stored | ({CURRENT: dated[0]} if dated else {})).items()))
+
+
+def holders(warehouse: Warehouse, alias: str) -> dict[str, str]:
+    """Return the parameter set id that an alias points to, by vessel, sorted."""
+    frame = delta.read(warehouse, "aliases", {})
+    names = frame["vessel"].unique().sort().to_list()
+    found = {vessel: of_vessel(warehouse, vessel).get(alias) for vessel in names}
+    return {vessel: name for vessel, name in found.items() if name is not None}
+
+
+def _require_name(alias: str) -> None:
+    if not _NAME.fullmatch(alias) or alias in EARLIER or alias.startswith("ps-"):
+        raise UsageError(
+            "alias_invalid",
+            f"{alias!r} cannot name a parameter set; expected a letter, then letters, digits, dots, hyphens or "
+            f"underscores, not {' or '.join(map(repr, EARLIER))}, and nothing that looks like an id.",
+            "Choose a name such as 'as-built' or 'after-docking'.",
+        )
 
 
 def withdraw(warehouse: Warehouse, vessel: str, alias: str = CURRENT) -> bool:

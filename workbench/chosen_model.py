@@ -1,15 +1,15 @@
-"""Which model a command begins from: a stored set's, a file's, the one a vessel stands at, or the plain one."""
+"""Which model a command begins from: a stored set's, a file's, the vessel's current one, or the plain one."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
 
+from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.standing_model import PLAIN, Own, model_of
+from kempf.flows.jobs.standing_model import Own, model_of, standing_model
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import parameter_sets
 from kempf.warehouse.store import Warehouse
 
 _LARGEST = 100_000
@@ -37,15 +37,8 @@ def chosen_model(warehouse: Warehouse, vessel: str, set_id: str | None, model: P
     if model is not None:
         return read_model(model), Own()
     if set_id is None:
-        return PLAIN, Own()
-    found = parameter_sets.get(warehouse, set_id)
-    if found.vessel != vessel:
-        raise UsageError(
-            "set_of_another_vessel",
-            f"{found.parameter_set_id} is a parameter set of {found.vessel!r}, not of {vessel!r}.",
-            f"List hers with `kempf params list --vessel {vessel}`.",
-        )
-    return model_of(found)
+        return standing_model(warehouse, vessel)
+    return model_of(chosen_set(warehouse, vessel, set_id)[0])
 
 
 def read_effect_files(paths: Sequence[Path]) -> dict[str, str]:

@@ -98,7 +98,7 @@ def compare(warehouse: str, vessel: str, set_id: str | None = None, horizon: str
         A folder, or ``s3://bucket/prefix``.
     vessel : str
     set_id : str, optional
-        Parameter set; by default the vessel's newest, see `kempf.flows.jobs.compare_vessel.ALIASES`.
+        Parameter set, by id or alias; by default the vessel's current one.
     horizon : str, optional
         ``1`` (one step), a time such as ``10s`` or ``60s``, or ``free``.
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.pool_vessel import ALIAS as POOLED_ALIAS
-from kempf.flows.jobs.standing_model import ALIAS, Own, known_effects, named
+from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.standing_model import Own, known_effects, named
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import SECOND_NS, Float
@@ -19,6 +19,7 @@ from kempf.pipeline.compare.comparison import ComparedRun, judged, summary
 from kempf.pipeline.compare.misfit import where
 from kempf.pipeline.compare.overshoot import Turn, turns_of
 from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.grid_gating import left_out
 from kempf.pipeline.estimate.levels import fit_levels
 from kempf.pipeline.estimate.record.grid_run import Run
 from kempf.pipeline.estimate.search.pooled_start import Start
@@ -26,16 +27,13 @@ from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.effect_model import Augmented
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
 from kempf.pipeline.predict.run_residuals import phases_s
-from kempf.schemas.errors import DataRejected, NotFound, UsageError
+from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from kempf.warehouse import aliases, parameter_sets, segments, vessels
+from kempf.warehouse import segments
 from kempf.warehouse.deduplicate import once, same
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
-
-#: aliases asked for in this order where no set is named: a model with effects, one hull of all runs, one of a run
-ALIASES = (ALIAS, POOLED_ALIAS, aliases.CURRENT)
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +112,7 @@ def compare_vessel(
     warehouse : Warehouse
     vessel : str
     set_id : str, optional
-        Parameter set; by default that of the first of `ALIASES` that the vessel has.
+        Parameter set, by id or alias; by default the current one.
     horizon : str, optional
         See `kempf.pipeline.predict.horizon.horizon_of`.
     progress : Progress, optional
@@ -129,8 +127,7 @@ def compare_vessel(
         ``set_without_parameters``, ``nothing_to_compare``.
     """
     asked = horizon_of(horizon)
-    vessels.require(warehouse, vessel)
-    chosen, alias = _chosen(warehouse, vessel, set_id)
+    chosen, alias = chosen_set(warehouse, vessel, set_id)
     hull, values, model = _parameters(chosen)
     usable = choose(warehouse, vessel, progress)
     data = assembled(warehouse, usable, ModelSpec.model_validate(dict(chosen.model_spec)), progress)
@@ -138,7 +135,8 @@ def compare_vessel(
     ordered = [by_name[run.name] for run in data.runs]
     seen = _seen(warehouse, vessel, chosen)
     held = [not _is_seen(segment, seen) for segment in ordered]
-    filtered = [Filtered(run, model, data.spec) for run in data.runs]
+    gross: Mapping[str, Any] = chosen.convergence.get("gross_error_instants_s") or {}
+    filtered = [Filtered(left_out(run, gross.get(run.name, {})), model, data.spec) for run in data.runs]
     progress(0, len(filtered), "predicting")
     levels = _levels(filtered, held, hull, values, chosen, data.start)
     runs, found, skipped = [], [], dict(data.skipped)
@@ -168,29 +166,6 @@ def compare_vessel(
             {"skipped": skipped},
         )
     return Comparison(vessel, chosen, alias, asked, tuple(runs), tuple(found), skipped)
-
-
-def _chosen(warehouse: Warehouse, vessel: str, set_id: str | None) -> tuple[ParameterSet, str | None]:
-    if set_id is not None:
-        found = parameter_sets.get(warehouse, set_id)
-        if found.vessel != vessel:
-            raise UsageError(
-                "set_of_another_vessel",
-                f"{found.parameter_set_id} is a parameter set of {found.vessel!r}, not of {vessel!r}.",
-                f"List hers with `kempf params list --vessel {vessel!r}`.",
-                {"parameter_set_id": found.parameter_set_id, "vessel": found.vessel},
-            )
-        return found, None
-    pointed = aliases.of_vessel(warehouse, vessel)
-    for alias in ALIASES:
-        if alias in pointed:
-            return parameter_sets.get(warehouse, pointed[alias]), alias
-    raise NotFound(
-        "no_parameter_set",
-        f"{vessel!r} has no parameter set to compare with her runs.",
-        f"Make one with `kempf identify --vessel {vessel!r}`.",
-        {"vessel": vessel},
-    )
 
 
 def _parameters(chosen: ParameterSet) -> tuple[Float, Float, Augmented]:

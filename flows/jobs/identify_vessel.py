@@ -227,10 +227,7 @@ def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], spec: M
         and o.parameter_set.convergence.get("converged")
         and o.parameter_set.estimator == "ml"
     ]
-    if not whole:
-        return
-    pointed = None if adopt else new.standing()
-    if pointed is None or ModelSpec.model_validate(dict(pointed.model_spec)) == spec:
+    if whole and new.may_move(spec, adopt=adopt):
         new.point(whole[-1].parameter_set_id)
 
 

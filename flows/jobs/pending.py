@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -44,6 +45,21 @@ class Waiting:
             return None
         made = next((one for one in self.sets if one.parameter_set_id == name), None)
         return made or parameter_sets.get(self._warehouse, name)
+
+    def may_move(self, spec: ModelSpec, *, adopt: bool) -> bool:
+        """Return whether ``current`` may go to a set of this model: from a model with effects only to the like.
+
+        Parameters
+        ----------
+        spec : ModelSpec
+        adopt : bool
+            Whether it may leave another model.
+        """
+        standing = self.standing()
+        if standing is None:
+            return True
+        now = ModelSpec.model_validate(dict(standing.model_spec))
+        return now == spec or (adopt and (bool(spec.effects) or not now.effects))
 
     def point(self, parameter_set_id: str, alias: str = aliases.CURRENT) -> None:
         """Let an alias point to one of her sets, once that is stored."""

@@ -28,8 +28,6 @@ from kempf.warehouse.store import Warehouse
 
 #: the estimator of pooled sets, and the one whose outcomes are pooled
 POOLED, SEPARATE = "ml-pooled", "ml"
-#: alias of the newest pooled set
-ALIAS = "pooled"
 
 
 def pool_vessel(
@@ -56,6 +54,7 @@ def pool_segments(
     outcomes: Sequence[IdentifyOutcome],
     new: Waiting,
     *,
+    adopt: bool = True,
     flow_run: str | None = None,
     progress: Progress = silent,
 ) -> tuple[ParameterSet, bool] | None:
@@ -70,7 +69,9 @@ def pool_segments(
     outcomes : sequence of IdentifyOutcome
         Of that job.
     new : Waiting
-        Takes the set where it is new, and where the alias shall point.
+        Takes the set where it is new, and where ``current`` shall point.
+    adopt : bool, optional
+        Whether ``current`` may move to this model from another one.
     flow_run : str, optional
     progress : Progress, optional
 
@@ -128,8 +129,8 @@ def pool_segments(
         profile = vessels.get(warehouse, profile_sha256)
         made = build_pooled(instruments, profile, inputs, vessel, tuple(s.segment_id for s in chosen), told)
         new.keep([made])
-    if made.convergence.get("converged"):
-        new.point(made.parameter_set_id, ALIAS)
+    if made.convergence.get("converged") and new.may_move(request.spec, adopt=adopt):
+        new.point(made.parameter_set_id)
     return made, not known
 
 

@@ -15,7 +15,6 @@ from typing import Any
 
 from kempf.flows.jobs.parameter_changes import Move, NewSet, paired
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.standing_model import ALIAS, standing
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import as_told
 from kempf.schemas.errors import KempfError
@@ -173,9 +172,8 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[st
     logs.record(scratch, kept)
     # those that no longer stand, too: their models are brought up to date with the others
     parameter_sets.insert(scratch, parameter_sets.get_all(warehouse, vessel))
-    model = standing(warehouse, vessel)
-    if model is not None:
-        aliases.point(scratch, vessel, model.parameter_set_id, alias=ALIAS)
+    for alias, name in aliases.of_vessel(warehouse, vessel).items():
+        aliases.point(scratch, vessel, name, alias)
     return failures
 
 

@@ -17,7 +17,7 @@ from kempf.flows.jobs.pending import Waiting, store
 from kempf.flows.jobs.pool_vessel import POOLED, pool_segments
 from kempf.flows.jobs.refresh_logs import Refreshed, Stale, read_anew, stale_logs
 from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.standing_model import ALIAS, ESTIMATOR, model_of, point, standing
+from kempf.flows.jobs.standing_model import ESTIMATOR, model_of, point, standing
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all
 from kempf.flows.process.commit_batch import together_or_each
@@ -212,6 +212,7 @@ class _Job:
                 request,
                 outcomes,
                 work.new,
+                adopt=False,
                 flow_run=self.flow_run,
                 progress=self.progress,
             )
@@ -238,7 +239,7 @@ class _Job:
             chosen = choose(self.warehouse, work.vessel)
             made, new = store_model(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
         except KempfError as error:
-            work.report.fail(ALIAS, error)
+            work.report.fail(aliases.CURRENT, error)
             return
         point(self.warehouse, made)
         work.report.new_sets += new

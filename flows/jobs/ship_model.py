@@ -10,9 +10,9 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.steering.nomoto import require_numbers
 from kempf.pipeline.steering.state_space import NoiseLevels, usual_levels
-from kempf.schemas.errors import NotFound, UsageError
+from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from kempf.warehouse import aliases, parameter_sets, vessels
+from kempf.warehouse import parameter_sets, vessels
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
@@ -61,26 +61,6 @@ class KnownShip:
     length_m: float | None
     noise: NoiseLevels
     warnings: tuple[str, ...]
-
-
-def current_set(warehouse: Warehouse, vessel: str) -> str:
-    """Return the id of the set that ``current`` of a vessel points to.
-
-    Raises
-    ------
-    NotFound
-        ``no_warehouse``, ``no_vessel``, ``no_current_set``.
-    """
-    vessels.require(warehouse, vessel)
-    pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
-    if pointed is None:
-        raise NotFound(
-            "no_current_set",
-            f"No parameter set of {vessel!r} is current; none converged on a whole zigzag by maximum likelihood.",
-            f"Identify her with `kempf identify --vessel {vessel}`, or name a set with --set.",
-            {"vessel": vessel},
-        )
-    return pointed
 
 
 def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None) -> KnownShip:

@@ -19,8 +19,8 @@ from kempf.warehouse import aliases, code_version, parameter_sets
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
 
-#: the estimator of these sets, and the alias of the model that a vessel stands at
-ESTIMATOR, ALIAS = "ml-effects", "model"
+#: the estimator of these sets
+ESTIMATOR = "ml-effects"
 #: eq. (16) with the bias of the rate gyro left to the catalogue, which names it where there is one
 PLAIN = ModelSpec(name="plain", rate_bias=False)
 
@@ -127,14 +127,15 @@ def stored_model(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, own: Own
 
 
 def point(warehouse: Warehouse, model: ParameterSet) -> None:
-    """Let the vessel stand at a model."""
-    aliases.point(warehouse, model.vessel, model.parameter_set_id, alias=ALIAS)
+    """Make a model the vessel's current one."""
+    aliases.point(warehouse, model.vessel, model.parameter_set_id)
 
 
 def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
-    """Return the model that a vessel stands at, None where she has none yet."""
-    pointed = aliases.of_vessel(warehouse, vessel).get(ALIAS)
-    return parameter_sets.get(warehouse, pointed) if pointed else None
+    """Return a vessel's current model, None where her current set is of no model of this kind."""
+    pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    current = parameter_sets.get(warehouse, pointed) if pointed else None
+    return current if current is not None and current.estimator == ESTIMATOR else None
 
 
 def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 from math import degrees, isfinite, nan, radians
 
-from kempf.flows.jobs.ship_model import KnownShip, current_set, known_ship
+from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.ship_model import KnownShip, known_ship
 from kempf.flows.jobs.steered_ship import SteeredShip
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.simulate.disturbances import Environment
@@ -140,14 +141,8 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
             f"A leg of {request.leg_s:g} s leaves too little after the first {request.settle_s:g} s to settle.",
             "Ask for legs that are more than a minute longer.",
         )
-    ship = known_ship(warehouse, request.set_id or current_set(warehouse, vessel), request.speed_m_s)
-    one = ship.parameter_set
-    if one.vessel != vessel:
-        raise UsageError(
-            "set_of_another_vessel",
-            f"{one.parameter_set_id} is a parameter set of {one.vessel!r}, not of {vessel!r}.",
-            f"List hers with `kempf params list --vessel {vessel}`; another ship's set goes with --wrong.",
-        )
+    one, _ = chosen_set(warehouse, vessel, request.set_id)
+    ship = known_ship(warehouse, one.parameter_set_id, request.speed_m_s)
     wanted = [(one.parameter_set_id, ship.hull)]
     if request.wrong is not None:
         wanted.append(_wrong(warehouse, request.wrong, ship))

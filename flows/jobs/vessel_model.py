@@ -23,6 +23,7 @@ from kempf.pipeline.diagnose.diagnosis import Step, step_of
 from kempf.pipeline.diagnose.forward_selection import staged
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import rung
+from kempf.pipeline.estimate.grid_gating import instants_left_out
 from kempf.pipeline.estimate.pooled_fit import Fit
 from kempf.pipeline.estimate.result import discrete_values
 from kempf.schemas.errors import NotFound
@@ -183,6 +184,7 @@ def _as_parameter_set(
             "step_s": _STEP_S,
             "grid_step_s": fit.runs[0].run.step_s,
             "gross_errors": fitted.gross_errors,
+            "gross_error_instants_s": _gross_errors(fit, runs),
             "held_out": held,
             "levels": {one.run.name: list(levels) for one, levels in zip(fit.runs, fit.levels, strict=True)},
             "left_out": runs.skipped,
@@ -191,6 +193,13 @@ def _as_parameter_set(
         parent=parent,
         provenance=told,
     )
+
+
+def _gross_errors(fit: Fit, runs: VesselRuns) -> dict[str, dict[str, list[float]]]:
+    """Return which measurements the fit left out, by run and measurement, so that a comparison leaves them out too."""
+    whole = {run.name: run for run in runs.runs}
+    found = {one.run.name: instants_left_out(whole[one.run.name], one.run) for one in fit.runs}
+    return {name: instants for name, instants in found.items() if instants}
 
 
 def _parameters(fit: Fit) -> tuple[Stored, ...]:

@@ -34,6 +34,8 @@ class ComparedRun:
         At the horizon asked for.
     free : Predicted
         The free run, for overshoots and for the threshold.
+    free_run_error_percent : float
+        The error of the model on this run, `kempf.pipeline.predict.free_run.FreeRun.relative_error` in percent.
     overshoots : tuple of Overshoot
     looked : Looked
         For `kempf.pipeline.compare.misfit.where`.
@@ -45,6 +47,7 @@ class ComparedRun:
     held_out: bool
     predicted: Predicted
     free: Predicted
+    free_run_error_percent: float
     overshoots: tuple[Overshoot, ...]
     looked: Looked
     levels_from: str
@@ -179,18 +182,8 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
             "n": len(known),
             "not_predicted": len(errors) - len(known),
         },
-        "free_run_error_percent": _mean([free_run_error(run) for run in runs]),
+        "free_run_error_percent": _mean([run.free_run_error_percent for run in runs]),
     }
-
-
-def free_run_error(run: ComparedRun) -> float:
-    """Return 100 less the fit % of the free run, mean over the channels.
-
-    Parameters
-    ----------
-    run : ComparedRun
-    """
-    return 100.0 - float(np.mean([fit for fit in run.free.fit_percent().values() if np.isfinite(fit)]))
 
 
 def judged(runs: Sequence[ComparedRun]) -> tuple[str, float]:
@@ -206,7 +199,7 @@ def judged(runs: Sequence[ComparedRun]) -> tuple[str, float]:
 
 
 def _error(runs: Sequence[ComparedRun]) -> float:
-    return float(np.mean([free_run_error(run) for run in runs]))
+    return float(np.mean([run.free_run_error_percent for run in runs]))
 
 
 def _mean(values: Sequence[float]) -> dict[str, float | None]:

@@ -82,12 +82,12 @@ class Step:
     @property
     def in_sample_error(self) -> float:
         """Mean relative error of the free runs of fitted manoeuvres."""
-        return float(np.mean([run.score for run in self.fitted]))
+        return float(np.mean([run.relative_error for run in self.fitted]))
 
     @property
     def held_out_error(self) -> float | None:
         """Mean relative error of the free runs of held-out manoeuvres."""
-        return float(np.mean([run.score for run in self.held])) if self.held else None
+        return float(np.mean([run.relative_error for run in self.held])) if self.held else None
 
     @property
     def intensities(self) -> Float:

@@ -2,17 +2,47 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from kempf.pipeline.estimate.pooled_fit import Fit
 from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 
 #: robust standard deviations beyond which a measurement is gross, and within which its neighbours must lie
 _GROSS, _SOUND = 6.0, 4.0
 #: more than this share of a channel is no set of gross errors but a model that does not fit
 _MOST = 0.02
+
+
+def left_out(run: Run, instants_s: Mapping[str, Sequence[float]]) -> Run:
+    """Return a run without the measurements that a fit left out, as `instants_left_out` told them.
+
+    Parameters
+    ----------
+    run : Run
+    instants_s : mapping of str to sequence of float
+        Seconds from the beginning of the run, by measurement.
+    """
+    measured = run.measured.copy()
+    for name, instants in instants_s.items():
+        rows = np.rint(np.asarray(instants) / run.step_s).astype(np.int64)
+        measured[rows[rows < measured.shape[0]], MEASUREMENTS.index(name)] = np.nan
+    return replace(run, measured=measured)
+
+
+def instants_left_out(before: Run, after: Run) -> dict[str, list[float]]:
+    """Return the instants, s from the beginning, at which a run lost measurements, by measurement.
+
+    Parameters
+    ----------
+    before, after : Run
+        The same run with and without them.
+    """
+    gone = np.isfinite(before.measured) & ~np.isfinite(after.measured)
+    return {name: before.time_s[gone[:, i]].tolist() for i, name in enumerate(MEASUREMENTS) if gone[:, i].any()}
 
 
 def without_gross_errors(fit: Fit) -> tuple[list[Run], int]:

@@ -57,9 +57,12 @@ class FreeRun:
         return result
 
     @property
-    def score(self) -> float:
-        """The relative errors of the channels in one number, their root mean square."""
-        return float(np.sqrt(np.nanmean(self.relative**2)))
+    def relative_error(self) -> float:
+        """The error of a model on this manoeuvre in one number: the mean of the channels' relative errors.
+
+        It is what ladder, comparison, diagnosis and report all show: 1 - fit % / 100, mean over the channels.
+        """
+        return float(np.nanmean(self.relative))
 
 
 def free_run(fit: Fit, run: Run) -> FreeRun:

@@ -148,12 +148,21 @@ def test_a_threshold_that_is_exceeded_is_an_exit_code(place: Path, document: dic
         assert ("fitted runs" in done.err) is (code == 5)
 
 
-def test_the_default_is_the_model_then_the_pooled_set_then_the_current_one(own: Path) -> None:
+def test_the_default_is_the_current_set_and_an_alias_names_any_other(own: Path) -> None:
     warehouse, made = Warehouse(str(own)), elsewhere(own)
-    for alias in ("pooled", "model"):
-        aliases.point(warehouse, "mariner", made.parameter_set_id, alias=alias)
-        document = asked(own)
-        assert (document["alias"], document["parameter_set_id"]) == (alias, made.parameter_set_id)
+    before = aliases.of_vessel(warehouse, "mariner")["current"]
+    done = kempf("params", "alias", "as-built", made.parameter_set_id, "--warehouse", own, "--json")
+    assert done.json == {
+        "vessel": "mariner",
+        "alias": "as-built",
+        "parameter_set_id": made.parameter_set_id,
+        "before": None,
+    }
+    for more, alias, wanted in (((), "current", before), (("--set", "as-built"), "as-built", made.parameter_set_id)):
+        document = asked(own, *more)
+        assert (document["alias"], document["parameter_set_id"]) == (alias, wanted)
+    assert kempf("params", "alias", "current", "as-built", "--warehouse", own).code == 0
+    assert asked(own)["parameter_set_id"] == made.parameter_set_id
 
 
 def test_a_wrong_request_is_refused_clearly(place: Path) -> None:

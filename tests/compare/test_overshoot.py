@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.compare.compared_run import compare_run
-from kempf.pipeline.compare.comparison import free_run_error, judged, summary
+from kempf.pipeline.compare.comparison import judged, summary
 from kempf.pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
 from kempf.pipeline.estimate.levels import fit_levels
 from kempf.pipeline.estimate.sensitivity import Point
@@ -82,9 +82,11 @@ def test_what_is_told_of_runs_keeps_the_samples_apart() -> None:
     assert told["fitted"]["fit_percent"]["heading"]["mean"] == pytest.approx(np.mean(fits[:2]))
     assert told["fitted"]["fit_percent"]["heading"]["std_error"] == pytest.approx(abs(fits[0] - fits[1]) / 2.0)
     assert told["held_out"]["fit_percent"]["heading"] == {"mean": fits[2], "std_error": None}
-    assert judged(runs) == ("held_out", pytest.approx(free_run_error(runs[2])))
+    assert judged(runs) == ("held_out", runs[2].free_run_error_percent)
     assert judged(runs[:2])[0] == "fitted"
-    assert free_run_error(runs[2]) > free_run_error(runs[0])
+    free = runs[2].free.fit_percent()
+    assert runs[2].free_run_error_percent == pytest.approx(100.0 - np.mean(list(free.values())))
+    assert runs[2].free_run_error_percent > runs[0].free_run_error_percent
     assert summary(runs[:2])["held_out"] is None
 
 

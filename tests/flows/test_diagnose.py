@@ -122,7 +122,7 @@ def test_an_effect_is_added_gone_back_from_and_built_again(late: Late, told: dic
     stored = parameter_sets.get(late.warehouse, made["parameter_set_id"])
     assert stored.parent == told["parameter_set_id"] and stored.estimator == "ml-effects"
     assert len(stored.parameters) == 7 and len(stored.covariance) == 7
-    assert aliases.of_vessel(late.warehouse, VESSEL)["model"] == stored.parameter_set_id
+    assert aliases.of_vessel(late.warehouse, VESSEL)["current"] == stored.parameter_set_id
     assert rerun(late.warehouse, stored.parameter_set_id).verdict == "bit-identical"
     rungs = late.json("ladder", "--vessel", VESSEL)
     assert [one["parameter_set_id"] for one in rungs] == [stored.parent, stored.parameter_set_id]
@@ -137,9 +137,9 @@ def test_an_effect_is_added_gone_back_from_and_built_again(late: Late, told: dic
 
 def test_a_model_with_effects_is_a_parameter_set_like_any_other(late: Late, told: dict[str, Any]) -> None:
     plain_set = told["parameter_set_id"]
-    name = aliases.of_vessel(late.warehouse, VESSEL)["model"]
+    name = aliases.of_vessel(late.warehouse, VESSEL)["current"]
     listed = {one["parameter_set_id"]: one for one in late.json("params", "list", "--vessel", VESSEL)}
-    assert listed[name]["aliases"] == ["model"] and listed[name]["model_name"] == "plain + rudder_lag"
+    assert listed[name]["aliases"] == ["current"] and listed[name]["model_name"] == "plain + rudder_lag"
     shown = late.json("params", "show", name)
     assert set(shown["parameters"]) > {"a11", "b2", "rudder_lag.tau"}
     assert shown["parameters"]["rudder_lag.tau"]["unit"] == "s"
@@ -150,7 +150,7 @@ def test_a_model_with_effects_is_a_parameter_set_like_any_other(late: Late, told
     assert late.kempf("params", "show", name).code == 0 and late.kempf("params", "diff", plain_set, name).code == 0
     assert late.kempf("params", "steering", name).code == 0
     rows = late.json("history", "--vessel", VESSEL)
-    assert {row["model"] for row in rows} == {"plain", "plain + rudder_lag"}
+    assert {row["current"] for row in rows} == {"plain", "plain + rudder_lag"}
     # sets of all runs at once are no points in time
     changes = late.json("history", "--vessel", VESSEL, "--changes")["changes"]
     assert all(one["parameter_set_ids"] == [] for one in changes)
@@ -161,7 +161,7 @@ def test_reprocessing_keeps_the_model_that_she_stands_at(late: Late, told: dict[
     report = reprocess_vessel(late.warehouse, VESSEL)
     assert report.status == "unchanged" and report.kept_sets == 1, report
     assert parameter_sets.summaries(late.warehouse, VESSEL)["parameter_set_id"].to_list() == before
-    assert aliases.of_vessel(late.warehouse, VESSEL)["model"] in before
+    assert aliases.of_vessel(late.warehouse, VESSEL)["current"] in before
 
 
 def test_a_vessel_that_fails_does_not_stop_the_fleet(late: Late, told: dict[str, Any]) -> None:

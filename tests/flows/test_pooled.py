@@ -10,7 +10,7 @@ import pytest
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.pool_vessel import ALIAS, POOLED, pool_vessel
+from kempf.flows.jobs.pool_vessel import POOLED, pool_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.pipeline.simulate.csv_log import to_csv
@@ -53,7 +53,7 @@ def test_two_days_make_one_set_which_is_built_again_and_not_twice(days: Warehous
     assert pooled.convergence["pooling"]["may_be_pooled"]
     single = [o.parameter_set for o in outcomes if o.parameter_set]
     assert all(pooled.parameters[5].std < 0.95 * one.parameters[5].std for one in single)
-    assert aliases.of_vessel(days, "mariner")[ALIAS] == pooled.parameter_set_id
+    assert aliases.of_vessel(days, "mariner")["current"] == pooled.parameter_set_id
     assert rerun(days, pooled.parameter_set_id).verdict == "bit-identical"
     again = pool_vessel(days, "mariner", Request(), outcomes)
     assert again is not None and not again[1] and again[0].parameter_set_id == pooled.parameter_set_id

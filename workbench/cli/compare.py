@@ -24,7 +24,7 @@ _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
 
 @click.command("compare")
 @vessel_option(required=True)
-@click.option("--set", "set_id", metavar="ID", help="Parameter set; default: alias model, else pooled, else current.")
+@click.option("--set", "set_id", metavar="ID", help="Parameter set, by id or alias; default: current.")
 @click.option(
     "--horizon",
     default="free",

@@ -84,7 +84,7 @@ def mat_file(
 
 @command.command("mcap")
 @vessel_option(required=True)
-@click.option("--set", "set_id", metavar="ID", help="Parameter set; default: alias model, else pooled, else current.")
+@click.option("--set", "set_id", metavar="ID", help="Parameter set, by id or alias; default: current.")
 @click.option(
     "--output", "--out", "out", type=click.Path(path_type=Path), metavar="FILE", required=True, help="Write here."
 )

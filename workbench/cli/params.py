@@ -1,4 +1,4 @@
-"""``kempf params list|show|diff|export|steering``."""
+"""``kempf params list|show|diff|export|alias|steering``."""
 
 from __future__ import annotations
 
@@ -59,11 +59,11 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
 @json_option
 def show(set_id: str, uri: str, as_json: bool) -> None:
     """Show a parameter set whole; a unique beginning of its id is enough."""
-    from kempf.warehouse import parameter_sets
+    from kempf.flows.jobs.chosen_set import named_set
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.parameter_set_table import tell_set
 
-    one = parameter_sets.get(Warehouse(uri), set_id)
+    one = named_set(Warehouse(uri), set_id)
     if as_json:
         print_json(one.show())
         return
@@ -86,12 +86,12 @@ def show(set_id: str, uri: str, as_json: bool) -> None:
 @json_option
 def diff(first: str, second: str, uri: str, as_json: bool) -> None:
     """Compare the parameters of two sets: difference, and the same in standard errors of the difference."""
-    from kempf.warehouse import parameter_sets
+    from kempf.flows.jobs.chosen_set import named_set
     from kempf.warehouse.parameter_set import compare
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
-    one, other = parameter_sets.get(warehouse, first), parameter_sets.get(warehouse, second)
+    one, other = named_set(warehouse, first), named_set(warehouse, second)
     found = compare(one, other)
     if as_json:
         print_json({"first": one.parameter_set_id, "second": other.parameter_set_id, "parameters": found})
@@ -114,15 +114,40 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
 
     --json is short for --format json.
     """
-    from kempf.warehouse import parameter_sets
+    from kempf.flows.jobs.chosen_set import named_set
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import as_text, write_new
 
-    text = as_text(parameter_sets.get(Warehouse(uri), set_id), "json" if as_json else form)
+    text = as_text(named_set(Warehouse(uri), set_id), "json" if as_json else form)
     if output is None:
         click.echo(text, nl=False)
     else:
         write_new(output, text, "--output")
+
+
+@command.command("alias")
+@click.argument("name")
+@click.argument("set_id")
+@warehouse_option
+@json_option
+def alias(name: str, set_id: str, uri: str, as_json: bool) -> None:
+    """Let NAME point to a parameter set of its vessel; `current` is what every command takes unless told otherwise.
+
+    Every command that takes the id of a set takes the name as well. Names move, sets never change.
+    """
+    from kempf.flows.jobs.chosen_set import named_set
+    from kempf.warehouse import aliases
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    one = named_set(warehouse, set_id)
+    before = aliases.of_vessel(warehouse, one.vessel).get(name)
+    aliases.point(warehouse, one.vessel, one.parameter_set_id, name)
+    if as_json:
+        print_json({"vessel": one.vessel, "alias": name, "parameter_set_id": one.parameter_set_id, "before": before})
+        return
+    moved = f", before {before}" if before not in (None, one.parameter_set_id) else ""
+    click.echo(f"{name} of {one.vessel}: {one.parameter_set_id}{moved}")
 
 
 @command.command("steering")

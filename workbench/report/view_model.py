@@ -117,8 +117,8 @@ def _rung(step: Step, diagnosis: Diagnosis) -> Rung:
     intensities = {name: float(value) for name, value, has in zip(_LEVELS, step.intensities, used, strict=True) if has}
     return Rung(
         added="plain model" if step.added is None else step.added.title,
-        in_sample=np.array([run.score for run in step.fitted]),
-        held_out=np.array([run.score for run in step.held]),
+        in_sample=np.array([run.relative_error for run in step.fitted]),
+        held_out=np.array([run.relative_error for run in step.held]),
         intensities=intensities,
         log_likelihood=step.fit.log_likelihood,
         parameters=N_HULL + len(step.fit.model.names),

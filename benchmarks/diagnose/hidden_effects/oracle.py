@@ -50,8 +50,8 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
                 fits, _ = staged(fitted, found.spec, start, [catalogue()[effect]], workers)
             held = [found.runs[i] for i in left]
             return {
-                "plain_held_out": float(np.mean([free_run(fits[0], run).score for run in held])),
-                "held_out": float(np.mean([free_run(fits[1], run).score for run in held])),
+                "plain_held_out": float(np.mean([free_run(fits[0], run).relative_error for run in held])),
+                "held_out": float(np.mean([free_run(fits[1], run).relative_error for run in held])),
                 "likelihood_ratio": 2.0 * (fits[1].log_likelihood - fits[0].log_likelihood),
                 "value": float(fits[1].values[0]),
                 "std": float(fits[1].std[6]),

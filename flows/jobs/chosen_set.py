@@ -1,0 +1,71 @@
+"""Which parameter set of a vessel a command works on: one that is named, by id or alias, else her current one."""
+
+from __future__ import annotations
+
+from kempf.schemas.errors import NotFound, UsageError
+from kempf.warehouse import aliases, parameter_sets, vessels
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+
+def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tuple[ParameterSet, str | None]:
+    """Return a parameter set of a vessel and the alias it was chosen by, None where an id named it.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    name : str, optional
+        An alias of hers, an id, or a unique beginning of one; by default ``current``.
+
+    Raises
+    ------
+    NotFound
+        ``no_vessel``, ``no_parameter_set``: nothing is current, or there is no such set.
+    UsageError
+        ``set_of_another_vessel``.
+    """
+    vessels.require(warehouse, vessel)
+    pointed = aliases.of_vessel(warehouse, vessel)
+    alias = name or aliases.CURRENT
+    if alias in pointed:
+        return parameter_sets.get(warehouse, pointed[alias]), alias
+    if name is None:
+        raise NotFound(
+            "no_parameter_set",
+            f"No parameter set of {vessel!r} is current.",
+            f"Make one with `kempf identify --vessel {vessel!r}`, or choose one with `kempf params alias current ID`.",
+            {"vessel": vessel},
+        )
+    found = parameter_sets.get(warehouse, name)
+    if found.vessel != vessel:
+        raise UsageError(
+            "set_of_another_vessel",
+            f"{found.parameter_set_id} is a parameter set of {found.vessel!r}, not of {vessel!r}.",
+            f"List hers with `kempf params list --vessel {vessel!r}`.",
+            {"parameter_set_id": found.parameter_set_id, "vessel": found.vessel},
+        )
+    return found, None
+
+
+def named_set(warehouse: Warehouse, name: str) -> ParameterSet:
+    """Return a parameter set by its id, a unique beginning of it, or an alias that one vessel alone has.
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter_set``.
+    UsageError
+        ``alias_ambiguous``: several vessels have this alias. ``id_ambiguous``.
+    """
+    if name.startswith("ps-"):
+        return parameter_sets.get(warehouse, name)
+    held = aliases.holders(warehouse, name)
+    if len(held) > 1:
+        raise UsageError(
+            "alias_ambiguous",
+            f"{name!r} names a parameter set of each of {', '.join(held)}.",
+            "Give the id: `kempf params list` has them all.",
+            {"alias": name, "parameter_sets": held},
+        )
+    return parameter_sets.get(warehouse, held[min(held)] if held else name)
