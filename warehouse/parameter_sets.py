@@ -140,12 +140,18 @@ def summaries(warehouse: Warehouse, vessel: str | None = None) -> pl.DataFrame:
     return delta.read(warehouse, "parameter_sets", where, columns).sort("vessel", "start_utc_ns", "parameter_set_id")
 
 
-def models(warehouse: Warehouse, vessel: str) -> list[tuple[dict[str, Any], str]]:
-    """Return every model specification and estimator that a vessel has sets of, in the order of their text."""
+def models(warehouse: Warehouse, vessel: str) -> list[tuple[dict[str, Any], str, dict[str, Any]]]:
+    """Return every model specification and estimator that a vessel has sets of, in the order of their text.
+
+    Returns
+    -------
+    list of (dict, str, dict)
+        Specification, estimator, and the text of effects that are not in the catalogue, as a set's settings hold it.
+    """
     where = {"vessel_key": vessel_key(vessel)}
-    frame = delta.read(warehouse, "parameter_sets", where, ("model_json", "estimator"))
-    frame = frame.unique().sort("model_json", "estimator")
-    return [(loads(text), estimator) for text, estimator in frame.rows()]
+    columns = ("model_json", "estimator", "settings_json")
+    frame = delta.read(warehouse, "parameter_sets", where, columns).unique().sort(*columns)
+    return [(loads(text), estimator, loads(settings).get("own") or {}) for text, estimator, settings in frame.rows()]
 
 
 def _refuse_other(stored: ParameterSet, given: ParameterSet) -> None:

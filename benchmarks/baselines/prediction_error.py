@@ -214,7 +214,7 @@ def _report(
     out[~np.isfinite(problem.measured)] = np.nan
     std = np.sqrt(np.nanmean(out**2, axis=0))
     padded = np.column_stack([out, np.full(out.shape[0], np.nan)])
-    fit = one_step_fit(problem.record, padded, np.tile([std[0] ** 2, std[1] ** 2, 1.0], (out.shape[0], 1)))
+    fit = one_step_fit(problem.record.measured, padded, np.tile([std[0] ** 2, std[1] ** 2, 1.0], (out.shape[0], 1)))
     return told(
         "prediction-error",
         problem.record,

@@ -189,8 +189,8 @@ def read_model(path: Path) -> ModelSpec:
     Raises
     ------
     UsageError
-        ``model_invalid``: every fault is named with its place. ``model_unknown``: it asks for a
-        base or an effect that is not there.
+        ``model_invalid``: every fault is named with its place. ``model_unknown``: it asks for a base
+        that is not there.
     """
     content = read_yaml(path, "model specification")
     try:
@@ -203,13 +203,12 @@ def read_model(path: Path) -> ModelSpec:
             f"Its keys are {', '.join(ModelSpec.model_fields)}.",
             {"faults": faults},
         ) from error
-    known = ModelSpec()
-    if spec.base != known.base or spec.effects:
-        asked = [f"base {spec.base!r}"] * (spec.base != known.base) + [f"effect {name!r}" for name in spec.effects]
+    base = ModelSpec().base
+    if spec.base != base:
         raise UsageError(
             "model_unknown",
-            f"{path} asks for {', '.join(asked)}, which this version cannot identify.",
-            f"Use base {known.base!r} without effects.",
-            {"base": spec.base, "effects": list(spec.effects)},
+            f"{path} asks for the base {spec.base!r}, which this version cannot identify.",
+            f"Use the base {base!r}; what is beyond it goes under effects.",
+            {"base": spec.base},
         )
     return spec

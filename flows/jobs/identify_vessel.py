@@ -12,6 +12,8 @@ from kempf.flows.jobs.no_speed_log import CAN, KEY, companions_of, estimate_of, 
 from kempf.flows.jobs.parameter_set_of import arm_of, as_parameter_set, without_arm
 from kempf.flows.jobs.pending import Waiting, waiting
 from kempf.flows.jobs.refresh_logs import Refreshed, refresh_logs
+from kempf.flows.jobs.standing_model import EFFECTS_BY, NONE_OF_ONES_OWN, Own, effect_settings
+from kempf.flows.jobs.vessel_model import build_single
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import as_told
@@ -33,17 +35,28 @@ from kempf.warehouse.store import Warehouse
 class Request:
     """What a person asks for: which model, which estimator, which of its settings differ from the defaults.
 
-    ``no_log`` are those of `pipeline.estimate.no_log.identify.NoLogSettings`, for segments without a speed through
-    the water.
+    ``own`` are effects of the model that are not in the catalogue. ``no_log`` are the settings of
+    `pipeline.estimate.no_log.identify.NoLogSettings`, for segments without a speed through the water.
     """
 
     spec: ModelSpec = field(default_factory=ModelSpec)
     estimator: str = "ml"
     settings: tuple[tuple[str, Any], ...] = ()
     no_log: tuple[tuple[str, Any], ...] = ()
+    own: Own = NONE_OF_ONES_OWN
+
+    def __post_init__(self) -> None:
+        if self.spec.effects and self.estimator != EFFECTS_BY:
+            raise UsageError(
+                "effects_need_ml",
+                f"The model has the effects {', '.join(self.spec.effects)}, which {self.estimator!r} cannot estimate.",
+                f"Take the estimator {EFFECTS_BY!r}, or a model without effects.",
+            )
 
     def all_settings(self) -> dict[str, Any]:
         """Return every setting of the estimator, defaults included; they are part of a set's identity."""
+        if self.spec.effects:
+            return effect_settings(self.spec, self.own)
         return {**default_settings(self.estimator), **dict(self.settings)}
 
 
@@ -178,7 +191,8 @@ def _identify_log(
     """
     warehouse, pool = job.warehouse, job.pool
     profile = vessels.get(warehouse, row.profile_sha256)
-    companions = [beside.get(s.segment_id, ()) if job.request.estimator in CAN else () for s in found]
+    alone = job.request.estimator not in CAN or bool(job.request.spec.effects)
+    companions = [() if alone else beside.get(s.segment_id, ()) for s in found]
     wanted = [inputs_of(s, row.profile_sha256, job.request, c) for s, c in zip(found, companions, strict=True)]
     missing = _missing(warehouse, row.vessel, wanted)
     asked = [c for c, inputs in zip(companions, wanted, strict=True) if parameter_set_id(inputs) in missing]
@@ -243,7 +257,7 @@ def inputs_of(segment: Segment, profile_sha256: str, request: Request, companion
         Of a segment without a log.
     """
     settings = request.all_settings()
-    if request.estimator in CAN and without_log(segment):
+    if request.estimator in CAN and without_log(segment) and not request.spec.effects:
         settings = {**settings, KEY: no_log_settings(dict(request.no_log))}
     return Inputs(
         log_ids=(segment.log_id, *(s.log_id for s in companions)),
@@ -294,6 +308,8 @@ def build(
             "Identify them one by one.",
         )
     bounds, spec = inputs.bounds[0], ModelSpec.model_validate(dict(inputs.model_spec))
+    if spec.effects:
+        return build_single(instruments, profile, inputs, vessel, segment_ids, told)
     arm = arm_of(spec, profile)
     record = make_record(instruments, bounds.start_utc_ns, bounds.end_utc_ns)
     if KEY in inputs.settings:

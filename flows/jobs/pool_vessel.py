@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
+from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.no_speed_log import without_log
 from kempf.flows.jobs.parameter_set_of import arm_of, as_parameter_set, without_arm
 from kempf.flows.jobs.pending import Waiting, waiting
+from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
@@ -86,6 +88,8 @@ def pool_segments(
     KempfError
         The segments have nothing in common.
     """
+    if request.spec.effects:
+        return _pool_with_effects(warehouse, vessel, request, new, adopt=adopt, flow_run=flow_run, progress=progress)
     rows = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
     chosen = [
         o.segment
@@ -132,6 +136,26 @@ def pool_segments(
     if made.convergence.get("converged") and new.may_move(request.spec, adopt=adopt):
         new.point(made.parameter_set_id)
     return made, not known
+
+
+def _pool_with_effects(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request,
+    new: Waiting,
+    *,
+    adopt: bool,
+    flow_run: str | None,
+    progress: Progress,
+) -> tuple[ParameterSet, bool] | None:
+    """Fit hull and effects to all manoeuvres but the held-out ones, as `kempf effects add` does."""
+    chosen = choose(warehouse, vessel, progress)
+    if len(chosen.segments) < 2:
+        return None
+    made, is_new = store_model(warehouse, chosen, request.spec, request.own, progress, flow_run)
+    if made.convergence.get("converged") and new.may_move(request.spec, adopt=adopt):
+        new.point(made.parameter_set_id)
+    return made, is_new
 
 
 def build_pooled(

@@ -17,7 +17,7 @@ from kempf.flows.jobs.pending import Waiting, store
 from kempf.flows.jobs.pool_vessel import POOLED, pool_segments
 from kempf.flows.jobs.refresh_logs import Refreshed, Stale, read_anew, stale_logs
 from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.standing_model import ESTIMATOR, model_of, point, standing
+from kempf.flows.jobs.standing_model import ESTIMATOR, Own, model_of, point, standing
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all
 from kempf.flows.process.commit_batch import together_or_each
@@ -267,10 +267,10 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
         return [default]
     asked: dict[str, Request] = {}
     known = parameter_sets.models(warehouse, vessel)
-    for spec, estimator in known:
+    for spec, estimator, own in known:
         if estimator in (POOLED, ESTIMATOR):
             continue  # the one comes of the separate ones, the other is a model of all runs at once
-        request = Request(ModelSpec.model_validate(spec), estimator)
+        request = Request(ModelSpec.model_validate(spec), estimator, own=Own.from_json(own))
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
     return [asked[key] for key in sorted(asked)] if known else [Request()]
 

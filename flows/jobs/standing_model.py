@@ -19,8 +19,8 @@ from kempf.warehouse import aliases, code_version, parameter_sets
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
 
-#: the estimator of these sets
-ESTIMATOR = "ml-effects"
+#: the estimator of these sets, and of sets of a single manoeuvre whose model has effects
+ESTIMATOR, EFFECTS_BY = "ml-effects", "ml"
 #: eq. (16) with the bias of the rate gyro left to the catalogue, which names it where there is one
 PLAIN = ModelSpec(name="plain", rate_bias=False)
 
@@ -98,23 +98,13 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
     own : Own
         Those that are not in the catalogue.
     """
-    known = known_effects(own)
-    used = named(spec.effects, known)
-    mine = Own(
-        {n: t for n, t in own.formulas.items() if n in spec.effects},
-        {n: t for n, t in own.files.items() if n in spec.effects},
-    )
     return Inputs(
         log_ids=tuple(s.log_id for s in chosen.segments),
         profile_sha256=chosen.profile_sha256,
         bounds=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in chosen.segments),
         model_spec=spec.model_dump(mode="json"),
         estimator=ESTIMATOR,
-        settings={
-            "segments": [s.segment_id for s in chosen.segments],
-            "effects": {effect.name: effect.sha256 for effect in used},
-            "own": mine.as_json(),
-        },
+        settings={"segments": [s.segment_id for s in chosen.segments], **effect_settings(spec, own)},
         code_version=code_version.fingerprint(),
     )
 
@@ -124,6 +114,16 @@ def stored_model(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, own: Own
     name = parameter_set_id(inputs_of(chosen, spec, own))
     there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
     return parameter_sets.get(warehouse, name) if name in there else None
+
+
+def effect_settings(spec: ModelSpec, own: Own) -> dict[str, Any]:
+    """Return what pins the effects of a model: their digests, and the texts of those that are not in the catalogue."""
+    used = named(spec.effects, known_effects(own))
+    mine = Own(
+        {n: t for n, t in own.formulas.items() if n in spec.effects},
+        {n: t for n, t in own.files.items() if n in spec.effects},
+    )
+    return {"effects": {effect.name: effect.sha256 for effect in used}, "own": mine.as_json()}
 
 
 def point(warehouse: Warehouse, model: ParameterSet) -> None:
@@ -140,8 +140,7 @@ def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
 
 def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:
     """Return the model of a stored set and the effects of a person's own in it."""
-    spec = ModelSpec.model_validate(dict(one.model_spec))
-    return spec, Own.from_json(one.settings["own"]) if one.estimator == ESTIMATOR else Own()
+    return ModelSpec.model_validate(dict(one.model_spec)), Own.from_json(one.settings.get("own") or {})
 
 
 def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:

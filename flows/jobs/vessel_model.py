@@ -24,10 +24,12 @@ from kempf.pipeline.diagnose.forward_selection import staged
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import rung
 from kempf.pipeline.estimate.grid_gating import instants_left_out
+from kempf.pipeline.estimate.one_step_fit import one_step_fit
+from kempf.pipeline.estimate.plausibility import doubts
 from kempf.pipeline.estimate.pooled_fit import Fit
 from kempf.pipeline.estimate.result import discrete_values
 from kempf.schemas.errors import NotFound
-from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import parameter_sets, provenance, vessels
 from kempf.warehouse.parameter_set import Estimate as Stored
@@ -140,6 +142,99 @@ def build_model(
     return _as_parameter_set(fitted.fits[-1], fitted, profile, inputs, vessel, told, parent)
 
 
+def build_single(
+    instruments: Instruments,
+    profile: VesselProfile,
+    inputs: Inputs,
+    vessel: str,
+    segment_ids: tuple[str, ...],
+    told: dict[str, Any],
+) -> ParameterSet:
+    """Compute the set of one manoeuvre whose model has effects; nothing is stored.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        Series of the log.
+    profile : VesselProfile
+    inputs : Inputs
+        One segment.
+    vessel : str
+    segment_ids : tuple of str
+        Its id.
+    told : dict
+        Provenance.
+
+    Raises
+    ------
+    KempfError
+        The segment cannot be identified from, or an effect cannot be told from it.
+    """
+    spec, (bounds,) = ModelSpec.model_validate(dict(inputs.model_spec)), inputs.bounds
+    runs = assemble({bounds.log_id: instruments}, profile, [(segment_ids[0], bounds)], spec)
+    fit = fitted_model(runs, spec, Own.from_json(inputs.settings["own"])).fits[-1]
+    (record,) = runs.records
+    passed = fit.linearised[0].passed
+    one_step = one_step_fit(fit.runs[0].run.measured, passed.innovation, passed.variance)
+    covariance = fit.covariance
+    discrete = discrete_values(fit.hull, np.nan_to_num(covariance[:6, :6]), record.mean_speed_m_s, _STEP_S)
+    std = np.sqrt(np.diag(covariance)[:6])
+    return ParameterSet(
+        parameter_set_id=parameter_set_id(inputs),
+        vessel=vessel,
+        model_name=" + ".join((spec.name, *spec.effects)),
+        model_spec=spec.model_dump(mode="json"),
+        model_sha256=spec.sha256,
+        estimator=inputs.estimator,
+        settings=dict(inputs.settings),
+        segment_ids=segment_ids,
+        log_ids=inputs.log_ids,
+        start_utc_ns=bounds.start_utc_ns,
+        parameters=_parameters(fit),
+        discrete=stored(discrete),
+        noise=_noise(fit, runs.spec),
+        covariance_names=(*HULL_PARAMETERS, *fit.model.names),
+        covariance=tuple(tuple(float(x) for x in row) for row in covariance),
+        fit=one_step,
+        iterations=[],
+        convergence={
+            "converged": fit.converged,
+            "reason": fit.reason,
+            "iterations": fit.iterations,
+            "log_likelihood": fit.log_likelihood,
+            "measurements": fit.count,
+            "speed_m_s": record.mean_speed_m_s,
+            "step_s": _STEP_S,
+            "grid_step_s": fit.runs[0].run.step_s,
+            "gross_error_instants_s": _gross_errors(fit, runs),
+            "levels": {segment_ids[0]: list(fit.levels[0])},
+        },
+        warnings=(
+            *record.warnings,
+            *(() if fit.converged else (f"not converged: {fit.reason}",)),
+            *doubts(fit.hull, std, one_step),
+            *without_arm(spec, arm_of(spec, profile)),
+            *channel_warnings(told),
+        ),
+        parent=spec.parent,
+        provenance=told,
+    )
+
+
+def _noise(fit: Fit, spec: ModelSpec) -> tuple[Stored, ...]:
+    """Return the noise levels of a fit of one run by name; those of the disturbances in the long run."""
+    rates = (
+        *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
+        *(spec.current_correlation_rate_per_s, 0.5, 0.5, 0.5),
+    )
+    used = fit.runs[0].levels_used()
+    return tuple(
+        Stored(name, float(np.exp(level) / np.sqrt(2.0 * rate)), None, unit)
+        for (name, unit), level, rate, there in zip(NOISE_PARAMETERS.items(), fit.levels[0], rates, used, strict=True)
+        if there
+    )
+
+
 def _as_parameter_set(
     fit: Fit,
     fitted: Fitted,
@@ -177,6 +272,7 @@ def _as_parameter_set(
         iterations=[],
         convergence={
             "converged": fit.converged,
+            "reason": fit.reason,
             "iterations": fit.iterations,
             "log_likelihood": fit.log_likelihood,
             "measurements": fit.count,
@@ -215,7 +311,7 @@ def _parameters(fit: Fit) -> tuple[Stored, ...]:
 def _warnings(step: Step, runs: VesselRuns) -> tuple[str, ...]:
     said = [f"left out: {name} ({why})" for name, why in sorted(runs.skipped.items())]
     if not step.fit.converged:
-        said.append("not converged: the iterations allowed ran out")
+        said.append(f"not converged: {step.fit.reason}")
     if not step.held:
         said.append("no manoeuvre is held out: fewer than three can be used, so the errors are in sample")
     return tuple(said)

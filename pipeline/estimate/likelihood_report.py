@@ -74,7 +74,7 @@ def report(
     movable = free(objective, theta, best.score)
     index = np.flatnonzero(movable)
     known = from_information(best.information, index)
-    fit = one_step_fit(record, trace.innovation, trace.variance)
+    fit = one_step_fit(record.measured, trace.innovation, trace.variance)
     covariance, kind, widened = known.covariance, "information", 1.0
     if not_white(fit):
         scores = objective.trace(theta, scores=True).scores.sum(axis=1)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.record.record import MEASUREMENTS, Record
+from kempf.pipeline.estimate.record.record import MEASUREMENTS
 
 #: a prediction counts when its variance is below this many times the median one
 _SETTLED = 3.0
@@ -30,12 +30,13 @@ def fit_percent(measured: Float, error: Float) -> float:
     return float(100.0 * (1.0 - np.linalg.norm(error) / spread)) if spread > 0 else float("nan")
 
 
-def one_step_fit(record: Record, innovation: Float, variance: Float) -> dict[str, Any]:
+def one_step_fit(measured: Float, innovation: Float, variance: Float) -> dict[str, Any]:
     """Summarise the innovations of the fitted model.
 
     Parameters
     ----------
-    record : Record
+    measured : ndarray, shape (n, 3)
+        What the model was fitted to.
     innovation, variance : ndarray, shape (n, 3)
         One-step prediction errors and their variances, NaN where not measured.
 
@@ -49,7 +50,7 @@ def one_step_fit(record: Record, innovation: Float, variance: Float) -> dict[str
     channels: dict[str, Any] = {}
     for i, name in enumerate(MEASUREMENTS):
         good = np.isfinite(innovation[:, i])
-        measured = int(np.count_nonzero(good))
+        made = int(np.count_nonzero(good))
         # the first predictions only carry how little was known of the initial state
         good[good] = variance[good, i] < _SETTLED * np.median(variance[good, i]) if good.any() else False
         if np.count_nonzero(good) < 3:
@@ -57,9 +58,9 @@ def one_step_fit(record: Record, innovation: Float, variance: Float) -> dict[str
         e, white = innovation[good, i], innovation[good, i] / np.sqrt(variance[good, i])
         channels[name] = {
             "rms": float(np.sqrt(np.mean(e**2))),
-            "fit_percent": fit_percent(record.measured[good, i], e),
+            "fit_percent": fit_percent(measured[good, i], e),
             "n": int(e.size),
-            "settling": measured - int(e.size),
+            "settling": made - int(e.size),
             "lag1_autocorrelation": float(np.sum(white[1:] * white[:-1]) / np.sum(white**2)),
             "inside_95_percent": float(np.mean(np.abs(white) < 1.96)),
         }

@@ -67,6 +67,8 @@ class Fit:
     linearised : tuple of Linearised
         At the end.
     converged : bool
+    reason : str
+        Why the search ended.
     iterations : int
     """
 
@@ -79,6 +81,7 @@ class Fit:
     covariance: Float
     linearised: tuple[Linearised, ...]
     converged: bool
+    reason: str
     iterations: int
 
     @property
@@ -165,6 +168,7 @@ def climb(
         covariance=covariance,
         linearised=lines,
         converged=found.converged,
+        reason=found.reason,
         iterations=len(found.passes) - 1,
     )
 

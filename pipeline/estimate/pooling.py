@@ -165,7 +165,9 @@ def _report(
     known = from_information(complement, np.arange(_HULL))
     covariance, kind = known.covariance, "information"
     traces = [m.trace(pool.own(best.theta, i), scores=True) for i, m in enumerate(pool.members)]
-    fits = [one_step_fit(m.record, t.innovation, t.variance) for m, t in zip(pool.members, traces, strict=True)]
+    fits = [
+        one_step_fit(m.record.measured, t.innovation, t.variance) for m, t in zip(pool.members, traces, strict=True)
+    ]
     if any(not_white(fit) for fit in fits):
         scores = np.concatenate([_of_the_hull(t.scores.sum(axis=1), c) for t, c in zip(traces, carried, strict=True)])
         ends = np.cumsum([0.0, *(m.record.time_s[-1] + 1.0 for m in pool.members)])

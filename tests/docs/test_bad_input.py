@@ -11,8 +11,8 @@ from tests.estimate.test_checks import REFUSED
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "bad_input.md").read_text(encoding="utf-8")
 SOURCES = [
-    (ROOT / "pipeline" / "identify" / f"{name}.py").read_text(encoding="utf-8")
-    for name in ("record", "checks", "agreement", "maximum_likelihood")
+    (ROOT / "pipeline" / "estimate" / f"{name}.py").read_text(encoding="utf-8")
+    for name in ("record/record", "record/checks", "record/agreement", "maximum_likelihood")
 ]
 CODE = re.compile(r'DataRejected\(\s*"(\w+)"(?: if \w+ else "(\w+)")?')
 

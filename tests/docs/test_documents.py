@@ -21,7 +21,7 @@ def test_links_commands_and_modules_exist(path: Path) -> None:
             assert (path.parent / link.partition("#")[0]).exists(), link
     for command in re.findall(r"(?:^\$ |`)kempf ([a-z][a-z-]+)", text, flags=re.MULTILINE):
         assert command in COMMANDS, command
-    for module in re.findall(r"python -m (benchmarks\.\w+)", text):
+    for module in re.findall(r"python -m (benchmarks(?:\.\w+)+)", text):
         assert (ROOT / (module.replace(".", "/") + ".py")).is_file(), module
     assert not re.search(r"(?<![\w.])/(?:tmp|home|work|Users)/", text)
 

@@ -13,7 +13,7 @@ SETTINGS = yaml.safe_load((ROOT / "prefect.yaml").read_text(encoding="utf-8"))
 
 def flows() -> dict[str, list[str]]:
     """Return the parameters of every flow in flows/fleet/flows.py by the flow's name, without importing Prefect."""
-    tree = ast.parse((ROOT / "flows" / "fleet.py").read_text(encoding="utf-8"))
+    tree = ast.parse((ROOT / "flows" / "fleet" / "flows.py").read_text(encoding="utf-8"))
     found = {}
     for node in tree.body:
         if isinstance(node, ast.FunctionDef) and any("flow" in ast.unparse(d) for d in node.decorator_list):
@@ -41,7 +41,7 @@ def test_the_page_names_the_pool_the_schedules_and_the_artifacts() -> None:
     crons = [[s["cron"] for s in deployment["schedules"]] for deployment in SETTINGS["deployments"]]
     assert crons == [["0 2 * * *"], ["0 4 * * 0"]]
     assert "02:00 UTC every night" in TEXT and "04:00 UTC every Sunday" in TEXT
-    source = (ROOT / "flows" / "fleet.py").read_text(encoding="utf-8")
+    source = (ROOT / "flows" / "fleet" / "flows.py").read_text(encoding="utf-8")
     keys = re.findall(r'create_table_artifact\(key="([\w-]+)"', source)
     assert sorted(keys) == ["kempf-diagnose", "kempf-identify", "kempf-ingest", "kempf-reprocess"]
     for key in keys:

@@ -207,6 +207,7 @@ def test_the_fleet_is_diagnosed_as_a_flow(own: Warehouse, monkeypatch: pytest.Mo
 
     few = {name: effects.catalogue()[name] for name in ("rudder_lag", "cross_flow_drag")}
     monkeypatch.setattr(effects, "catalogue", lambda: few)
+    before = {name: aliases.of_vessel(own, name) for name in FLEET}
     rows = diagnose(own.uri)
     # one manoeuvre each: nothing can be held against another
     assert [(row["vessel"], row["verdict"], row["effects"]) for row in rows] == [

@@ -191,8 +191,10 @@ def test_a_model_from_a_file(tmp_path: Path):
     path = tmp_path / "model.yaml"
     path.write_text("name: stream\ncurrent: lateral\n")
     assert read_model(path) == ModelSpec(name="stream", current="lateral")
-    path.write_text("effects: [sails]\n")
-    with pytest.raises(UsageError, match="sails"):
+    path.write_text("effects: [rudder_lag]\n")
+    assert read_model(path).effects == ("rudder_lag",)
+    path.write_text("base: guesswork\n")
+    with pytest.raises(UsageError, match="guesswork"):
         read_model(path)
 
 

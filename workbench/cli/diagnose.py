@@ -53,8 +53,9 @@ def command(
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
 
     warehouse = Warehouse(uri)
-    spec, own = chosen_model(warehouse, vessel, set_id, model)
-    own = own.beside(Own(files=read_effect_files(files)))
+    mine = Own(files=read_effect_files(files))
+    spec, own = chosen_model(warehouse, vessel, set_id, model, mine)
+    own = own.beside(mine)
     with progress() as tell:
         found, _ = diagnose_vessel(warehouse, vessel, spec, own, progress=tell)
     if as_json:

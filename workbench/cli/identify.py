@@ -23,26 +23,33 @@ if TYPE_CHECKING:
 
 @click.command("identify")
 @vessel_option(required=True)
-@click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Model specification in YAML.")
+@click.option("--model", metavar="FILE|ID", help="Model file, YAML, or a parameter set whose model it is.")
+@click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+              help="An effect of your own that the model file names, YAML. May be repeated.")  # fmt: skip
 @click.option("--estimator", type=click.Choice(NAMES), default="ml", show_default=True, help="How it is estimated.")
 @warehouse_option
 @json_option
-def command(vessel: str, model: Path | None, estimator: str, uri: str, as_json: bool) -> None:
+def command(vessel: str, model: str | None, files: tuple[Path, ...], estimator: str, uri: str, as_json: bool) -> None:
     """Identify a model from every zigzag of a vessel and store it as a parameter set.
 
-    Maximum likelihood also identifies one hull from all of them together, and tests whether they may be pooled.
+    Maximum likelihood also identifies one hull from all of them together. A model file may name effects; they are
+    estimated with the hull, from each zigzag and from all of them.
 
     What was identified before from the same inputs, with the same code and settings, is not computed again.
     """
-    from kempf.flows.jobs.files import read_model
     from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+    from kempf.flows.jobs.standing_model import Own
     from kempf.schemas.model_spec import ModelSpec
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.chosen_model import named_model, read_effect_files
 
-    request = Request(read_model(model) if model else ModelSpec(), estimator)
+    warehouse = Warehouse(uri)
+    mine = Own(files=read_effect_files(files))
+    spec, own = named_model(warehouse, vessel, model, mine) if model else (ModelSpec(), Own())
+    request = Request(spec, estimator, own=own.beside(mine))
     with progress() as tell:
-        outcomes = identify_vessel(Warehouse(uri), vessel, request, progress=tell)
-        pooled = _pooled(Warehouse(uri), vessel, request, outcomes, tell)
+        outcomes = identify_vessel(warehouse, vessel, request, progress=tell)
+        pooled = _pooled(warehouse, vessel, request, outcomes, tell)
     if as_json:
         print_json([*(_show(outcome) for outcome in outcomes), *([pooled.show()] if pooled else [])])
     else:

@@ -48,8 +48,9 @@ def command(
     path = _called_after(vessel) if output is None else output
     require_new(path, "--output")
     warehouse = Warehouse(uri)
-    spec, own = chosen_model(warehouse, vessel, set_id, model)
-    own = own.beside(Own(files=read_effect_files(files)))
+    mine = Own(files=read_effect_files(files))
+    spec, own = chosen_model(warehouse, vessel, set_id, model, mine)
+    own = own.beside(mine)
     with progress() as tell:
         found = made(warehouse, vessel, spec, own, tell)
     write_new(path, found.html, "--output")

@@ -1,0 +1,91 @@
+"""Models with effects through `kempf identify`: each zigzag, all of them, over time; and one error of a model everywhere."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from benchmarks.diagnose import late_rudder
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.warehouse import aliases
+from kempf.warehouse.store import Warehouse
+from tests.flows.content import fresh
+from tests.workbench.driving import kempf, refused
+
+VESSEL = late_rudder.VESSEL
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("late")
+    late_rudder.write(folder)
+    warehouse = fresh(folder / "w")
+    ingest(warehouse, [folder / "day.mcap"], given=read_profiles([folder / "late.yaml"]))
+    (folder / "lag.yaml").write_text("name: plain\neffects: [rudder_lag]\nrate_bias: false\n", encoding="utf-8")
+    return folder
+
+
+def run(place: Path, *arguments: object) -> Any:
+    ran = kempf(*arguments, "--warehouse", place / "w", "--json")
+    assert ran.code == 0, ran
+    return ran.json
+
+
+@pytest.fixture(scope="module")
+def identified(place: Path) -> list[dict[str, Any]]:
+    return list(run(place, "identify", "--vessel", VESSEL, "--model", place / "lag.yaml"))
+
+
+def test_each_zigzag_and_all_of_them_know_the_lag(place: Path, identified: list[dict[str, Any]]) -> None:
+    assert [one["estimator"] for one in identified] == ["ml", "ml", "ml", "ml-effects"]
+    for one in identified:
+        lag = one["parameters"]["rudder_lag.tau"]
+        assert lag["unit"] == "s" and abs(lag["value"] - late_rudder.LAG_S) < 4.0 * lag["std"], one["parameter_set_id"]
+        assert one["fit"]
+    single = identified[0]
+    assert set(single["noise"]) >= {"sigma_F", "sigma_v", "sigma_r", "sigma_psi"}
+    assert single["fit"]["channels"]["yaw_rate"]["fit_percent"] > 90.0
+    pooled = identified[-1]["parameter_set_id"]
+    warehouse = Warehouse(str(place / "w"))
+    assert aliases.of_vessel(warehouse, VESSEL) == {"current": pooled}
+    assert [r["parameter_set_id"] for r in run(place, "ladder", "--vessel", VESSEL)][-1] == pooled
+    for one in (single, identified[-1]):
+        assert rerun(warehouse, one["parameter_set_id"]).verdict == "bit-identical"
+
+
+def test_the_history_follows_a_ship_whose_model_has_effects(place: Path, identified: list[dict[str, Any]]) -> None:
+    changes = run(place, "history", "--vessel", VESSEL, "--changes")["changes"]
+    followed = {(one["model"], one["estimator"]): one for one in changes}["plain + rudder_lag", "ml"]
+    assert followed["parameter_set_ids"] == [one["parameter_set_id"] for one in identified[:-1]]
+
+
+def test_a_set_names_its_model_and_plain_identification_leaves_current_where_it_is(
+    place: Path, identified: list[dict[str, Any]]
+) -> None:
+    pooled = identified[-1]["parameter_set_id"]
+    again = run(place, "identify", "--vessel", VESSEL, "--model", pooled[:12])
+    assert [one["parameter_set_id"] for one in again] == [one["parameter_set_id"] for one in identified]
+    run(place, "identify", "--vessel", VESSEL)
+    warehouse = Warehouse(str(place / "w"))
+    assert aliases.of_vessel(warehouse, VESSEL) == {"current": pooled}
+    report = reprocess_vessel(warehouse, VESSEL)
+    assert (report.status, report.new_sets) == ("unchanged", 0)
+    assert aliases.of_vessel(warehouse, VESSEL) == {"current": pooled}
+
+
+def test_one_error_of_a_model(place: Path, identified: list[dict[str, Any]]) -> None:
+    rung = run(place, "ladder", "--vessel", VESSEL)[-1]
+    compared = run(place, "compare", "--vessel", VESSEL)
+    told = {sample: one["free_run_error_percent"]["mean"] for sample, one in compared["summary"].items() if one}
+    assert told == {"fitted": 100.0 * rung["in_sample_error"], "held_out": 100.0 * rung["held_out_error"]}
+    assert compared["judged"] == {"sample": "held_out", "free_run_error_percent": 100.0 * rung["held_out_error"]}
+
+
+def test_an_estimator_that_knows_no_effects_refuses_the_model(place: Path) -> None:
+    arguments = ("identify", "--vessel", VESSEL, "--model", place / "lag.yaml", "--estimator", "paper")
+    refused(kempf(*arguments, "--warehouse", place / "w", "--json"), 2, "effects_need_ml")
