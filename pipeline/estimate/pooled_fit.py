@@ -140,7 +140,7 @@ def climb(
 ) -> Fit:
     """Climb to the maximum by damped Fisher scoring; given up where the log-likelihood ``wanted`` is out of reach."""
     model = filtered[0].model
-    layout = _Layout(filtered, workers)
+    layout = CommonLikelihood(filtered, workers)
     # a number that happens to lie near 0 may grow to the size that it has in other ships
     least = 0.05 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
     begin = np.where(np.abs(hull) < least, np.copysign(least, hull), hull)
@@ -173,8 +173,8 @@ def climb(
     )
 
 
-class _Layout:
-    """Where everything stands in the common vector: hull, effects, then six levels a run; and its log-likelihood."""
+class CommonLikelihood:
+    """The log-likelihood of several runs over one vector: hull, effects in units of their steps, six levels a run."""
 
     def __init__(self, filtered: Sequence[Filtered], workers: Executor) -> None:
         self.filtered, self.workers, self.model = filtered, workers, filtered[0].model

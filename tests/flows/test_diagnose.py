@@ -150,7 +150,7 @@ def test_a_model_with_effects_is_a_parameter_set_like_any_other(late: Late, told
     assert late.kempf("params", "show", name).code == 0 and late.kempf("params", "diff", plain_set, name).code == 0
     assert late.kempf("params", "steering", name).code == 0
     rows = late.json("history", "--vessel", VESSEL)
-    assert {row["current"] for row in rows} == {"plain", "plain + rudder_lag"}
+    assert {row["model"] for row in rows} == {"plain", "plain + rudder_lag"}
     # sets of all runs at once are no points in time
     changes = late.json("history", "--vessel", VESSEL, "--changes")["changes"]
     assert all(one["parameter_set_ids"] == [] for one in changes)
