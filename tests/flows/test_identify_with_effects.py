@@ -1,4 +1,4 @@
-"""Models with effects through `kempf identify`: each zigzag, all of them, over time; one error of a model everywhere."""
+"""Models with effects through `kempf identify`: each zigzag, all of them, over time; and one error of a model."""
 
 from __future__ import annotations
 
