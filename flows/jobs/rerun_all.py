@@ -15,7 +15,7 @@ from os import cpu_count
 from typing import Any
 
 from kempf.flows.fleet.state import responsible_code
-from kempf.flows.jobs.rerun_set import Rerun, inputs_of, judged, raw_inputs, rebuilt
+from kempf.flows.jobs.rerun_set import Rerun, code_changed, inputs_of, judged, raw_inputs, rebuilt
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import as_told
 from kempf.schemas.errors import KempfError
@@ -206,8 +206,7 @@ def _verdict(one: ParameterSet, result: Rerun) -> Verdict:
 
 
 def _failed(one: ParameterSet, error: KempfError) -> Verdict:
-    changed = inputs_of(one).code_version != code_version.fingerprint()
-    return Verdict(one.vessel, one.parameter_set_id, FAILED, changed, error=error)
+    return Verdict(one.vessel, one.parameter_set_id, FAILED, code_changed(inputs_of(one)), error=error)
 
 
 def _run_id(parameter_set_id: str, tolerance: float) -> str:

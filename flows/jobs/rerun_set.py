@@ -9,7 +9,7 @@ from typing import Any
 from kempf.flows.jobs.identify_vessel import build
 from kempf.flows.jobs.pool_vessel import POOLED, build_pooled
 from kempf.flows.jobs.spool import spooled
-from kempf.flows.jobs.standing_model import ESTIMATOR
+from kempf.flows.jobs.standing_model import ESTIMATOR, Own, known_effects
 from kempf.flows.jobs.vessel_model import build_model
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.schemas.profile import VesselProfile
@@ -32,7 +32,7 @@ class Rerun:
     differences : list of Difference
         Fields that differ.
     code_changed, packages_changed : bool, dict
-        Whether the code, and which packages, are others than when the set was made.
+        Whether the code or an effect, and which packages, are others than when the set was made.
     """
 
     parameter_set_id: str
@@ -153,8 +153,15 @@ def judged(stored: ParameterSet, again: ParameterSet, tolerance: float = 1e-9) -
     verdict, differences = agreement.verdict(stored, again, tolerance)
     now, then = code_version.packages(), dict(stored.provenance.get("packages") or {})
     changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}
-    other_code = inputs_of(stored).code_version != code_version.fingerprint()
-    return Rerun(stored.parameter_set_id, verdict, differences, other_code, changed)
+    return Rerun(stored.parameter_set_id, verdict, differences, code_changed(inputs_of(stored)), changed)
+
+
+def code_changed(inputs: Inputs) -> bool:
+    """Return whether the code, or what an effect of the model computes, is another than when a set was made."""
+    then = inputs.settings.get("effects", {})
+    now = known_effects(Own.from_json(inputs.settings.get("own") or {})) if then else {}
+    changed = any(name not in now or now[name].sha256 != hashed for name, hashed in then.items())
+    return changed or inputs.code_version != code_version.fingerprint()
 
 
 def inputs_of(stored: ParameterSet) -> Inputs:

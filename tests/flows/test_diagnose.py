@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +18,7 @@ from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.rerun_set import code_changed, inputs_of, rerun
 from kempf.flows.jobs.standing_model import PLAIN
 from kempf.schemas import effects
 from kempf.warehouse import aliases, parameter_sets
@@ -123,7 +123,10 @@ def test_an_effect_is_added_gone_back_from_and_built_again(late: Late, told: dic
     assert stored.parent == told["parameter_set_id"] and stored.estimator == "ml-effects"
     assert len(stored.parameters) == 7 and len(stored.covariance) == 7
     assert aliases.of_vessel(late.warehouse, VESSEL)["current"] == stored.parameter_set_id
-    assert rerun(late.warehouse, stored.parameter_set_id).verdict == "bit-identical"
+    again = rerun(late.warehouse, stored.parameter_set_id)
+    assert again.verdict == "bit-identical" and not again.code_changed
+    inputs = inputs_of(stored)
+    assert code_changed(replace(inputs, settings={**inputs.settings, "effects": {"rudder_lag": "another"}}))
     rungs = late.json("ladder", "--vessel", VESSEL)
     assert [one["parameter_set_id"] for one in rungs] == [stored.parent, stored.parameter_set_id]
     refused(late.kempf("effects", "add", "rudder_lag", "--vessel", VESSEL, "--json"), 2, "effect_there")
