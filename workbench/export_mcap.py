@@ -16,7 +16,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import SECOND_NS, Float
 from kempf.pipeline.compare.comparison import ComparedRun
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.compare.run_series import first_heading, instants_utc_ns
 from kempf.pipeline.predict.linear_ahead import WIDTH_95
 from kempf.pipeline.predict.prediction import Predicted
 
@@ -119,7 +119,7 @@ def _schema(topic: _Topic) -> bytes:
 
 def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
     taken = run.looked.filtered.run
-    instant = taken.start_utc_ns + np.round(taken.time_s * SECOND_NS).astype(np.int64)
+    instant = instants_utc_ns(taken)
     begins = _Topic(
         "/run",
         "run",
@@ -128,7 +128,7 @@ def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
     for event, at in (("begin", instant[0]), ("end", instant[-1])):
         yield begins, int(at), {"event": event, "segment_id": run.name, "held_out": run.held_out}
     for name, (column, unit, factor) in _CHANNELS.items():
-        zero = factor * _first_heading(taken) if name == "heading" else 0.0
+        zero = factor * first_heading(taken) if name == "heading" else 0.0
         # a prediction is made for the moment of its measurement, a little off the grid's instant
         late = instant + np.round(taken.offset_s[:, column] * SECOND_NS).astype(np.int64)
         words = f"{name.replace('_', ' ')}, {_WORDS[unit]}"
@@ -147,12 +147,6 @@ def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
         instant,
         {"speed_through_water_m_s": taken.speed_m_s},
     )
-
-
-def _first_heading(run: Run) -> float:
-    """Return the true heading, rad, that the measured one is counted from."""
-    known = np.isfinite(run.measured[:, 2])
-    return float(np.median(run.heading_rad[known] - run.measured[known, 2])) if known.any() else 0.0
 
 
 def _predicted(

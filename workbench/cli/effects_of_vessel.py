@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
@@ -12,14 +12,6 @@ from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.ladder import tell_rungs
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
-
-if TYPE_CHECKING:
-    from kempf.flows.jobs.chosen_manoeuvres import Chosen
-    from kempf.flows.jobs.standing_model import Own
-    from kempf.flows.process.progress import Progress
-    from kempf.schemas.model_spec import ModelSpec
-    from kempf.warehouse.parameter_set import ParameterSet
-    from kempf.warehouse.store import Warehouse
 
 
 @click.command("try")
@@ -88,8 +80,8 @@ def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
 @json_option
 def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str, as_json: bool) -> None:
     """Add an effect to the model that a vessel stands at, refit, and show the error before and after."""
-    from kempf.flows.jobs.chosen_manoeuvres import choose
-    from kempf.flows.jobs.standing_model import Own, point, rungs_to, standing_model, stored_model
+    from kempf.flows.jobs.add_effect import add_effect
+    from kempf.flows.jobs.standing_model import Own, rungs_to
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import read_effect_files
 
@@ -100,20 +92,9 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
         raise UsageError(
             "effect_name", f"{path} holds the effect {next(iter(mine.files))!r}, not {name!r}.", "Name it as it is."
         )
-    if formula is None and path is None:
-        _require_known(name)
     warehouse = Warehouse(uri)
-    spec, own = standing_model(warehouse, vessel)
-    if name in spec.effects:
-        raise UsageError(
-            "effect_there", f"The model of {vessel!r} holds {name!r} already.", f"See `kempf ladder --vessel {vessel}`."
-        )
-    own = own.beside(mine)
-    wanted = spec.model_copy(update={"effects": (*spec.effects, name)})
     with progress() as tell:
-        chosen = choose(warehouse, vessel, tell)
-        made = stored_model(warehouse, chosen, wanted, own) or _fitted(warehouse, chosen, wanted, own, tell)
-    point(warehouse, made)
+        made = add_effect(warehouse, vessel, name, mine, tell)
     rungs = rungs_to(warehouse, made)
     if as_json:
         print_json({"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": made.show()})
@@ -123,19 +104,6 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
     for warning in made.warnings:
         click.echo(f"  {warning}")
     click.echo(f"next: kempf ladder --vessel {vessel}, kempf effects undo --vessel {vessel}")
-
-
-def _fitted(warehouse: Warehouse, chosen: Chosen, wanted: ModelSpec, own: Own, tell: Progress) -> ParameterSet:
-    """Fit a model that is not stored yet, and store it; only this needs the estimators."""
-    from kempf.flows.jobs.vessel_model import store_model
-
-    return store_model(warehouse, chosen, wanted, own, tell)[0]
-
-
-def _require_known(name: str) -> None:
-    from kempf.schemas.effects import get
-
-    get(name)
 
 
 def _tell_runs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:

@@ -20,18 +20,10 @@ def command() -> None:
 @json_option
 def list_vessels(uri: str, as_json: bool) -> None:
     """List the vessels with their logs, zigzags and parameter sets."""
-    from kempf.warehouse import logs, parameter_sets, segments, vessels
     from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.vessel_counts import vessel_counts
 
-    warehouse = Warehouse(uri)
-    warehouse.require()
-    held = [row.vessel for row in logs.current(warehouse)]
-    found = [segment.vessel for segment in segments.current(warehouse)]
-    sets = parameter_sets.summaries(warehouse)["vessel"].to_list()
-    listed = [
-        {"vessel": name, "logs": held.count(name), "segments": found.count(name), "parameter_sets": sets.count(name)}
-        for name in vessels.names(warehouse)
-    ]
+    listed = vessel_counts(Warehouse(uri))
     if as_json:
         print_json(listed)
         return
