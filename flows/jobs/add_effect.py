@@ -38,7 +38,7 @@ def add_effect(
     NotFound
         ``effect_unknown``, ``no_vessel``, ``no_segments``, ``no_runs``.
     UsageError
-        ``effect_there``.
+        ``effect_there``, ``effect_name``.
     """
     named((name,), known_effects(own))
     spec, before = standing_model(warehouse, vessel)
@@ -47,7 +47,8 @@ def add_effect(
             "effect_there", f"The model of {vessel!r} holds {name!r} already.", f"See `kempf ladder --vessel {vessel}`."
         )
     wanted = spec.model_copy(update={"effects": (*spec.effects, name)})
-    chosen, both = choose(warehouse, vessel, progress), before.beside(own)
+    both = before.beside(own)
+    chosen = choose(warehouse, vessel, progress)
     made = stored_model(warehouse, chosen, wanted, both)
     if made is None:
         # only a fit needs the estimators, which take a while to load
