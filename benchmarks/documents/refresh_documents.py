@@ -12,27 +12,32 @@ import sys
 import tempfile
 from pathlib import Path
 
-from tests.docs.console import Command, Names, Shell, learn, renewed, steps
+from tests.docs.console import Command, Names, learn, renewed, sessions_in, steps
 
 README = Path(__file__).parents[2] / "README.md"
 
 
 def refreshed(text: str, folder: Path) -> str:
     """Return a document with the outputs that its commands have in ``folder``."""
-    lines, names, shell = text.splitlines(), Names(), Shell(folder)
+    lines, names, sessions = text.splitlines(), Names(), sessions_in(folder)
     edits: list[tuple[int, int, list[str]]] = []
     try:
+        sessions["console"].run(f"export PYTHONPATH='{README.parent}'")
         for step in steps(text):
             if not isinstance(step, Command):
                 (folder / step.name).write_text(step.content, encoding="utf-8")
                 continue
             command = names.resolved(step.line)
-            found, code = shell.run(command)
-            print(f"{code} $ {command}")
+            found, code = sessions[step.kind].run(command)
+            typed = step.typed(command)
+            print(*typed, sep="\n")
+            if code:
+                raise SystemExit("\n".join(found))
             learn(step.shown, found, names)
-            edits.append((step.first - 1, step.last, [f"$ {command}", *renewed(step, found)]))
+            edits.append((step.first - len(typed), step.last, [*typed, *renewed(step, found)]))
     finally:
-        shell.close()
+        for session in sessions.values():
+            session.close()
     for first, last, new in reversed(edits):
         lines[first:last] = new
     return "\n".join(lines) + "\n"

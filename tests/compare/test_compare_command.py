@@ -13,7 +13,7 @@ import pytest
 from kempf.warehouse import aliases, parameter_sets, segments
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
-from kempf.workbench import notebook
+from kempf.workbench.notebook.warehouse_view import open_warehouse
 from tests.conftest import Ship
 from tests.workbench.driving import kempf, refused, tree
 
@@ -193,7 +193,7 @@ def test_a_figure_and_the_view_of_a_notebook(place: Path, tmp_path: Path) -> Non
     assert done.code == 0
     data = (tmp_path / "f.png").read_bytes()
     assert data.startswith(b"\x89PNG") and len(data) > 20_000
-    view = notebook.compare(str(place), "mariner", horizon="10s")
+    view = open_warehouse(place).vessel("mariner").compare(horizon="10s")
     page = view._repr_html_()
     assert page == view._repr_html_()
     assert re.findall(r"(?:src|href)=\"(.{15})", page) == ["data:image/png;"]

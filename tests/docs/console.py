@@ -1,9 +1,9 @@
 """Runs what a document shows: its console blocks in one shell and one folder, command after command.
 
 A block whose fence says ``console`` holds commands behind ``$ `` and the output under each; a line ``...`` stands for
-lines left out. A block whose first line is a comment with a file's name, such as ``# ship.yaml``, is that file. Ids and
-hashes hang on the code and are names here: the same one must stand for the same thing all through the document, also in
-the commands.
+lines left out. One that says ``pycon`` holds Python behind ``>>> ``, with further lines of it behind ``... ``. A block
+whose first line is a comment with a file's name, such as ``# ship.yaml``, is that file. Ids and hashes hang on the code
+and are names here: the same one must stand for the same thing all through the document, also in the commands.
 """
 
 from __future__ import annotations
@@ -14,9 +14,14 @@ import secrets
 import subprocess
 import sys
 from dataclasses import dataclass, field
+from itertools import takewhile
 from pathlib import Path
 
+from tests.docs.python_session import PythonSession
+
 _FENCE = re.compile(r"^```(\w*)\s*$")
+_PROMPTS = {"console": "$ ", "pycon": ">>> "}
+_GOES_ON = "... "
 _FILE = re.compile(r"^# ([\w-]+\.\w+)$")
 _LEFT_OUT = "..."
 
@@ -32,16 +37,23 @@ class Command:
     Attributes
     ----------
     line : str
-        What stands behind ``$ ``.
+        What stands behind ``$ ``; of Python it may be several.
     shown : tuple of str
     first, last : int
         The shown output is ``lines[first:last]`` of the document.
+    kind : {"console", "pycon"}
     """
 
     line: str
     shown: tuple[str, ...]
     first: int
     last: int
+    kind: str = "console"
+
+    def typed(self, line: str) -> list[str]:
+        """Return a command as the document shows it, behind its prompts."""
+        begin, *more = line.split("\n")
+        return [_PROMPTS[self.kind] + begin, *(_GOES_ON + part for part in more)]
 
 
 @dataclass(frozen=True)
@@ -75,11 +87,14 @@ def steps(text: str) -> list[Command | File]:
         named = _FILE.match(lines[0]) if lines else None
         if named:
             found.append(File(named[1], "\n".join(lines) + "\n"))
-        elif kind == "console":
-            begins = [k for k, line in enumerate(lines) if line.startswith("$ ")]
+        elif kind in _PROMPTS:
+            prompt = _PROMPTS[kind]
+            begins = [k for k, line in enumerate(lines) if line.startswith(prompt)]
             for begin, end in zip(begins, [*begins[1:], len(lines)], strict=True):
-                shown = tuple(lines[begin + 1 : end])
-                found.append(Command(lines[begin][2:], shown, first + begin + 1, first + end))
+                more = list(takewhile(lambda text: text.startswith(_GOES_ON), lines[begin + 1 : end]))
+                line = "\n".join([lines[begin].removeprefix(prompt), *(part.removeprefix(_GOES_ON) for part in more)])
+                output = begin + 1 + len(more)
+                found.append(Command(line, tuple(lines[output:end]), first + output, first + end, kind))
     return found
 
 
@@ -141,22 +156,29 @@ def follow(text: str, folder: Path, *before: str) -> int:
     int
         Commands of the document.
     """
-    names, shell, commands = Names(), Shell(folder), 0
+    names, commands = Names(), 0
+    sessions = sessions_in(folder)
     try:
         for line in before:
-            shell.run(line)
+            sessions["console"].run(line)
         for step in steps(text):
             if isinstance(step, File):
                 (folder / step.name).write_text(step.content, encoding="utf-8")
                 continue
             commands += 1
-            found, code = shell.run(names.resolved(step.line))
+            found, code = sessions[step.kind].run(names.resolved(step.line))
             assert code == 0, (step.line, found)
             told = difference(step.shown, found, names)
-            assert told is None, f"$ {step.line}\n{told}\nmend it with python -m benchmarks.documents.refresh_documents"
+            assert told is None, f"{step.line}\n{told}\nmend it with python -m benchmarks.documents.refresh_documents"
     finally:
-        shell.close()
+        for session in sessions.values():
+            session.close()
     return commands
+
+
+def sessions_in(folder: Path) -> dict[str, Shell | PythonSession]:
+    """Return what runs the commands of a document, by the kind of its blocks."""
+    return {"console": Shell(folder), "pycon": PythonSession(folder)}
 
 
 def difference(shown: tuple[str, ...], found: list[str], names: Names) -> str | None:
