@@ -5,7 +5,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import polars as pl
@@ -56,8 +55,8 @@ class VesselView:
 
         Parameters
         ----------
-        model : path, optional
-            Model specification in YAML.
+        model : path or str, optional
+            Model specification in YAML, or a parameter set whose model it is, by id or alias.
         estimator : str, optional
             See `kempf.pipeline.estimate.names.NAMES`.
 
@@ -72,12 +71,15 @@ class VesselView:
         KempfError
             No zigzag could be identified from, or there is none.
         """
-        from kempf.flows.jobs.files import read_model
         from kempf.flows.jobs.identify_vessel import Request, identify_vessel
         from kempf.flows.jobs.pool_vessel import pool_vessel
+        from kempf.flows.jobs.standing_model import Own
         from kempf.schemas.model_spec import ModelSpec
+        from kempf.workbench.chosen_model import named_model
 
-        request = Request(read_model(Path(model)) if model is not None else ModelSpec(), estimator)
+        name = None if model is None else os.fspath(model)
+        spec, own = named_model(self.warehouse, self.name, name) if name else (ModelSpec(), Own())
+        request = Request(spec, estimator, own=own)
         outcomes = identify_vessel(self.warehouse, self.name, request)
         failed = [outcome.error for outcome in outcomes if outcome.error is not None]
         if len(failed) == len(outcomes):
@@ -102,7 +104,7 @@ class VesselView:
         Parameters
         ----------
         set_id : str, optional
-            Parameter set; by default her current one.
+            Parameter set, by id or alias; by default her current one.
         horizon : str, optional
             ``1`` (one step), a time such as ``10s`` or ``60s``, or ``free``.
 
