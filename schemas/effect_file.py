@@ -10,27 +10,13 @@ from pydantic import ValidationError
 
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
+from kempf.schemas.unique_keys import require_unique_keys
 
 _LONGEST = 50_000
 _DEEPEST = 20
 #: libyaml's, ten times as fast, where PyYAML was built with it
 _Safe: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _NEXT = "Correct it; docs/effects.md shows an effect file that works."
-
-
-class _Loader(_Safe):  # type: ignore[misc]
-    """Refuses a key that is written twice, where YAML would take the last."""
-
-    def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        """Return the mapping of a node."""
-        lines: dict[str, int] = {}
-        for key, _ in node.value:
-            line = key.start_mark.line + 1
-            if str(key.value) in lines:
-                raise ValueError(f"{key.value!r} is written twice, in lines {lines[key.value]} and {line}")
-            lines[str(key.value)] = line
-        made: dict[Any, Any] = super().construct_mapping(node, deep)
-        return made
 
 
 def read(text: str, where: str) -> Effect:
@@ -83,7 +69,10 @@ def _content(text: str, where: str) -> dict[str, Any]:
         raise invalid(where, f"it is {len(text)} characters long, {_LONGEST} is the most")
     try:
         _check_shape(text)
-        content = yaml.load(text, Loader=_Loader)  # noqa: S506 - made of a safe loader
+        loader = _Safe(text)
+        root = loader.get_single_node()
+        require_unique_keys(root)
+        content = None if root is None else loader.construct_document(root)
     except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError, TypeError) as error:
         raise invalid(where, f"it is not valid YAML: {' '.join(str(error).split())[:300]}") from error
     if not isinstance(content, dict):

@@ -17,7 +17,8 @@ def tell_set(one: ParameterSet, title: str) -> None:
     rows = [[p.name, number(p.value), number(p.std, 2), p.unit] for p in (*one.parameters, *one.noise)]
     print_table(["", "value", "std", "unit"], rows, title)
     converged = one.convergence.get("converged")
-    click.echo(f"  {'converged' if converged else 'NOT CONVERGED'}: {one.convergence.get('reason')}")
+    reason = one.convergence.get("reason")
+    click.echo(f"  {'converged' if converged else 'NOT CONVERGED'}" + (f": {reason}" if reason else ""))
     for name, fit in dict(one.fit.get("channels", {})).items():
         click.echo(
             f"  {name}: fit {fit['fit_percent']:.1f} % one step ahead, in sample; "

@@ -16,6 +16,7 @@ from kempf.schemas import profile as profiles
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
+from kempf.schemas.unique_keys import require_unique_keys
 
 #: Keys and values in a file that a person wrote; a few hundred bytes of nested aliases can stand for billions.
 _MOST_NODES = 100_000
@@ -121,21 +122,22 @@ def read_yaml(path: Path, what: str) -> Any:
     Raises
     ------
     UsageError
-        ``not_yaml``: it is no YAML; the place is named. ``yaml_too_large``: its aliases stand for more than a person
-        writes.
+        ``not_yaml``: it is no YAML, or has a key twice; the place is named. ``yaml_too_large``: its aliases stand for
+        more than a person writes.
     """
     data = read_bytes(path, what)
     try:
         loader = _Loader(data)
         root = loader.get_single_node()
         too_large = root is not None and _written_out(root, {}) > _MOST_NODES
+        require_unique_keys(root)
         content = None if root is None or too_large else loader.construct_document(root)
     except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError) as error:
         told = " ".join(str(error).split())
         raise UsageError(
             "not_yaml",
             f"The {what} {path} is not valid YAML: {told}.",
-            "Mend the line it names.",
+            "Correct the line it names.",
             {"path": str(path)},
         ) from error
     except RecursionError as error:

@@ -141,6 +141,8 @@ def test_a_time_that_is_none(filled: Path, time: str):
         ("vessel: !!python/object/apply:os.system ['touch gotcha']", "not_yaml", "python/object"),
         ("vessel: !!python/name:os.system", "not_yaml", "python/name"),
         ("!!python/object/new:os.system [touch gotcha]", "not_yaml", "python/object"),
+        ("vessel: x\nlength_m: 5\nvessel: y\n", "not_yaml", "'vessel' is written twice, in lines 1 and 3"),
+        ("antenna:\n  up_m: 1\n  up_m: 2\n", "not_yaml", "'up_m' is written twice, in lines 2 and 3"),
         (BOMB, "yaml_too_large", "100000"),
         (MERGE_BOMB, "yaml_too_large", "100000"),
         ("a: &a [*a]", "yaml_too_large", "100000"),
@@ -220,6 +222,7 @@ def test_nobody_says_whose_the_log_is(logs: Path, tmp_path: Path):
         ("effects: [sails]", "model_unknown", "sails"),
         ("base: guesswork", "model_unknown", "guesswork"),
         ("name: [", "not_yaml", "line 1"),
+        ("name: x\nname: y\n", "not_yaml", "'name' is written twice, in lines 1 and 2"),
         (BOMB, "yaml_too_large", "100000"),
     ],
 )

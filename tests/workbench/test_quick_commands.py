@@ -80,14 +80,12 @@ def test_one_set_is_shown_without_an_engine(modelled: Path):
 
 def test_an_effect_is_undone_and_added_again_from_what_is_stored(modelled: Path):
     assert loaded_by("effects", "undo", *OF, "--warehouse", modelled) & ENGINES == set()
-    loaded = loaded_by("effects", "add", EFFECT, *OF, "--warehouse", modelled)
-    assert loaded & {"prefect", "matplotlib", "jinja2"} == set()
+    assert loaded_by("effects", "add", EFFECT, *OF, "--warehouse", modelled) & ENGINES == set()
 
 
 @pytest.mark.parametrize("arguments", [("list",), ("show", EFFECT), ("show", "--symbols")])
 def test_the_catalogue_is_shown_without_a_table(arguments: tuple[str, ...]):
-    loaded = loaded_by("effects", *arguments)
-    assert loaded & {"prefect", "matplotlib", "jinja2", "polars", "pyarrow", "deltalake"} == set()
+    assert loaded_by("effects", *arguments) & (ENGINES | {"polars", "pyarrow", "deltalake"}) == set()
 
 
 @pytest.mark.parametrize("name", COMMANDS)
