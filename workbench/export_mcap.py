@@ -10,11 +10,13 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import chain
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.compare.comparison import ComparedRun
 from kempf.pipeline.compare.run_series import first_heading, instants_utc_ns
 from kempf.pipeline.predict.linear_ahead import WIDTH_95
@@ -35,6 +37,7 @@ _WORDS = {
     "deg_s": "deg/s",
     "deg": "deg",
 }
+NOWHERE: Mapping[str, tuple[Series, Series]] = MappingProxyType({})
 
 
 if TYPE_CHECKING:
@@ -50,7 +53,9 @@ class _Topic:
     properties: Mapping[str, str]
 
 
-def to_mcap(runs: Sequence[ComparedRun], about: Mapping[str, str]) -> bytes:
+def to_mcap(
+    runs: Sequence[ComparedRun], about: Mapping[str, str], positions: Mapping[str, tuple[Series, Series]] = NOWHERE
+) -> bytes:
     """Return runs as an MCAP file.
 
     Parameters
@@ -58,14 +63,18 @@ def to_mcap(runs: Sequence[ComparedRun], about: Mapping[str, str]) -> bytes:
     runs : sequence of ComparedRun
         Compared one step ahead; each bears its free run as well.
     about : mapping of str to str
-        What the file tells of itself: vessel, ids, settings; a metadata record of it.
+        What the file says of itself: vessel, ids, settings; a metadata record of it.
+    positions : mapping of str to (Series, Series), optional
+        Latitude and longitude, rad, by run.
 
     Returns
     -------
     bytes
-        Topics ``/measured/X``, ``/predicted/one_step/X`` with ``low_95`` and ``high_95``, ``/predicted/free_run/X`` for
-        X in ``lateral_speed``, ``yaw_rate``, ``heading`` (true, not wrapped at 360 deg); ``/input/rudder``,
-        ``/input/speed``; ``/run`` names each manoeuvre where it begins and ends. Equal content gives equal bytes.
+        Topics ``/measured/X``, ``/predicted/one_step/X`` with ``low_95`` and ``high_95``, ``/predicted/free_run/X``,
+        ``/residual/one_step/X`` and ``/residual/free_run/X`` (measured less predicted) for X in ``lateral_speed``,
+        ``yaw_rate``, ``heading`` (true, 0 to 360 deg; the ends of its interval stay beside it); ``/input/rudder``,
+        ``/input/speed``; ``/measured/position`` as log viewers' maps take it; ``/run`` names each manoeuvre where it
+        begins and ends. Equal content gives equal bytes.
     """
     from mcap.writer import CompressionType, Writer
 
@@ -75,9 +84,9 @@ def to_mcap(runs: Sequence[ComparedRun], about: Mapping[str, str]) -> bytes:
     channels: dict[str, int] = {}
     messages = []
     for run in sorted(runs, key=lambda one: (one.looked.filtered.run.start_utc_ns, one.name)):
-        for topic, stamp, content in _of_run(run):
+        for topic, stamp, content in chain(_of_run(run), _of_position(*positions.get(run.name, ()))):
             if topic.name not in channels:
-                schema = writer.register_schema(f"kempf.{topic.schema}", "jsonschema", _schema(topic))
+                schema = writer.register_schema(topic.schema, "jsonschema", _schema(topic))
                 channels[topic.name] = writer.register_channel(topic.name, "json", schema)
             messages.append((stamp, channels[topic.name], content))
     writer.add_metadata("kempf", dict(about))
@@ -114,7 +123,7 @@ def _schema(topic: _Topic) -> bytes:
     properties = {
         name: {"type": kinds.get(name, "number"), "description": words} for name, words in topic.properties.items()
     }
-    return json.dumps({"type": "object", "title": f"kempf.{topic.schema}", "properties": properties}).encode()
+    return json.dumps({"type": "object", "title": topic.schema, "properties": properties}).encode()
 
 
 def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
@@ -122,21 +131,23 @@ def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
     instant = instants_utc_ns(taken)
     begins = _Topic(
         "/run",
-        "run",
+        "kempf.run",
         {"event": "begin or end", "segment_id": "manoeuvre", "held_out": "whether the parameters have not seen it"},
     )
     for event, at in (("begin", instant[0]), ("end", instant[-1])):
         yield begins, int(at), {"event": event, "segment_id": run.name, "held_out": run.held_out}
     for name, (column, unit, factor) in _CHANNELS.items():
-        zero = factor * first_heading(taken) if name == "heading" else 0.0
+        first = first_heading(taken) if name == "heading" else None
         # a prediction is made for the moment of its measurement, a little off the grid's instant
         late = instant + np.round(taken.offset_s[:, column] * SECOND_NS).astype(np.int64)
         words = f"{name.replace('_', ' ')}, {_WORDS[unit]}"
         field = f"{name}_{unit}"
-        measured = factor * taken.measured[:, column] + zero
-        yield from _series(_topic(f"/measured/{name}", f"measured {words}", field), late, {field: measured})
-        yield from _predicted(run.predicted, "one_step", name, words, late, zero)
-        yield from _predicted(run.free, "free_run", name, words, late, zero)
+        shown = {field: _shown(factor * taken.measured[:, column], first)}
+        yield from _series(_topic(f"/measured/{name}", f"measured {words}", field), late, shown)
+        for horizon, one in (("one_step", run.predicted), ("free_run", run.free)):
+            yield from _predicted(one, horizon, name, words, late, first)
+            topic = _topic(f"/residual/{horizon}/{name}", f"measured less predicted {words}, {_spoken(horizon)}", field)
+            yield from _series(topic, late, {field: factor * one.error[:, column]})
     yield from _series(
         _topic("/input/rudder", "rudder angle, deg, starboard positive", "rudder_angle_deg"),
         instant,
@@ -149,23 +160,42 @@ def _of_run(run: ComparedRun) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
     )
 
 
+def _of_position(*position: Series) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
+    """Yield the fixes of a run as Foxglove's schema of a place has them, whose name its map knows."""
+    if not position:
+        return
+    latitude, longitude = position
+    words = {"latitude": "degrees, north positive", "longitude": "degrees, east positive"}
+    columns = {"latitude": _DEG * latitude.value, "longitude": np.mod(_DEG * longitude.value + 180.0, 360.0) - 180.0}
+    yield from _series(_Topic("/measured/position", "foxglove.LocationFix", words), latitude.time_utc_ns, columns)
+
+
+def _shown(value: Float, first_rad: float | None) -> Float:
+    """Return values as they are, or headings counted from a first one as true ones of 0 to 360 deg."""
+    return value if first_rad is None else np.mod(value + _DEG * first_rad, 360.0)
+
+
+def _spoken(horizon: str) -> str:
+    return horizon.replace("_", " ")
+
+
 def _predicted(
-    one: Predicted, horizon: str, name: str, words: str, instant: Any, zero: float
+    one: Predicted, horizon: str, name: str, words: str, instant: Any, first_rad: float | None
 ) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:
     column, unit, factor = _CHANNELS[name]
     field = f"{name}_{unit}"
-    columns = {field: factor * one.predicted[:, column] + zero}
-    properties = {field: f"predicted {words}, {horizon.replace('_', ' ')}"}
+    columns = {field: _shown(factor * one.predicted[:, column], first_rad)}
+    properties = {field: f"predicted {words}, {_spoken(horizon)}"}
     if np.isfinite(one.std[:, column]).any():
         half = WIDTH_95 * factor * one.std[:, column]
         columns |= {"low_95": columns[field] - half, "high_95": columns[field] + half}
         properties |= {"low_95": "lower end of the 95 % interval", "high_95": "upper end of the 95 % interval"}
-    topic = _Topic(f"/predicted/{horizon}/{name}", f"{horizon}.{name}", properties)
+    topic = _Topic(f"/predicted/{horizon}/{name}", f"kempf.{horizon}.{name}", properties)
     yield from _series(topic, instant, columns)
 
 
 def _topic(name: str, words: str, field: str) -> _Topic:
-    return _Topic(name, name.strip("/").replace("/", "."), {field: words})
+    return _Topic(name, f"kempf.{name.strip('/').replace('/', '.')}", {field: words})
 
 
 def _series(topic: _Topic, instant: Any, columns: Mapping[str, Float]) -> Iterator[tuple[_Topic, int, dict[str, Any]]]:

@@ -148,6 +148,19 @@ def test_a_threshold_that_is_exceeded_is_an_exit_code(place: Path, document: dic
         assert ("fitted runs" in done.err) is (code == 5)
 
 
+def test_several_sets_are_all_compared(own: Path, document: dict) -> None:
+    first, second = document["parameter_set_id"], elsewhere(own).parameter_set_id
+    both = asked(own, "--set", first, "--set", second, "--set", first)
+    assert [one["parameter_set_id"] for one in both] == [first, second]
+    assert both[0] == asked(own, "--set", first), "one alone keeps its form"
+    told = kempf("compare", "--vessel", "mariner", "--set", first, "--set", second, "--warehouse", own)
+    assert first in told.out and second in told.out
+    done = kempf(
+        "compare", "--vessel", "mariner", "--set", first, "--set", second, "--fail-above", 0, "--warehouse", own
+    )
+    assert done.code == 5 and first in done.err and second in done.err
+
+
 def test_the_default_is_the_current_set_and_an_alias_names_any_other(own: Path) -> None:
     warehouse, made = Warehouse(str(own)), elsewhere(own)
     before = aliases.of_vessel(warehouse, "mariner")["current"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import gzip
+import re
 from datetime import datetime
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import pytest
 import yaml
 
 from kempf.workbench.cli.entry import COMMANDS
+from tests.conftest import Ship
 from tests.workbench.driving import HULL, kempf, refused, tree, versions
 
 #: Keys that people script against: DESIGN's, which may be joined by more but never lost.
@@ -108,6 +111,47 @@ def test_vessels(own: Path, logs: Path, tmp_path: Path):
     changed = kempf("vessels", "set", "mariner", "--profile", wider, "--warehouse", own, "--json")
     assert changed.json == {"vessel": "mariner", "changed": True}
     assert len(kempf("vessels", "show", "mariner", "--warehouse", own, "--json").json["versions"]) == 2
+
+
+def test_the_history_of_several_vessels_shows_them_all(own: Path, ferry: Ship, tmp_path: Path):
+    folder = ferry.write(tmp_path / "ferry")
+    done = kempf("ingest", folder / "ferry.csv.gz", "--profile", folder / "profile.yaml", "--warehouse", own)
+    assert done.code == 0, done
+    assert kempf("identify", "--vessel", "ferry", "--estimator", "least-squares", "--warehouse", own).code == 0
+    asked = ("history", "--parameter", "b2", "--warehouse", own)
+    both = ("--vessel", "mariner", "--vessel", "ferry")
+    rows = kempf(*asked, *both, "--json").json
+    alone = [kempf(*asked, "--vessel", name, "--json").json for name in ("mariner", "ferry")]
+    assert rows == [*alone[0], *alone[1]] and {row["vessel"] for row in rows} == {"mariner", "ferry"}
+    table = kempf(*asked, *both).out.splitlines()
+    assert table[0].startswith("vessel") and {line.split()[0] for line in table[1:]} == {"mariner", "ferry"}
+    assert not kempf(*asked, "--vessel", "ferry").out.startswith("vessel")
+    changes = kempf("history", *both, "--changes", "--warehouse", own, "--json").json
+    assert [one["vessel"] for one in changes] == ["mariner", "ferry"]
+
+
+def test_a_second_vessel_is_not_dropped(filled: Path):
+    told = kempf("segments", "--vessel", "mariner", "--vessel", "ferry", "--warehouse", filled, "--json")
+    assert "mariner, ferry" in refused(told, 2, "usage")["message"]
+
+
+def test_what_is_counted_of_a_log_adds_up(mariner: Ship, tmp_path: Path):
+    header, *rows = gzip.decompress(mariner.csv).splitlines(keepends=True)
+    place = header.split(b",").index(b"heading")
+    for k in (100, 200, 300):
+        cells = rows[k].split(b",")
+        cells[place] = b"7000"
+        rows[k] = b",".join(cells)
+    folder = mariner.write(tmp_path / "logs")
+    (tmp_path / "day.csv").write_bytes(b"".join([header, *rows[:5000], b"broken\n", *rows[5000:]]))
+    asked = ("--profile", folder / "profile.yaml", "--warehouse", tmp_path / "w")
+    told = kempf("ingest", tmp_path / "day.csv", *asked).out
+    assert re.search(r"(\d+) records read = (\d+) kept \+ (\d+) rejected; (\d+) values in the kept ones = ", told)
+    (one,) = kempf("logs", "list", "--warehouse", tmp_path / "w", "--json").json
+    for what in ("records", "values"):
+        assert one[f"{what}_read"] == one[f"{what}_kept"] + one[f"{what}_rejected"] > one[f"{what}_kept"]
+    assert sum(one["rejected_by_reason"].values()) == one["records_rejected"] + one["values_rejected"]
+    assert f"{one['values_rejected']} values of kept records" in kempf("logs", "rejected", "day.csv", *asked[2:]).out
 
 
 def test_logs_and_what_was_refused_in_them(filled: Path):

@@ -12,6 +12,7 @@ from mcap.reader import make_reader
 
 from tests.workbench.driving import kempf, refused
 
+HORIZONS = ("one_step", "free_run")
 CHANNELS = {"lateral_speed": "m_s", "yaw_rate": "deg_s", "heading": "deg"}
 
 
@@ -42,9 +43,10 @@ def topics(written: bytes) -> dict[str, tuple[np.ndarray, list[dict]]]:
 
 
 def test_topics_stand_side_by_side(topics: dict):
-    wanted = {"/run", "/input/rudder", "/input/speed"}
+    wanted = {"/run", "/input/rudder", "/input/speed", "/measured/position"}
     for name in CHANNELS:
-        wanted |= {f"/measured/{name}", f"/predicted/one_step/{name}", f"/predicted/free_run/{name}"}
+        wanted.add(f"/measured/{name}")
+        wanted |= {f"/{kind}/{horizon}/{name}" for kind in ("predicted", "residual") for horizon in HORIZONS}
     assert set(topics) == wanted
     for name in CHANNELS:
         times = topics[f"/measured/{name}"][0]
@@ -68,6 +70,10 @@ def test_predictions_are_those_of_compare(topics: dict, _filled: Path):
                 if t in measured and (horizon == "free" or "low_95" in m)
             ]
             error = np.array([a - b for a, b in kept])
+            left = [m[field] for m in topics[f"/residual/{topic}/{name}"][1]]
+            if name == "heading":
+                error = (error + 180.0) % 360.0 - 180.0
+            assert np.sort(left) == pytest.approx(np.sort(error), abs=1e-9)
             assert len(kept) == run["n"][name]
             assert np.sqrt(np.mean(error**2)) == pytest.approx(run["rms_told"][name]["value"], rel=1e-9)
 
@@ -81,15 +87,39 @@ def test_intervals_hold_what_they_promise(topics: dict):
             if int(t) in at:
                 low, high = at[int(t)]["low_95"], at[int(t)]["high_95"]
                 assert low < high
-                inside.append(low <= content[f"{name}_{unit}"] <= high)
+                turns = (0.0, -360.0, 360.0) if name == "heading" else (0.0,)
+                inside.append(any(low <= content[f"{name}_{unit}"] + turn <= high for turn in turns))
         assert "low_95" not in topics[f"/predicted/free_run/{name}"][1][0], "no model of its error: no interval"
     assert 0.91 < np.mean(inside) < 0.985
 
 
 def test_heading_is_the_true_one(topics: dict, _filled: Path):
     segment = kempf("segments", "--vessel", "mariner", "--warehouse", _filled, "--json").json[0]
+    for topic in ("/measured/heading", *(f"/predicted/{horizon}/heading" for horizon in HORIZONS)):
+        assert all(0.0 <= one["heading_deg"] < 360.0 for one in topics[topic][1])
     first = topics["/measured/heading"][1][0]["heading_deg"]
     assert (first - segment["base_heading_deg"] + 180.0) % 360.0 - 180.0 == pytest.approx(0.0, abs=1.5)
+
+
+def test_the_position_is_that_of_the_log_for_the_maps_of_viewers(written: bytes, topics: dict):
+    times, fixes = topics["/measured/position"]
+    begin, end = topics["/run"][0]
+    # the grid of the run begins and ends within a second or two of the segment
+    assert np.all((begin - 2e9 <= times) & (times <= end + 2e9)) and len(fixes) > 100
+    assert all(-90.0 <= one["latitude"] <= 90.0 and -180.0 <= one["longitude"] < 180.0 for one in fixes)
+    schemas = {c.topic: s.name for s, c, _ in make_reader(BytesIO(written)).iter_messages() if s is not None}
+    assert schemas["/measured/position"] == "foxglove.LocationFix"
+
+
+def test_one_manoeuvre_alone(written: bytes, _filled: Path, tmp_path: Path):
+    (record,) = make_reader(BytesIO(written)).iter_metadata()
+    name = next(key for key in record.metadata if key.startswith("seg-"))
+    asked = ("export", "mcap", "--vessel", "mariner", "--warehouse", _filled, "--json")
+    path = tmp_path / "one.mcap"
+    assert kempf(*asked, "--output", path, "--segment", name[:8]).json["runs"] == 1
+    assert path.read_bytes() == written, "the ship has no other"
+    error = refused(kempf(*asked, "--output", tmp_path / "none.mcap", "--segment", "seg-none"), 4, "no_segment")
+    assert error["details"]["known"] == [name]
 
 
 def test_runs_and_provenance_are_named(written: bytes, topics: dict, _filled: Path):

@@ -24,7 +24,13 @@ _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
 
 @click.command("compare")
 @vessel_option(required=True)
-@click.option("--set", "set_id", metavar="ID", help="Parameter set, by id or alias; default: current.")
+@click.option(
+    "--set",
+    "sets",
+    multiple=True,
+    metavar="ID",
+    help="Parameter set, by id or alias; default: current. May be repeated: one block a set.",
+)
 @click.option(
     "--horizon",
     default="free",
@@ -44,7 +50,7 @@ _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
 @json_option
 def command(
     vessel: str,
-    set_id: str | None,
+    sets: tuple[str, ...],
     horizon: str,
     with_where: bool,
     figure: Path | None,
@@ -67,24 +73,34 @@ def command(
             "figure_format", f"--figure {figure} ends in {figure.suffix!r}; expected .png, .svg or .pdf.", "Rename it."
         )
     with progress() as tell:
-        found = compare_vessel(Warehouse(uri), vessel, set_id, horizon, tell)
-    document = found.show()
-    if with_where:
-        document["where"] = found.where()
-    if figure is not None:
-        _draw(found, figure)
-    error = document["judged"]["free_run_error_percent"]
-    exceeded = fail_above is not None and not error <= fail_above
-    if fail_above is not None:
-        document["fail_above"] = {"limit_percent": fail_above, "exceeded": exceeded, **document["judged"]}
+        wanted: list[str | None] = [*dict.fromkeys(sets)] or [None]
+        compared = [compare_vessel(Warehouse(uri), vessel, name, horizon, tell) for name in wanted]
+    documents = []
+    for k, found in enumerate(compared):
+        document = found.show()
+        if with_where:
+            document["where"] = found.where()
+        if figure is not None:
+            _draw(found, figure if k == 0 else figure.with_stem(f"{figure.stem}-{k + 1}"))
+        if fail_above is not None:
+            judged = document["judged"]
+            exceeded = not judged["free_run_error_percent"] <= fail_above
+            document["fail_above"] = {"limit_percent": fail_above, "exceeded": exceeded, **judged}
+        documents.append(document)
     if as_json:
-        print_json(document)
+        print_json(documents if len(documents) > 1 else documents[0])
     else:
-        _tell(document)
-    if exceeded:
-        assert fail_above is not None
-        named = _SAMPLES[document["judged"]["sample"]]
-        click.echo(f"the free-run error of {named} runs is {error:.2f} %, above {fail_above:g} %", err=True)
+        for document in documents:
+            _tell(document)
+    above = [one for one in documents if fail_above is not None and one["fail_above"]["exceeded"]]
+    for document in above:
+        judged = document["judged"]
+        click.echo(
+            f"{document['parameter_set_id']}: the free-run error of {_SAMPLES[judged['sample']]} runs is "
+            f"{judged['free_run_error_percent']:.2f} %, above {fail_above:g} %",
+            err=True,
+        )
+    if above:
         sys.exit(ThresholdExceeded.exit_code)
 
 

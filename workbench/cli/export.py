@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from math import radians
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from kempf.schemas.errors import UsageError
+from kempf.schemas.errors import NotFound, UsageError
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import print_json, progress
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.compare_vessel import Comparison
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -88,14 +92,19 @@ def mat_file(
 @click.option(
     "--output", "--out", "out", type=click.Path(path_type=Path), metavar="FILE", required=True, help="Write here."
 )
+@click.option(
+    "--segment", "segments", multiple=True, metavar="ID", help="Only this manoeuvre; may be repeated. Default: all."
+)
 @warehouse_option
 @json_option
-def mcap_file(vessel: str, set_id: str | None, out: Path, uri: str, as_json: bool) -> None:
+def mcap_file(vessel: str, set_id: str | None, out: Path, segments: tuple[str, ...], uri: str, as_json: bool) -> None:
     """Measured and predicted channels of a vessel's runs side by side, for Foxglove and PlotJuggler.
 
-    One step ahead with 95 % intervals, and the free run; UTC nanoseconds, JSON messages with a schema, zstd.
+    One step ahead with 95 % intervals, and the free run, with what each leaves, and the position; UTC nanoseconds, JSON
+    messages with a schema, zstd.
     """
     from kempf.flows.jobs.compare_vessel import compare_vessel
+    from kempf.flows.jobs.measured_positions import measured_positions
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import write_new
     from kempf.workbench.export_mcap import about, to_mcap
@@ -104,7 +113,8 @@ def mcap_file(vessel: str, set_id: str | None, out: Path, uri: str, as_json: boo
     require_new(out, "--output")
     with progress() as tell:
         found = compare_vessel(Warehouse(uri), vessel, set_id, "1", tell)
-    data = to_mcap(found.runs, about(found))
+    found = _only(found, segments) if segments else found
+    data = to_mcap(found.runs, about(found), measured_positions(Warehouse(uri), found.found))
     write_new(out, data, "--output")
     name = found.parameter_set.parameter_set_id
     if as_json:
@@ -112,6 +122,24 @@ def mcap_file(vessel: str, set_id: str | None, out: Path, uri: str, as_json: boo
         print_json({**told, "skipped": found.skipped})
     else:
         click.echo(f"{vessel}, {name}: {len(found.runs)} runs written to {out}", err=True)
+
+
+def _only(found: Comparison, wanted: Sequence[str]) -> Comparison:
+    """Return a comparison with the runs of some segments alone; a unique beginning of an id is enough."""
+    known = [run.name for run in found.runs]
+    chosen = set()
+    for asked in wanted:
+        named = [name for name in known if name.startswith(asked)]
+        if len(named) != 1:
+            raise NotFound(
+                "no_segment",
+                f"{asked!r} begins {len(named)} ids of the manoeuvres that the set predicts: {', '.join(known)}.",
+                f"Name one of them; `kempf segments --vessel {found.vessel}` lists them all.",
+                {"segment_id": asked, "known": known, "skipped": found.skipped},
+            )
+        chosen.update(named)
+    pairs = [pair for pair in zip(found.runs, found.found, strict=True) if pair[0].name in chosen]
+    return replace(found, runs=tuple(run for run, _ in pairs), found=tuple(segment for _, segment in pairs))
 
 
 def _linear(uri: str, set_id: str, speed: float | None, step: float, course: float) -> Any:

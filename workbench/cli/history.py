@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime
+from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 
 @click.command("history")
-@vessel_option(required=True)
+@vessel_option(required=True, multiple=True)
 @click.option("--parameter", metavar="NAME", help="Only this parameter, such as b2.")
 @click.option("--as-of", metavar="TIME", help="What was known at this time, ISO 8601; without a zone it is UTC.")
 @click.option("--all", "superseded", is_flag=True, help="Also sets that a newer profile or code superseded.")
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
 @warehouse_option
 @json_option
 def command(
-    vessel: str,
+    vessel: tuple[str, ...],
     parameter: str | None,
     as_of: str | None,
     superseded: bool,
@@ -50,35 +51,52 @@ def command(
     uri: str,
     as_json: bool,
 ) -> None:
-    """Show a vessel's parameters over time, as known now or at an earlier time, and whether she changed."""
+    """Show vessels' parameters over time, as known now or at an earlier time, and whether they changed."""
     from kempf.warehouse import history
     from kempf.warehouse.store import Warehouse
 
     if figure is not None and not changes:
         raise UsageError("figure_without_changes", "--figure draws what --changes found.", "Add --changes.")
     warehouse, instant = Warehouse(uri), _instant(as_of)
-    found = history.of_vessel(warehouse, vessel, parameter, instant, superseded=superseded)
-    if found.note:
-        click.echo(found.note, err=as_json)
+    histories = {
+        name: history.of_vessel(warehouse, name, parameter, instant, superseded=superseded)
+        for name in dict.fromkeys(vessel)
+    }
+    for found in histories.values():
+        if found.note:
+            click.echo(found.note, err=as_json)
     if not changes:
-        _show(found, as_json=as_json)
+        _show(histories, as_json=as_json)
         return
-    kinds = history.comparable(warehouse, vessel, instant)
-    told = [_examine(kind, occasion_h, _beside(figure, k), vessel) for k, kind in enumerate(kinds)]
+    documents, figures = [], count()
+    for name, found in histories.items():
+        kinds = history.comparable(warehouse, name, instant)
+        told = [_examine(kind, occasion_h, _beside(figure, next(figures)), name) for kind in kinds]
+        documents.append({"vessel": name, "history": _rows(name, found), "changes": told})
     if as_json:
-        print_json({"vessel": vessel, "history": found.rows(), "changes": told})
+        print_json(documents if len(documents) > 1 else documents[0])
         return
-    for one in told:
-        _tell(one)
+    for document in documents:
+        if len(documents) > 1:
+            click.echo(click.style(document["vessel"], bold=True))
+        for one in document["changes"]:
+            _tell(one)
 
 
-def _show(found: History, *, as_json: bool) -> None:
+def _rows(vessel: str, found: History) -> list[dict[str, Any]]:
+    return [{"vessel": vessel, **row} for row in found.rows()]
+
+
+def _show(histories: dict[str, History], *, as_json: bool) -> None:
+    listed = [row for name, found in histories.items() for row in _rows(name, found)]
     if as_json:
-        print_json(found.rows())
-    if found.note or as_json:
+        print_json(listed)
+    if not listed or as_json:
         return
+    several = len(histories) > 1
     rows = [
         [
+            *([r["vessel"]] if several else []),
             r["start"][:19],
             r["parameter"],
             number(r["value"]),
@@ -88,9 +106,10 @@ def _show(found: History, *, as_json: bool) -> None:
             r["model"],
             r["parameter_set_id"] + (" superseded" if r["superseded"] else ""),
         ]
-        for r in found.rows()
+        for r in listed
     ]
-    print_table(["start UTC", "parameter", "value", "std", "unit", "estimator", "model", "parameter set"], rows)
+    head = ["vessel"] if several else []
+    print_table([*head, "start UTC", "parameter", "value", "std", "unit", "estimator", "model", "parameter set"], rows)
 
 
 def _beside(figure: Path | None, k: int) -> Path | None:

@@ -13,6 +13,7 @@ from kempf.workbench.terminal import one_line, print_json, progress
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.ingest_logs import IngestOutcome
+    from kempf.pipeline.ingest.readings import Tally
 
 
 @click.command("ingest")
@@ -55,12 +56,7 @@ def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
         assert outcome.error is not None
         click.echo(f"{name}: {click.style('failed', fg='red')} [{outcome.error.code}] {outcome.error}", err=True)
         return
-    tally = outcome.tally
-    reasons = ", ".join(f"{count} {reason}" for reason, count in tally.by_reason.items())
-    click.echo(
-        f"{name}: {outcome.outcome}, {tally.records_read} records read = {tally.records_kept} kept + "
-        f"{tally.records_rejected} rejected{f' ({reasons})' if reasons else ''}; {_zigzags(outcome)}"
-    )
+    click.echo(f"{name}: {outcome.outcome}, {_ledger(outcome.tally)}; {_zigzags(outcome)}")
     if outcome.lost:
         from kempf.flows.jobs.unreadable_stretches import as_json
 
@@ -71,6 +67,19 @@ def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
     tell_channels(outcome)
     for note in outcome.notes if notes else ():
         click.echo(f"  note: {one_line(note)[:600]}")
+
+
+def _ledger(tally: Tally) -> str:
+    """Say what was read of a log: records, and the values of those kept where some are rejected; both sums close."""
+    reasons = ", ".join(f"{count} {reason}" for reason, count in tally.by_reason.items())
+    said = f"{tally.records_read} records read = {tally.records_kept} kept + {tally.records_rejected} rejected"
+    if tally.values_rejected:
+        said += (
+            f"; {tally.values_read} values in the kept ones = {tally.values_kept} kept + "
+            f"{tally.values_rejected} rejected"
+        )
+        return f"{said}; rejected records and values by reason: {reasons}"
+    return f"{said} ({reasons})" if reasons else said
 
 
 def tell_channels(outcome: IngestOutcome) -> None:

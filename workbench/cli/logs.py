@@ -26,7 +26,7 @@ def command() -> None:
 @warehouse_option
 @json_option
 def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
-    """List the logs with their ledgers: records read = kept + rejected, and what the channel doctor says of each."""
+    """List the logs with their ledgers, records read = kept + rejected, and what the channel doctor says of each."""
     from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
     from kempf.warehouse import examinations, logs, lost, vessels
     from kempf.warehouse.store import Warehouse
@@ -77,6 +77,9 @@ def _facts(row: LogRow) -> dict[str, Any]:
         "records_read": row.tally.records_read,
         "records_kept": row.tally.records_kept,
         "records_rejected": row.tally.records_rejected,
+        "values_read": row.tally.values_read,
+        "values_kept": row.tally.values_kept,
+        "values_rejected": row.tally.values_rejected,
         "rejected_by_reason": dict(row.tally.by_reason),
     }
 
@@ -146,9 +149,14 @@ def rejected(log_id: str, limit: int, uri: str, as_json: bool) -> None:
     refused = readings.read_rejected(warehouse, row.ingest_id)
     shown = refused.head(limit).rows(named=True)
     if as_json:
-        print_json({"log_id": row.log_id, "rejected": refused.height, "shown": len(shown), "rows": shown})
+        counts = {"records_rejected": row.tally.records_rejected, "values_rejected": row.tally.values_rejected}
+        print_json({"log_id": row.log_id, "rejected": refused.height, **counts, "shown": len(shown), "rows": shown})
         return
     rows = [[str(r["record"]), r["reason"], r["source"] or "", r["channel"] or "", repr(r["raw"])[:80]] for r in shown]
+    click.echo(
+        f"{row.tally.records_rejected} records rejected, and {row.tally.values_rejected} values of kept records, which "
+        "name their channel"
+    )
     print_table(["record", "reason", "source", "channel", "raw"], rows)
     if refused.height > limit:
         click.echo(f"... {refused.height - limit} more, see --limit")
