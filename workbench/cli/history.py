@@ -68,7 +68,8 @@ def command(
     if not changes:
         _show(histories, as_json=as_json)
         return
-    documents, figures = [], count()
+    figures = count()
+    documents: list[dict[str, Any]] = []
     for name, found in histories.items():
         kinds = history.comparable(warehouse, name, instant)
         told = [_examine(kind, occasion_h, _beside(figure, next(figures)), name) for kind in kinds]
