@@ -19,8 +19,7 @@ import numpy as np
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.compare.comparison import ComparedRun
 from kempf.pipeline.compare.run_series import first_heading, instants_utc_ns
-from kempf.pipeline.predict.linear_ahead import WIDTH_95
-from kempf.pipeline.predict.prediction import Predicted
+from kempf.pipeline.predict.prediction import WIDTH_95, Predicted
 
 #: written into the header instead of the writer's version, so that an upgrade of it leaves the bytes alone
 _LIBRARY = "kempf"

@@ -11,10 +11,10 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
-from kempf.pipeline.predict.linear_free_run import FreeRun
+from benchmarks.identify.linear_free_run import LinearFreeRun
 
 
-def draw_held_out(runs: dict[str, FreeRun], path: Path) -> None:
+def draw_held_out(runs: dict[str, LinearFreeRun], path: Path) -> None:
     figure, axes = plt.subplots(
         2, len(runs), figsize=(3.4 * len(runs), 5.5), sharex="col", sharey="row", layout="constrained", squeeze=False
     )

@@ -11,8 +11,9 @@ mpl.use("Agg")
 import matplotlib.pyplot as plt
 import numpy as np
 
+from benchmarks.identify.linear_ahead import Ahead
 from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.predict.linear_ahead import WIDTH_95, Ahead
+from kempf.pipeline.predict.prediction import WIDTH_95
 
 _SHOWN = (
     (2, np.rad2deg(1.0), "heading from its first value, deg"),

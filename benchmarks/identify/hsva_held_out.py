@@ -17,6 +17,7 @@ import numpy as np
 from benchmarks import measured_ships, result_page
 from benchmarks.identify import plausibility
 from benchmarks.identify.draw_held_out import draw_held_out
+from benchmarks.identify.linear_free_run import LinearFreeRun, free_run
 from benchmarks.measured_ships import ordered
 from kempf.flows.jobs.files import read_model
 from kempf.flows.jobs.log_channels import channels_of
@@ -26,7 +27,6 @@ from kempf.pipeline.estimate.pooling import Member
 from kempf.pipeline.estimate.record.record import Record, make_record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.result import Estimate
-from kempf.pipeline.predict.linear_free_run import FreeRun, free_run
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.warehouse.store import Warehouse
 
@@ -45,7 +45,7 @@ class Trained:
 
     title: str
     estimate: Estimate
-    runs: dict[str, FreeRun]
+    runs: dict[str, LinearFreeRun]
 
     def mean_rms(self, *, held_out: bool) -> tuple[float, float]:
         """Mean over the runs of the rms error of yaw rate, deg/s, and lateral speed, m/s."""

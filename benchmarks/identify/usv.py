@@ -17,6 +17,7 @@ import matplotlib.pyplot as plt
 from benchmarks import measured_ships, result_page
 from benchmarks.identify import plausibility
 from benchmarks.identify.draw_predicted import draw_predicted
+from benchmarks.identify.linear_ahead import predict_ahead
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, identify_vessel
 from kempf.flows.jobs.ingest_logs import IngestOutcome
 from kempf.flows.jobs.log_channels import channels_of
@@ -24,7 +25,6 @@ from kempf.flows.jobs.rerun_set import rerun
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, search
 from kempf.pipeline.estimate.record.record import Record, make_record
-from kempf.pipeline.predict.linear_ahead import predict_ahead
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment

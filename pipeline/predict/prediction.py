@@ -13,9 +13,10 @@ from kempf.pipeline.estimate.one_step_fit import fit_percent
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.free_run import CHANNELS, FreeRun, free_run_of
 from kempf.pipeline.predict.horizon import Horizon
-from kempf.pipeline.predict.linear_ahead import WIDTH_95
 from kempf.schemas.errors import DataRejected
 
+#: half width of a 95 % interval in standard deviations
+WIDTH_95 = 1.96
 #: a prediction counts when its variance is below this many times the median one: the first only carry the initial state
 _SETTLED = 3.0
 #: parts of a horizon; errors of its last part count, so that all predictions are between 3/4 and the whole of it ahead

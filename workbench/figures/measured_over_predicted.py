@@ -12,7 +12,7 @@ import numpy as np
 from kempf.pipeline.compare.comparison import ORDER, ComparedRun
 from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.predict.free_run import CHANNELS
-from kempf.pipeline.predict.linear_ahead import WIDTH_95
+from kempf.pipeline.predict.prediction import WIDTH_95
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from benchmarks.identify.linear_free_run import free_run
 from kempf.pipeline.model.ship import Hull
-from kempf.pipeline.predict.linear_free_run import free_run
 from kempf.pipeline.simulate.disturbances import Environment
 from kempf.schemas.model_spec import ModelSpec
 from tests.estimate.simulated import record_of, sailed, truth_of

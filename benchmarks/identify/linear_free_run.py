@@ -20,7 +20,7 @@ _NOTHING, _INITIAL_S = -400.0, 1.0
 
 
 @dataclass(frozen=True, eq=False)
-class FreeRun:
+class LinearFreeRun:
     """A free run beside the measurements.
 
     Attributes
@@ -57,7 +57,7 @@ class FreeRun:
         return found
 
 
-def free_run(record: Record, hull: Hull, spec: ModelSpec) -> FreeRun:
+def free_run(record: Record, hull: Hull, spec: ModelSpec) -> LinearFreeRun:
     """Let the ship of some parameters run under a record's rudder.
 
     Parameters
@@ -70,7 +70,7 @@ def free_run(record: Record, hull: Hull, spec: ModelSpec) -> FreeRun:
 
     Returns
     -------
-    FreeRun
+    LinearFreeRun
     """
     used = with_rudder_inflow(record, spec)
     n = used.time_s.size
@@ -90,4 +90,4 @@ def free_run(record: Record, hull: Hull, spec: ModelSpec) -> FreeRun:
         *(np.zeros(n, dtype=np.bool_), np.zeros((n, 2)), 0.0, 1.0, 1.0, 1.0, 1.0, LONGEST, x0, P0, trace),
     )
     predicted = states[:, [0, 1, 4]]
-    return FreeRun(record.time_s, predicted, record.measured - predicted)
+    return LinearFreeRun(record.time_s, predicted, record.measured - predicted)

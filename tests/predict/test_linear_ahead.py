@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from benchmarks.identify.linear_ahead import predict_ahead
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, search
-from kempf.pipeline.predict.linear_ahead import predict_ahead
 from kempf.schemas.model_spec import ModelSpec
 from tests.estimate.simulated import record_of, sailed
 

@@ -9,9 +9,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.likelihood import Likelihood
 from kempf.pipeline.estimate.record.record import MEASUREMENTS
-
-#: half width of a 95 % interval in standard deviations
-WIDTH_95 = 1.96
+from kempf.pipeline.predict.prediction import WIDTH_95
 
 
 @dataclass(frozen=True, eq=False)
