@@ -35,7 +35,7 @@ from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.pool_vessel import pool_vessel
 from kempf.flows.jobs.standing_model import PLAIN
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import vessels as vessel_table
 from kempf.warehouse.instant import iso_utc
@@ -256,7 +256,7 @@ def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any])
             found, _ = diagnose_vessel(Warehouse(warehouse), vessel, model)
             told.append(found.show())
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
-            told.append({"vessel": vessel, "verdict": "failed", "error": as_told(error).to_json()["error"]})
+            told.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).to_json()["error"]})
         get_run_logger().info("%s: %s", vessel, told[-1]["verdict"])
     return told
 

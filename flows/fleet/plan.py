@@ -12,7 +12,7 @@ from kempf.flows.jobs.reprocess_vessel import reprocess_vessels
 from kempf.flows.jobs.vessel_report import FLOW, PASSING, VesselReport, from_run, run_id_of
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import runs, vessels
 from kempf.warehouse.runs import Run
@@ -155,7 +155,7 @@ def do_batch(
     except Exception as error:  # noqa: BLE001 - whatever it is, the next batch must not pay for it
         reports = [VesselReport(vessel) for vessel in batch]
         for report in reports:
-            report.fail(report.vessel, as_told(error))
+            report.fail(report.vessel, wrapped(error))
     for report in reports:
         tell(report.vessel, report.status)
     return [report.show() for report in reports]

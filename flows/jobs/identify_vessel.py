@@ -16,7 +16,7 @@ from kempf.flows.jobs.standing_model import EFFECTS_BY, NONE_OF_ONES_OWN, Own, e
 from kempf.flows.jobs.vessel_model import build_single
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.estimators import default_settings, estimate
 from kempf.pipeline.estimate.record.record import make_record
@@ -208,7 +208,7 @@ def _identify_log(
         try:
             made = build(held[row.log_id], profile, inputs, row.vessel, (segment.segment_id,), told, held)
         except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
-            return IdentifyOutcome(segment, None, error=as_told(error))
+            return IdentifyOutcome(segment, None, error=wrapped(error))
         return IdentifyOutcome(segment, made, new=True)
 
     return list(pool.map(one, found, wanted, companions))

@@ -14,7 +14,7 @@ from kempf.flows.jobs.spool import spooled
 from kempf.flows.jobs.unreadable_stretches import as_json
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.release_memory import give_back
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import LogReadings, LostStretch, Tally
@@ -166,7 +166,7 @@ def ingest(
             with opened_log(path) as log:
                 outcomes.append(ingest_log(warehouse, name, path.name, log, profile, str(path)))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
-            outcomes.append(IngestOutcome(str(path), "failed", error=as_told(error)))
+            outcomes.append(IngestOutcome(str(path), "failed", error=wrapped(error)))
     progress(len(paths), len(paths), "done")
     return outcomes
 
@@ -259,7 +259,7 @@ def _examined(
     try:
         content = examine_instruments(instruments, profile, file_name, log_format).content
     except Exception as error:  # noqa: BLE001 - a log is not lost because its channels could not be compared
-        content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(as_told(error))}
+        content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(wrapped(error))}
     findings = tuple(finding["words"] for finding in content["findings"])
     code = code_version.fingerprint()
     return StoredExamination(one.vessel, one.ingest_id, one.log_id, code, content["verdict"], findings, content)

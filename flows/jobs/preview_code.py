@@ -16,7 +16,7 @@ from typing import Any
 from kempf.flows.jobs.parameter_changes import Move, NewSet, paired
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.process.progress import Progress, silent
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import aliases, code_version, logs, parameter_sets, raw
 from kempf.warehouse import vessels as vessel_table
@@ -102,7 +102,7 @@ def preview_all(warehouse: Warehouse, vessels: Sequence[str] = (), progress: Pro
         try:
             found.append(preview(warehouse, vessel))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
-            found.append(VesselPreview(vessel, 0, 0, failures=(_failure(vessel, as_told(error)),)))
+            found.append(VesselPreview(vessel, 0, 0, failures=(_failure(vessel, wrapped(error)),)))
     progress(len(names), len(names), "done")
     return found
 

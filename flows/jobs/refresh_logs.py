@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, logs, raw, vessels
@@ -122,7 +122,7 @@ def read_anew(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Progre
                     readings = until_stored.enter_context(spooled(row.file_name, log, profile))
                     read[row.ingest_id] = look_through(row.vessel, row.file_name, log, profile, readings)
                 except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
-                    failed[row.ingest_id] = as_told(error)
+                    failed[row.ingest_id] = wrapped(error)
             failed |= together_or_each(read, partial(store, warehouse))
     return {vessel: _refreshed(hers, failed) for vessel, hers in stale.items()}
 

@@ -22,7 +22,7 @@ from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, code_version, logs, parameter_sets, segments
@@ -136,7 +136,7 @@ class _Work:
 
     def stop(self, error: Exception) -> None:
         """Write a failure down after which the others go on without her."""
-        self.report.fail(self.vessel, as_told(error))
+        self.report.fail(self.vessel, wrapped(error))
         self.over = True
 
 

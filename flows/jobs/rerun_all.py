@@ -17,7 +17,7 @@ from typing import Any
 from kempf.flows.fleet.state import responsible_code
 from kempf.flows.jobs.rerun_set import Rerun, code_changed, inputs_of, judged, raw_inputs, rebuilt
 from kempf.flows.process.progress import Progress, silent
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import code_version, parameter_sets, runs
 from kempf.warehouse import vessels as vessel_table
@@ -174,13 +174,13 @@ def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: floa
     try:
         instruments, profile = raw_inputs(warehouse, group[0])
     except Exception as error:  # noqa: BLE001 - whatever it is, the other logs must not pay for it
-        return [_failed(one, as_told(error)) for one in group]
+        return [_failed(one, wrapped(error)) for one in group]
 
     def verdict_on(one: ParameterSet) -> Verdict:
         try:
             return _verdict(one, judged(one, rebuilt(one, instruments, profile), tolerance))
         except Exception as error:  # noqa: BLE001 - whatever it is, the other sets must not pay for it
-            return _failed(one, as_told(error))
+            return _failed(one, wrapped(error))
 
     if len(inputs_of(group[0]).bounds) > 1:  # such a set takes all cores for itself
         return [verdict_on(one) for one in group]

@@ -144,13 +144,13 @@ def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:
 
 
 def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:
-    """Return the model that a vessel stands at, the plain one where she has none yet."""
+    """Return a vessel's current model, the plain one where she has none with effects yet."""
     now = standing(warehouse, vessel)
     return model_of(now) if now else (PLAIN, Own())
 
 
 def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
-    """Let the vessel stand at the parent of her model; nothing is deleted.
+    """Make the parent of a vessel's current model the current one; nothing is deleted.
 
     Raises
     ------
@@ -161,7 +161,7 @@ def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
     if now is None or now.parent is None:
         raise NotFound(
             "no_parent",
-            f"{vessel!r} stands at {'no model' if now is None else 'the plain model'}: there is nothing to undo.",
+            f"There is nothing to undo: {vessel!r} has {'no current model' if now is None else 'the plain model'}.",
             f"See `kempf ladder --vessel {vessel}`.",
         )
     before = parameter_sets.get(warehouse, now.parent)

@@ -122,7 +122,7 @@ def assemble(
             "no_runs",
             f"None of the {len(bounds)} zigzags can be used: "
             + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:5]),
-            "See docs/bad_input.md for every reason and what mends it.",
+            "See docs/bad_input.md for every reason and what to do about it.",
             {"skipped": skipped},
         )
     arm = arm_of(spec, profile)

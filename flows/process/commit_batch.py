@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import TypeVar
 
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 
 T = TypeVar("T")
@@ -30,7 +30,7 @@ def together_or_each(items: Mapping[str, T], store: Callable[[Sequence[T]], obje
         store(list(items.values()))
     except Exception as error:  # noqa: BLE001 - told of those that it concerns
         if len(items) == 1:
-            return dict.fromkeys(items, as_told(error))
+            return dict.fromkeys(items, wrapped(error))
         failed: dict[str, KempfError] = {}
         for name, one in items.items():
             failed |= together_or_each({name: one}, store)

@@ -1,12 +1,12 @@
-"""An error that nobody foresaw, as one that can be told."""
+"""Wrap unexpected exceptions as errors of the house."""
 
 from __future__ import annotations
 
 from kempf.schemas.errors import KempfError
 
 
-def as_told(error: Exception) -> KempfError:
-    """Return an error as one that can be told; an unforeseen one keeps its kind and words, and is the cause.
+def wrapped(error: Exception) -> KempfError:
+    """Return an error of the house as it is, any other wrapped: with its kind and words, and as the cause.
 
     Parameters
     ----------
@@ -14,15 +14,15 @@ def as_told(error: Exception) -> KempfError:
 
     Examples
     --------
-    >>> as_told(ZeroDivisionError("division by zero")).message
+    >>> wrapped(ZeroDivisionError("division by zero")).message
     'ZeroDivisionError: division by zero'
     """
     if isinstance(error, KempfError):
         return error
-    told = KempfError(
+    wrapping = KempfError(
         "internal",
         f"{type(error).__name__}: {error}",
         "This is a fault of kempf: report it with the log it happened on.",
     )
-    told.__cause__ = error
-    return told
+    wrapping.__cause__ = error
+    return wrapping

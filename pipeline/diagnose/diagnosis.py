@@ -193,7 +193,7 @@ def diagnose(
         steps.append(_step(found, best[0][0].effect, tuple(best), worse, held, screened, workers))
         idle = _idle(steps)
         if idle is not None:
-            told(f"step {len(steps) - 1}: {idle.title} no longer earns its place")
+            told(f"step {len(steps) - 1}: {idle.title} is no longer significant")
             steps = _without(idle, steps, held, effects, workers)
     told("measuring what is left")
     after = flexible(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
@@ -207,7 +207,7 @@ def _unseen(step: Step, held: Sequence[Run], workers: Executor) -> Unseen:
 
 
 def _idle(steps: Sequence[Step]) -> Effect | None:
-    """Return an effect added before the last one that is absent in the last fit, None where all earn their place."""
+    """Return an effect added before the last one that is absent in the last fit, None where all are significant."""
     fit, at = steps[-1].fit, 0
     added = {step.added.name for step in steps[1:-1] if step.added is not None}
     for effect in fit.model.effects:

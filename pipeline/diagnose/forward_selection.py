@@ -182,15 +182,15 @@ def staged(
         if candidate.told_by:
             raise DataRejected(
                 "effect_not_testable",
-                f"The logs have {', '.join(candidate.told_by)}, which tells {effect.title} already.",
-                "The model runs on that channel; nothing need be added.",
+                f"The logs have {', '.join(candidate.told_by)}, which measures {effect.title} already.",
+                "The model uses that channel; nothing need be added.",
                 {"effect": effect.name, "told_by": list(candidate.told_by)},
             )
         if np.isnan(candidate.score):
             raise DataRejected(
                 "effect_not_testable",
-                f"What the model has already imitates {100 * candidate.absorption:.2f} % of {effect.title}: these data "
-                "cannot tell its size.",
+                f"The model as it is absorbs {100 * candidate.absorption:.2f} % of {effect.title}: these data do not "
+                "determine its size.",
                 effect.separated_by or "Sail another kind of manoeuvre.",
                 {"effect": effect.name, "absorption": candidate.absorption},
             )

@@ -19,13 +19,13 @@ LEFT_OVER = 12.0
 #: and the share that this must be of what it gained beside the plain model: of an effect that was rightly named a
 #: little stays unexplained, and the stronger the effect, the more log-likelihood that little is worth
 LEFT_SHARE = 0.07
-#: so many effects are a string, which stands in for something else where the first has less than this share of the gain
-STRING, FIRST_SHARE = 3, 0.8
+#: so many effects, of which the first has less than this share of the gain, together imitate something else
+MANY, FIRST_SHARE = 3, 0.8
 #: what explains the innovations must show to the flexible reference as far as the reference can see it: it lacks at
 #: most this share of what it would gain, or so little log-likelihood as chance takes away
 UNSEEN_SHARE, UNSEEN = 0.5, 5.0
 #: said of an effect that improves the prediction while something that repeats itself is left
-STANDS_IN = "it stands in for something that none of the known effects explains"
+NOT_EXPLAINED = "improves the fit, but does not explain the misfit (see what remains)"
 #: an effect whose possible size is smaller than this many standard errors cannot be seen
 POWER = 3.0
 #: log-likelihood that an effect must gain in a manoeuvre to be seen in it
@@ -64,13 +64,13 @@ def something_left(diagnosis: Diagnosis) -> bool:
 
     Either the flexible reference still finds what repeats itself; or the first effect goes by v, r, rudder or heading
     and yet the reference, which tries all of these, does not see it in runs that did not fit it: what it imitates is
-    something else; or it took a string of effects of which the first explains little: terms that together imitate what
+    something else; or it took several effects of which the first explains little: terms that together imitate what
     none of them is.
     """
     if _reference_gains(diagnosis) or _unseen_by_reference(diagnosis):
         return True
     ratios = [step.chosen_from[0][1].likelihood_ratio for step in diagnosis.steps[1:]]
-    return len(ratios) >= STRING and ratios[0] < FIRST_SHARE * sum(ratios)
+    return len(ratios) >= MANY and ratios[0] < FIRST_SHARE * sum(ratios)
 
 
 def _reference_gains(diagnosis: Diagnosis) -> bool:
@@ -102,7 +102,7 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
     for number, step in enumerate(diagnosis.steps[1:], start=1):
         members = {c.effect.name: k for c, k in step.chosen_from}
         if effect.name in members and something_left(diagnosis):
-            return Finding("absent", f"{STANDS_IN}: {sized(effect, members[effect.name])}")
+            return Finding("absent", f"{NOT_EXPLAINED}: {sized(effect, members[effect.name])}")
         if effect.name in members:
             others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
             alike = f"; these data would fit {_listed(others)} as well" if others else ""
@@ -123,10 +123,10 @@ def _untestable(candidate: Candidate) -> str:
     if candidate.missing:
         return f"the logs lack {_listed(list(candidate.missing))}"
     if candidate.told_by:
-        return f"the logs have {_listed(list(candidate.told_by))}, which tells it already"
+        return f"the logs have {_listed(list(candidate.told_by))}, which measures it already"
     if np.isnan(candidate.score):
         share = _percent(candidate.absorption)
-        return f"what the model has already imitates {share} of it. {candidate.effect.separated_by}"
+        return f"the model as it is absorbs {share} of it. {candidate.effect.separated_by}"
     weak = _too_weak(candidate)
     return f"{weak} {candidate.effect.separated_by}" if weak else ""
 
@@ -138,26 +138,28 @@ def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
     last = {c.effect.name: c for c in diagnosis.steps[-1].screened}.get(name)
     refits = [k for step in diagnosis.steps for c, k in step.refused if c.effect.name == name]
     if added and (last is None or np.isnan(last.score) or last.p_adjusted >= diagnosis.settings.level):
-        return Finding("absent", f"significant by itself, and no more beside {_listed(added)}")
+        return Finding("absent", f"no longer significant once {_listed(added)} is included")
     if refits:
-        return Finding("absent", f"significant by itself, refitted and refused: {refusal(refits[-1])}")
-    return Finding("absent", "significant by itself, but others explain more and it was not refitted")
+        return Finding("absent", f"significant by itself; refused after the refit: {refusal(refits[-1])}")
+    return Finding("absent", "significant by itself; not refitted, as others explain more")
 
 
 def refusal(one: Confirmation) -> str:
     """Say which test a refitted effect did not stand."""
     gains = np.concatenate([one.fold_gains, one.held_out_gains])
     if not np.isfinite(one.fit.log_likelihood):
-        return "the fit runs away"
+        return "the refitted model diverges"
     if one.outdone:
-        return "another one is so much better that it was not fitted to the end"
+        return "another effect is so much better that its fit was not finished"
     if one.at_bound:
-        return "its size ends at the bound of what is physical"
+        return "its size is at the limit of what is physical"
     if one.bic_change > -6.0:
-        return f"it does not earn its parameters (BIC {one.bic_change:+.1f})"
+        return f"the improvement does not justify its parameters (BIC {one.bic_change:+.1f})"
     if np.mean(gains > 0.0) <= 0.5 or np.sum(gains) <= 0.0:
-        return f"it predicts {int(np.sum(gains > 0.0))} of {gains.size} manoeuvres better that it was not fitted to"
-    return "another one is clearly better"
+        return (
+            f"it predicts only {int(np.sum(gains > 0.0))} of {gains.size} manoeuvres better that it was not fitted to"
+        )
+    return "another effect is clearly better"
 
 
 def sized(effect: Effect, one: Confirmation) -> str:
@@ -172,8 +174,9 @@ def _shown(name: str, value: float, std: float, unit: str) -> str:
     factor, shown = (180.0 / np.pi, unit.replace("rad", "deg")) if unit in ("rad", "rad/s") else (1.0, unit)
     digits = max(0, 1 - int(np.floor(np.log10(abs(std * factor))))) if np.isfinite(std) and std > 0.0 else 4
     digits = min(digits, 8)
-    error = f" +- {std * factor:.{digits}f}" if np.isfinite(std) else ""
-    return f"{name} = {value * factor:.{digits}f}{error}{f' {shown}' if shown not in ('', '1') else ''}"
+    error = f" ± {std * factor:.{digits}f}" if np.isfinite(std) else ""
+    what = " (1 s.e.)" if error else ""
+    return f"{name} = {value * factor:.{digits}f}{error}{f' {shown}' if shown not in ('', '1') else ''}{what}"
 
 
 def _too_weak(candidate: Candidate) -> str:
@@ -183,16 +186,16 @@ def _too_weak(candidate: Candidate) -> str:
     reach = np.array([max(abs(p.low), abs(p.high)) for p in parameters])
     if np.all(reach < POWER * candidate.std[made]):
         error = f"{candidate.std[made][0]:.2g} {parameters[0].unit}".rstrip()
-        return f"its standard error, {error}, is no smaller than what is physical."
+        return f"its standard error, {error}, is as large as any size that is physical."
     return ""
 
 
 def _absent(candidate: Candidate) -> str:
     p, made = candidate.effect.parameters[0], np.isfinite(candidate.std)
     if not made[0]:
-        return "no sign of it"
+        return "not seen"
     limit = abs(candidate.change[0]) + 2.0 * candidate.std[0]
-    return f"no sign of it; were there any, {p.name} would be within {limit:.2g} {p.unit}".rstrip()
+    return f"not seen; upper limit (95 %): |{p.name}| < {limit:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
 
 
 def sentences(diagnosis: Diagnosis) -> list[str]:
@@ -202,18 +205,18 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     for step in diagnosis.steps[1:]:
         (candidate, best), *others = step.chosen_from
         if what == "unexplained":
-            said.append(f"{sized(candidate.effect, best).capitalize()} helps, but {STANDS_IN}.")
+            said.append(f"{sized(candidate.effect, best).capitalize()}: {NOT_EXPLAINED}.")
             continue
         line = f"{candidate.effect.plain.rstrip('.')}: {sized(candidate.effect, best)}"
         if others:
             line += f"; the same data would fit {_listed([c.effect.title for c, _ in others])}"
-            line += f". To tell them apart: {candidate.effect.separated_by}"
+            line += f". What distinguishes them: {candidate.effect.separated_by}"
         said.append(line.rstrip(".") + ".")
     if len(diagnosis.steps) > 1:
         said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
     if what == "insufficient_data":
         said.append(
-            "One manoeuvre alone cannot tell an effect from chance: sail at least three zigzags, to both sides, at two "
+            "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, at two "
             "rudder angles, on two headings."
         )
     if what == "adequate":
@@ -221,17 +224,17 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     if what == "unexplained" and diagnosis.after is not None:
         if _reference_gains(diagnosis):
             said.append(
-                "None of the known effects explains it: a smooth force without a name still gains "
+                "None of the known effects explains what remains: a smooth force of unknown origin still gains "
                 f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."
             )
         else:
             said.append(
-                f"None of the known effects explains it: it took {len(diagnosis.steps) - 1} of them, and the first "
+                f"None of the known effects explains the misfit: {len(diagnosis.steps) - 1} of them were needed, and the first "
                 "explains too little to be what is missing."
             )
         if diagnosis.after.formula:
             terms = "; ".join(f"{one.target}: {one.expression}" for one in diagnosis.after.formula)
-            said.append(f"Exploratory, a formula to try and no finding: {terms}.")
+            said.append(f"Exploratory, not a finding; a formula to try: {terms}.")
     return said
 
 

@@ -50,7 +50,7 @@ def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
     vague = [name for name, value, error in zip(HULL_PARAMETERS, hull, std, strict=True) if error >= abs(value)]
     found = []
     if vague:
-        cure = "a zigzag of other angles or more legs, or several pooled, would tell"
+        cure = "a zigzag of other angles or more legs, or several pooled, would determine them"
         found.append(f"not determined, error as large as the value ({cure}): {', '.join(vague)}")
     if a11 > 0:
         found.append("a11 is positive: sway would feed itself, no hull does; something acts that the model lacks")
@@ -61,7 +61,7 @@ def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
     if b2 < 0:
         found.append("b2 is negative: the rudder turns the ship the wrong way; check the sign of the rudder channel")
     elif b1 > 0:
-        found.append("b1 is positive: the rudder pushes the stern the wrong way; sway and yaw are hardly told apart")
+        found.append("b1 is positive: the rudder pushes the stern the wrong way; sway and yaw are hardly distinguished")
     unlike_noise = not_white(fit)
     for name, channel in fit.get("channels", {}).items():
         lag, inside = channel["lag1_autocorrelation"], channel["inside_95_percent"]

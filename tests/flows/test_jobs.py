@@ -15,7 +15,7 @@ from kempf.flows.jobs.ingest_logs import ingest, settle_vessel
 from kempf.flows.jobs.register_vessel import set_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.model_spec import ModelSpec
@@ -205,10 +205,10 @@ def test_nothing_to_identify_from(tmp_path: Path):
 
 def test_an_unforeseen_error_keeps_its_cause():
     error = KeyError("x")
-    told = as_told(error)
+    told = wrapped(error)
     assert (told.code, told.exit_code, told.__cause__) == ("internal", 1, error)
     known = KempfError("a", "b", "c")
-    assert as_told(known) is known
+    assert wrapped(known) is known
 
 
 def test_the_demonstration_finds_the_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):

@@ -14,7 +14,7 @@ from io import TextIOWrapper
 
 import click
 
-from kempf.flows.process.wrap_error import as_told
+from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.workbench.cli.lazy import LazyGroup
 from kempf.workbench.terminal import one_line
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # click has put something else in its place: the reader of our output has seen enough
         code = 0
     except Exception as error:  # noqa: BLE001 - the last place where it can be told
-        code = _tell(as_told(error), as_json)
+        code = _tell(wrapped(error), as_json)
     sys.exit(code if isinstance(code, int) else 0)
 
 

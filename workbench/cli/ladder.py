@@ -16,7 +16,7 @@ from kempf.workbench.terminal import number, print_json, print_table
 @warehouse_option
 @json_option
 def command(vessel: str, uri: str, as_json: bool) -> None:
-    """Show the models that lead to the one a vessel stands at, and how the error fell from one to the next."""
+    """Show the models that lead to a vessel's current one, and how the error fell from one to the next."""
     from kempf.flows.jobs.standing_model import rungs_to, standing
     from kempf.warehouse.store import Warehouse
 
@@ -25,7 +25,7 @@ def command(vessel: str, uri: str, as_json: bool) -> None:
     if model is None:
         raise NotFound(
             "no_model",
-            f"{vessel!r} stands at no model yet.",
+            f"{vessel!r} has no current model with effects yet.",
             f"Run `kempf diagnose --vessel {vessel}`, then `kempf effects add NAME --vessel {vessel}`.",
             {"vessel": vessel},
         )
@@ -41,7 +41,7 @@ def tell_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
     rows = []
     for one in rungs:
         held, wind = one["held_out_error"], one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"]
-        change = [f"{name} {number(v['value'])} +- {number(v['std'], 2)}" for name, v in one["effects"].items()]
+        change = [f"{name} {number(v['value'])} ± {number(v['std'], 2)}" for name, v in one["effects"].items()]
         rows.append(
             [
                 str(one["step"]),
@@ -54,5 +54,14 @@ def tell_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
                 one["parameter_set_id"],
             ]
         )
-    head = ["step", "added", "fitted, %", "held out, %", "wind, m/s^2/s^0.5", "log-likelihood", "effects", "set"]
+    head = [
+        "step",
+        "added",
+        "fitted, %",
+        "held out, %",
+        "wind, m/s^2/s^0.5",
+        "log-likelihood",
+        "effects, ± 1 s.e.",
+        "set",
+    ]
     print_table(head, rows, f"{vessel}: free-run error as a share of the motion")

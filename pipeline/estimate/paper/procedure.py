@@ -203,7 +203,7 @@ def _whole_steps(vehicle: LinearVehicle, measured: Float, skip: int) -> NDArray[
         raise DataRejected(
             "segment_too_short",
             f"The record holds {now.size} pairs of whole samples; each row of [A B] has {unknown} unknowns.",
-            "Give a longer record, or mend the gaps.",
+            "Give a longer record, or fill the gaps.",
             {"pairs": int(now.size), "needed": unknown + 1},
         )
     return now

@@ -172,7 +172,7 @@ def estimate_of(record: Record, sampled: Sampled, course: Course) -> Estimate:
     """
     warnings = list(record.warnings)
     if course.hidden:
-        warnings.append(f"the measurements do not tell {' and '.join(course.hidden)}: the model is not observable")
+        warnings.append(f"the measurements do not determine {' and '.join(course.hidden)}: the model is not observable")
     return estimate_from_discrete(
         "paper",
         sampled,

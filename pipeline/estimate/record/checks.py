@@ -108,7 +108,7 @@ def check_manoeuvre(rudder: Series, heading: Series) -> tuple[str, ...]:
         raise DataRejected(
             "too_few_executes",
             f"The rudder is put over {executes} time{'' if executes == 1 else 's'} in this segment, identification "
-            f"needs {_EXECUTES}: one turn alone does not tell damping from rudder force.",
+            f"needs {_EXECUTES}: one turn alone does not distinguish damping from rudder force.",
             "Sail a zigzag of at least two legs, or take a longer part of the log.",
             {"executes": executes, "needed": _EXECUTES},
         )
@@ -193,5 +193,5 @@ def check_sway(lateral: LateralSpeed, heading: Series, rudder: Series, yaw_rate:
         return ()
     return (
         f"lateral speed, yaw rate and rudder are collinear: the last two leave over {left:.2g} m/s of the first, whose "
-        f"noise is {noise:.2g} m/s; a11, a12 and b1 are hardly told apart, sail a second zigzag of other angles",
+        f"noise is {noise:.2g} m/s; a11, a12 and b1 are hardly distinguished, sail a second zigzag of other angles",
     )

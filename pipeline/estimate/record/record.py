@@ -256,7 +256,7 @@ def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:
     count = int(np.count_nonzero(found.inside))
     if found.unresolved:
         warnings.append(
-            f"the GNSS velocity leaps {found.unresolved} times as no ship can, and nothing tells which side is right: "
+            f"the GNSS velocity jumps {found.unresolved} times as no ship can, and nothing shows which side is right: "
             "all of it is kept; look at the receiver"
         )
     if not count:
@@ -318,6 +318,6 @@ def _check(instants: Nanoseconds, delta: Float, rudder: Series) -> None:
     if float(np.std(delta)) < _MIN_RUDDER_STD_RAD:
         raise DataRejected(
             "no_excitation",
-            f"The rudder moves by {np.rad2deg(np.std(delta)):.2f} deg rms only: nothing tells the parameters apart.",
+            f"The rudder moves by {np.rad2deg(np.std(delta)):.2f} deg rms only: too little to identify from.",
             "Sail a zigzag of at least 5 degrees of rudder.",
         )
