@@ -70,7 +70,7 @@ def test_a_lag_is_found_with_its_size_and_the_held_out_error_falls(late: tuple[S
     assert found.before is not None and found.after is not None
     assert found.after.gain < 0.2 * found.before.gain
     said = sentences(found)
-    assert f"tau = {tau:.3f} +- {std:.3f} s" in said[0] and "held-out" in said[1]
+    assert f"tau = {tau:.3f} ± {std:.3f} s (1 s.e.)" in said[0] and "held-out" in said[1]
 
 
 def test_a_lag_that_leaves_no_ship_without_it_is_found_with_its_size() -> None:
@@ -101,7 +101,7 @@ def test_an_effect_that_no_catalogue_names_is_not_given_a_wrong_name() -> None:
     found = sailed("kick_at_executes").diagnosis(("yaw_quadratic", "gyro_bias"))
     assert verdict(found) == "unexplained"
     told = as_json(found)
-    assert any(said.startswith("None of the known effects explains it") for said in told["sentences"])
+    assert any(said.startswith("None of the known effects explains") for said in told["sentences"])
     assert all(one["verdict"] != "present" for one in told["candidates"])
     assert told["left_over"]["gain_after"] > 12.0 and len(told["left_over"]["runs"]) == 3
     assert "{" not in "".join(told["sentences"])
@@ -208,7 +208,7 @@ def test_the_speed_lost_in_a_turn_is_looked_for_only_where_no_log_shows_it() -> 
     none = DiagnosisSettings(most_steps=0)
     (one,) = as_json(ship.diagnosis(("speed_loss",), settings=none))["candidates"]
     assert one["verdict"] == "not_testable" and np.isnan(one["score"])
-    assert one["why"] == "the logs have speed_through_water, which tells it already"
+    assert one["why"] == "the logs have speed_through_water, which measures it already"
     with pytest.raises(DataRejected, match="speed_through_water") as caught:
         staged(ship.runs[:1], ship.spec, ship.start.of([0]), [effect], WORKERS)
     assert caught.value.code == "effect_not_testable"
