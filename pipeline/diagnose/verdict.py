@@ -216,8 +216,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
     if what == "insufficient_data":
         said.append(
-            "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, at "
-            "two rudder angles, on two headings."
+            "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, "
+            "at two rudder angles, on two headings."
         )
     if what == "adequate":
         said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
@@ -229,8 +229,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             )
         else:
             said.append(
-                f"None of the known effects explains the misfit: {len(diagnosis.steps) - 1} of them were needed, and the "
-                "first explains too little to be what is missing."
+                f"None of the known effects explains the misfit: {len(diagnosis.steps) - 1} of them were needed, and "
+                "the first explains too little to be what is missing."
             )
         if diagnosis.after.formula:
             terms = "; ".join(f"{one.target}: {one.expression}" for one in diagnosis.after.formula)
