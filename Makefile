@@ -7,7 +7,17 @@ RUNTIME := $(VENV)/.runtime
 DEVELOP := $(VENV)/.develop
 RIVALS := $(VENV)/.rivals
 
-.PHONY: demo test check bench bench-long lock clean setup
+# Some of every room, by file: those that simulate no voyage and compile little. `make quick` takes half a minute on two
+# cores once numba has compiled what they call; what runs a ship from log to diagnosis is left to `make test`.
+QUICK := test_layers.py test_docstrings.py package/test_import.py docs/test_documents.py docs/test_model.py \
+	$(addprefix ingest/test_, cells.py delimited.py nmea.py cdr.py) channels segment/test_imo.py \
+	$(addprefix model/test_, ship.py expression.py effects.py) $(addprefix estimate/test_, arrow.py record.py uncertainty.py) \
+	$(addprefix compare/test_, overshoot.py predicted.py where.py) diagnose/test_formula.py \
+	$(addprefix steering/test_, nomoto.py stability.py) $(addprefix history/test_, contrasts.py pooled.py) \
+	$(addprefix simulate/test_, disturbances.py manoeuvre.py) $(addprefix warehouse/test_, store.py vessels.py segments.py) \
+	flows/test_fleet_plan.py $(addprefix workbench/test_, names.py effects.py)
+
+.PHONY: demo test check quick bench bench-long lock clean setup
 
 demo: $(RUNTIME)
 	$(BIN)/kempf demo
@@ -20,6 +30,11 @@ check: $(DEVELOP)
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+
+quick: $(DEVELOP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(addprefix tests/, $(QUICK))
 
 # Every figure anew, each on its own page in benchmarks/results; needs the measured logs in ../shared. Minutes.
 bench: $(RIVALS)
