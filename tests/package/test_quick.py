@@ -13,8 +13,7 @@ def test_quick_covers_every_room() -> None:
     planned = subprocess.run(command, cwd=ROOT, check=True, capture_output=True, text=True).stdout
     named = [Path(word) for line in planned.splitlines() for word in line.split() if word.startswith("tests/")]
     assert named
-    assert all((ROOT / path).exists() for path in named)
+    assert [str(path) for path in named if not (ROOT / path).exists()] == []
     rooms = {path.parts[1] for path in named}
     wanted = {p.name for p in (ROOT / "pipeline").iterdir() if (p / "__init__.py").exists()}
-    # what predicts is tested with what compares
-    assert rooms >= wanted - {"predict"} | {"compare", "warehouse", "flows", "workbench", "docs"}
+    assert rooms >= wanted | {"warehouse", "flows", "workbench", "docs"}
