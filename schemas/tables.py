@@ -44,7 +44,7 @@ _VESSEL = (
 )
 _INGEST = Column("ingest_id", "text", "one log read with one profile by one version of the code")
 _LOG = Column("log_id", "text", "SHA-256 of the log as delivered")
-_CODE = Column("code_version", "text", "hash of the source that made the row")
+_CODE = Column("code_version", "text", "hash of the source of the stage that made the row")
 _START = Column("start_utc_ns", "integer", "first instant", "ns")
 _END = Column("end_utc_ns", "integer", "last instant", "ns")
 _PROFILE = Column("profile_sha256", "text", "hash of the vessel profile")

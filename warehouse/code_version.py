@@ -1,64 +1,136 @@
-"""Which code made a result: a fingerprint of its source, the packages it rests on, the commit where there is one."""
+"""Which code made a result: fingerprints of its source, the packages it rests on, the commit where there is one.
+
+A result goes through stages: readings of a log, what is found in them, parameters, diagnoses. Each stage has a
+fingerprint of its own, so that a change of one makes anew only what rests on it, and a comment nothing.
+"""
 
 from __future__ import annotations
 
-import hashlib
 import platform
 import shutil
 import subprocess
-from collections.abc import Mapping
+from dataclasses import dataclass
 from functools import cache
+from hashlib import sha256
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from types import ModuleType
+from typing import Literal
 
-from kempf import pipeline, schemas
+from kempf import pipeline
+from kempf.warehouse.source_tree import SourceTree
 
 #: Packages whose version may change a result or how it is stored.
 PACKAGES = ("deltalake", "numba", "numpy", "polars", "pyarrow", "scipy")
 
+Stage = Literal["ingest", "segment", "estimate", "diagnose"]
 
-def fingerprint_of(sources: Mapping[str, bytes]) -> str:
-    """Return the fingerprint of source files, 16 hex digits of a SHA-256.
 
-    Parameters
+@dataclass(frozen=True)
+class Entry:
+    """Where the code of a stage begins.
+
+    Attributes
     ----------
-    sources : mapping of str to bytes
-        Content by relative name with forward slashes; the order does not matter.
+    modules : tuple of str
+        What its jobs call, in ``kempf.pipeline``; all that these import counts with them. The catalogue of effects does
+        not: which effects a set has, and which a diagnosis tries, stands with their hashes among the inputs of these.
+    rests_on : tuple of Stage
+        Stages whose results its own are made of, and whose code therefore counts, too. The bounds of a segment are
+        named among the inputs of a parameter set, so that the code that finds segments does not count in it.
     """
-    digest = hashlib.sha256()
-    for name in sorted(sources):
-        # lengths first, so that no two sets of files give the same stream
-        digest.update(f"{len(name.encode())} {len(sources[name])} {name}\n".encode())
-        digest.update(sources[name])
-    return digest.hexdigest()[:16]
+
+    modules: tuple[str, ...]
+    rests_on: tuple[Stage, ...] = ()
+
+
+STAGES: dict[Stage, Entry] = {
+    "ingest": Entry(("ingest.read",)),
+    "segment": Entry(
+        (
+            *("channels.instruments", "channels.doctor.examine", "channels.doctor.corrections"),
+            *("channels.doctor.verdict", "segment.find", "segment.imo", "segment.lateral"),
+            "estimate.no_log.companions",
+        ),
+        ("ingest",),
+    ),
+    "estimate": Entry(
+        (
+            *("channels.instruments", "estimate.estimators", "estimate.pooling", "estimate.no_log.companions"),
+            *("diagnose.forward_selection", "diagnose.diagnosis", "diagnose.verdict"),
+        ),
+        ("ingest",),
+    ),
+    "diagnose": Entry(("diagnose.diagnosis", "diagnose.misfit", "diagnose.verdict"), ("segment", "estimate")),
+}
+#: Rooms that a result is a function of.
+_ROOMS = ("pipeline", "schemas")
 
 
 @cache
-def fingerprint() -> str:
-    """Return the fingerprint of the installed `pipeline` and `schemas`: every result is a function of these.
+def fingerprint(stage: Stage) -> str:
+    """Return the fingerprint of the installed code of a stage, 16 hex digits.
 
-    The simulator is left out: it makes logs, and a log counts by its own bytes.
+    Parameters
+    ----------
+    stage : {"ingest", "segment", "estimate", "diagnose"}
     """
-    return fingerprint_of_packages(pipeline, schemas)
+    return fingerprint_in(_folder(pipeline.__file__).parent, stage)
+
+
+def fingerprint_in(folder: Path, stage: Stage) -> str:
+    """Return the fingerprint of a stage's code in some folder of source.
+
+    Parameters
+    ----------
+    folder : Path
+        Holds ``pipeline`` and ``schemas``.
+    stage : {"ingest", "segment", "estimate", "diagnose"}
+
+    Raises
+    ------
+    ModuleNotFoundError
+        A module that the stage begins with is not there.
+    """
+    return _joined(modules_in(folder, stage))
+
+
+def modules_in(folder: Path, stage: Stage) -> dict[str, str]:
+    """Return the digests of all that counts in a stage's code in some folder of source, by name.
+
+    Parameters
+    ----------
+    folder : Path
+    stage : {"ingest", "segment", "estimate", "diagnose"}
+
+    Raises
+    ------
+    ModuleNotFoundError
+        A module that the stage begins with is not there.
+    """
+    return SourceTree(folder, _ROOMS).reached(_entries(stage))
+
+
+def _entries(stage: Stage) -> list[str]:
+    own = [f"kempf.pipeline.{module}" for module in STAGES[stage].modules]
+    return own + [module for before in STAGES[stage].rests_on for module in _entries(before)]
 
 
 def fingerprint_of_packages(*packages: ModuleType) -> str:
-    """Return the fingerprint of some installed packages, the simulator left out.
+    """Return the fingerprint of all modules of some installed packages.
 
     Parameters
     ----------
     packages : module
+        Rooms of kempf, beside each other.
     """
-    roots = [_folder(package.__file__) for package in packages]
-    return fingerprint_of(
-        {
-            f"{root.name}/{path.relative_to(root).as_posix()}": path.read_bytes()
-            for root in roots
-            for path in root.rglob("*.py")
-            if path.relative_to(root).parts[0] != "simulate"
-        }
-    )
+    folders = [_folder(package.__file__) for package in packages]
+    tree = SourceTree(folders[0].parent, [folder.name for folder in folders])
+    return _joined(tree.reached(tree.modules))
+
+
+def _joined(digests: dict[str, str]) -> str:
+    return sha256("\n".join(f"{name} {digests[name]}" for name in sorted(digests)).encode()).hexdigest()[:16]
 
 
 @cache

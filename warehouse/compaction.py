@@ -28,7 +28,7 @@ _SMALL = ("vessels", "logs", "lost", "segments", "examinations", "parameter_sets
 #: Rows that are read or skipped together.
 _ROW_GROUP = 8192
 #: Tables that ``history --as-of`` reads at any time there ever was: every version of them is kept.
-ALWAYS = ("logs", "parameter_sets")
+ALWAYS = ("logs", "segments", "parameter_sets")
 #: A writer that has not committed yet is at most so old, hours; its files must not be taken from under it.
 RETENTION_HOURS = 168.0
 

@@ -293,7 +293,7 @@ def replace(
     import pyarrow as pa
     from deltalake import WriterProperties, write_deltalake
 
-    schema = arrow_schema(TABLES[name])
+    schema = _as_described(table, arrow_schema(TABLES[name]))
     if isinstance(new, Sequence):
         data = pa.Table.from_pylist(list(new), schema=schema)
     else:
@@ -306,6 +306,14 @@ def replace(
             predicate=predicate,
             writer_properties=WriterProperties(compression="ZSTD"),
         )
+
+
+def _as_described(table: DeltaTable, schema: pa.Schema) -> pa.Schema:
+    """Return a schema with the units and words that a table has: other words than its own no table takes."""
+    import pyarrow as pa
+
+    held = {field.name: field.metadata for field in table.schema().fields}
+    return pa.schema([field.with_metadata(held.get(field.name, field.metadata)) for field in schema])
 
 
 def _batches(frames: Iterator[pl.DataFrame], schema: pa.Schema) -> Iterator[pa.RecordBatch]:

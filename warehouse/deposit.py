@@ -36,9 +36,7 @@ class Delivery:
     readings : LogReadings
         What the reader returned.
     code_version : str
-        Of the code that read it, see `kempf.warehouse.code_version.fingerprint`.
-    notes : tuple of str
-        What a person should know besides what the reader says.
+        Of the code that read it: stage ``ingest`` of `kempf.warehouse.code_version`.
     """
 
     vessel: str
@@ -47,7 +45,6 @@ class Delivery:
     profile: VesselProfile
     readings: LogReadings
     code_version: str
-    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -153,7 +150,7 @@ def _row(delivery: Delivery) -> logs.LogRow:
         start_utc_ns=since,
         end_utc_ns=until,
         tally=delivery.readings.tally,
-        notes=(*delivery.readings.notes, *delivery.notes),
+        notes=delivery.readings.notes,
     )
 
 

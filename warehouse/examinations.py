@@ -26,7 +26,7 @@ class StoredExamination:
     findings : tuple of str
         One sentence each.
     content : mapping
-        JSON content.
+        JSON content, with the notes on how the channels were chosen.
     """
 
     vessel: str
@@ -36,6 +36,11 @@ class StoredExamination:
     verdict: str
     findings: tuple[str, ...]
     content: Mapping[str, Any] = field(default_factory=dict)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """How the channels were chosen, and why zigzags could not be looked for, where that is so."""
+        return tuple(self.content.get("notes", ()))
 
 
 def replace(warehouse: Warehouse, found: Sequence[StoredExamination]) -> tuple[str, ...]:
@@ -80,6 +85,12 @@ def of_ingests(warehouse: Warehouse, ingest_ids: Iterable[str]) -> dict[str, Sto
     """Return the examinations of some ingests, by ingest id; an ingest from before there was a doctor has none."""
     frame = delta.read(warehouse, "examinations", {"ingest_id": sorted(set(ingest_ids))})
     return {row["ingest_id"]: _stored(row) for row in frame.sort("ingest_id").rows(named=True)}
+
+
+def codes(warehouse: Warehouse, ingest_ids: Iterable[str]) -> dict[str, str]:
+    """Return the fingerprint of the code that looked through some ingests, by ingest id."""
+    where = {"ingest_id": sorted(set(ingest_ids))}
+    return dict(delta.read(warehouse, "examinations", where, ("ingest_id", "code_version")).rows())
 
 
 def _stored(row: Mapping[str, Any]) -> StoredExamination:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from datetime import datetime
@@ -12,11 +12,12 @@ from math import isfinite
 from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
-from kempf.schemas.errors import UsageError
-from kempf.warehouse import delta, vessels
+from kempf.schemas.errors import KempfError, UsageError
+from kempf.warehouse import code_version, delta, examinations, vessels
 from kempf.warehouse.canonical import plain
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
@@ -118,7 +119,7 @@ def of_vessel(
     as_of : datetime, optional
         With a time zone: only what had been committed by then.
     superseded : bool, optional
-        Also sets whose log has been read anew since, with another profile or code.
+        Also sets whose log has been read anew since, whose segment is no longer found, or that older code made.
 
     Raises
     ------
@@ -131,9 +132,9 @@ def of_vessel(
     with _sets_as_of(warehouse, as_of) as table:
         if table is None and as_of is not None:
             vessels.require(warehouse, vessel)
-            nothing = _exploded(None, vessel, [])
+            nothing = _exploded(None, vessel, _Logs([], None))
             return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
-        frame = _exploded(table, vessel, _past_ingests(warehouse, vessel, as_of))
+        frame = _exploded(table, vessel, _logs_of(warehouse, vessel, as_of))
         version = table.version() if table is not None else None
     if not superseded:
         frame = frame.remove(frame["superseded"])
@@ -144,6 +145,21 @@ def of_vessel(
     elif parameter is not None:
         frame = _only(frame, parameter)
     return History(frame, version, note)
+
+
+def standing(warehouse: Warehouse, vessel: str) -> list[str]:
+    """Return the ids of a vessel's parameter sets that are not superseded, by start, then id.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    warehouse.require()
+    with delta.reading(warehouse, "parameter_sets") as table:
+        marked = _marked(table, vessel, _logs_of(warehouse, vessel, None), ("parameter_set_id", "start_utc_ns"))
+    names: list[str] = marked.remove(marked["superseded"])["parameter_set_id"].to_list()
+    return names
 
 
 def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None) -> list[Comparable]:
@@ -169,7 +185,7 @@ def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None)
 
     warehouse.require()
     with _sets_as_of(warehouse, as_of) as table:
-        found = _marked(table, vessel, _past_ingests(warehouse, vessel, as_of), _COMPARED)
+        found = _marked(table, vessel, _logs_of(warehouse, vessel, as_of), _COMPARED)
     kinds: dict[tuple[str, str, str], list[dict[str, Any]]] = {}
     for row in found.rows(named=True):
         if not row["superseded"]:
@@ -181,7 +197,7 @@ def comparable(warehouse: Warehouse, vessel: str, as_of: datetime | None = None)
 
 _COMPARED = (
     *("parameter_set_id", "start_utc_ns", "model_name", "model_sha256", "estimator", "settings_json", "segment_ids"),
-    *("parameters", "covariance_names", "covariance", "convergence_json", "provenance_json"),
+    *("parameters", "covariance_names", "covariance", "convergence_json"),
 )
 
 
@@ -259,33 +275,78 @@ def _sets_as_of(warehouse: Warehouse, as_of: datetime | None) -> Iterator[DeltaT
         yield table
 
 
-def _past_ingests(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> list[str]:
-    """Return the ingests after which their logs had been read anew, by a time or by now."""
+@dataclass(frozen=True)
+class _Logs:
+    """What was known of a vessel's logs at some time.
+
+    Attributes
+    ----------
+    past : list of str
+        Ingests after which their logs had been read anew.
+    segments : list of str or None
+        Segments found in the others; None where nobody had looked for any, or nobody knows any more.
+    """
+
+    past: list[str]
+    segments: list[str] | None
+
+
+def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs:
+    """Return what is known of a vessel's logs, or was by a time."""
     version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
     if as_of is not None and version is None:
-        return []
+        return _Logs([], None)
     columns = ("log_id", "ingest_id", "revision")
     hers = {"vessel_key": vessel_key(vessel)}
     rows = delta.read(warehouse, "logs", hers, columns, version).sort("log_id", "revision")
     present = {row["log_id"]: row["ingest_id"] for row in rows.rows(named=True)}
-    return [row["ingest_id"] for row in rows.rows(named=True) if present[row["log_id"]] != row["ingest_id"]]
+    past = [row["ingest_id"] for row in rows.rows(named=True) if present[row["log_id"]] != row["ingest_id"]]
+    return _Logs(past, _segments_in(warehouse, vessel, sorted(present.values()), as_of))
 
 
-def _exploded(table: DeltaTable | None, vessel: str, past: list[str]) -> pl.DataFrame:
-    columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters", "provenance_json")
-    each = _marked(table, vessel, past, columns).explode("parameters", empty_as_null=False)
+def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: datetime | None) -> list[str] | None:
+    version = None if as_of is None else delta.version_as_of(warehouse, "segments", as_of)
+    if as_of is not None and version is None:
+        return None
+    where: Where = {"vessel_key": vessel_key(vessel), "ingest_id": ingests}
+    try:
+        found = delta.read(warehouse, "segments", where, ("segment_id",), version)["segment_id"].to_list()
+    except KempfError:
+        if version is None:
+            raise
+        return None  # what was found then has been deleted since: earlier versions of kempf did not keep it
+    return found or ([] if examinations.codes(warehouse, ingests) else None)
+
+
+def _exploded(table: DeltaTable | None, vessel: str, known: _Logs) -> pl.DataFrame:
+    columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters")
+    each = _marked(table, vessel, known, columns).explode("parameters", empty_as_null=False)
     return each.unnest("parameters").rename({"model_name": "model", "name": "parameter"})
 
 
-def _marked(table: DeltaTable | None, vessel: str, past: list[str], columns: tuple[str, ...]) -> pl.DataFrame:
-    """Return sets in the order of their start with a column ``superseded`` instead of the provenance."""
+def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequence[str]) -> pl.DataFrame:
+    """Return sets in the order of their start with a column ``superseded``.
+
+    A set is superseded where one of its logs has been read anew since, where one of its segments is no longer found,
+    and where there are sets of newer code: of the present code, else of the one that was at work last.
+    """
     import polars as pl
 
-    sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, columns)
-    # a set of several logs is superseded with any of them; ids are of one length, so that none stands in another
-    ingests = pl.col("provenance_json").str.json_path_match("$.ingest_ids")
-    old = ingests.str.contains_any(past).fill_null(value=False) if past else pl.lit(value=False)
-    marked = sets.with_columns(superseded=old).drop("provenance_json")
+    told = [name for name in ("segment_ids", "provenance_json") if name not in columns]
+    sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, (*columns, *told))
+    provenance = pl.col("provenance_json").str
+    at = provenance.json_path_match("$.table_versions.parameter_sets").cast(pl.Int64).fill_null(-1)
+    sets = sets.with_columns(_code=provenance.json_path_match("$.code_version"), _at=at)
+    codes = sets["_code"].to_list()
+    own = code_version.fingerprint("estimate")
+    newest = own if own in codes else next(iter(sets.sort("_at", descending=True)["_code"]), None)
+    old = pl.col("_code").ne_missing(newest)
+    if known.past:
+        # a set of several logs is superseded with any of them; ids are of one length, so that none stands in another
+        old |= provenance.json_path_match("$.ingest_ids").str.contains_any(known.past).fill_null(value=False)
+    if known.segments is not None:
+        old |= ~pl.col("segment_ids").list.eval(pl.element().is_in(known.segments)).list.all()
+    marked = sets.with_columns(superseded=old).drop("_code", "_at", *told)
     return marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
 
 

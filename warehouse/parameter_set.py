@@ -53,7 +53,7 @@ class Inputs:
     settings : mapping
         Of the estimator, JSON content.
     code_version : str
-        Fingerprint of the source, see `kempf.warehouse.code_version.fingerprint`.
+        Fingerprint of the code that reads logs and estimates: stage ``estimate`` of `kempf.warehouse.code_version`.
     """
 
     log_ids: tuple[str, ...]

@@ -154,6 +154,12 @@ def models(warehouse: Warehouse, vessel: str) -> list[tuple[dict[str, Any], str,
     return [(loads(text), estimator, loads(settings).get("own") or {}) for text, estimator, settings in frame.rows()]
 
 
+def codes(warehouse: Warehouse, vessel: str) -> set[str]:
+    """Return the fingerprints of the code that made a vessel's sets."""
+    told = delta.read(warehouse, "parameter_sets", {"vessel_key": vessel_key(vessel)}, ("provenance_json",))
+    return set(told["provenance_json"].str.json_path_match("$.code_version").drop_nulls().to_list())
+
+
 def _refuse_other(stored: ParameterSet, given: ParameterSet) -> None:
     if stored is given or content_digest(stored) == content_digest(given):
         return

@@ -119,6 +119,19 @@ def current(warehouse: Warehouse, vessel: str) -> VesselProfile:
     return versions(warehouse, vessel)[-1].profile
 
 
+def current_hashes(warehouse: Warehouse, vessel: str | None = None) -> dict[str, str]:
+    """Return the hash of the current profile by vessel, of one or of all; one that is not known is left out.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    rows = delta.read(warehouse, "vessels", where, ("vessel", "profile_sha256", "revision")).sort("revision")
+    return {name: profile_sha256 for name, profile_sha256, _ in rows.rows()}
+
+
 def require(warehouse: Warehouse, vessel: str) -> None:
     """Do nothing where the vessel is known.
 

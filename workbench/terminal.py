@@ -30,6 +30,12 @@ def _finite(value: Any) -> Any:
     return value
 
 
+def print_note(sentence: str | None) -> None:
+    """Print a remark on stderr, beside a result that is whole; nothing for None."""
+    if sentence is not None:
+        click.echo(f"{click.style('note', fg='yellow')}: {one_line(sentence)}", err=True)
+
+
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
     """Print a table on stdout, numbers to the right; plain text off a terminal."""
     rows = [[one_line(cell) for cell in row] for row in rows]

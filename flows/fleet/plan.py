@@ -206,10 +206,10 @@ def to_try_again(reports: Iterable[Report]) -> list[str]:
 
 def together(first: Report, second: Report) -> Report:
     """Return the report of two attempts on one vessel: what both did, and what the second left."""
-    new, reread = (first[key] + second[key] for key in ("new_sets", "reread"))
+    done = {key: first[key] + second[key] for key in ("new_sets", "reread", "searched")}
     kept = max(second["kept_sets"] - first["new_sets"], 0)
-    changed = "changed" if second["status"] == "unchanged" and (new or reread) else second["status"]
-    return {**second, "status": changed, "new_sets": new, "kept_sets": kept, "reread": reread}
+    changed = "changed" if second["status"] == "unchanged" and any(done.values()) else second["status"]
+    return {**second, "status": changed, "kept_sets": kept, **done}
 
 
 def do_fleet(

@@ -69,13 +69,14 @@ def table(reports: Reports) -> list[dict[str, Any]]:
 
 def markdown(reports: Reports) -> str:
     """Return the summary of a run as Markdown: what was done, who failed with what, and what to do about it."""
-    totals = {key: sum(int(r[key]) for r in reports) for key in ("logs", "reread", "segments", "new_sets", "kept_sets")}
+    keys = ("logs", "reread", "searched", "segments", "new_sets", "kept_sets")
+    totals = {key: sum(int(r[key]) for r in reports) for key in keys}
     verified: Counter[str] = sum((Counter(r["verified"]) for r in reports), Counter())
     lines = [
         f"# {sentence(reports)}",
         "",
-        f"{totals['logs']} logs, {totals['reread']} read anew; {totals['segments']} zigzags; {totals['new_sets']} new "
-        f"parameter sets, {totals['kept_sets']} kept.",
+        f"{totals['logs']} logs, {totals['reread']} read anew, {totals['searched']} only searched anew; "
+        f"{totals['segments']} zigzags; {totals['new_sets']} new parameter sets, {totals['kept_sets']} kept.",
     ]
     if verified:
         lines += ["", "Verified: " + ", ".join(f"{count} {verdict}" for verdict, count in sorted(verified.items()))]

@@ -59,10 +59,20 @@ class VesselState:
         return sha256(canonical_json([responsible_code(), *told]))
 
 
-@cache
 def responsible_code() -> list[str]:
-    """Return the fingerprints of the code that makes results, and of the code that decides which are made."""
-    return [code_version.fingerprint(), code_version.fingerprint_of_packages(flows, storage)]
+    """Return the fingerprints of the code that makes segments and sets, and of the code that decides which are made."""
+    return [code_version.fingerprint("segment"), *code_of_sets()]
+
+
+def code_of_sets() -> list[str]:
+    """Return the fingerprints of the code that makes parameter sets, and of the code that puts warnings beside them."""
+    return [code_version.fingerprint("estimate"), deciding_code()]
+
+
+@cache
+def deciding_code() -> str:
+    """Return the fingerprint of the code that decides what is made of what, and how it is kept."""
+    return code_version.fingerprint_of_packages(flows, storage)
 
 
 def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> dict[str, VesselState]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.chosen_manoeuvres import choose_refreshed
 from kempf.flows.jobs.standing_model import (
     NONE_OF_ONES_OWN,
     Own,
@@ -48,7 +48,7 @@ def add_effect(
         )
     wanted = spec.model_copy(update={"effects": (*spec.effects, name)})
     both = before.beside(own)
-    chosen = choose(warehouse, vessel, progress)
+    chosen = choose_refreshed(warehouse, vessel, progress)
     made = stored_model(warehouse, chosen, wanted, both)
     if made is None:
         # only a fit needs the estimators, which take a while to load

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 from kempf.flows.jobs.refresh_logs import refresh_logs
@@ -38,23 +39,22 @@ class Chosen:
     skipped: dict[str, str]
 
 
-def choose(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Chosen:
-    """Choose the zigzags of a vessel: each manoeuvre once, all read with the newest profile.
+def choose(warehouse: Warehouse, vessel: str, failed: Collection[str] = ()) -> Chosen:
+    """Choose the zigzags of a vessel, as they are stored: each manoeuvre once, all read with one profile.
 
     Parameters
     ----------
     warehouse : Warehouse
     vessel : str
-    progress : Progress, optional
-        Logs that were read by other code are read anew first.
+    failed : collection of str, optional
+        Ingests that are out of date and could not be brought up to date: they do not count.
 
     Raises
     ------
     NotFound
         ``no_segments``.
     """
-    refreshed = refresh_logs(warehouse, vessel, progress)
-    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel) if row.ingest_id not in refreshed.failed}
+    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel) if row.ingest_id not in failed}
     found = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
     if not found:
         raise NotFound(
@@ -78,3 +78,20 @@ def choose(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Ch
         {s.log_id: rows[s.ingest_id].file_name for s in kept},
         skipped,
     )
+
+
+def choose_refreshed(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Chosen:
+    """Choose as `choose`, once what other code read and found is brought up to date: for what is stored.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel : str
+    progress : Progress, optional
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``, ``no_segments``.
+    """
+    return choose(warehouse, vessel, refresh_logs(warehouse, vessel, progress).failed)

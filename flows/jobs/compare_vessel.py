@@ -129,7 +129,7 @@ def compare_vessel(
     asked = horizon_of(horizon)
     chosen, alias = chosen_set(warehouse, vessel, set_id)
     hull, values, model = _parameters(chosen)
-    usable = choose(warehouse, vessel, progress)
+    usable = choose(warehouse, vessel)
     data = assembled(warehouse, usable, ModelSpec.model_validate(dict(chosen.model_spec)), progress)
     by_name = {segment.segment_id: segment for segment in usable.segments}
     ordered = [by_name[run.name] for run in data.runs]

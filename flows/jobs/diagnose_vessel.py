@@ -6,7 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose
+from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose_refreshed
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, Own, inputs_of, known_effects, named
 from kempf.flows.jobs.vessel_model import Fitted, store_model
 from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
@@ -59,7 +59,7 @@ def diagnose_vessel(
     (StoredDiagnosis, bool)
         And whether it is new.
     """
-    chosen = choose(warehouse, vessel, progress)
+    chosen = choose_refreshed(warehouse, vessel, progress)
     inputs = _inputs(chosen, spec, own, settings)
     found = diagnoses.find(warehouse, diagnosis_id(inputs))
     if found is not None:
@@ -71,7 +71,7 @@ def diagnose_in_full(
     warehouse: Warehouse, vessel: str, spec: ModelSpec, own: Own, settings: DiagnosisSettings, progress: Progress
 ) -> tuple[StoredDiagnosis, Examined]:
     """Diagnose a vessel as `diagnose_vessel`, and return also what is not stored: it is computed in any case."""
-    chosen = choose(warehouse, vessel, progress)
+    chosen = choose_refreshed(warehouse, vessel, progress)
     inputs = _inputs(chosen, spec, own, settings)
     examined = examine(warehouse, chosen, spec, own, settings, progress)
     found = diagnoses.find(warehouse, diagnosis_id(inputs))
@@ -95,7 +95,7 @@ def _kept(
         effects=tuple(name for one in content["sets"] for name in one["effects"]),
         content=content,
         inputs=inputs,
-        code_version=code_version.fingerprint(),
+        code_version=inputs["code_version"],
     )
     diagnoses.insert(warehouse, made)
     # as it is read back, so that new and known answers are the same
@@ -148,6 +148,7 @@ def _inputs(chosen: Chosen, spec: ModelSpec, own: Own, settings: DiagnosisSettin
     return {
         **told,
         "estimator": "diagnosis",
+        "code_version": code_version.fingerprint("diagnose"),
         "settings": asdict(settings),
         "own": own.as_json(),
         "catalogue": {name: effect.sha256 for name, effect in known_effects(own).items()},

@@ -12,7 +12,7 @@ from kempf.pipeline.segment.imo import judge
 from kempf.pipeline.segment.lateral import lateral_summary
 from kempf.pipeline.segment.zigzag import Zigzag
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse.code_version import fingerprint
+from kempf.warehouse import code_version
 from kempf.warehouse.segments import Segment, segment_id
 
 
@@ -70,7 +70,7 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
         end_utc_ns=zigzag.end_utc_ns,
         executes_utc_ns=zigzag.executes_utc_ns,
         overshoots_deg=tuple(o.beyond_nominal_deg for o in zigzag.overshoots),
-        code_version=fingerprint(),
+        code_version=code_version.fingerprint("segment"),
         imo={criterion.name: _without_name(asdict(criterion)) for criterion in criteria},
         quality=asdict(zigzag.quality),
         detail={

@@ -266,7 +266,7 @@ def inputs_of(segment: Segment, profile_sha256: str, request: Request, companion
         model_spec=request.spec.model_dump(mode="json"),
         estimator=request.estimator,
         settings=settings,
-        code_version=code_version.fingerprint(),
+        code_version=code_version.fingerprint("estimate"),
         companions=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in companions),
     )
 

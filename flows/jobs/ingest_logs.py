@@ -7,15 +7,17 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from kempf.flows.jobs.examine_log import examine_instruments
+from kempf.flows.jobs import search_log
 from kempf.flows.jobs.files import opened_log
-from kempf.flows.jobs.find_segments import Ingest, find_segments
+from kempf.flows.jobs.find_segments import Ingest
+from kempf.flows.jobs.out_of_date import unsearched
+from kempf.flows.jobs.search_log import SearchedLog, search
 from kempf.flows.jobs.spool import spooled
 from kempf.flows.jobs.unreadable_stretches import as_json
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.release_memory import give_back
 from kempf.flows.process.wrap_error import wrapped
-from kempf.pipeline.channels.instruments import Instruments, from_readings
+from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import LogReadings, LostStretch, Tally
 from kempf.schemas.errors import KempfError, UsageError
@@ -181,37 +183,43 @@ def ingest_log(
     KempfError
         The log cannot be read, or is another vessel's; nothing of it was stored.
     """
-    code = code_version.fingerprint()
+    code = code_version.fingerprint("ingest")
     there = held(warehouse, vessel, file_name, log, profile_sha256=profile.sha256, code_version=code)
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
+        if unsearched(warehouse, [row]):
+            search_log.store(warehouse, [search_log.search_again(warehouse, row)])
         found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
-        seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
-        gone = _lost(warehouse, row)
-        return IngestOutcome(
-            path, "unchanged", row.log_id, row.ingest_id, row.tally, row.notes, found, lost=gone, examination=seen
-        )
+        seen = examinations.of_ingests(warehouse, [row.ingest_id])[row.ingest_id]
+        return _outcome(warehouse, path, "unchanged", row, found, seen)
     with spooled(file_name, log, profile) as readings:
         give_back(readings.tally.records_read)
         read = look_through(vessel, file_name, log, profile, readings)
         give_back(readings.tally.records_read)
         (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
+    return _outcome(warehouse, path, stored.outcome, row, read.found.segments, read.found.examination)
+
+
+def _outcome(
+    warehouse: Warehouse,
+    path: str,
+    outcome: str,
+    row: logs.LogRow,
+    found: tuple[Segment, ...],
+    examination: StoredExamination,
+) -> IngestOutcome:
     return IngestOutcome(
         path,
-        stored.outcome,
+        outcome,
         row.log_id,
         row.ingest_id,
         row.tally,
-        row.notes,
-        read.segments,
-        lost=_lost(warehouse, row),
-        examination=read.examination,
+        (*row.notes, *examination.notes),
+        found,
+        lost=lost.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id, ()),
+        examination=examination,
     )
-
-
-def _lost(warehouse: Warehouse, row: logs.LogRow) -> tuple[LostStretch, ...]:
-    return lost.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id, ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,22 +227,17 @@ class ReadLog:
     """A log that was read and looked through; nothing of it is stored yet."""
 
     delivery: Delivery
-    ingest_id: str
-    segments: tuple[Segment, ...]
-    examination: StoredExamination
+    found: SearchedLog
 
 
 def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfile, readings: LogReadings) -> ReadLog:
     """Find the zigzags of a log that was read, and compare its channels."""
-    code = code_version.fingerprint()
+    code = code_version.fingerprint("ingest")
     one = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code))
     instruments = from_readings(readings.lazy())
     give_back(readings.tally.records_read)
-    zigzags, notes = find_segments(one, profile, instruments)
-    give_back(readings.tally.records_read)
-    seen = _examined(one, profile, file_name, instruments, readings.format)
-    delivery = Delivery(vessel, file_name, log, profile, readings, code, notes)
-    return ReadLog(delivery, one.ingest_id, tuple(zigzags), seen)
+    found = search(one, profile, file_name, readings.format, instruments, readings.tally.records_read)
+    return ReadLog(Delivery(vessel, file_name, log, profile, readings, code), found)
 
 
 def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
@@ -247,19 +250,5 @@ def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
     """
     # zigzags and verdicts before the rows that make the logs count: what a crash leaves in between is not seen, and not
     # missed
-    segments.replace(warehouse, {(one.delivery.vessel, one.ingest_id): one.segments for one in read})
-    examinations.replace(warehouse, [one.examination for one in read])
+    search_log.store(warehouse, [one.found for one in read])
     return deposit(warehouse, [one.delivery for one in read])
-
-
-def _examined(
-    one: Ingest, profile: VesselProfile, file_name: str, instruments: Instruments, log_format: str
-) -> StoredExamination:
-    """Examine a log; should the doctor fail, that is the verdict, and the log is in all the same."""
-    try:
-        content = examine_instruments(instruments, profile, file_name, log_format).content
-    except Exception as error:  # noqa: BLE001 - a log is not lost because its channels could not be compared
-        content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(wrapped(error))}
-    findings = tuple(finding["words"] for finding in content["findings"])
-    code = code_version.fingerprint()
-    return StoredExamination(one.vessel, one.ingest_id, one.log_id, code, content["verdict"], findings, content)

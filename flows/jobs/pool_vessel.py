@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.chosen_manoeuvres import choose_refreshed
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.no_speed_log import without_log
@@ -116,7 +116,7 @@ def pool_segments(
         model_spec=request.spec.model_dump(mode="json"),
         estimator=POOLED,
         settings=request.all_settings(),
-        code_version=code_version.fingerprint(),
+        code_version=code_version.fingerprint("estimate"),
     )
     name = parameter_set_id(inputs)
     known = name in set(parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list())
@@ -149,7 +149,7 @@ def _pool_with_effects(
     progress: Progress,
 ) -> tuple[ParameterSet, bool] | None:
     """Fit hull and effects to all manoeuvres but the held-out ones, as `kempf effects add` does."""
-    chosen = choose(warehouse, vessel, progress)
+    chosen = choose_refreshed(warehouse, vessel, progress)
     if len(chosen.segments) < 2:
         return None
     made, is_new = store_model(warehouse, chosen, request.spec, request.own, progress, flow_run)

@@ -13,12 +13,13 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+from kempf.flows.jobs.out_of_date import unsearched
 from kempf.flows.jobs.parameter_changes import Move, NewSet, paired
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import aliases, code_version, logs, parameter_sets, raw
+from kempf.warehouse import aliases, code_version, history, logs, parameter_sets, raw
 from kempf.warehouse import vessels as vessel_table
 from kempf.warehouse.keys import ingest_id
 from kempf.warehouse.parameter_set import ParameterSet
@@ -116,11 +117,13 @@ def preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
         ``no_warehouse``, ``no_vessel``.
     """
     vessel_table.require(warehouse, vessel)
-    code = code_version.fingerprint()
+    code = code_version.fingerprint("estimate")
     stand = standing_sets(warehouse, vessel)
     old = [one for one in stand if one.provenance["code_version"] != code]
     ready = len(stand) - len(old)
-    if not old and all(row.code_version == code for row in logs.current(warehouse, vessel)):
+    rows = logs.current(warehouse, vessel)
+    read = all(row.code_version == code_version.fingerprint("ingest") for row in rows)
+    if not old and read and not unsearched(warehouse, rows):
         return VesselPreview(vessel, ready, ready)
     with _scratch() as scratch:
         failures = _seed(warehouse, scratch, vessel)
@@ -141,10 +144,8 @@ def preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
 
 
 def standing_sets(warehouse: Warehouse, vessel: str) -> list[ParameterSet]:
-    """Return the parameter sets of a vessel that no newer reading of a log has superseded, by start, then id."""
-    present = {row.ingest_id for row in logs.current(warehouse, vessel)}
-    every = parameter_sets.get_all(warehouse, vessel)
-    return [one for one in every if present.issuperset(one.provenance["ingest_ids"])]
+    """Return the parameter sets of a vessel that are not superseded, by start, then id."""
+    return parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
 
 
 @contextmanager

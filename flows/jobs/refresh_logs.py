@@ -1,24 +1,27 @@
-"""The job that reads vessels' logs anew where a profile or the code has changed since they were read."""
+"""The job that reads and looks through vessels' logs anew where a profile or the code has changed since."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from itertools import count
 from typing import TYPE_CHECKING
 
+from kempf.flows.jobs.out_of_date import unread, unsearched
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version, logs, raw, vessels
+from kempf.warehouse import logs, raw, vessels
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.ingest_logs import ReadLog
+    from kempf.flows.jobs.search_log import SearchedLog
 
 #: Logs that are stored together, at most; and their bytes as delivered, which compression may hide twentyfold.
 _MOST_LOGS, _MOST_BYTES = 60, 8 << 20
@@ -30,20 +33,22 @@ class Refreshed:
 
     Attributes
     ----------
-    logs, reread : int
-        Logs in all, and those read anew.
+    logs, reread, searched : int
+        Logs in all, those read anew, and those of the others whose readings were looked through anew.
     failed : dict of str to KempfError
-        By ingest id: logs that could not be read anew; what was read of them before stands, but is out of date.
+        By ingest id: logs that could not be read or looked through anew; what was read of them before stands, but is
+        out of date.
     """
 
     logs: int
     reread: int
+    searched: int
     failed: dict[str, KempfError]
 
 
 @dataclass(frozen=True)
 class Stale:
-    """Logs of a vessel that were read with another profile or other code than the present.
+    """Logs of a vessel of which something was made with another profile or by other code than the present.
 
     Attributes
     ----------
@@ -51,16 +56,25 @@ class Stale:
         The present one.
     logs : int
         Of hers in all.
-    rows : tuple of LogRow
+    unread : tuple of LogRow
+        Read with another profile or by other code.
+    unsearched : tuple of LogRow
+        Those of the others in whose readings other code has looked for zigzags.
     """
 
     profile: VesselProfile
     logs: int
-    rows: tuple[LogRow, ...]
+    unread: tuple[LogRow, ...]
+    unsearched: tuple[LogRow, ...]
+
+    @property
+    def rows(self) -> tuple[LogRow, ...]:
+        """All of them."""
+        return self.unread + self.unsearched
 
 
 def stale_logs(warehouse: Warehouse, vessel: str) -> Stale:
-    """Find the logs of a vessel that are to be read anew.
+    """Find the logs of a vessel that are to be read, or to be looked through, anew.
 
     Raises
     ------
@@ -68,26 +82,29 @@ def stale_logs(warehouse: Warehouse, vessel: str) -> Stale:
         ``no_warehouse``, ``no_vessel``.
     """
     profile = vessels.current(warehouse, vessel)
-    hers, code = logs.current(warehouse, vessel), code_version.fingerprint()
-    stale = [row for row in hers if (row.profile_sha256, row.code_version) != (profile.sha256, code)]
-    return Stale(profile, len(hers), tuple(stale))
+    hers = logs.current(warehouse, vessel)
+    old = unread(hers, {vessel: profile.sha256})
+    names = {row.ingest_id for row in old}
+    others = [row for row in hers if row.ingest_id not in names]
+    return Stale(profile, len(hers), tuple(old), tuple(unsearched(warehouse, others)))
 
 
 def refresh_logs(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Refreshed:
-    """Read anew, from the raw bytes, every log that was read with another profile or other code than the present.
+    """Read anew, from the raw bytes, the logs that were read with another profile or by other code than the present.
 
-    Results carry the code that made them in their identity; so nothing may be computed from readings of other code.
+    Those that were only looked through by other code are looked through anew, from the readings that are stored.
+    Results carry the code that made them in their identity; so nothing may be computed from what other code made.
 
     Raises
     ------
     NotFound
         ``no_warehouse``, ``no_vessel``.
     """
-    return read_anew(warehouse, {vessel: stale_logs(warehouse, vessel)}, progress)[vessel]
+    return refresh_all(warehouse, {vessel: stale_logs(warehouse, vessel)}, progress)[vessel]
 
 
-def read_anew(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Progress = silent) -> dict[str, Refreshed]:
-    """Read the logs of several vessels anew; many short ones are stored in one commit a table.
+def refresh_all(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Progress = silent) -> dict[str, Refreshed]:
+    """Do as `refresh_logs` for several vessels; many short logs are stored in one commit a table.
 
     Parameters
     ----------
@@ -101,22 +118,34 @@ def read_anew(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Progre
     dict of str to Refreshed
         By vessel.
     """
-    rows = [row for hers in stale.values() for row in hers.rows]
+    done, steps = count(), sum(len(hers.rows) for hers in stale.values())
+
+    def tell(what: str) -> None:
+        progress(next(done), steps, what)
+
+    profiles = {vessel: hers.profile for vessel, hers in stale.items()}
+    failed = _read_anew(warehouse, [row for hers in stale.values() for row in hers.unread], profiles, tell)
+    failed |= _search_anew(warehouse, [row for hers in stale.values() for row in hers.unsearched], tell)
+    return {vessel: _refreshed(hers, failed) for vessel, hers in stale.items()}
+
+
+def _read_anew(
+    warehouse: Warehouse, rows: Sequence[LogRow], profiles: Mapping[str, VesselProfile], tell: Callable[[str], None]
+) -> dict[str, KempfError]:
+    """Read logs anew and store them; return those that failed, by ingest id."""
     if not rows:
-        return {vessel: Refreshed(hers.logs, 0, {}) for vessel, hers in stale.items()}
+        return {}
     # the readers, the finder of zigzags and the doctor, which a vessel whose logs are up to date needs none of
     from kempf.flows.jobs.ingest_logs import look_through, store
     from kempf.flows.jobs.spool import spooled
 
     failed: dict[str, KempfError] = {}
-    done = 0
     for chunk in _chunks(rows):
         read: dict[str, ReadLog] = {}
         with ExitStack() as until_stored:
             for row in chunk:
-                progress(done, len(rows), f"reading {row.file_name}")
-                done += 1
-                profile = stale[row.vessel].profile
+                tell(f"reading {row.file_name}")
+                profile = profiles[row.vessel]
                 try:
                     log = until_stored.enter_context(raw.opened(warehouse, row.log_id))
                     readings = until_stored.enter_context(spooled(row.file_name, log, profile))
@@ -124,12 +153,32 @@ def read_anew(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Progre
                 except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                     failed[row.ingest_id] = wrapped(error)
             failed |= together_or_each(read, partial(store, warehouse))
-    return {vessel: _refreshed(hers, failed) for vessel, hers in stale.items()}
+    return failed
+
+
+def _search_anew(warehouse: Warehouse, rows: Sequence[LogRow], tell: Callable[[str], None]) -> dict[str, KempfError]:
+    """Look through stored readings anew and store what is found; return the logs that failed, by ingest id."""
+    if not rows:
+        return {}
+    from kempf.flows.jobs.search_log import search_again, store
+
+    failed: dict[str, KempfError] = {}
+    for chunk in _chunks(rows):
+        found: dict[str, SearchedLog] = {}
+        for row in chunk:
+            tell(f"looking for zigzags in {row.file_name}")
+            try:
+                found[row.ingest_id] = search_again(warehouse, row)
+            except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
+                failed[row.ingest_id] = wrapped(error)
+        failed |= together_or_each(found, partial(store, warehouse))
+    return failed
 
 
 def _refreshed(stale: Stale, failed: Mapping[str, KempfError]) -> Refreshed:
+    reread, searched = (sum(row.ingest_id not in failed for row in rows) for rows in (stale.unread, stale.unsearched))
     own = {row.ingest_id: failed[row.ingest_id] for row in stale.rows if row.ingest_id in failed}
-    return Refreshed(stale.logs, len(stale.rows) - len(own), own)
+    return Refreshed(stale.logs, reread, searched, own)
 
 
 def _chunks(stale: Sequence[LogRow]) -> list[list[LogRow]]:

@@ -15,17 +15,18 @@ from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_segments
 from kempf.flows.jobs.pending import Waiting, store
 from kempf.flows.jobs.pool_vessel import POOLED, pool_segments
-from kempf.flows.jobs.refresh_logs import Refreshed, Stale, read_anew, stale_logs
+from kempf.flows.jobs.refresh_logs import Refreshed, Stale, refresh_all, stale_logs
 from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.standing_model import ESTIMATOR, Own, model_of, point, standing
+from kempf.flows.jobs.standing_model import Own, model_of, point, standing
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
+from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, code_version, logs, parameter_sets, segments
+from kempf.warehouse import aliases, code_version, history, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
 
 
@@ -56,7 +57,8 @@ def reprocess_vessels(
 ) -> list[VesselReport]:
     """Bring vessels up to date with their profiles and the code.
 
-    A log read with the current profile and code is not read again, a set that is there is not identified again.
+    A log read with the current profile and code is not read again, one whose zigzags the current code has found is not
+    searched again, a set that is there is not identified again.
 
     Parameters
     ----------
@@ -85,7 +87,7 @@ def reprocess_vessels(
 
     def read() -> None:
         stale = {w.vessel: w.stale for w in _going(all_of_them) if w.stale is not None}
-        for vessel, refreshed in read_anew(warehouse, stale, progress).items():
+        for vessel, refreshed in refresh_all(warehouse, stale, progress).items():
             works[vessel].refreshed = refreshed
 
     _together(all_of_them, begin)
@@ -181,7 +183,7 @@ class _Job:
         report, refreshed = work.report, work.refreshed
         assert refreshed is not None and work.stale is not None
         names = {row.ingest_id: row.file_name for row in work.stale.rows}
-        report.logs, report.reread = refreshed.logs, refreshed.reread
+        report.logs, report.reread, report.searched = refreshed.logs, refreshed.reread, refreshed.searched
         for ingest, error in refreshed.failed.items():
             report.fail(names[ingest], error)
         report.segments = len(segments.current(self.warehouse, work.vessel))
@@ -236,7 +238,7 @@ class _Job:
             return
         spec, own = model_of(now)
         try:
-            chosen = choose(self.warehouse, work.vessel)
+            chosen = choose(self.warehouse, work.vessel, work.refreshed.failed if work.refreshed else ())
             made, new = store_model(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
         except KempfError as error:
             work.report.fail(aliases.CURRENT, error)
@@ -268,8 +270,10 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
     asked: dict[str, Request] = {}
     known = parameter_sets.models(warehouse, vessel)
     for spec, estimator, own in known:
-        if estimator in (POOLED, ESTIMATOR):
-            continue  # the one comes of the separate ones, the other is a model of all runs at once
+        # a pooled set comes of the separate ones, one with effects is a model of all runs at once, and of an estimator
+        # that an earlier version had the sets stay as they are
+        if estimator not in NAMES:
+            continue
         request = Request(ModelSpec.model_validate(spec), estimator, own=Own.from_json(own))
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
     return [asked[key] for key in sorted(asked)] if known else [Request()]
@@ -280,14 +284,13 @@ def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
     pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
     if pointed is None:
         return
-    standing = {row.ingest_id for row in logs.current(warehouse, vessel)}
-    if not standing.intersection(parameter_sets.get(warehouse, pointed).provenance["ingest_ids"]):
+    if pointed not in history.standing(warehouse, vessel):
         aliases.withdraw(warehouse, vessel)
         report.withdrawn = pointed
 
 
 def _verify(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
-    code = code_version.fingerprint()
+    code = code_version.fingerprint("estimate")
     for name in parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list():
         if parameter_sets.get(warehouse, name).provenance["code_version"] != code:
             continue

@@ -14,7 +14,7 @@ from itertools import groupby
 from os import cpu_count
 from typing import Any
 
-from kempf.flows.fleet.state import responsible_code
+from kempf.flows.fleet.state import code_of_sets
 from kempf.flows.jobs.rerun_set import Rerun, code_changed, inputs_of, judged, raw_inputs, rebuilt
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
@@ -212,7 +212,7 @@ def _failed(one: ParameterSet, error: KempfError) -> Verdict:
 def _run_id(parameter_set_id: str, tolerance: float) -> str:
     """Return the id of the run that judges a set with the present code and packages."""
     what = {"parameter_set_id": parameter_set_id, "tolerance": tolerance}
-    return runs.run_id(FLOW, {**what, "code": responsible_code(), "packages": code_version.packages()})
+    return runs.run_id(FLOW, {**what, "code": code_of_sets(), "packages": code_version.packages()})
 
 
 def _as_run(one: Verdict, tolerance: float) -> runs.Run:

@@ -12,6 +12,8 @@ from kempf.flows.jobs.spool import spooled
 from kempf.flows.jobs.standing_model import ESTIMATOR, Own, known_effects
 from kempf.flows.jobs.vessel_model import build_model
 from kempf.pipeline.channels.instruments import Instruments, from_readings
+from kempf.pipeline.estimate.names import NAMES
+from kempf.schemas.errors import NotFound
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
 from kempf.warehouse.agreement import Difference
@@ -136,16 +138,32 @@ def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profil
 
     Raises
     ------
+    NotFound
+        ``no_estimator``: an earlier version had it, this one has not.
     KempfError
         It can no longer be identified; the reason says why.
     """
     inputs, told = inputs_of(stored), dict(stored.provenance)
+    if inputs.estimator not in (*NAMES, POOLED, ESTIMATOR):
+        raise _no_estimator(stored)
     if inputs.estimator == POOLED:
         return build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, told)
     if inputs.estimator == ESTIMATOR:
         return build_model(instruments, profile, inputs, stored.vessel, told, stored.parent)
     one = instruments[inputs.bounds[0].log_id]
     return build(one, profile, inputs, stored.vessel, stored.segment_ids, told, instruments)
+
+
+def _no_estimator(stored: ParameterSet) -> NotFound:
+    commit = stored.provenance.get("git_commit")
+    return NotFound(
+        "no_estimator",
+        f"{stored.parameter_set_id} was made by the estimator {stored.estimator!r}, which this version of kempf no "
+        "longer has: it cannot be built again.",
+        "The stored set stays readable. To build it again, install the version that made it"
+        + (f", commit {commit}." if commit else "."),
+        {"parameter_set_id": stored.parameter_set_id, "estimator": stored.estimator, "git_commit": commit},
+    )
 
 
 def judged(stored: ParameterSet, again: ParameterSet, tolerance: float = 1e-9) -> Rerun:
@@ -161,7 +179,7 @@ def code_changed(inputs: Inputs) -> bool:
     then = inputs.settings.get("effects", {})
     now = known_effects(Own.from_json(inputs.settings.get("own") or {})) if then else {}
     changed = any(name not in now or now[name].sha256 != hashed for name, hashed in then.items())
-    return changed or inputs.code_version != code_version.fingerprint()
+    return changed or inputs.code_version != code_version.fingerprint("estimate")
 
 
 def inputs_of(stored: ParameterSet) -> Inputs:

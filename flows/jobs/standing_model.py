@@ -105,7 +105,7 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
         model_spec=spec.model_dump(mode="json"),
         estimator=ESTIMATOR,
         settings={"segments": [s.segment_id for s in chosen.segments], **effect_settings(spec, own)},
-        code_version=code_version.fingerprint(),
+        code_version=code_version.fingerprint("estimate"),
     )
 
 

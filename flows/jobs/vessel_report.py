@@ -23,8 +23,9 @@ class VesselReport:
     Attributes
     ----------
     vessel : str
-    logs, reread, segments, new_sets, kept_sets : int
-        Logs in all, logs read anew, zigzags found, parameter sets made and kept.
+    logs, reread, searched, segments, new_sets, kept_sets : int
+        Logs in all, logs read anew, logs of the others in which zigzags were looked for anew, zigzags found, parameter
+        sets made and kept.
     verified : dict of str to int
         Verdicts on the kept sets, where everything was asked for.
     withdrawn : str or None
@@ -37,6 +38,7 @@ class VesselReport:
     vessel: str
     logs: int = 0
     reread: int = 0
+    searched: int = 0
     segments: int = 0
     new_sets: int = 0
     kept_sets: int = 0
@@ -49,7 +51,7 @@ class VesselReport:
         """``failed`` where something did, else ``changed`` or ``unchanged``."""
         if self.failures:
             return "failed"
-        return "changed" if self.reread or self.new_sets else "unchanged"
+        return "changed" if self.reread or self.searched or self.new_sets else "unchanged"
 
     def show(self) -> dict[str, Any]:
         """Return the report as JSON content."""

@@ -72,7 +72,7 @@ def vessel_runs(warehouse: Warehouse, vessel: str, spec: ModelSpec, progress: Pr
     NotFound
         ``no_segments``, ``no_runs``: none can be used; the details say why.
     """
-    chosen = choose(warehouse, vessel, progress)
+    chosen = choose(warehouse, vessel)
     return assembled(warehouse, chosen, spec, progress)
 
 

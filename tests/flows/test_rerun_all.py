@@ -51,9 +51,7 @@ def own(_identified: Path, tmp_path: Path) -> Warehouse:
 
 
 def other_code(monkeypatch: pytest.MonkeyPatch, letter: str = "f") -> None:
-    monkeypatch.setattr(code_version, "fingerprint", lambda: letter * 16)
-    for module in ("kempf.flows.jobs.find_segments",):  # has it by name
-        monkeypatch.setattr(f"{module}.fingerprint", lambda: letter * 16)
+    monkeypatch.setattr(code_version, "fingerprint", lambda _: letter * 16)
 
 
 def test_every_set_is_counted_and_the_second_call_computes_nothing(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -75,11 +73,11 @@ def test_a_verdict_of_other_flows_is_not_taken_over(own: Warehouse, monkeypatch:
     """What the flows put beside an estimate, such as warnings, is compared too; their code is no part of a set's id."""
     assert verify_all(own).counts() == {**NONE, "bit-identical": 2}
     monkeypatch.setattr(code_version, "fingerprint_of_packages", lambda *_: "f" * 16)
-    state.responsible_code.cache_clear()
+    state.deciding_code.cache_clear()
     try:
         assert verify_all(own).show()["known_before"] == 0
     finally:
-        state.responsible_code.cache_clear()
+        state.deciding_code.cache_clear()
 
 
 def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: pytest.MonkeyPatch):

@@ -69,12 +69,12 @@ def test_current_is_withdrawn_where_its_set_no_longer_stands(ferry) -> None:
 def test_readings_of_other_code_are_read_anew_before_anything_is_computed(ferry, monkeypatch) -> None:
     warehouse, log, profile = ferry
     with monkeypatch.context() as before:
-        before.setattr(code_version, "fingerprint", lambda: "0" * 16)
+        before.setattr(code_version, "fingerprint", lambda _: "0" * 16)
         ingest(warehouse, [log], given=profile)
         assert logs.current(warehouse)[0].code_version == "0" * 16
     (outcome,) = identify_vessel(warehouse, "ferry")
     assert outcome.parameter_set is not None
-    assert logs.current(warehouse)[0].code_version == code_version.fingerprint()
+    assert logs.current(warehouse)[0].code_version == code_version.fingerprint("ingest")
     assert rerun(warehouse, outcome.parameter_set.parameter_set_id).verdict == "bit-identical"
     report = reprocess_vessel(warehouse, "ferry")
     assert (report.status, report.reread, report.kept_sets) == ("unchanged", 0, 1)

@@ -10,6 +10,7 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.deposit import Delivery
+from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.parameter_set import Bounds, Estimate, Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.segments import Segment, segment_id
 
@@ -77,6 +78,10 @@ def segment(vessel: str, log_id: str, ingest_id: str, start_utc_ns: int = START_
         "quality": {"gap_s": float("nan")},
     }
     return Segment(**{**values, **changes})
+
+
+def examination(vessel: str, log_id: str, ingest_id: str, finding: str) -> StoredExamination:
+    return StoredExamination(vessel, ingest_id, log_id, CODE, "faults", (finding,), {"findings": [finding]})
 
 
 def inputs(log_id: str = "a" * 64, start_utc_ns: int = START_NS, **changes: Any) -> Inputs:

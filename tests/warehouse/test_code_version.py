@@ -10,30 +10,43 @@ from pathlib import Path
 import pytest
 
 from kempf.warehouse import code_version
+from kempf.warehouse.code_version import Stage
+from kempf.warehouse.source_tree import read_module
 
 ROOT = Path(__file__).parents[2]
 
 
-def test_the_fingerprint_is_the_source() -> None:
-    assert re.fullmatch(r"[0-9a-f]{16}", code_version.fingerprint())
-    every = {p.relative_to(ROOT).as_posix(): p for top in ("pipeline", "schemas") for p in (ROOT / top).rglob("*.py")}
-    files = {name: path for name, path in every.items() if not name.startswith("pipeline/simulate/")}
-    assert 0 < len(files) < len(every)
-    assert code_version.fingerprint_of({n: p.read_bytes() for n, p in files.items()}) == code_version.fingerprint()
+#: Jobs whose calls into the pipeline make the results of a stage.
+JOBS: dict[Stage, tuple[str, ...]] = {
+    "ingest": ("spool",),
+    "segment": ("search_log", "find_segments", "examine_log"),
+    "estimate": ("identify_vessel", "pool_vessel", "no_speed_log", "parameter_set_of", "vessel_runs", "vessel_model"),
+    "diagnose": ("diagnose_vessel",),
+}
 
 
-def test_every_change_of_name_or_byte_changes_it() -> None:
-    base = {"pipeline/a.py": b"x = 1\n", "pipeline/b.py": b""}
-    others = [
-        {"pipeline/a.py": b"x = 2\n", "pipeline/b.py": b""},
-        {"pipeline/a.py": b"x = 1\n", "pipeline/c.py": b""},
-        {"pipeline/a.py": b"x = 1\n"},
-        {"pipeline/a.py": b"", "pipeline/b.py": b"x = 1\n"},
-        {},
-    ]
-    found = {code_version.fingerprint_of(sources) for sources in (base, *others)}
-    assert len(found) == len(others) + 1
-    assert code_version.fingerprint_of(dict(reversed(base.items()))) == code_version.fingerprint_of(base)
+@pytest.mark.parametrize("stage", code_version.STAGES)
+def test_what_the_jobs_of_a_stage_call_counts_in_its_fingerprint(stage: Stage) -> None:
+    assert re.fullmatch(r"[0-9a-f]{16}", code_version.fingerprint(stage))
+    counted = code_version.modules_in(ROOT, stage)
+    for job in JOBS[stage]:
+        called = read_module((ROOT / "flows" / "jobs" / f"{job}.py").read_bytes()).imports
+        there = {name for name in called if name.startswith("kempf.pipeline.") and _is_module(name)}
+        assert there <= set(counted), (job, there - set(counted))
+    assert not any(name.startswith(("kempf.pipeline.simulate", "kempf.pipeline.steering")) for name in counted)
+
+
+def _is_module(name: str) -> bool:
+    path = ROOT.joinpath(*name.split(".")[1:])
+    return path.with_suffix(".py").is_file() or (path / "__init__.py").is_file()
+
+
+def test_stages_count_what_is_theirs() -> None:
+    of = {stage: set(code_version.modules_in(ROOT, stage)) for stage in code_version.STAGES}
+    assert "kempf.pipeline.segment.find" in of["segment"] - of["estimate"] - of["ingest"]
+    assert "kempf.pipeline.estimate.likelihood" in of["estimate"] - of["segment"]
+    assert of["ingest"] <= of["segment"] and of["ingest"] <= of["estimate"] <= of["diagnose"] >= of["segment"]
+    assert "kempf.pipeline.model.effects.rudder_lag" in of["estimate"], "code of an effect of the catalogue"
 
 
 def test_packages_are_named_with_their_versions() -> None:

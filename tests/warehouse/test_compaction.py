@@ -18,6 +18,7 @@ from kempf.warehouse import (
     aliases,
     compaction,
     delta,
+    examinations,
     history,
     logs,
     parameter_sets,
@@ -28,7 +29,7 @@ from kempf.warehouse import (
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.provenance import collect
 from kempf.warehouse.store import Warehouse
-from tests.warehouse.samples import START_NS, delivery, inputs, parameter_set, segment
+from tests.warehouse.samples import START_NS, delivery, examination, inputs, parameter_set, segment
 from tests.warehouse.samples import readings as readings_of
 
 
@@ -46,6 +47,7 @@ def lived_in(warehouse: Warehouse) -> list[dict[str, int]]:
         for start in (START_NS, START_NS + 10**9):  # found, then found otherwise: rows of no version that counts
             found = [segment("aurora", stored.log_id, stored.ingest_id, start)]
             segments.replace(warehouse, {("aurora", stored.ingest_id): found})
+            examinations.replace(warehouse, [examination("aurora", stored.log_id, stored.ingest_id, f"{start}")])
         asked = inputs(stored.log_id, START_NS + i)
         told = collect(warehouse, asked, [stored.ingest_id])
         made = parameter_set("aurora", asked, provenance=told)
@@ -82,7 +84,8 @@ def test_what_a_parameter_set_refers_to_survives(warehouse: Warehouse) -> None:
     assert orphan.exists() and half.exists()
     done = {one.table: one for one in compaction.vacuum(warehouse, 0.0)}
     assert {n: one.files for n, one in done.items()} == {n: one.files for n, one in said.items()}
-    assert done["readings"].files == 1 and done["raw"].files == 1 and done["segments"].files >= 4
+    assert done["readings"].files == 1 and done["raw"].files == 1 and done["examinations"].files >= 4
+    assert not any(done[name].files for name in compaction.ALWAYS), "any version of these may be asked for"
     assert all(one.size_bytes > 0 for one in done.values() if one.files)
     assert not orphan.exists() and not half.exists()
     assert content(warehouse) == now

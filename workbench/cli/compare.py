@@ -11,7 +11,7 @@ import click
 
 from kempf.schemas.errors import ThresholdExceeded, UsageError
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.terminal import number, print_json, print_note, print_table, progress
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -64,6 +64,7 @@ def command(
     initial state and a constant wind force and current are fitted to the run itself.
     """
     from kempf.flows.jobs.compare_vessel import compare_vessel
+    from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.warehouse.store import Warehouse
 
     if fail_above is not None and not isfinite(fail_above):
@@ -72,9 +73,11 @@ def command(
         raise UsageError(
             "figure_format", f"--figure {figure} ends in {figure.suffix!r}; expected .png, .svg or .pdf.", "Rename it."
         )
+    warehouse = Warehouse(uri)
     with progress() as tell:
         wanted: list[str | None] = [*dict.fromkeys(sets)] or [None]
-        compared = [compare_vessel(Warehouse(uri), vessel, name, horizon, tell) for name in wanted]
+        compared = [compare_vessel(warehouse, vessel, name, horizon, tell) for name in wanted]
+    print_note(said_of_vessel(warehouse, vessel))
     documents = []
     for k, found in enumerate(compared):
         document = found.show()

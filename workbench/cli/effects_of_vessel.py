@@ -11,7 +11,7 @@ import click
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.ladder import tell_rungs
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.terminal import number, print_json, print_note, print_table, progress
 
 
 @click.command("try")
@@ -27,6 +27,7 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     """
     from kempf.flows.jobs.chosen_manoeuvres import choose
     from kempf.flows.jobs.diagnose_vessel import examine
+    from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.flows.jobs.standing_model import Own, standing_model
     from kempf.pipeline.diagnose.diagnosis import DiagnosisSettings
     from kempf.pipeline.diagnose.verdict import as_json as told_as_json
@@ -39,9 +40,10 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     spec, own = standing_model(warehouse, vessel)
     own = own.beside(mine)
     with progress() as tell:
-        chosen = choose(warehouse, vessel, tell)
+        chosen = choose(warehouse, vessel)
         settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
         found = examine(warehouse, chosen, spec, own, settings, tell, only=(name,))
+    print_note(said_of_vessel(warehouse, vessel))
     told = told_as_json(found.diagnosis)
     told = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **told})
     if as_json:

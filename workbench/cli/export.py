@@ -12,7 +12,7 @@ import click
 
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import print_json, progress
+from kempf.workbench.terminal import print_json, print_note, progress
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -105,16 +105,19 @@ def mcap_file(vessel: str, set_id: str | None, out: Path, segments: tuple[str, .
     """
     from kempf.flows.jobs.compare_vessel import compare_vessel
     from kempf.flows.jobs.measured_positions import measured_positions
+    from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import write_new
     from kempf.workbench.export_mcap import about, to_mcap
     from kempf.workbench.new_file import require_new
 
     require_new(out, "--output")
+    warehouse = Warehouse(uri)
     with progress() as tell:
-        found = compare_vessel(Warehouse(uri), vessel, set_id, "1", tell)
+        found = compare_vessel(warehouse, vessel, set_id, "1", tell)
+    print_note(said_of_vessel(warehouse, vessel))
     found = _only(found, segments) if segments else found
-    data = to_mcap(found.runs, about(found), measured_positions(Warehouse(uri), found.found))
+    data = to_mcap(found.runs, about(found), measured_positions(warehouse, found.found))
     write_new(out, data, "--output")
     name = found.parameter_set.parameter_set_id
     if as_json:
@@ -143,19 +146,24 @@ def _only(found: Comparison, wanted: Sequence[str]) -> Comparison:
 
 
 def _linear(uri: str, set_id: str, speed: float | None, step: float, course: float) -> Any:
+    from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.flows.jobs.ship_model import known_ship
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import linear
 
-    return linear(known_ship(Warehouse(uri), set_id, speed), step, radians(course))
+    ship = known_ship(Warehouse(uri), set_id, speed)
+    print_note(said_of_sets([ship.parameter_set]))
+    return linear(ship, step, radians(course))
 
 
 def _text(form: str, set_id: str, out: Path | None, uri: str, as_json: bool) -> None:
+    from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse import parameter_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import as_text
 
     one = parameter_sets.get(Warehouse(uri), set_id)
+    print_note(said_of_sets([one]))
     _deliver(form, one.parameter_set_id, as_text(one, form), out, as_json)
 
 

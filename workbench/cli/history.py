@@ -12,7 +12,7 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table
+from kempf.workbench.terminal import number, print_json, print_note, print_table
 
 if TYPE_CHECKING:
     from kempf.pipeline.history.changes import Changes
@@ -52,6 +52,7 @@ def command(
     as_json: bool,
 ) -> None:
     """Show vessels' parameters over time, as known now or at an earlier time, and whether they changed."""
+    from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.warehouse import history
     from kempf.warehouse.store import Warehouse
 
@@ -62,7 +63,9 @@ def command(
         name: history.of_vessel(warehouse, name, parameter, instant, superseded=superseded)
         for name in dict.fromkeys(vessel)
     }
-    for found in histories.values():
+    for name, found in histories.items():
+        if instant is None:
+            print_note(said_of_vessel(warehouse, name))
         if found.note:
             click.echo(found.note, err=as_json)
     if not changes:

@@ -8,7 +8,7 @@ import click
 
 from kempf.schemas.errors import NotFound
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table
+from kempf.workbench.terminal import number, print_json, print_note, print_table
 
 
 @click.command("ladder")
@@ -17,6 +17,7 @@ from kempf.workbench.terminal import number, print_json, print_table
 @json_option
 def command(vessel: str, uri: str, as_json: bool) -> None:
     """Show the models that lead to a vessel's current one, and how the error fell from one to the next."""
+    from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.flows.jobs.standing_model import rungs_to, standing
     from kempf.warehouse.store import Warehouse
 
@@ -30,6 +31,7 @@ def command(vessel: str, uri: str, as_json: bool) -> None:
             {"vessel": vessel},
         )
     rungs = rungs_to(warehouse, model)
+    print_note(said_of_vessel(warehouse, vessel))
     if as_json:
         print_json(rungs)
     else:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import one_line, print_json, print_table
+from kempf.workbench.terminal import one_line, print_json, print_note, print_table
 
 if TYPE_CHECKING:
     from kempf.pipeline.ingest.readings import LostStretch
@@ -27,6 +27,7 @@ def command() -> None:
 @json_option
 def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers, records read = kept + rejected, and what the channel doctor says of each."""
+    from kempf.flows.jobs.out_of_date import said_of_logs
     from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
     from kempf.warehouse import examinations, logs, lost, vessels
     from kempf.warehouse.store import Warehouse
@@ -43,11 +44,12 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
             **_facts(row),
             "partial": row.ingest_id in gone,
             "lost": lost_as_json(gone.get(row.ingest_id, ())),
-            "notes": list(row.notes),
+            "notes": _notes(row, said.get(row.ingest_id)),
             "channels": _verdict(said.get(row.ingest_id)),
         }
         for row in rows_of_logs
     ]
+    print_note(said_of_logs(warehouse, vessel))
     if as_json:
         print_json(found)
         return
@@ -84,6 +86,10 @@ def _facts(row: LogRow) -> dict[str, Any]:
     }
 
 
+def _notes(row: LogRow, examination: StoredExamination | None) -> list[str]:
+    return [*row.notes, *(examination.notes if examination else ())]
+
+
 def _verdict(examination: StoredExamination | None) -> dict[str, Any] | None:
     if examination is None:
         return None
@@ -111,7 +117,7 @@ def show(log_id: str, uri: str, as_json: bool) -> None:
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
     seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
-    facts = {**_facts(row), "notes": list(row.notes)}
+    facts = {**_facts(row), "notes": _notes(row, seen)}
     if as_json:
         print_json({**facts, "channels": dict(seen.content) if seen else None})
         return

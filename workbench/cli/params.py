@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table
+from kempf.workbench.terminal import number, print_json, print_note, print_table
 
 if TYPE_CHECKING:
     from kempf.pipeline.estimate.result import Value
@@ -27,6 +27,7 @@ def command() -> None:
 @json_option
 def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
     """List parameter sets, of one vessel or of all."""
+    from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.warehouse import aliases, parameter_sets, vessels
     from kempf.warehouse.instant import iso_utc
     from kempf.warehouse.store import Warehouse
@@ -34,6 +35,7 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
     warehouse = Warehouse(uri)
     if vessel is not None:
         vessels.require(warehouse, vessel)
+        print_note(said_of_vessel(warehouse, vessel))
     found = parameter_sets.summaries(warehouse, vessel).rows(named=True)
     pointed: dict[str, list[str]] = {}
     for name in sorted({row["vessel"] for row in found}):
@@ -60,10 +62,12 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
 def show(set_id: str, uri: str, as_json: bool) -> None:
     """Show a parameter set whole; a unique beginning of its id is enough."""
     from kempf.flows.jobs.chosen_set import named_set
+    from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.parameter_set_table import tell_set
 
     one = named_set(Warehouse(uri), set_id)
+    print_note(said_of_sets([one]))
     if as_json:
         print_json(one.show())
         return
@@ -87,12 +91,14 @@ def show(set_id: str, uri: str, as_json: bool) -> None:
 def diff(first: str, second: str, uri: str, as_json: bool) -> None:
     """Compare the parameters of two sets: difference, and the same in standard errors of the difference."""
     from kempf.flows.jobs.chosen_set import named_set
+    from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.parameter_set import compare
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     one, other = named_set(warehouse, first), named_set(warehouse, second)
     found = compare(one, other)
+    print_note(said_of_sets([one, other]))
     if as_json:
         print_json({"first": one.parameter_set_id, "second": other.parameter_set_id, "parameters": found})
         return
@@ -115,10 +121,13 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
     --json is short for --format json.
     """
     from kempf.flows.jobs.chosen_set import named_set
+    from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import as_text, write_new
 
-    text = as_text(named_set(Warehouse(uri), set_id), "json" if as_json else form)
+    one = named_set(Warehouse(uri), set_id)
+    print_note(said_of_sets([one]))
+    text = as_text(one, "json" if as_json else form)
     if output is None:
         click.echo(text, nl=False)
     else:
@@ -157,12 +166,14 @@ def alias(name: str, set_id: str, uri: str, as_json: bool) -> None:
 @json_option
 def steering(set_id: str, speed: float | None, uri: str, as_json: bool) -> None:
     """Show Nomoto's constants and whether she holds a straight course, with standard errors."""
+    from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.flows.jobs.ship_model import known_ship
     from kempf.pipeline.steering.nomoto import nomoto
     from kempf.pipeline.steering.stability import stability
     from kempf.warehouse.store import Warehouse
 
     ship = known_ship(Warehouse(uri), set_id, speed)
+    print_note(said_of_sets([ship.parameter_set]))
     constants = nomoto(ship.hull, ship.covariance, ship.speed_m_s, ship.length_m)
     judged = stability(ship.hull, ship.covariance, ship.speed_m_s)
     warnings = [*ship.parameter_set.warnings, *constants.warnings]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, one_line, print_json, print_table
+from kempf.workbench.terminal import number, one_line, print_json, print_note, print_table
 
 
 @click.command("segments")
@@ -14,6 +14,7 @@ from kempf.workbench.terminal import number, one_line, print_json, print_table
 @json_option
 def command(vessel: str | None, uri: str, as_json: bool) -> None:
     """List the zigzags found, with their executes, overshoots and IMO criteria."""
+    from kempf.flows.jobs.out_of_date import said_of_logs
     from kempf.warehouse import examinations, logs, segments
     from kempf.warehouse.instant import iso_utc
     from kempf.warehouse.store import Warehouse
@@ -25,6 +26,7 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in names]
     said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
     lies = {name: list(one.findings) for name, one in said.items() if one.findings}
+    print_note(said_of_logs(warehouse, vessel))
     if as_json:
         shown = [segment.show(names[segment.ingest_id]) for segment in found]
         print_json([{**one, "channels": lies.get(s.ingest_id, [])} for one, s in zip(shown, found, strict=True)])

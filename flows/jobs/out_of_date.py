@@ -1,0 +1,95 @@
+"""What of a warehouse the present code, or the present profile of a vessel, would make anew. Nothing is stored.
+
+Commands that read work on what is stored and print one of these sentences.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections import Counter
+from collections.abc import Collection, Iterable, Mapping, Sequence
+
+from kempf.warehouse import code_version, examinations, logs, parameter_sets, vessels
+from kempf.warehouse.logs import LogRow
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+_OLDER = "with an older profile or another version of kempf"
+
+
+def unread(rows: Sequence[LogRow], profiles: Mapping[str, str]) -> list[LogRow]:
+    """Return those of some logs that were read by other code than the present or with another profile.
+
+    Parameters
+    ----------
+    rows : sequence of LogRow
+    profiles : mapping of str to str
+        Hash of the present profile by vessel.
+    """
+    code = code_version.fingerprint("ingest")
+    return [row for row in rows if (row.code_version, row.profile_sha256) != (code, profiles.get(row.vessel))]
+
+
+def unsearched(warehouse: Warehouse, rows: Sequence[LogRow]) -> list[LogRow]:
+    """Return those of some logs whose readings were looked through by other code than the present, or never."""
+    code = code_version.fingerprint("segment")
+    known = examinations.codes(warehouse, [row.ingest_id for row in rows])
+    return [row for row in rows if known.get(row.ingest_id) != code]
+
+
+def said_of_logs(warehouse: Warehouse, vessel: str | None = None) -> str | None:
+    """Return the sentence that logs of one vessel or of all are out of date; None where none is.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    found = _stale(warehouse, vessel)
+    if not found:
+        return None
+    whose = f" of {next(iter(found))}" if len(found) == 1 else f" of {len(found)} vessels"
+    return f"{_logs(found.total())}{whose} read {_OLDER}; next: {_next(found)}"
+
+
+def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
+    """Return the sentence that a vessel's logs, or all of her parameter sets, are out of date; None where neither is.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    stale = _stale(warehouse, vessel).total()
+    codes = parameter_sets.codes(warehouse, vessel)
+    old = bool(codes) and code_version.fingerprint("estimate") not in codes
+    parts = [f"{_logs(stale)} read"] * bool(stale) + ["parameter sets made"] * old
+    return f"{vessel}: {' and '.join(parts)} {_OLDER}; next: {_next([vessel])}" if parts else None
+
+
+def said_of_sets(sets: Iterable[ParameterSet]) -> str | None:
+    """Return the sentence that some parameter sets are of other code than the present; None where none is."""
+    code = code_version.fingerprint("estimate")
+    old = [one for one in sets if one.provenance.get("code_version") != code]
+    if not old:
+        return None
+    names = ", ".join(one.parameter_set_id for one in old)
+    return f"{names}: made with another version of kempf; next: {_next({one.vessel for one in old})}"
+
+
+def _stale(warehouse: Warehouse, vessel: str | None) -> Counter[str]:
+    """Count the logs, by vessel, that were not read and looked through by the present code with the present profile."""
+    rows = logs.current(warehouse, vessel)
+    old = unread(rows, vessels.current_hashes(warehouse, vessel))
+    names = {row.ingest_id for row in old}
+    old += unsearched(warehouse, [row for row in rows if row.ingest_id not in names])
+    return Counter(row.vessel for row in old)
+
+
+def _logs(count: int) -> str:
+    return f"{count} log{'' if count == 1 else 's'}"
+
+
+def _next(names: Collection[str]) -> str:
+    only = f" --vessel {shlex.quote(next(iter(names)))}" if len(names) == 1 else ""
+    return f"kempf reprocess{only}"

@@ -1,0 +1,84 @@
+"""The job that looks through the readings of a log: its zigzags, and what the channel doctor says of its channels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from kempf.flows.jobs.examine_log import examine_instruments
+from kempf.flows.jobs.find_segments import Ingest, find_segments
+from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.process.release_memory import give_back
+from kempf.flows.process.wrap_error import wrapped
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import code_version, examinations, segments, vessels
+from kempf.warehouse.examinations import StoredExamination
+from kempf.warehouse.logs import LogRow
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True, eq=False)
+class SearchedLog:
+    """What was found in the readings of a log; nothing of it is stored yet."""
+
+    segments: tuple[Segment, ...]
+    examination: StoredExamination
+
+
+def search(
+    log: Ingest, profile: VesselProfile, file_name: str, log_format: str, instruments: Instruments, records: int
+) -> SearchedLog:
+    """Find the zigzags in the channels of a log, and examine the channels.
+
+    Should the doctor fail, that is the verdict, and the zigzags count all the same.
+
+    Parameters
+    ----------
+    log : Ingest
+    profile : VesselProfile
+        With which it was read.
+    file_name : str
+    log_format : {"delimited", "mcap", "nmea"}
+    instruments : Instruments
+    records : int
+        Of the log.
+    """
+    zigzags, notes = find_segments(log, profile, instruments)
+    give_back(records)
+    try:
+        content = examine_instruments(instruments, profile, file_name, log_format).content
+    except Exception as error:  # noqa: BLE001 - a log is not lost because its channels could not be compared
+        content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(wrapped(error))}
+    examination = StoredExamination(
+        log.vessel,
+        log.ingest_id,
+        log.log_id,
+        code_version.fingerprint("segment"),
+        content["verdict"],
+        tuple(finding["words"] for finding in content["findings"]),
+        {**content, "notes": list(notes)},
+    )
+    return SearchedLog(tuple(zigzags), examination)
+
+
+def search_again(warehouse: Warehouse, row: LogRow) -> SearchedLog:
+    """Look through the stored readings of a log; nothing is stored.
+
+    Raises
+    ------
+    NotFound
+        ``no_profile``: the profile that it was read with is lost.
+    """
+    profile = vessels.get(warehouse, row.profile_sha256)
+    log = Ingest(row.vessel, row.log_id, row.ingest_id)
+    instruments = channels_of(warehouse, row.ingest_id)
+    return search(log, profile, row.file_name, row.format, instruments, row.tally.records_read)
+
+
+def store(warehouse: Warehouse, found: Sequence[SearchedLog]) -> None:
+    """Put what was found in some logs in place of what is stored of them, in one commit a table."""
+    segments.replace(warehouse, {(f.examination.vessel, f.examination.ingest_id): f.segments for f in found})
+    # behind the zigzags: from the examination on the log counts as looked through
+    examinations.replace(warehouse, [f.examination for f in found])

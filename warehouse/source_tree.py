@@ -1,0 +1,212 @@
+"""Fingerprints of source code: what its modules do, whatever their comments and docstrings say.
+
+Nothing is imported. A module counts by its syntax tree, without docstrings, in a form that is the same for every
+version of Python. Which modules it imports is read from the same tree. Parsing takes a second for the whole source, so
+what was found in a file is kept by the hash of its bytes beside Python's own byte code, or in the user's cache folder.
+"""
+
+from __future__ import annotations
+
+import ast
+import json
+import os
+import secrets
+from collections.abc import Iterable, Iterator
+from contextlib import suppress
+from dataclasses import dataclass
+from hashlib import sha256
+from importlib.util import cache_from_source, resolve_name
+from pathlib import Path
+from typing import Any
+
+#: Name of the package, and the part of it that makes logs: a log counts by its own bytes.
+_PACKAGE, _SIMULATOR = "kempf", "pipeline.simulate"
+#: A module that imports one of these opens files beside it by name: all that lie in its folder count with it.
+_BY_NAME = ("importlib", "pkgutil")
+#: Of what is kept: the way in which a tree is written down, and how many files of which no more is asked may stay.
+_FORM, _MOST_KEPT = 1, 4000
+
+
+@dataclass(frozen=True)
+class Module:
+    """What one file of source does.
+
+    Attributes
+    ----------
+    digest : str
+        Of its syntax tree.
+    imports : tuple of str
+        Dotted names that may be modules, relative ones with their dots.
+    by_name : bool
+        Whether it opens files beside it by name.
+    """
+
+    digest: str
+    imports: tuple[str, ...]
+    by_name: bool
+
+
+def read_module(content: bytes) -> Module:
+    """Return what a file of source does.
+
+    Parameters
+    ----------
+    content : bytes
+
+    Raises
+    ------
+    SyntaxError
+        It is no source of this version of Python.
+    """
+    tree = ast.parse(content)
+    names = tuple(sorted(set(_imported(tree))))
+    by_name = any(name.partition(".")[0] in _BY_NAME for name in names)
+    return Module(sha256(repr(_plain(tree)).encode()).hexdigest(), names, by_name)
+
+
+def _plain(node: Any) -> Any:
+    """Return a syntax tree as lists and texts; fields that are empty are left out, as versions of Python add some."""
+    if isinstance(node, ast.AST):
+        fields = ((name, _plain(value)) for name, value in ast.iter_fields(node) if name not in ("ctx", "kind"))
+        return [type(node).__name__, *((name, value) for name, value in fields if value not in ("None", []))]
+    if isinstance(node, list):
+        return [_plain(part) for part in node if not _is_remark(part)]
+    return repr(node)
+
+
+def _is_remark(node: Any) -> bool:
+    """Return whether a node is a text that nothing is done with: a docstring."""
+    return isinstance(node, ast.Expr) and isinstance(node.value, ast.Constant) and isinstance(node.value.value, str)
+
+
+def _imported(node: ast.AST) -> Iterator[str]:
+    if isinstance(node, ast.If) and isinstance(node.test, ast.Name) and node.test.id == "TYPE_CHECKING":
+        for other in node.orelse:
+            yield from _imported(other)
+        return
+    if isinstance(node, ast.Import):
+        yield from (alias.name for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        base = "." * node.level + (node.module or "")
+        yield base
+        yield from (f"{base}{'' if base.endswith('.') else '.'}{alias.name}" for alias in node.names)
+    for part in ast.iter_child_nodes(node):
+        yield from _imported(part)
+
+
+class SourceTree:
+    """The source of some rooms of the package.
+
+    Parameters
+    ----------
+    folder : Path
+        Where the rooms lie.
+    rooms : sequence of str
+        Such as ``pipeline``; what is imported from elsewhere does not count.
+    """
+
+    def __init__(self, folder: Path, rooms: Iterable[str]) -> None:
+        self._files = {_name(path, folder): path for room in rooms for path in sorted((folder / room).rglob("*.py"))}
+        simulator = f"{_PACKAGE}.{_SIMULATOR}"
+        self._files = {name: path for name, path in self._files.items() if not f"{name}.".startswith(f"{simulator}.")}
+        self._folder = folder
+        self._known = _Kept()
+
+    @property
+    def modules(self) -> tuple[str, ...]:
+        """Dotted names of all modules, sorted."""
+        return tuple(sorted(self._files))
+
+    def reached(self, entries: Iterable[str]) -> dict[str, str]:
+        """Return the digests of some modules, of all that they import, and of the files that they open by name.
+
+        Parameters
+        ----------
+        entries : iterable of str
+            Dotted names.
+
+        Returns
+        -------
+        dict of str to str
+            By dotted name of a module, or by path of another file.
+
+        Raises
+        ------
+        ModuleNotFoundError
+            An entry is not there.
+        """
+        todo = list(entries)
+        for name in todo:
+            if name not in self._files:
+                raise ModuleNotFoundError(f"there is no module {name} in {self._folder}", name=name)
+        found: dict[str, str] = {}
+        while todo:
+            name = todo.pop()
+            if name in found or name not in self._files:
+                continue
+            path = self._files[name]
+            module = self._known.module(path.read_bytes())
+            found[name] = module.digest
+            package = name if path.stem == "__init__" else name.rpartition(".")[0]
+            todo += [name.rpartition(".")[0], *(resolve_name(one, package) for one in module.imports)]
+            if module.by_name:
+                beside = [p for p in sorted(path.parent.rglob("*")) if p.is_file() and p.parent.name != "__pycache__"]
+                todo += [_name(p, self._folder) for p in beside if p.suffix == ".py"]
+                data = [p for p in beside if p.suffix != ".py"]
+                found |= {p.relative_to(self._folder).as_posix(): sha256(p.read_bytes()).hexdigest() for p in data}
+        self._known.keep()
+        return found
+
+
+def _name(path: Path, folder: Path) -> str:
+    parts = path.relative_to(folder).with_suffix("").parts
+    return ".".join((_PACKAGE, *(parts[:-1] if parts[-1] == "__init__" else parts)))
+
+
+class _Kept:
+    """What was found in files of source before, by the hash of their bytes."""
+
+    def __init__(self) -> None:
+        self._modules: dict[str, list[Any]] = {}
+        self._new: dict[str, list[Any]] = {}
+        for place in _places():
+            with suppress(OSError, ValueError, KeyError, TypeError):
+                content = json.loads(place.read_text(encoding="utf-8"))
+                if content["form"] == _FORM:
+                    self._modules |= content["modules"]
+
+    def module(self, content: bytes) -> Module:
+        """Return what a file of source does; it is parsed where that is not known."""
+        key = sha256(content).hexdigest()
+        with suppress(KeyError, ValueError, TypeError):
+            digest, imports, by_name = self._modules[key]
+            return Module(str(digest), tuple(imports), bool(by_name))
+        made = read_module(content)
+        self._new[key] = [made.digest, made.imports, made.by_name]
+        return made
+
+    def keep(self) -> None:
+        """Write down what is new, at the first place that can be written to; nowhere is no harm."""
+        if not self._new:
+            return
+        modules = {**self._modules, **self._new} if len(self._modules) < _MOST_KEPT else self._new
+        text = json.dumps({"form": _FORM, "modules": modules}, separators=(",", ":"))
+        for place in _places():
+            passing = place.with_name(f"{place.name}.{secrets.token_hex(8)}")
+            try:
+                place.parent.mkdir(parents=True, exist_ok=True)
+                passing.write_text(text, encoding="utf-8")
+                passing.replace(place)
+            except OSError:
+                with suppress(OSError):
+                    passing.unlink()
+                continue
+            self._modules, self._new = modules, {}
+            return
+
+
+def _places() -> list[Path]:
+    places = [Path(cache_from_source(__file__)).with_name("source_tree.json")]
+    with suppress(RuntimeError):  # nobody's home is known
+        places.append(Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / _PACKAGE / "source_tree.json")
+    return places
