@@ -53,7 +53,7 @@ def test_import_kempf_takes_no_time() -> None:
         return int(found)
 
     # the best of three: others may be at work on the machine
-    assert min(microseconds() for _ in range(3)) < 20_000
+    assert min(microseconds() for _ in range(3)) < 100_000
 
 
 def test_what_is_handed_out_is_there() -> None:
