@@ -23,8 +23,10 @@ demo: $(RUNTIME)
 	$(BIN)/kempf demo
 	@echo "  (first: source $(BIN)/activate)"
 
+# Last, whether the demonstration still gives the reference's segments and parameter sets, bit for bit.
 test: check
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	$(BIN)/python -m benchmarks.identify.identical demo
 
 check: $(DEVELOP)
 	$(BIN)/ruff check .
@@ -38,7 +40,7 @@ quick: $(DEVELOP)
 
 # Every figure anew, each on its own page in benchmarks/results; needs the measured logs in ../shared. Minutes.
 bench: $(RIVALS)
-	for name in identify.hsva identify.hsva_held_out identify.usv identify.trials fleet.rerun_demo ingest.speed \
+	for name in documents.house identify.engines identify.hsva identify.hsva_held_out identify.usv identify.trials fleet.rerun_demo ingest.speed \
 		identify.monte_carlo identify.current_frame documents.draw_paper identify.course_keeping identify.estimator_speed \
 		identify.estimators baselines.vessel_models diagnose.trials_diagnosis diagnose.hsva_ladder diagnose.diagnosis_speed \
 		ingest.mcap_speed ingest.nmea_speed fleet.adopt fleet.command_speed; \

@@ -204,8 +204,8 @@ def page(found: list[tuple[Zigzag, Outcome, Outcome, Outcome]]) -> list[str]:
     return [
         f"Median over {len(found)} zigzags, beside the linear filter at the measurements' own instants: an "
         f"evaluation with derivatives takes {ratios[0]:.2f} times as long by the linear filter on means and "
-        f"{ratios[1]:.2f} times by the extended one; a fit {ratios[2]:.2f} and {ratios[3]:.2f} times. The farthest of the six parameters is "
-        f"{middle[0]:.2f} and {middle[1]:.2f} standard errors away.",
+        f"{ratios[1]:.2f} times by the extended one; a fit {ratios[2]:.2f} and {ratios[3]:.2f} times. The "
+        f"farthest of the six parameters is {middle[0]:.2f} and {middle[1]:.2f} standard errors away.",
         "",
         *result_page.table(head, rows),
         "",
