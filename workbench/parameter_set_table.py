@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kempf.workbench.ranked_warnings import show_warnings
 from kempf.workbench.terminal import number, print_table
 
 if TYPE_CHECKING:
     from kempf.warehouse.parameter_set import ParameterSet
 
 
-def tell_set(one: ParameterSet, title: str) -> None:
-    """Print a parameter set for a person: values with standard errors, noise levels, fit, warnings."""
+def tell_set(one: ParameterSet, title: str, *, verbose: bool = False) -> None:
+    """Print a parameter set for a person: values with standard errors, noise levels, fit, the gravest warnings."""
     rows = [[p.name, number(p.value), number(p.std, 2), p.unit] for p in (*one.parameters, *one.noise)]
     print_table(["", "value", "std", "unit"], rows, title)
     converged = one.convergence.get("converged")
@@ -24,5 +25,4 @@ def tell_set(one: ParameterSet, title: str) -> None:
             f"  {name}: fit {fit['fit_percent']:.1f} % one step ahead, in sample; "
             f"{100 * fit['inside_95_percent']:.0f} % inside the 95 % interval"
         )
-    for warning in one.warnings:
-        click.echo(f"  warning: {warning}")
+    show_warnings(one.warnings, verbose=verbose)

@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import zip_longest
 from math import isnan
+from textwrap import wrap
 from typing import Any
 
 import click
 
 from kempf.flows.process.progress import Progress, silent
+
+#: Columns of the narrowest terminal that a table is not to overflow; how narrow a folded column may become.
+WIDEST, _NARROWEST = 100, 8
+_GAP = "  "
 
 
 def print_json(content: Any) -> None:
@@ -37,15 +43,65 @@ def print_note(sentence: str | None) -> None:
 
 
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
-    """Print a table on stdout, numbers to the right; plain text off a terminal."""
+    """Print a table on stdout, numbers to the right; plain text off a terminal.
+
+    One that is wider than `WIDEST` is made narrower by folding its head, then the widest cells of words.
+    """
     rows = [[one_line(cell) for cell in row] for row in rows]
-    widths = [max(len(cell) for cell in column) for column in zip(head, *rows, strict=True)]
     numeric = [all(_is_number(row[k]) for row in rows) and bool(rows) for k in range(len(head))]
+    widths = _widths(head, rows)
     if title:
         click.echo(click.style(title, bold=True))
-    click.echo(click.style(_line(head, widths, numeric), underline=sys.stdout.isatty()))
+    for line in _folded(head, widths, numeric):
+        click.echo(click.style(line, underline=sys.stdout.isatty()))
     for row in rows:
-        click.echo(_line(row, widths, numeric))
+        for line in _folded(row, widths, numeric):
+            click.echo(line)
+
+
+def _widths(head: Sequence[str], rows: Sequence[Sequence[str]]) -> list[int]:
+    """Return the widths of the columns: what is in them, less where the table would be too wide."""
+    columns = list(zip(*rows, strict=True)) if rows else [()] * len(head)
+    inside = [max(map(len, column), default=0) for column in columns]
+    widths = [max(len(name), width) for name, width in zip(head, inside, strict=True)]
+    over = sum(widths) + len(_GAP) * (len(widths) - 1) - WIDEST
+    words = [_longest_word([name]) for name in head]
+    # the head first, the widest of the columns that can give; then what is in them
+    for least in (
+        [max(word, width) for word, width in zip(words, inside, strict=True)],
+        [max(word, _longest_word(column), _NARROWEST) for word, column in zip(words, columns, strict=True)],
+    ):
+        while over > 0:
+            room = [width if width > low else 0 for width, low in zip(widths, least, strict=True)]
+            if not any(room):
+                break
+            widths[room.index(max(room))] -= 1
+            over -= 1
+    return widths
+
+
+def _longest_word(cells: Sequence[str]) -> int:
+    return max((len(word) for cell in cells for word in cell.split(" ")), default=0)
+
+
+def _folded(cells: Sequence[str], widths: Sequence[int], numeric: Sequence[bool]) -> list[str]:
+    """Return the lines of a row, its cells folded between words."""
+    folded = [wrap(c, w, break_long_words=False, break_on_hyphens=False) if len(c) > w else [c]
+              for c, w in zip(cells, widths, strict=True)]  # fmt: skip
+    return [_line(list(parts), widths, numeric) for parts in zip_longest(*folded, fillvalue="")]
+
+
+def short_ids(names: Iterable[str]) -> dict[str, str]:
+    """Return the beginnings of ids that tell them apart, for a table; commands that take an id take these.
+
+    Examples
+    --------
+    >>> short_ids(["ps-ba3d03040ef0caf4", "ps-7cbd05343e3a84a8"])
+    {'ps-ba3d03040ef0caf4': 'ps-ba3d0304', 'ps-7cbd05343e3a84a8': 'ps-7cbd0534'}
+    """
+    different = list(dict.fromkeys(names))
+    begin = {name: name[: name.find("-") + 9] for name in different}
+    return begin if len(set(begin.values())) == len(different) else {name: name for name in different}
 
 
 def one_line(text: str) -> str:
@@ -61,7 +117,7 @@ def one_line(text: str) -> str:
 
 def _line(cells: Sequence[str], widths: Sequence[int], numeric: Sequence[bool]) -> str:
     parts = [c.rjust(w) if n else c.ljust(w) for c, w, n in zip(cells, widths, numeric, strict=True)]
-    return "  ".join(parts).rstrip()
+    return _GAP.join(parts).rstrip()
 
 
 def _is_number(text: str) -> bool:

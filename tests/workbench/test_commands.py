@@ -72,7 +72,7 @@ def test_segments(filled: Path):
     assert kempf("segments", "--vessel", "mariner", "--warehouse", filled, "--json").json == found
     told = kempf("segments", "--warehouse", filled)
     assert told.code == 0
-    assert all(one["segment_id"] in told.out for one in found)
+    assert all(one["segment_id"][:12] in told.out for one in found), "the beginning tells them apart"
 
 
 def test_reprocess_of_one_vessel(filled: Path):

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.schemas.errors import ThresholdExceeded, UsageError
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_note, print_table, progress
+from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.ranked_warnings import MOST
+from kempf.workbench.terminal import number, print_json, print_note, print_table, progress, short_ids
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -46,6 +47,7 @@ _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
     metavar="PERCENT",
     help="Exit code 5 where the mean free-run error (100 - fit %) of held-out runs, else of fitted ones, is larger.",
 )
+@verbose_option
 @warehouse_option
 @json_option
 def command(
@@ -55,6 +57,7 @@ def command(
     with_where: bool,
     figure: Path | None,
     fail_above: float | None,
+    verbose: bool,
     uri: str,
     as_json: bool,
 ) -> None:
@@ -94,7 +97,7 @@ def command(
         print_json(documents if len(documents) > 1 else documents[0])
     else:
         for document in documents:
-            _tell(document)
+            _tell(document, verbose=verbose)
     above = [one for one in documents if fail_above is not None and one["fail_above"]["exceeded"]]
     for document in above:
         judged = document["judged"]
@@ -119,7 +122,18 @@ def _draw(found: Comparison, figure: Path) -> None:
         ) from error
 
 
-def _tell(document: dict[str, Any]) -> None:
+def _tell_skipped(skipped: dict[str, str], *, verbose: bool) -> None:
+    """Say which runs are left out, those of one reason together."""
+    by_reason: dict[str, list[str]] = {}
+    for name, why in skipped.items():
+        by_reason.setdefault(why, []).append(name)
+    for why, names in by_reason.items():
+        shown = names if verbose else names[:MOST]
+        more = f" and {len(names) - len(shown)} more" if len(names) > len(shown) else ""
+        click.echo(f"  left out: {', '.join(shown)}{more}: {why}", err=True)
+
+
+def _tell(document: dict[str, Any], *, verbose: bool) -> None:
     by = f" (alias {document['alias']})" if document["alias"] else ""
     effects = f", effects {', '.join(document['effects'])}" if document["effects"] else ", without effects"
     click.echo(
@@ -134,8 +148,7 @@ def _tell(document: dict[str, Any]) -> None:
         click.echo(f"initial state: {start['initial_state']}; {start['disturbances']}")
     for sample, title in _SAMPLES.items():
         _tell_sample(title, [r for r in document["runs"] if r["sample"] == sample], document["summary"][sample])
-    for name, why in document["skipped"].items():
-        click.echo(f"  left out: {name}: {why}", err=True)
+    _tell_skipped(document["skipped"], verbose=verbose)
     for sample, title in _SAMPLES.items():
         if document.get("where", {}).get(sample):
             _tell_where(title, document["where"][sample])
@@ -150,9 +163,9 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
     for name in there:
         head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_told'][name]['unit']}"]
     head += ["overshoot errors deg (free run)"]
-    rows = []
+    rows, short = [], short_ids(run["segment_id"] for run in runs)
     for run in runs:
-        row = [run["segment_id"], f"{run['psi0_deg']:g}/{run['delta0_deg']:g}", run["start"][:16]]
+        row = [short[run["segment_id"]], f"{run['psi0_deg']:g}/{run['delta0_deg']:g}", run["start"][:16]]
         for name in there:
             row += [_percent(run["fit_percent"].get(name)), number(run["rms_told"].get(name, {}).get("value"), 3)]
         rows.append([*row, " ".join(_signed(e) for e in run["overshoot_error_deg"]) or "-"])
@@ -200,8 +213,12 @@ def _tell_where(title: str, where: dict[str, Any]) -> None:
             )
     for channel, told in where["correlations"].items():
         _tell_correlation(_CHANNELS[channel], told)
-    rows = [[w["start"], w["end"], w["run"], _CHANNELS[w["channel"]], w["measure"], _size(w)] for w in where["worst"]]
-    print_table(["start UTC", "end UTC", "run", "channel", "horizon", "error"], rows, "  worst stretches")
+    short = short_ids(w["run"] for w in where["worst"])
+    rows = [
+        [w["start"][:19], w["end"][11:19], short[w["run"]], _CHANNELS[w["channel"]], w["measure"], _size(w)]
+        for w in where["worst"]
+    ]
+    print_table(["start UTC", "end", "run", "channel", "horizon", "error"], rows, "  worst stretches")
 
 
 def _tell_correlation(channel: str, told: dict[str, Any]) -> None:

@@ -50,11 +50,10 @@ def command(folder: Path, as_json: bool) -> None:
 
 
 def _tell(shown: Demonstration) -> None:
-    from kempf.workbench.cli.ingest import tell_outcome
+    from kempf.workbench.cli.ingest import tell_outcomes
 
     click.echo(click.style("Raw logs", bold=True) + f" in {shown.folder / 'logs'}")
-    for log in shown.ingested:
-        tell_outcome(log, notes=False)
+    tell_outcomes(shown.ingested, notes=False)
     click.echo()
     zigzags = [
         [

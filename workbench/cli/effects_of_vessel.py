@@ -10,7 +10,8 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.ladder import tell_rungs
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.ranked_warnings import show_warnings
 from kempf.workbench.terminal import number, print_json, print_note, print_table, progress
 
 
@@ -78,9 +79,10 @@ def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
 @vessel_option(required=True)
 @click.option("--formula", help="The effect is your own: its formula.")
 @click.option("--file", "path", type=click.Path(path_type=Path), help="The effect is your own: its YAML file.")
+@verbose_option
 @warehouse_option
 @json_option
-def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str, as_json: bool) -> None:
+def add(name: str, vessel: str, formula: str | None, path: Path | None, verbose: bool, uri: str, as_json: bool) -> None:
     """Add an effect to the model that a vessel stands at, refit, and show the error before and after."""
     from kempf.flows.jobs.add_effect import add_effect
     from kempf.flows.jobs.standing_model import Own, rungs_to
@@ -103,8 +105,7 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, uri: str
         return
     tell_rungs(rungs[-2:], vessel)
     _tell_runs(rungs[-2], rungs[-1])
-    for warning in made.warnings:
-        click.echo(f"  {warning}")
+    show_warnings(made.warnings, verbose=verbose)
     click.echo(f"next: kempf ladder --vessel {vessel}, kempf effects undo --vessel {vessel}")
 
 

@@ -12,7 +12,7 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_note, print_table
+from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
 
 if TYPE_CHECKING:
     from kempf.pipeline.history.changes import Changes
@@ -97,23 +97,23 @@ def _show(histories: dict[str, History], *, as_json: bool) -> None:
         print_json(listed)
     if not listed or as_json:
         return
-    several = len(histories) > 1
+    several, short = len(histories) > 1, short_ids(row["parameter_set_id"] for row in listed)
     rows = [
         [
             *([r["vessel"]] if several else []),
-            r["start"][:19],
+            r["start"][:16],
             r["parameter"],
             number(r["value"]),
             number(r["std"], 2),
             r["unit"],
             r["estimator"],
             r["model"],
-            r["parameter_set_id"] + (" superseded" if r["superseded"] else ""),
+            short[r["parameter_set_id"]] + (" superseded" if r["superseded"] else ""),
         ]
         for r in listed
     ]
     head = ["vessel"] if several else []
-    print_table([*head, "start UTC", "parameter", "value", "std", "unit", "estimator", "model", "parameter set"], rows)
+    print_table([*head, "start UTC", "parameter", "value", "std", "unit", "estimator", "model", "set"], rows)
 
 
 def _beside(figure: Path | None, k: int) -> Path | None:

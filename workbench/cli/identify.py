@@ -11,7 +11,7 @@ import click
 from kempf.flows.process.progress import Progress
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import KempfError
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.parameter_set_table import tell_set
 from kempf.workbench.terminal import print_json, progress
 
@@ -27,9 +27,18 @@ if TYPE_CHECKING:
 @click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
               help="An effect of your own that the model file names, YAML. May be repeated.")  # fmt: skip
 @click.option("--estimator", type=click.Choice(NAMES), default="ml", show_default=True, help="How it is estimated.")
+@verbose_option
 @warehouse_option
 @json_option
-def command(vessel: str, model: str | None, files: tuple[Path, ...], estimator: str, uri: str, as_json: bool) -> None:
+def command(
+    vessel: str,
+    model: str | None,
+    files: tuple[Path, ...],
+    estimator: str,
+    verbose: bool,
+    uri: str,
+    as_json: bool,
+) -> None:
     """Identify a model from every zigzag of a vessel and store it as a parameter set.
 
     Maximum likelihood also identifies one hull from all of them together. A model file may name effects; they are
@@ -54,9 +63,10 @@ def command(vessel: str, model: str | None, files: tuple[Path, ...], estimator: 
         print_json([*(_show(outcome) for outcome in outcomes), *([pooled.show()] if pooled else [])])
     else:
         for outcome in outcomes:
-            _tell(outcome)
+            _tell(outcome, verbose=verbose)
         if pooled is not None:
-            tell_set(pooled, f"{len(pooled.segment_ids)} zigzags pooled: {pooled.parameter_set_id}")
+            title = f"{len(pooled.segment_ids)} zigzags pooled: {pooled.parameter_set_id}"
+            tell_set(pooled, title, verbose=verbose)
             out = len(outcomes) - len(pooled.segment_ids)
             if out:
                 click.echo(
@@ -89,11 +99,11 @@ def _show(outcome: IdentifyOutcome) -> object:
     return {"segment_id": outcome.segment.segment_id, **outcome.error.to_json()}
 
 
-def _tell(outcome: IdentifyOutcome) -> None:
+def _tell(outcome: IdentifyOutcome, *, verbose: bool) -> None:
     segment = outcome.segment
     named = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} zigzag {segment.segment_id}"
     if outcome.parameter_set is None:
         assert outcome.error is not None
         click.echo(f"{named}: not identified [{outcome.error.code}] {outcome.error}", err=True)
         return
-    tell_set(outcome.parameter_set, f"{named}: {outcome.parameter_set.parameter_set_id}")
+    tell_set(outcome.parameter_set, f"{named}: {outcome.parameter_set.parameter_set_id}", verbose=verbose)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
-from kempf.workbench.cli.options import json_option, profile_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import json_option, profile_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.ranked_warnings import of_several, show_warnings
 from kempf.workbench.terminal import one_line, print_json, progress
 
 if TYPE_CHECKING:
@@ -20,9 +22,12 @@ if TYPE_CHECKING:
 @click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path))
 @vessel_option()
 @profile_option
+@verbose_option
 @warehouse_option
 @json_option
-def command(paths: tuple[Path, ...], vessel: str | None, profiles: tuple[Path, ...], uri: str, as_json: bool) -> None:
+def command(
+    paths: tuple[Path, ...], vessel: str | None, profiles: tuple[Path, ...], verbose: bool, uri: str, as_json: bool
+) -> None:
     """Take raw logs in: MCAP, NMEA 0183 or delimited text, also compressed.
 
     Each log is read, checked, kept byte for byte and searched for zigzags. A log that is in already changes nothing.
@@ -41,15 +46,28 @@ def command(paths: tuple[Path, ...], vessel: str | None, profiles: tuple[Path, .
     if as_json:
         print_json([outcome.show() for outcome in outcomes])
     else:
-        for outcome in outcomes:
-            tell_outcome(outcome)
+        tell_outcomes(outcomes, verbose=verbose)
         if any(outcome.segments for outcome in outcomes):
             click.echo("next: kempf segments, kempf identify --vessel NAME")
     if failed:
         sys.exit(max(error.exit_code for error in failed))
 
 
-def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
+def tell_outcomes(outcomes: Sequence[IngestOutcome], *, verbose: bool = False, notes: bool = True) -> None:
+    """Print what became of some logs, then what is to be said of their channels and of how they were read."""
+    for outcome in outcomes:
+        tell_outcome(outcome)
+    for outcome in outcomes:
+        tell_channels(outcome, named=len(outcomes) > 1)
+    if notes:
+        said: dict[str, list[str]] = {}
+        for outcome in outcomes:
+            said.setdefault(one_line(Path(outcome.path).name), []).extend(outcome.notes)
+        every = [f"{name}: {note}" if len(said) > 1 else note for name, of_log in said.items() for note in of_log]
+        show_warnings(every if verbose else of_several(said), verbose=verbose, word="note")
+
+
+def tell_outcome(outcome: IngestOutcome) -> None:
     """Print what became of one log."""
     name = one_line(Path(outcome.path).name)
     if outcome.error is not None or outcome.tally is None:
@@ -64,9 +82,6 @@ def tell_outcome(outcome: IngestOutcome, *, notes: bool = True) -> None:
         many = f"{len(outcome.lost)} stretch{'es' if len(outcome.lost) > 1 else ''} of this log could not be read"
         from_then = f", the first from {times[0]} on" if times else ""
         click.echo(f"  {click.style('partial', fg='yellow')}: {many}{from_then}")
-    tell_channels(outcome)
-    for note in outcome.notes if notes else ():
-        click.echo(f"  note: {one_line(note)[:600]}")
 
 
 def _ledger(tally: Tally) -> str:
@@ -82,14 +97,15 @@ def _ledger(tally: Tally) -> str:
     return f"{said} ({reasons})" if reasons else said
 
 
-def tell_channels(outcome: IngestOutcome) -> None:
-    """Print what the channel doctor found in a log, nothing where it is clean."""
+def tell_channels(outcome: IngestOutcome, *, named: bool = False) -> None:
+    """Print what the channel doctor found in a log, nothing where it is clean; its name before it where asked."""
     examination = outcome.examination
     if examination is None or examination.verdict not in ("faults", "failed"):
         return
     for words in examination.findings or (str(examination.content.get("why", "")),):
         said = "channels" if examination.verdict == "faults" else "the channel doctor failed"
-        click.echo(f"  {click.style(said, fg='yellow')}: {one_line(words)[:600]}")
+        of = f" of {one_line(Path(outcome.path).name)}" if named else ""
+        click.echo(f"  {click.style(said, fg='yellow')}{of}: {one_line(words)[:600]}")
     if examination.findings and outcome.log_id:
         click.echo(f"  next: kempf doctor {outcome.log_id[:12]}")
 

@@ -53,15 +53,14 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     if as_json:
         print_json(found)
         return
-    head = ["log_id", "vessel", "file_name", "format", "start", "records_read", "records_kept", "records_rejected"]
-    rows = [
-        [*(str(one[name])[: 12 if name == "log_id" else 40] for name in head), _brief(one["channels"])] for one in found
-    ]
-    head.append("channels")
+    head = ["log_id", "vessel", "file_name", "start", "records_kept", "records_rejected"]
+    most = {"log_id": 12, "start": 16}
+    rows = [[*(str(one[name])[: most.get(name, 28)] for name in head), _brief(one["channels"])] for one in found]
+    head = ["log", "vessel", "file name", "start UTC", "records kept", "rejected", "channels"]
     if gone:
         head.append("damage")
         rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, rows_of_logs, strict=True)]
-    print_table([name.replace("_", " ") for name in head], rows)
+    print_table(head, rows)
 
 
 def _facts(row: LogRow) -> dict[str, Any]:

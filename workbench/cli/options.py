@@ -31,6 +31,13 @@ def json_option(function: F) -> F:
     return click.option("--json", "as_json", is_flag=True, help="Print one JSON document on stdout.")(function)
 
 
+def verbose_option(function: F) -> F:
+    """Add ``--verbose``."""
+    return click.option("--verbose", is_flag=True, help="Print every warning and note, not the gravest alone.")(
+        function
+    )
+
+
 def vessel_option(*, required: bool = False, multiple: bool = False) -> Callable[[F], F]:
     """Add ``--vessel``: one name, which must not be given twice, or with ``multiple`` a tuple of them."""
     return click.option(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_note, print_table
 
 if TYPE_CHECKING:
@@ -57,9 +57,10 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
 
 @command.command("show")
 @click.argument("set_id")
+@verbose_option
 @warehouse_option
 @json_option
-def show(set_id: str, uri: str, as_json: bool) -> None:
+def show(set_id: str, verbose: bool, uri: str, as_json: bool) -> None:
     """Show a parameter set whole; a unique beginning of its id is enough."""
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
@@ -71,7 +72,8 @@ def show(set_id: str, uri: str, as_json: bool) -> None:
     if as_json:
         print_json(one.show())
         return
-    tell_set(one, f"{one.parameter_set_id}: {one.vessel}, model {one.model_name}, estimator {one.estimator}")
+    title = f"{one.parameter_set_id}: {one.vessel}, model {one.model_name}, estimator {one.estimator}"
+    tell_set(one, title, verbose=verbose)
     print_table(
         ["", "value", "std", "unit"],
         [[p.name, number(p.value), number(p.std, 2), p.unit] for p in one.discrete],
@@ -162,15 +164,17 @@ def alias(name: str, set_id: str, uri: str, as_json: bool) -> None:
 @command.command("steering")
 @click.argument("set_id")
 @click.option("--speed", type=float, metavar="M/S", help="Speed through the water; default: that of the trial.")
+@verbose_option
 @warehouse_option
 @json_option
-def steering(set_id: str, speed: float | None, uri: str, as_json: bool) -> None:
+def steering(set_id: str, speed: float | None, verbose: bool, uri: str, as_json: bool) -> None:
     """Show Nomoto's constants and whether she holds a straight course, with standard errors."""
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.flows.jobs.ship_model import known_ship
     from kempf.pipeline.steering.nomoto import nomoto
     from kempf.pipeline.steering.stability import stability
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.ranked_warnings import show_warnings
 
     ship = known_ship(Warehouse(uri), set_id, speed)
     print_note(said_of_sets([ship.parameter_set]))
@@ -207,8 +211,7 @@ def steering(set_id: str, speed: float | None, uri: str, as_json: bool) -> None:
     click.echo(f"  on a straight course: {judged.verdict}; {judged.reason}")
     for part in judged.real_parts:
         click.echo(f"  {part.name}: real part {number(part.value)} +- {number(part.std, 2)} {part.unit}")
-    for warning in warnings:
-        click.echo(f"  warning: {warning}")
+    show_warnings(warnings, verbose=verbose)
 
 
 def _told(one: Constant | Value) -> dict[str, object]:

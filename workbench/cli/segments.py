@@ -5,7 +5,7 @@ from __future__ import annotations
 import click
 
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, one_line, print_json, print_note, print_table
+from kempf.workbench.terminal import number, one_line, print_json, print_note, print_table, short_ids
 
 
 @click.command("segments")
@@ -34,22 +34,21 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     if not found:
         click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
         return
+    short = short_ids(s.segment_id for s in found)
     rows = [
         [
-            s.segment_id,
+            short[s.segment_id],
             s.vessel,
-            f"{s.psi0_deg:g}/{s.delta0_deg:g}",
-            s.kind.replace("_", " "),
+            f"{s.psi0_deg:g}/{s.delta0_deg:g}" + ("" if s.kind == "zigzag" else f" {s.kind.replace('_', ' ')}"),
             s.first_side,
             number(s.base_heading_deg),
-            iso_utc(s.start_utc_ns)[:19],
-            str(len(s.executes_utc_ns)),
+            iso_utc(s.start_utc_ns)[:16],
             " ".join(f"{angle:.1f}" for angle in s.overshoots_deg[:4]),
             _imo(s.imo),
         ]
         for s in found
     ]
-    head = ["segment", "vessel", "psi0/delta0", "kind", "first side", "K0 deg", "start UTC", "executes"]
+    head = ["segment", "vessel", "zigzag", "first side", "K0 deg", "start UTC"]
     print_table([*head, "overshoots deg", "IMO"], rows)
     for ingest, findings in lies.items():
         for words in findings:
