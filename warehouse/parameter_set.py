@@ -199,22 +199,21 @@ def compare(first: ParameterSet, second: ParameterSet) -> dict[str, dict[str, An
     Returns
     -------
     dict
-        For each parameter that both have: ``first``, ``second``, ``difference`` (second less first), ``in_std``: the
-        difference over its standard error, the two sets taken as independent; None where it is unknown.
+        For each parameter that either has: ``first``, ``second``, ``difference`` (second less first), ``in_std``: the
+        difference over its standard error, the two sets taken as independent; None where it is unknown, or where only
+        one of the sets has the parameter.
     """
-    others = {p.name: p for p in second.parameters}
+    here, there = ({p.name: p for p in one.parameters} for one in (first, second))
     found: dict[str, dict[str, Any]] = {}
-    for p in first.parameters:
-        if p.name not in others:
-            continue
-        q = others[p.name]
-        spread = hypot(p.std or nan, q.std or nan)
-        difference = q.value - p.value
-        found[p.name] = {
-            "first": p.value,
-            "second": q.value,
+    for name in dict.fromkeys([*here, *there]):
+        p, q = here.get(name), there.get(name)
+        difference = q.value - p.value if p is not None and q is not None else None
+        spread = hypot(p.std or nan, q.std or nan) if p is not None and q is not None else nan
+        found[name] = {
+            "first": p.value if p is not None else None,
+            "second": q.value if q is not None else None,
             "difference": difference,
-            "in_std": difference / spread if spread > 0 else None,
-            "unit": p.unit,
+            "in_std": difference / spread if difference is not None and spread > 0 else None,
+            "unit": (p or q).unit,  # type: ignore[union-attr]
         }
     return found

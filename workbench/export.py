@@ -66,7 +66,13 @@ def linear(ship: KnownShip, step_s: float, course_rad: float) -> Linear:
     from kempf.pipeline.steering.state_space import continuous, discretised
 
     model = continuous(
-        ship.hull, ship.spec, ship.speed_m_s, arm_per_m=ship.arm_per_m, course_rad=course_rad, noise=ship.noise
+        ship.hull,
+        ship.spec,
+        ship.speed_m_s,
+        arm_per_m=ship.arm_per_m,
+        course_rad=course_rad,
+        noise=ship.noise,
+        effects=ship.effects,
     )
     return Linear(ship, model, discretised(model, step_s))
 
@@ -74,7 +80,7 @@ def linear(ship: KnownShip, step_s: float, course_rad: float) -> Linear:
 def as_control(model: Linear) -> str:
     """Write a Python module for python-control with the continuous and the discrete system, named, and their noise."""
     one, about = model.ship.parameter_set, model.continuous
-    names, values, spread, units = _parameters(one)
+    names, values, spread, units = _parameters(model.ship)
     units_of = {**about.states, **about.inputs, **about.outputs}
     lines = [
         '"""A ship identified by Kempf as python-control systems: `continuous` and `discrete`."""',
@@ -82,17 +88,19 @@ def as_control(model: Linear) -> str:
         "import control",
         "import numpy as np",
         "",
+        "nan = np.nan",
         f"VESSEL = {one.vessel!r}",
         f"PARAMETER_SET = {one.parameter_set_id!r}",
         f"CONVERGED = {bool(one.convergence.get('converged'))!r}",
         f"WARNINGS = {list(model.ship.warnings)!r}",
         f"SPEED_M_S = {about.speed_m_s!r}  # through the water; the matrices hold at this speed",
         f"COURSE_RAD = {about.course_rad!r}  # psi is counted from it",
+        f"RUDDER_RAD = {about.rudder_rad!r}  # with which she holds the course; the input is counted from it",
+        f"OFFSETS = {_array(about.offsets)}  # of the outputs on that course",
         f"UNITS = {units_of!r}",
         f"PARAMETERS = {dict(zip(names, values, strict=True))!r}",
         f"STANDARD_ERRORS = {dict(zip(names, spread, strict=True))!r}  # None: unknown",
         f"PARAMETER_UNITS = {dict(zip(names, units, strict=True))!r}",
-        "nan = np.nan",
         f"COVARIANCE = {_array(model.ship.covariance)}  # of PARAMETERS, in their order",
         "",
         f"NAMES = dict(states={list(about.states)!r}, inputs={list(about.inputs)!r}, outputs={list(about.outputs)!r})",
@@ -121,7 +129,7 @@ def as_mat(model: Linear) -> bytes:
     from scipy.io import savemat
 
     one, about = model.ship.parameter_set, model.continuous
-    names, values, spread, units = _parameters(one)
+    names, values, spread, units = _parameters(model.ship)
 
     def cells(texts: list[str]) -> Any:
         column = np.empty((len(texts), 1), dtype=object)
@@ -141,6 +149,8 @@ def as_mat(model: Linear) -> bytes:
         "step_s": model.discrete.step_s,
         "speed_m_s": about.speed_m_s,
         "course_rad": about.course_rad,
+        "rudder_rad": about.rudder_rad,
+        "output_offsets": about.offsets[:, None],
         "state_names": cells(list(about.states)),
         "state_units": cells(list(about.states.values())),
         "input_names": cells(list(about.inputs)),
@@ -191,9 +201,9 @@ def write_new(path: Path, data: str | bytes, option: str) -> None:
         ) from error
 
 
-def _parameters(one: ParameterSet) -> tuple[list[str], list[float], list[float | None], list[str]]:
-    held = {p.name: p for p in one.parameters}
-    found = [held[name] for name in HULL_PARAMETERS]
+def _parameters(ship: KnownShip) -> tuple[list[str], list[float], list[float | None], list[str]]:
+    held = {p.name: p for p in ship.parameter_set.parameters}
+    found = [*(held[name] for name in HULL_PARAMETERS), *ship.effect_parameters]
     spread = [p.std if p.std is not None and p.std == p.std else None for p in found]
     return [p.name for p in found], [p.value for p in found], spread, [p.unit for p in found]
 

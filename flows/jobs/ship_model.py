@@ -6,14 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kempf.flows.jobs.chosen_set import named_set
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.carried import carried, sentences
+from kempf.pipeline.steering.motion import ShipEffects
 from kempf.pipeline.steering.nomoto import require_numbers
 from kempf.pipeline.steering.state_space import NoiseLevels, usual_levels
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from kempf.warehouse import parameter_sets, vessels
-from kempf.warehouse.parameter_set import ParameterSet
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import vessels
+from kempf.warehouse.parameter_set import Estimate, ParameterSet
 from kempf.warehouse.store import Warehouse
 
 #: noise level of a set by the field of `NoiseLevels` that it is
@@ -38,8 +42,10 @@ class KnownShip:
     ----------
     parameter_set : ParameterSet
     hull : Hull
-    covariance : ndarray, shape (6, 6)
-        Of the six parameters; NaN where unknown.
+    effects : ShipEffects or None
+        None where the model has none.
+    covariance : ndarray, shape (6 + p, 6 + p)
+        Of the six parameters and those of the effects; NaN where unknown.
     spec : ModelSpec
     speed_m_s : float
     arm_per_m : float
@@ -48,19 +54,29 @@ class KnownShip:
         Of the profile.
     noise : NoiseLevels
         For an estimator: of the set, and where it has none, the usual ones.
+    remarks : tuple of str
+        What a linear model about a straight course has not, or not wholly, of the effects.
     warnings : tuple of str
-        What speaks against these numbers: the set's own, and what was assumed.
+        What speaks against these numbers: the set's own, what was assumed, and the remarks.
     """
 
     parameter_set: ParameterSet
     hull: Hull
+    effects: ShipEffects | None
     covariance: Float
     spec: ModelSpec
     speed_m_s: float
     arm_per_m: float
     length_m: float | None
     noise: NoiseLevels
+    remarks: tuple[str, ...]
     warnings: tuple[str, ...]
+
+    @property
+    def effect_parameters(self) -> tuple[Estimate, ...]:
+        """The parameters of the effects, in their order."""
+        held = {p.name: p for p in self.parameter_set.parameters}
+        return tuple(held[name] for name in (self.effects.model.names if self.effects is not None else ()))
 
 
 def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None) -> KnownShip:
@@ -70,7 +86,7 @@ def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None
     ----------
     warehouse : Warehouse
     set_id : str
-        Or a unique beginning of it.
+        Or a unique beginning of it, or an alias.
     speed_m_s : float, optional
         Speed through the water to work at; by default the mean one of the manoeuvre.
 
@@ -83,7 +99,7 @@ def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None
     DataRejected
         The set holds no six finite parameters.
     """
-    one = parameter_sets.get(warehouse, set_id)
+    one = named_set(warehouse, set_id)
     spec = ModelSpec.model_validate(dict(one.model_spec))
     told = speed_m_s if speed_m_s is not None else one.convergence.get("speed_m_s")
     if told is None:
@@ -97,20 +113,43 @@ def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None
     require_numbers(hull, float(told))
     profile = vessels.get(warehouse, str(one.provenance["inputs"]["profile_sha256"]))
     arm = spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
+    effects = _effects(one, profile)
+    remarks = sentences(carried(hull, effects, float(told), arm or 0.0))
     noise, assumed = _noise(one, spec)
-    warnings = [*one.warnings, *assumed]
+    warnings = [*one.warnings, *assumed, *remarks]
     if not one.convergence.get("converged"):
         warnings.insert(0, f"the set did not converge: {one.convergence.get('reason')}")
-    return KnownShip(
-        one, hull, _covariance(one), spec, float(told), arm or 0.0, profile.length_m, noise, tuple(warnings)
+    covariance = _covariance(one, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
+    numbers = (float(told), arm or 0.0, profile.length_m)
+    return KnownShip(one, hull, effects, covariance, spec, *numbers, noise, remarks, tuple(warnings))
+
+
+def _effects(one: ParameterSet, profile: VesselProfile) -> ShipEffects | None:
+    """Return the effects of a set as its fit had them."""
+    if not one.model_spec.get("effects"):
+        return None
+    # compiled code, which a set without effects does without
+    from kempf.flows.jobs.standing_model import known_effects, model_of, named
+    from kempf.flows.jobs.vessel_runs import LENGTH_M
+    from kempf.pipeline.model.effect_model import Augmented
+
+    spec, own = model_of(one)
+    model = Augmented(named(spec.effects, known_effects(own)))
+    values = {p.name: p.value for p in one.parameters}
+    return ShipEffects(
+        model,
+        np.array([values[name] for name in model.names]),
+        length_m=profile.length_m or LENGTH_M,
+        draught_m=profile.draught_m or 1.0,
+        day=len(one.log_ids) - 1.0,
     )
 
 
-def _covariance(one: ParameterSet) -> Float:
-    """Pick the six parameters out of the covariance; NaN for what it does not hold."""
-    found = np.full((6, 6), np.nan)
+def _covariance(one: ParameterSet, wanted: list[str]) -> Float:
+    """Pick parameters out of the covariance; NaN for what it does not hold."""
+    found = np.full((len(wanted), len(wanted)), np.nan)
     names = list(one.covariance_names)
-    held = [(i, names.index(name)) for i, name in enumerate(HULL_PARAMETERS) if name in names]
+    held = [(i, names.index(name)) for i, name in enumerate(wanted) if name in names]
     for i, row in held:
         for j, column in held:
             found[i, j] = one.covariance[row][column]
@@ -118,7 +157,7 @@ def _covariance(one: ParameterSet) -> Float:
 
 
 def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
-    levels = {p.name: p.value for p in one.noise}
+    levels = {p.name: p.value for p in one.noise} or _levels_of_runs(one, spec)
     usual, values, assumed = usual_levels(spec), {}, []
     for field, name in _LEVELS.items():
         standard = float(getattr(usual, field))
@@ -129,3 +168,23 @@ def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
         elif level < least:
             assumed.append(f"{name} is {level:.2g} in the set: {least:.2g} taken, an estimator finds it from nothing")
     return NoiseLevels(**values), assumed
+
+
+def _levels_of_runs(one: ParameterSet, spec: ModelSpec) -> dict[str, float]:
+    """Return the noise levels of a model with effects, geometric means over its manoeuvres.
+
+    A measurement that no manoeuvre has keeps the level at which the fit began.
+    """
+    runs = list(dict(one.convergence.get("levels") or {}).values())
+    if not runs:
+        return {}
+    mean = np.exp(np.mean(np.array(runs, dtype=np.float64), axis=0))
+    # intensities of force and current become levels in the long run
+    force = float(mean[0] / np.sqrt(2.0 * spec.wind_correlation_rate_per_s))
+    stream = float(mean[2] / np.sqrt(2.0 * spec.current_correlation_rate_per_s))
+    found = dict(zip(("sigma_v", "sigma_r", "sigma_psi"), mean[3:].tolist(), strict=True))
+    if spec.wind != "none":
+        found["sigma_F"] = force
+    if spec.current != "none":
+        found["sigma_V"] = stream
+    return found

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from math import degrees, isfinite, nan, radians
+
+import numpy as np
 
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.ship_model import KnownShip, known_ship
@@ -12,8 +15,11 @@ from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.simulate.disturbances import Environment
 from kempf.pipeline.simulate.hulls import Hull as SimulatedHull
 from kempf.pipeline.simulate.hulls import HullParameters
+from kempf.pipeline.simulate.steering_gear import DeadTime, Lag, Part, Play, RateLimit, SteeringGear
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT
+from kempf.pipeline.steering.carried import Carried, carried
 from kempf.pipeline.steering.course_keeping import Law, LawSettings, course_law
+from kempf.pipeline.steering.motion import ShipEffects, equivalent_hull, linear_motion
 from kempf.pipeline.steering.robustness import ClosedLoop, closed_loop, share_held
 from kempf.pipeline.steering.track import (
     CourseChange,
@@ -114,7 +120,8 @@ class Steered:
 def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = SteerRequest()) -> Steered:
     """Make course-keeping laws and try them on one simulated ship in the same weather.
 
-    The ship that is steered has the parameters of the set; what she really is nobody knows.
+    The ship that is steered has the parameters of the set, and of its effects what the simulator can do; what she
+    really is nobody knows. Her instruments read right, so effects on measurements are in neither law nor ship.
 
     Parameters
     ----------
@@ -142,12 +149,12 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
             "Ask for legs that are more than a minute longer.",
         )
     one, _ = chosen_set(warehouse, vessel, request.set_id)
-    ship = known_ship(warehouse, one.parameter_set_id, request.speed_m_s)
-    wanted = [(one.parameter_set_id, ship.hull)]
+    ship, dropped = _with_right_instruments(known_ship(warehouse, one.parameter_set_id, request.speed_m_s))
+    wanted = [(one.parameter_set_id, ship.hull, ship.effects)]
     if request.wrong is not None:
         wanted.append(_wrong(warehouse, request.wrong, ship))
-    laws = tuple(_tried(label, hull, ship, request) for label, hull in wanted)
-    warnings = list(ship.warnings)
+    laws = tuple(_tried(*making, ship, request) for making in wanted)
+    warnings = [*ship.warnings, *dropped, *_not_simulated(ship, dropped)]
     needed = abs(laws[0].law.rudder_per_force * request.environment.wind_force.mean)
     if needed > 0.8 * request.settings.rudder_limit_rad:
         warnings.append(
@@ -157,19 +164,53 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
     return Steered(ship, request, laws, tuple(warnings))
 
 
-def _wrong(warehouse: Warehouse, wrong: str, ship: KnownShip) -> tuple[str, Hull]:
+def _on_instruments(effects: ShipEffects | None) -> list[str]:
+    every = effects.model.effects if effects is not None else ()
+    return [one.name for one in every if one.terms and set(one.terms) <= {"lateral_speed", "yaw_rate", "heading"}]
+
+
+def _with_right_instruments(ship: KnownShip) -> tuple[KnownShip, tuple[str, ...]]:
+    """Return a ship whose instruments read right, and what was dropped for it."""
+    names = _on_instruments(ship.effects)
+    if ship.effects is None or not names:
+        return ship, ()
+    kept = np.concatenate([np.ones(6), [effect.name not in names for effect, _ in ship.effects.model.parameters]])
+    known = np.where(np.outer(kept, kept) > 0.0, ship.covariance, 0.0)
+    verb = "is" if len(names) == 1 else "are"
+    said = f"{', '.join(names)} {verb} in neither law nor simulated ship: her instruments read right"
+    return replace(ship, effects=ship.effects.without(*names), covariance=known), (said,)
+
+
+def _not_simulated(ship: KnownShip, dropped: tuple[str, ...]) -> tuple[str, ...]:
+    """Say what the simulator cannot do, or does to first order only."""
+    if ship.effects is None:
+        return ()
+    on_instruments = _on_instruments(ship.effects) if dropped else []
+    by_name = {effect.name: effect for effect in ship.effects.model.effects}
+
+    def sails(one: Carried) -> bool:
+        effect = by_name[one.effect]
+        linear = one.how == "carried" and not one.sentence and not effect.states
+        return effect.rudder_course is not None or one.how == "shifts the course" or linear
+
+    found = carried(ship.hull, ship.effects, ship.speed_m_s, ship.arm_per_m)
+    lacking = [one.effect for one in found if one.effect not in on_instruments and not sails(one)]
+    return (f"the simulated ship sails without {', '.join(lacking)}",) if lacking else ()
+
+
+def _wrong(warehouse: Warehouse, wrong: str, ship: KnownShip) -> tuple[str, Hull, ShipEffects | None]:
     try:
         factor = float(wrong)
     except ValueError:
-        other = known_ship(warehouse, wrong, ship.speed_m_s)
-        return f"{other.parameter_set.parameter_set_id} ({other.parameter_set.vessel})", other.hull
+        other, _ = _with_right_instruments(known_ship(warehouse, wrong, ship.speed_m_s))
+        return f"{other.parameter_set.parameter_set_id} ({other.parameter_set.vessel})", other.hull, other.effects
     if not (isfinite(factor) and factor > 0.0):
         raise UsageError("wrong_factor", f"The factor is {wrong}, expected more than 0.", "Give 0.5 or 2, say.")
     hull = replace(ship.hull, b1=factor * ship.hull.b1, b2=factor * ship.hull.b2)
-    return f"rudder taken for {factor:g} times as effective", hull
+    return f"rudder taken for {factor:g} times as effective", hull, ship.effects
 
 
-def _tried(label: str, hull: Hull, ship: KnownShip, request: SteerRequest) -> Tried:
+def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: KnownShip, request: SteerRequest) -> Tried:
     law = course_law(
         hull,
         ship.speed_m_s,
@@ -177,10 +218,16 @@ def _tried(label: str, hull: Hull, ship: KnownShip, request: SteerRequest) -> Tr
         spec=ship.spec,
         noise=ship.noise,
         settings=request.settings,
+        effects=effects,
     )
-    simulated = simulated_hull(ship, request.settings)
     longest = 2.0 * request.leg_s + 2.0 * law.step_s
-    steered = SteeredShip(simulated, request.environment, longest, seed=request.seed)
+    steered = SteeredShip(
+        simulated_hull(ship, request.settings),
+        request.environment,
+        longest,
+        seed=request.seed,
+        gear=simulated_gear(ship),
+    )
     track = keep_course(steered, law, 2.0 * request.leg_s, 0.0, ((request.leg_s, request.change_rad),))
     change = course_change(track)
     assert change is not None
@@ -191,14 +238,34 @@ def _tried(label: str, hull: Hull, ship: KnownShip, request: SteerRequest) -> Tr
         track,
         performance(track, request.settle_s, request.leg_s),
         change,
-        closed_loop(law, ship.hull, ship.speed_m_s),
-        share_held(law, ship.hull, ship.covariance, ship.speed_m_s),
+        closed_loop(law, ship.hull, ship.speed_m_s, ship.effects),
+        share_held(law, ship.hull, ship.covariance, ship.speed_m_s, effects=ship.effects),
     )
+
+
+#: parts of the simulated steering gear by the effect that they are, made from its one parameter
+_PARTS: dict[str, Callable[[float], Part]] = {
+    "rudder_lag": Lag,
+    "dead_time": DeadTime,
+    "backlash": Play,
+    "rate_limit": RateLimit,
+}
+
+
+def simulated_gear(ship: KnownShip) -> SteeringGear | None:
+    """Return what lies between the rudder's reading and the hull of a parameter set, None where nothing does."""
+    if ship.effects is None:
+        return None
+    sizes = {one.name: float(ship.effects.of(one.name)[0]) for one in ship.effects.model.effects}
+    parts = [_PARTS[name](size) for name, size in sizes.items() if name in _PARTS and size > 0.0]
+    zero = -linear_motion(ship.hull, ship.effects, ship.speed_m_s, arm_per_m=ship.arm_per_m).rudder_rad
+    return SteeringGear(parts, zero) if parts or zero != 0.0 else None
 
 
 def simulated_hull(ship: KnownShip, settings: LawSettings) -> SimulatedHull:
     """Return the ship of a parameter set as the simulator takes her; without a length her speed stays constant."""
-    parameters = HullParameters(*(float(x) for x in ship.hull.array()))
+    hull = equivalent_hull(ship.hull, ship.effects, ship.speed_m_s)
+    parameters = HullParameters(*(float(x) for x in hull.array()))
     return SimulatedHull(
         ship.parameter_set.vessel,
         ship.parameter_set.parameter_set_id,

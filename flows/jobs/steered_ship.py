@@ -13,9 +13,10 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.simulate.disturbances import Environment
 from kempf.pipeline.simulate.hulls import Hull
-from kempf.pipeline.simulate.plant import ORDERS, hull_constants, steer
+from kempf.pipeline.simulate.plant import ORDERS, follow, hull_constants, steer
 from kempf.pipeline.simulate.programme import GRID_S
 from kempf.pipeline.simulate.random_streams import stream
+from kempf.pipeline.simulate.steering_gear import SteeringGear
 from kempf.schemas.errors import DataRejected, UsageError
 
 
@@ -51,6 +52,8 @@ class SteeredShip:
     seed : int
         Of wind, stream and noise; equal seeds give equal weather and noise whatever the law does.
     instruments : Instruments, optional
+    gear : SteeringGear, optional
+        Between the rudder's reading and the hull, fresh; None lets the hull feel what is read.
     """
 
     def __init__(
@@ -62,6 +65,7 @@ class SteeredShip:
         course_rad: float = 0.0,
         seed: int = 0,
         instruments: Instruments | None = None,
+        gear: SteeringGear | None = None,
     ) -> None:
         # a law's steps are cut to the grid one by one
         n = round(longest_s / GRID_S) + 2
@@ -71,6 +75,7 @@ class SteeredShip:
         self._state[0, 2], self._state[0, 5] = course_rad, hull.trial_speed_m_s
         self._forcing = environment.forcing(n, GRID_S, seed)
         self._random = stream(seed, "steered ship")
+        self._gear, self._felt = gear, 0.0
 
     def measure(self) -> tuple[Float, float]:
         """Return (y_v m/s of eq. (18), y_r rad/s, heading rad not wrapped) and the rudder, rad, as instruments show."""
@@ -117,6 +122,12 @@ class SteeredShip:
             self._forcing,
             np.zeros(1),
         )
+        if self._gear is not None:
+            # how the helm moves does not depend on where the ship is: she sails the same cells with what she feels
+            readings = self._rudder[self._row : self._row + cells + 1]
+            felt = np.concatenate([[self._felt], self._gear.felt(readings, GRID_S)])
+            follow(felt, (GRID_S, 1), self._row, self._constants, self._state, self._forcing)
+            self._felt = float(felt[-1])
         self._row += cells
         if not np.all(np.isfinite(self._state[self._row])) or self._state[self._row, 5] <= 0.0:
             raise DataRejected(

@@ -25,7 +25,7 @@ from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.store import Warehouse
 
 #: where the profile does not tell a length; only the scale of non-dimensional coefficients hangs on it
-_LENGTH_M = 100.0
+LENGTH_M = 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,7 +127,7 @@ def assemble(
         )
     arm = arm_of(spec, profile)
     ready = spec.with_arm(arm)
-    ship = Ship(profile.length_m or _LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
+    ship = Ship(profile.length_m or LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
     step = step_of([record for _, _, record in records], ship.length_m)
     days = {log_id: k for k, log_id in enumerate(dict.fromkeys(one.log_id for _, one, _ in records))}
     runs = tuple(

@@ -320,3 +320,40 @@ def steer(
         if turned or (kind == ZIGZAG and helm[3] >= settings[4]):
             return k + 1, int(helm[3])
     return cells, int(helm[3])
+
+
+@compiled
+def follow(rudder: Float, grid: tuple[float, int], first: int, constants: Float, states: Float, forcing: Float) -> None:
+    """Sail cells whose rudder is known into the table of states.
+
+    Parameters
+    ----------
+    rudder : ndarray, shape (n + 1,)
+        What the hull feels at the cells' ends, rad; linear between them.
+    grid : (float, int)
+        Length of a cell in s, integrator steps in it.
+    first : int
+        Row to start from, which holds the initial state.
+    constants : ndarray, shape (11,)
+        See `kempf.pipeline.simulate.plant.hull_constants`.
+    states, forcing : ndarray
+        The columns of `Tables`.
+    """
+    cell_s, substeps = grid
+    step_s = cell_s / substeps
+    for k in range(rudder.size - 1):
+        row = first + k
+        rate, slope = (rudder[k + 1] - rudder[k]) / cell_s, (forcing[row + 1] - forcing[row]) / cell_s
+        states[row + 1] = states[row]
+        for part in range(substeps):
+            now, state = part * step_s, states[row + 1].copy()
+            advance(
+                state,
+                rudder[k] + now * rate,
+                rate,
+                forcing[row] + now * slope,
+                slope,
+                step_s,
+                constants,
+                states[row + 1],
+            )

@@ -7,9 +7,11 @@ sway and rudder with which she holds her heading in that wind, and the regulator
     delta = delta_F F^ - k (x^ - x_F F^),        x = (v, r, psi)
 
 so that a steady wind is met by a steady rudder and leaves no heading error, also where the parameters are wrong: a
-constant innovation would let F^ grow. References: Johnson (1971), "Accommodation of external disturbances in linear
-regulator and servomechanism problems", IEEE Transactions on Automatic Control 16; Kallstrom, Astrom, Thorell, Eriksson
-and Sten (1979), "Adaptive autopilots for tankers", Automatica 15; Koyama (1967) for the cost.
+constant innovation would let F^ grow. States that effects bring along, such as a rudder that lags behind its reading,
+are estimated like those of the ship, and fed back where the rudder moves them. References: Johnson (1971),
+"Accommodation of external disturbances in linear regulator and servomechanism problems", IEEE Transactions on Automatic
+Control 16; Kallstrom, Astrom, Thorell, Eriksson and Sten (1979), "Adaptive autopilots for tankers", Automatica 15;
+Koyama (1967) for the cost.
 """
 
 from __future__ import annotations
@@ -24,14 +26,14 @@ from scipy.signal import place_poles
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.motion import ShipEffects, equivalent_hull
 from kempf.pipeline.steering.nomoto import largest_rate_per_s, turning_frequency_rad_s
 from kempf.pipeline.steering.state_space import NoiseLevels, StateSpace, continuous, discretised
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.model_spec import ModelSpec
 
-#: of v, r, psi, F, V_T
-N_STATE = 5
-N_SHIP = 3
+#: the place of r, psi and the wind force among the states: v, r, psi, F, V_T, then those of effects
+_R, _PSI, _F = 1, 2, 3
 
 
 @dataclass(frozen=True)
@@ -69,14 +71,14 @@ class Law:
     Attributes
     ----------
     plant : StateSpace
-        What it takes the ship for: discrete, states v, r, psi, F, V_T.
-    gain : ndarray, shape (3,)
-        k: rudder per m/s, rad/s and rad.
+        What it takes the ship for: discrete, states v, r, psi, F, V_T, then those of effects.
+    gain : ndarray, shape (n_steered,)
+        k: rudder per unit of the states that the rudder moves, v, r, psi first.
     rudder_per_force : float
         delta_F, rad per m/s^2.
-    state_per_force : ndarray, shape (3,)
-        x_F: (v, r, psi) per m/s^2; r and psi are 0.
-    observer : ndarray, shape (5, 3)
+    state_per_force : ndarray, shape (n_steered,)
+        x_F: these states per m/s^2; r and psi are 0.
+    observer : ndarray, shape (n_state, 3)
         Steady gain of the filter, applied to the innovation of (y_v, y_r, y_psi).
     settings : LawSettings
     """
@@ -96,25 +98,25 @@ class Law:
 
     @property
     def feedback(self) -> Float:
-        """The whole law as one row, shape (5,): delta = -feedback x^."""
-        row = np.zeros(N_STATE)
-        row[:N_SHIP] = self.gain
-        row[N_SHIP] = -(self.rudder_per_force + self.gain @ self.state_per_force)
+        """The whole law as one row, shape (n_state,): delta = -feedback x^, counted from the rudder of the course."""
+        row = np.zeros(len(self.plant.states))
+        row[self.plant.steered] = self.gain
+        row[_F] = -(self.rudder_per_force + self.gain @ self.state_per_force)
         return row
 
     def order(self, estimate: Float) -> float:
-        """Return the rudder order for an estimated state, shape (5,), within the limit, rad."""
+        """Return the rudder order for an estimated state, shape (n_state,), within the limit, rad."""
         limit = self.settings.rudder_limit_rad
-        return min(max(-float(self.feedback @ estimate), -limit), limit)
+        return min(max(self.plant.rudder_rad - float(self.feedback @ estimate), -limit), limit)
 
     def predict(self, estimate: Float, rudder_rad: float) -> Float:
-        """Return the state a step later, shape (5,), for the mean rudder of the step."""
-        ahead: Float = self.plant.A @ estimate + self.plant.B[:, 0] * rudder_rad
+        """Return the state a step later, shape (n_state,), for the mean rudder of the step."""
+        ahead: Float = self.plant.A @ estimate + self.plant.B[:, 0] * (rudder_rad - self.plant.rudder_rad)
         return ahead
 
     def correct(self, predicted: Float, measured: Float) -> Float:
         """Return the state after a measurement, shape (3,); what is NaN is not corrected with."""
-        innovation = measured - self.plant.measured @ predicted
+        innovation = measured - self.plant.offsets[: measured.size] - self.plant.measured @ predicted
         corrected: Float = predicted + self.observer @ np.where(np.isfinite(innovation), innovation, 0.0)
         return corrected
 
@@ -127,6 +129,7 @@ def course_law(
     spec: ModelSpec | None = None,
     noise: NoiseLevels | None = None,
     settings: LawSettings | None = None,
+    effects: ShipEffects | None = None,
 ) -> Law:
     """Synthesise a course-keeping law.
 
@@ -141,6 +144,8 @@ def course_law(
         Correlation rates of the disturbances, which say how fast they may change.
     noise : NoiseLevels, optional
     settings : LawSettings, optional
+    effects : ShipEffects, optional
+        That the ship is taken to have.
 
     Returns
     -------
@@ -158,14 +163,18 @@ def course_law(
     _check(chosen)
     of_model = spec or ModelSpec()
     lateral = of_model.model_copy(update={"wind": "force", "current": "lateral"})
-    model = continuous(hull, lateral, speed_m_s, arm_per_m=arm_per_m, noise=noise, constant_disturbances=True)
-    plant = discretised(model, chosen.step_s or default_step_s(hull, speed_m_s))
-    rudder_per_force, state_per_force = _steady(hull, speed_m_s, arm_per_m)
-    A, B = plant.A[:N_SHIP, :N_SHIP], plant.B[:N_SHIP]
-    if np.linalg.matrix_rank(_scaled(_krylov(A, B))) < N_SHIP:
+    model = continuous(
+        hull, lateral, speed_m_s, arm_per_m=arm_per_m, noise=noise, constant_disturbances=True, effects=effects
+    )
+    settled = equivalent_hull(hull, effects, speed_m_s)
+    plant = discretised(model, chosen.step_s or default_step_s(settled, speed_m_s))
+    rudder_per_force, state_per_force = _steady(model)
+    steered = plant.steered
+    A, B = plant.A[np.ix_(steered, steered)], plant.B[steered]
+    if _deficient(A.T, B.T):
         raise _no_law("the rudder does not move every motion of such a ship")
     try:
-        gain = _lqr(A, B, chosen) if chosen.method == "lqr" else _placed(A, B, hull, speed_m_s, plant, chosen)
+        gain = _lqr(A, B, chosen) if chosen.method == "lqr" else _placed(A, B, settled, speed_m_s, plant, chosen)
         observer = _observer(plant)
     except (np.linalg.LinAlgError, ValueError) as error:
         raise _no_law(f"the design equation has no solution ({error})") from error
@@ -178,18 +187,23 @@ def default_step_s(hull: Hull, speed_m_s: float) -> float:
     return float(min(max(np.floor(10.0 * fifth) / 10.0, 0.1), 1.0))
 
 
-def _steady(hull: Hull, V: float, arm_per_m: float) -> tuple[float, Float]:
-    """Solve eq. (16) at rest for r = 0: sway and rudder that hold the heading under a unit force."""
-    matrix = np.array([[hull.a11 * V, hull.b1 * V**2], [hull.a21 * V, hull.b2 * V**2]])
-    both = (matrix[0, 0] * matrix[1, 1], matrix[0, 1] * matrix[1, 0])
-    if abs(both[0] - both[1]) <= 1e-12 * (abs(both[0]) + abs(both[1])):
+def _steady(model: StateSpace) -> tuple[float, Float]:
+    """Solve the continuous model at rest for r = psi = 0: what holds the heading under a unit force."""
+    steered = model.steered
+    rows, free = [i for i in steered if i != _PSI], [i for i in steered if i not in (_R, _PSI)]
+    matrix = np.column_stack([model.A[np.ix_(rows, free)], model.B[rows, 0]])
+    sizes = np.linalg.norm(matrix, axis=1)
+    if abs(float(np.linalg.det(matrix))) <= 1e-12 * float(np.prod(sizes)):
         raise _no_law("no rudder angle holds such a ship against a steady wind")
-    sway, rudder = np.linalg.solve(matrix, [-1.0, -arm_per_m])
-    return float(rudder), np.array([float(sway), 0.0, 0.0])
+    solved = np.linalg.solve(matrix, -model.A[rows, _F])
+    states = np.zeros(len(steered))
+    states[[steered.index(i) for i in free]] = solved[:-1]
+    return float(solved[-1]), states
 
 
 def _lqr(A: Float, B: Float, settings: LawSettings) -> Float:
-    cost = np.diag([0.0, 0.0, 1.0])
+    cost = np.zeros_like(A)
+    cost[_PSI, _PSI] = 1.0
     weight = np.array([[settings.rudder_weight]])
     P = solve_discrete_are(A, B, cost, weight)
     gain: Float = np.linalg.solve(weight + B.T @ P @ B, B.T @ P @ A)[0]
@@ -201,7 +215,10 @@ def _placed(A: Float, B: Float, hull: Hull, V: float, plant: StateSpace, setting
     w, z = settings.bandwidth * turning_frequency_rad_s(hull, V), settings.damping
     swing = w * np.emath.sqrt(z**2 - 1.0)
     fast = -max(largest_rate_per_s(hull, V), 1.1 * w)
-    wanted = np.exp(np.array([-z * w + swing, -z * w - swing, fast]) * plant.step_s)
+    # what effects add keeps the pace that it has, as far as it is stable
+    steered = plant.steered
+    added = np.linalg.eigvals(plant.A[np.ix_(steered[3:], steered[3:])]) if len(steered) > 3 else np.zeros(0)
+    wanted = np.concatenate([np.exp(np.array([-z * w + swing, -z * w - swing, fast]) * plant.step_s), added])
     gain: Float = np.real(place_poles(A, B, wanted, method="YT").gain_matrix[0])
     return gain
 
@@ -209,24 +226,21 @@ def _placed(A: Float, B: Float, hull: Hull, V: float, plant: StateSpace, setting
 def _observer(plant: StateSpace) -> Float:
     """Steady gain of eqs. (4)-(5), in the form that corrects the prediction."""
     A, H, R = plant.A, plant.measured, plant.R
-    if np.linalg.matrix_rank(_scaled(_krylov(A.T, H.T))) < N_STATE:
+    if _deficient(A, H):
         raise _no_law("wind and current cannot be told apart by such a ship")
     P = solve_discrete_are(A.T, H.T, plant.Q, R)
     gain: Float = np.linalg.solve(H @ P @ H.T + R, H @ P).T
     return gain
 
 
-def _krylov(A: Float, B: Float) -> Float:
-    blocks = [B]
-    for _ in range(A.shape[0] - 1):
-        blocks.append(A @ blocks[-1])
-    return np.hstack(blocks)
+def _deficient(A: Float, H: Float) -> bool:
+    """Say whether a motion that neither grows nor decays is not seen in H x (Hautus 1969); rows of unit length.
 
-
-def _scaled(matrix: Float) -> Float:
-    """Rows of unit length: m/s, rad and m/s^2 differ by orders of magnitude, and a rank is about directions."""
-    scaled: Float = matrix / np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), 1e-300)
-    return scaled
+    m/s, rad and m/s^2 differ by orders of magnitude, and a rank is about directions.
+    """
+    rows = np.vstack([np.eye(A.shape[0]) - A, H])
+    scaled = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+    return bool(np.linalg.matrix_rank(scaled) < A.shape[0])
 
 
 def _check(settings: LawSettings) -> None:

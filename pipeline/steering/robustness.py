@@ -1,12 +1,13 @@
 """Whether a law holds another ship than the one it was made for: closed-loop poles, margins, share of ships held.
 
-The loop is linear: eq. (16) with the heading, the estimator, the law; the rudder follows its order at once and within
-its limits. Reference: Astrom and Murray, "Feedback Systems" (2nd ed. 2021), ch. 10 and 13 for the margins.
+The loop is linear: eq. (16) with the heading and what effects bring, the estimator, the law; the rudder follows its
+order at once and within its limits. Reference: Astrom and Murray, "Feedback Systems" (2nd ed. 2021), ch. 10 and 13 for
+the margins.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,9 +15,55 @@ from scipy.linalg import expm
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
-from kempf.pipeline.steering.course_keeping import N_SHIP, N_STATE, Law
+from kempf.pipeline.steering.course_keeping import Law
+from kempf.pipeline.steering.motion import ShipEffects
+from kempf.pipeline.steering.state_space import continuous
+from kempf.schemas.model_spec import ModelSpec
 
 _FREQUENCIES = 2000
+#: what moves the ship alone: no disturbance is in the loop
+_STILL = ModelSpec(wind="none", current="none")
+
+
+@dataclass(frozen=True, eq=False)
+class SteeredShips:
+    """Ships sampled at a law's step.
+
+    Attributes
+    ----------
+    A : ndarray, shape (n, n_ship, n_ship)
+    B : ndarray, shape (n, n_ship, 1)
+    C : ndarray, shape (n, 3, n_ship)
+        What the instruments show.
+    """
+
+    A: Float
+    B: Float
+    C: Float
+
+
+def steered_ships(law: Law, ships: Float, speed_m_s: float, effects: ShipEffects | None = None) -> SteeredShips:
+    """Sample ships at the step of a law.
+
+    Parameters
+    ----------
+    law : Law
+    ships : ndarray, shape (n, 6 + p)
+        Parameters of hull and effects.
+    speed_m_s : float
+    effects : ShipEffects, optional
+        Which effects.
+    """
+    made = []
+    for theta in ships:
+        own = replace(effects, values=theta[6:]) if effects is not None else None
+        made.append(continuous(Hull(*theta[:6].tolist()), _STILL, speed_m_s, effects=own))
+    n = len(made[0].states)
+    block = np.zeros((len(made), n + 1, n + 1))
+    block[:, :n, :n] = [one.A for one in made]
+    block[:, :n, n:] = [one.B for one in made]
+    both = expm(block * law.step_s)
+    return SteeredShips(both[:, :n, :n], both[:, :n, n:], np.array([one.measured for one in made]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,7 +72,7 @@ class ClosedLoop:
 
     Attributes
     ----------
-    poles : ndarray of complex128, shape (8,)
+    poles : ndarray of complex128, shape (n_ship + n_state,)
         Of the loop over a step, the largest modulus first.
     stable : bool
         All of them inside the unit circle.
@@ -45,45 +92,33 @@ class ClosedLoop:
     modulus_margin: float
 
 
-def loop_matrices(law: Law, ships: Float, speed_m_s: float) -> Float:
+def loop_matrices(law: Law, ships: SteeredShips) -> Float:
     """Return the matrix of the loop over one step for each of some ships.
 
     Parameters
     ----------
     law : Law
-    ships : ndarray, shape (n, 6)
-        Parameters of the ships that it steers.
-    speed_m_s : float
+    ships : SteeredShips
 
     Returns
     -------
-    ndarray, shape (n, 8, 8)
-        On ship (v, r, psi) and estimate before the measurement (5).
+    ndarray, shape (n, n_ship + n_state, n_ship + n_state)
+        On ship and estimate before the measurement (5).
     """
-    A, B = _sampled(ships, speed_m_s, law.step_s)
-    Am, Bm, H, L, k = law.plant.A, law.plant.B, law.plant.measured, law.observer, law.feedback[None, :]
-    corrected = np.eye(N_STATE) - L @ H
-    n = N_SHIP + N_STATE
-    M = np.zeros((ships.shape[0], n, n))
-    # the instruments show v, r, psi themselves, no disturbance acts
-    M[:, :N_SHIP, :N_SHIP] = A - B @ (k @ L)
-    M[:, :N_SHIP, N_SHIP:] = -B @ (k @ corrected)
-    M[:, N_SHIP:, :N_SHIP] = (Am - Bm @ k) @ L
-    M[:, N_SHIP:, N_SHIP:] = (Am - Bm @ k) @ corrected
+    Am, Bm, L, k = law.plant.A, law.plant.B, law.observer, law.feedback[None, :]
+    corrected = np.eye(Am.shape[0]) - L @ law.plant.measured
+    A, B, C = ships.A, ships.B, ships.C
+    n = A.shape[1]
+    M = np.zeros((A.shape[0], n + Am.shape[0], n + Am.shape[0]))
+    # the instruments show what the ship does, no disturbance acts
+    M[:, :n, :n] = A - B @ (k @ L @ C)
+    M[:, :n, n:] = -B @ (k @ corrected)
+    M[:, n:, :n] = (Am - Bm @ k) @ L @ C
+    M[:, n:, n:] = (Am - Bm @ k) @ corrected
     return M
 
 
-def _sampled(ships: Float, V: float, step_s: float) -> tuple[Float, Float]:
-    """Sample eq. (16) with the heading for each ship, shapes (n, 3, 3) and (n, 3, 1)."""
-    block = np.zeros((ships.shape[0], N_SHIP + 1, N_SHIP + 1))
-    block[:, :2, :2] = V * ships[:, :4].reshape(-1, 2, 2)
-    block[:, :2, 3] = V**2 * ships[:, 4:]
-    block[:, 2, 1] = 1.0
-    both = expm(block * step_s)
-    return both[:, :N_SHIP, :N_SHIP], both[:, :N_SHIP, N_SHIP:]
-
-
-def closed_loop(law: Law, hull: Hull, speed_m_s: float) -> ClosedLoop:
+def closed_loop(law: Law, hull: Hull, speed_m_s: float, effects: ShipEffects | None = None) -> ClosedLoop:
     """Return poles and margins of a law on a ship.
 
     Parameters
@@ -92,36 +127,49 @@ def closed_loop(law: Law, hull: Hull, speed_m_s: float) -> ClosedLoop:
     hull : Hull
         The ship that it steers, which need not be the one it was made for.
     speed_m_s : float
+    effects : ShipEffects, optional
+        Of the ship that it steers.
     """
-    poles = np.linalg.eigvals(loop_matrices(law, hull.array()[None, :], speed_m_s)[0]).astype(np.complex128)
+    theta = np.concatenate([hull.array(), effects.values if effects is not None else np.zeros(0)])
+    ship = steered_ships(law, theta[None, :], speed_m_s, effects)
+    poles = np.linalg.eigvals(loop_matrices(law, ship)[0]).astype(np.complex128)
     poles = poles[np.argsort(-np.abs(poles), kind="stable")]
     stable = bool(np.abs(poles[0]) < 1.0)
     rates = np.log(np.maximum(np.abs(poles), 1e-300)) + 1j * np.angle(poles)
     damping = -np.real(rates) / np.maximum(np.abs(rates), 1e-300)
     slowest = -law.step_s / float(np.real(rates[0])) if stable else float("inf")
-    margin = _modulus_margin(law, hull, speed_m_s) if stable else 0.0
+    margin = _modulus_margin(law, ship) if stable else 0.0
     return ClosedLoop(poles, stable, slowest, float(np.min(damping)), margin)
 
 
-def _modulus_margin(law: Law, hull: Hull, speed_m_s: float) -> float:
-    """Break the loop where the rudder meets the ship; the estimator is told what the law ordered."""
-    (ship_A,), (ship_B,) = _sampled(hull.array()[None, :], speed_m_s, law.step_s)
-    Am, Bm, H, L, k = law.plant.A, law.plant.B, law.plant.measured, law.observer, law.feedback[None, :]
-    corrected = np.eye(N_STATE) - L @ H
+def _modulus_margin(law: Law, ship: SteeredShips) -> float:
+    """Break the loop where the rudder meets the ship; the estimator knows what the law ordered."""
+    (ship_A,), (ship_B,), (ship_C,) = ship.A, ship.B, ship.C
+    Am, Bm, L, k = law.plant.A, law.plant.B, law.observer, law.feedback[None, :]
+    corrected = np.eye(Am.shape[0]) - L @ law.plant.measured
     # states: ship, estimate; input: the ship's rudder; output: minus the law's order
-    n = N_SHIP + N_STATE
+    n_ship, n = ship_A.shape[0], ship_A.shape[0] + Am.shape[0]
     A = np.zeros((n, n))
-    A[:N_SHIP, :N_SHIP] = ship_A
-    A[N_SHIP:, :N_SHIP] = (Am - Bm @ k) @ L
-    A[N_SHIP:, N_SHIP:] = (Am - Bm @ k) @ corrected
+    A[:n_ship, :n_ship] = ship_A
+    A[n_ship:, :n_ship] = (Am - Bm @ k) @ L @ ship_C
+    A[n_ship:, n_ship:] = (Am - Bm @ k) @ corrected
     B = np.vstack([ship_B, np.zeros_like(Bm)])
-    C = np.hstack([k @ L, k @ corrected])
+    C = np.hstack([k @ L @ ship_C, k @ corrected])
     z = np.exp(1j * np.geomspace(1e-4, np.pi, _FREQUENCIES))
     response = C @ np.linalg.solve(z[:, None, None] * np.eye(n) - A, np.broadcast_to(B, (z.size, n, 1)))
     return float(np.min(np.abs(1.0 + response[:, 0, 0])))
 
 
-def share_held(law: Law, hull: Hull, covariance: Float, speed_m_s: float, *, draws: int = 400, seed: int = 0) -> float:
+def share_held(
+    law: Law,
+    hull: Hull,
+    covariance: Float,
+    speed_m_s: float,
+    *,
+    effects: ShipEffects | None = None,
+    draws: int = 400,
+    seed: int = 0,
+) -> float:
     """Return the share of the ships that the data allow which the law keeps stable; NaN without a covariance.
 
     Parameters
@@ -129,9 +177,11 @@ def share_held(law: Law, hull: Hull, covariance: Float, speed_m_s: float, *, dra
     law : Law
     hull : Hull
         Estimate.
-    covariance : ndarray, shape (6, 6)
-        Of the estimate; ships are drawn from the normal distribution.
+    covariance : ndarray, shape (6 + p, 6 + p)
+        Of the estimate with the effects; ships are drawn from the normal distribution, within the effects' bounds.
     speed_m_s : float
+    effects : ShipEffects, optional
+        Of the estimate.
     draws : int, optional
         How many.
     seed : int, optional
@@ -139,9 +189,15 @@ def share_held(law: Law, hull: Hull, covariance: Float, speed_m_s: float, *, dra
     """
     if not np.all(np.isfinite(covariance)):
         return float("nan")
+    centre = np.concatenate([hull.array(), effects.values if effects is not None else np.zeros(0)])
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    normal = np.random.default_rng(seed).standard_normal((draws, 6))
-    ships = hull.array() + normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T * scale
-    largest = np.max(np.abs(np.linalg.eigvals(loop_matrices(law, ships, speed_m_s))), axis=1)
+    normal = np.random.default_rng(seed).standard_normal((draws, centre.size))
+    ships = centre + normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T * scale
+    if effects is not None:
+        # a lag of nothing would have no state: what is there stays there
+        low = np.where(effects.model.low == 0.0, 0.01 * effects.values, effects.model.low)
+        ships[:, 6:] = np.clip(ships[:, 6:], low, effects.model.high)
+    made = steered_ships(law, ships, speed_m_s, effects)
+    largest = np.max(np.abs(np.linalg.eigvals(loop_matrices(law, made))), axis=1)
     return float(np.mean(largest < 1.0))

@@ -1,16 +1,16 @@
 """The linear ship as a controller's designer wants her: A, B, C, D with names and units, continuous or discrete.
 
 States v, r, psi and, where the model has them, the wind force F and the current: V_T of eq. (16), or c_N and c_E fixed
-over ground. psi is the heading counted from the course; with c_N and c_E the lateral speed of eq. (19) is taken at that
-course, to first order. The disturbances have the correlation rates of the model, or none at all (zero derivative, as
-an integrating controller wants them).
+over ground; then the states of effects and of the rudder's way to the hull. psi is the heading counted from the course;
+with c_N and c_E the lateral speed of eq. (19) is taken at that course, to first order. The disturbances have the
+correlation rates of the model, or none at all (zero derivative, as an integrating controller wants them).
 Discrete matrices are exact for a rudder held over the step; the noise of the step by Van Loan (1978), "Computing
 integrals involving the matrix exponential", IEEE Transactions on Automatic Control 23.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from math import cos, isfinite, sin
 
 import numpy as np
@@ -19,7 +19,9 @@ from scipy.linalg import expm
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.disturbances import level_of_change
 from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.motion import N_BEFORE, PSI, F, R, ShipEffects, V, linear_motion
 from kempf.pipeline.steering.nomoto import require_numbers
+from kempf.pipeline.steering.rudder_path import rudder_path
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
 
@@ -29,6 +31,8 @@ OUTPUTS = {"lateral_speed": "m/s", "yaw_rate": "rad/s", "heading": "rad", "cross
 N_MEASURED = 3
 #: changes of the wind force, m/s^2, and of the current, m/s, and the times they take, s
 _CHANGES = ((1.1e-3, 300.0), (0.056, 1800.0))
+#: units of the states that effects of the catalogue bring along
+_UNITS = {"memory_m1": "m/s", "waves_m1": "rad", "waves_m2": "rad/s"}
 
 
 @dataclass(frozen=True)
@@ -76,7 +80,7 @@ class StateSpace:
     B : ndarray, shape (n, 1)
     C : ndarray, shape (4, n)
     D : ndarray, shape (4, 1)
-        Zero.
+        Zero but for an effect that measures accelerations.
     Q : ndarray, shape (n, n)
         Covariance of the noise of a step; of a continuous model its intensity (covariance per second).
     R : ndarray, shape (3, 3)
@@ -86,6 +90,10 @@ class StateSpace:
     speed_m_s, course_rad : float
     step_s : float or None
         None for a continuous model.
+    rudder_rad : float
+        With which she holds the course in calm air; u is counted from it.
+    offsets : ndarray, shape (4,)
+        Outputs on that course; y is counted from them.
     """
 
     A: Float
@@ -100,11 +108,21 @@ class StateSpace:
     speed_m_s: float
     course_rad: float
     step_s: float | None
+    rudder_rad: float = 0.0
+    offsets: Float = field(default_factory=lambda: np.zeros(len(OUTPUTS)))
 
     @property
     def measured(self) -> Float:
         """H: the rows of C that instruments measure, shape (3, n)."""
         return self.C[:N_MEASURED]
+
+    @property
+    def steered(self) -> list[int]:
+        """Which states the rudder moves; v, r and psi are always among them."""
+        found = [i for i in range(len(self.states)) if i <= PSI or self.B[i, 0] != 0.0]
+        for i in found:  # grows while it is walked
+            found += [int(j) for j in np.flatnonzero(self.A[:, i]) if j not in found]
+        return sorted(found)
 
 
 def continuous(
@@ -116,8 +134,9 @@ def continuous(
     course_rad: float = 0.0,
     noise: NoiseLevels | None = None,
     constant_disturbances: bool = False,
+    effects: ShipEffects | None = None,
 ) -> StateSpace:
-    """Return the continuous model, eq. (16) with the heading and the disturbances as states.
+    """Return the continuous model, eq. (16) with the heading, the disturbances and what effects bring as states.
 
     Parameters
     ----------
@@ -134,6 +153,8 @@ def continuous(
         Default `usual_levels(spec)`.
     constant_disturbances : bool, optional
         Zero derivatives in place of the correlation rates; the noise that drives them stays.
+    effects : ShipEffects, optional
+        Linearised; `kempf.pipeline.steering.carried` says what comes of each.
 
     Raises
     ------
@@ -145,30 +166,48 @@ def continuous(
     require_numbers(hull, speed_m_s)
     if not isfinite(course_rad):
         raise UsageError("course_not_finite", "The course is not a finite number.", "Give a course in degrees.")
-    told, V = noise or usual_levels(spec), speed_m_s
+    levels = noise or usual_levels(spec)
+    motion = linear_motion(hull, effects, speed_m_s, arm_per_m=arm_per_m, course_rad=course_rad)
+    path = rudder_path(effects)
     states = {"v": "m/s", "r": "rad/s", "psi": "rad"}
     if spec.wind == "force":
         states["F"] = "m/s^2"
     if spec.current != "none":
         states |= {"V_T": "m/s"} if spec.current == "lateral" else {"c_N": "m/s", "c_E": "m/s"}
-    names = list(states)
-    n = len(names)
+    slow, moved = list(states)[3:], motion.own_states
+    states |= {name: _UNITS.get(name, "of its effect") for name in _names(effects, moved)}
+    states |= dict.fromkeys(path.states, "rad")
+    n, k = len(states), len(path.states)
     A, B, C, Q = np.zeros((n, n)), np.zeros((n, 1)), np.zeros((len(OUTPUTS), n)), np.zeros((n, n))
-    A[:2, :2], B[:2] = hull.continuous(V)
-    A[2, 1] = 1.0
-    C[0, 0], C[1, 1], C[2, 2], C[3, 0], C[3, 2] = 1.0, 1.0, 1.0, 1.0, V
+    # rows and columns of the motion, and where they stand here
+    own = len(slow) + 3 + np.arange(len(moved))
+    there = [V, R, PSI, *([F] if "F" in slow else []), *moved]
+    here = np.array([0, 1, 2, *([3] if "F" in slow else []), *own])
+    A[np.ix_(here, here)] = motion.A[np.ix_(there, there)]
+    A[np.ix_(here, range(n - k, n))] = np.outer(motion.B[there], path.C)
+    A[n - k :, n - k :], B[here, 0], B[n - k :, 0] = path.A, motion.B[there] * path.D, path.B
+    C[:N_MEASURED, here] = motion.C[:, there]
+    C[:N_MEASURED, n - k :] = np.outer(motion.D, path.C)
+    C[3, 0], C[3, 2] = 1.0, speed_m_s
     across = {"V_T": 1.0, "c_N": -sin(course_rad), "c_E": cos(course_rad)}
-    for i, name in enumerate(names[3:], start=3):
+    for i, name in enumerate(slow, start=3):
         mu = spec.wind_correlation_rate_per_s if name == "F" else spec.current_correlation_rate_per_s
         A[i, i] = 0.0 if constant_disturbances else -mu
-        Q[i, i] = 2.0 * mu * (told.wind_m_s2 if name == "F" else told.current_m_s) ** 2
-        if name == "F":
-            A[0, i], A[1, i] = 1.0, arm_per_m
-        else:
+        Q[i, i] = 2.0 * mu * (levels.wind_m_s2 if name == "F" else levels.current_m_s) ** 2
+        if name != "F":
             C[0, i] = C[3, i] = across[name]
-    R = np.diag(np.square([told.lateral_speed_m_s, told.yaw_rate_rad_s, told.heading_rad]))
+    Q[own, own] = [motion.noise[i - N_BEFORE] for i in moved]
+    R_ = np.diag(np.square([levels.lateral_speed_m_s, levels.yaw_rate_rad_s, levels.heading_rad]))
     D = np.zeros((len(OUTPUTS), 1))
-    return StateSpace(A, B, C, D, Q, R, states, {"rudder": "rad"}, dict(OUTPUTS), V, course_rad, None)
+    D[:N_MEASURED, 0] = motion.D * path.D
+    offsets = np.array([*motion.offsets, motion.sway_m_s])
+    units = ({"rudder": "rad"}, dict(OUTPUTS))
+    return StateSpace(A, B, C, D, Q, R_, states, *units, speed_m_s, course_rad, None, motion.rudder_rad, offsets)
+
+
+def _names(effects: ShipEffects | None, moved: list[int]) -> list[str]:
+    every = [f"{e.name}_{state.name}" for e in (effects.model.effects if effects else ()) for state in e.states]
+    return [every[i - N_BEFORE] for i in moved]
 
 
 def discretised(model: StateSpace, step_s: float) -> StateSpace:

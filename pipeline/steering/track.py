@@ -13,7 +13,7 @@ from typing import Protocol
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.steering.course_keeping import N_STATE, Law
+from kempf.pipeline.steering.course_keeping import Law
 from kempf.schemas.errors import UsageError
 
 
@@ -44,8 +44,8 @@ class Track:
         Heading that was ordered.
     truth : ndarray, shape (n, 8)
         See `Ship.truth`.
-    estimate : ndarray, shape (n, 5)
-        v, r, psi (from the course at the start), F, V_T as the law sees them.
+    estimate : ndarray, shape (n, n_state)
+        v, r, psi (from the course at the start), F, V_T as the law sees them, then the states of effects.
     order_rad : ndarray, shape (n,)
     """
 
@@ -131,8 +131,9 @@ def keep_course(
     course = np.full(steps, course_rad)
     for instant, heading in changes:
         course[time >= instant] = heading
-    truth, estimate, order = np.empty((steps, 8)), np.empty((steps, N_STATE)), np.empty(steps)
-    x, last_rudder = np.zeros(N_STATE), 0.0
+    n_state = len(law.plant.states)
+    truth, estimate, order = np.empty((steps, 8)), np.empty((steps, n_state)), np.empty(steps)
+    x, turned, last_rudder = np.zeros(n_state), np.zeros(n_state), 0.0
     for k in range(steps):
         measured, rudder = ship.measure()
         measured = measured - np.array([0.0, 0.0, course_rad])
@@ -142,8 +143,8 @@ def keep_course(
             # what the rudder did meanwhile is known when the step is over; straight between its ends
             x = law.predict(x, 0.5 * (last_rudder + rudder))
         x = law.correct(x, measured)
-        aimed = x - np.array([0.0, 0.0, course[k] - course_rad, 0.0, 0.0])
-        truth[k], estimate[k], order[k] = ship.truth(), x, law.order(aimed)
+        turned[2] = course[k] - course_rad
+        truth[k], estimate[k], order[k] = ship.truth(), x, law.order(x - turned)
         last_rudder = rudder
         ship.hold(float(order[k]), law.step_s)
     return Track(time, course, truth, estimate, order)

@@ -91,7 +91,10 @@ def show(set_id: str, verbose: bool, uri: str, as_json: bool) -> None:
 @warehouse_option
 @json_option
 def diff(first: str, second: str, uri: str, as_json: bool) -> None:
-    """Compare the parameters of two sets: difference, and the same in standard errors of the difference."""
+    """Compare the parameters of two sets: difference, and the same in standard errors of the difference.
+
+    A parameter that only one of the sets has is shown with a dash for the other.
+    """
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.parameter_set import compare
@@ -108,7 +111,7 @@ def diff(first: str, second: str, uri: str, as_json: bool) -> None:
         [name, number(d["first"]), number(d["second"]), number(d["difference"]), number(d["in_std"], 3), d["unit"]]
         for name, d in found.items()
     ]
-    print_table(["", "first", "second", "difference", "in std errors", "unit"], rows)
+    print_table(["", "first", "second", "difference", "in s.e.", "unit"], rows)
 
 
 @command.command("export")
@@ -168,9 +171,14 @@ def alias(name: str, set_id: str, uri: str, as_json: bool) -> None:
 @warehouse_option
 @json_option
 def steering(set_id: str, speed: float | None, verbose: bool, uri: str, as_json: bool) -> None:
-    """Show Nomoto's constants and whether she holds a straight course, with standard errors."""
+    """Show Nomoto's constants and whether she holds a straight course, with standard errors.
+
+    Of a set with effects these are the constants of its linear model about a straight course; what has no part in it is
+    named, and so is a lag of the rudder, which is none of the hull's.
+    """
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.flows.jobs.ship_model import known_ship
+    from kempf.pipeline.steering.motion import linear_hull
     from kempf.pipeline.steering.nomoto import nomoto
     from kempf.pipeline.steering.stability import stability
     from kempf.warehouse.store import Warehouse
@@ -178,9 +186,13 @@ def steering(set_id: str, speed: float | None, verbose: bool, uri: str, as_json:
 
     ship = known_ship(Warehouse(uri), set_id, speed)
     print_note(said_of_sets([ship.parameter_set]))
-    constants = nomoto(ship.hull, ship.covariance, ship.speed_m_s, ship.length_m)
-    judged = stability(ship.hull, ship.covariance, ship.speed_m_s)
-    warnings = [*ship.parameter_set.warnings, *constants.warnings]
+    linear = linear_hull(ship.hull, ship.effects, ship.covariance, ship.speed_m_s)
+    constants = nomoto(linear.hull, linear.covariance, ship.speed_m_s, ship.length_m)
+    judged = stability(linear.hull, linear.covariance, ship.speed_m_s)
+    effects = ship.effect_parameters
+    warnings = [*ship.parameter_set.warnings, *constants.warnings, *ship.remarks]
+    if linear.settled:
+        warnings.append("the states of effects are settled in K, T1, T2, T3 and T: they hold for slow motion")
     if not ship.parameter_set.convergence.get("converged"):
         warnings.insert(0, "the search for these parameters did not converge")
     name = ship.parameter_set.parameter_set_id
@@ -202,15 +214,17 @@ def steering(set_id: str, speed: float | None, verbose: bool, uri: str, as_json:
                     "determinant": _told(judged.determinant),
                     "eigenvalues_real_part": [_told(v) for v in judged.real_parts],
                 },
+                "effects": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in effects},
                 "warnings": warnings,
             }
         )
         return
     rows = [[c.name, number(c.value), number(c.std, 2), c.unit, _interval(c)] for c in constants.constants.values()]
-    print_table(["", "value", "std", "unit", "95 % interval"], rows, f"{name} at {number(ship.speed_m_s)} m/s")
+    rows += [[p.name, number(p.value), number(p.std, 2), p.unit, "-"] for p in effects]
+    print_table(["", "value", "1 s.e.", "unit", "95 % interval"], rows, f"{name} at {number(ship.speed_m_s)} m/s")
     click.echo(f"  on a straight course: {judged.verdict}; {judged.reason}")
     for part in judged.real_parts:
-        click.echo(f"  {part.name}: real part {number(part.value)} +- {number(part.std, 2)} {part.unit}")
+        click.echo(f"  {part.name}: real part {number(part.value)} ± {number(part.std, 2)} {part.unit} (1 s.e.)")
     show_warnings(warnings, verbose=verbose)
 
 

@@ -50,7 +50,8 @@ def command(
     """Make a course-keeping law from a parameter set and try it on the simulated ship in wind and stream.
 
     The ship that is steered has the parameters of the set: the track shows what the law does to her, and what wrong
-    parameters cost. It does not show that the parameters are right.
+    parameters cost. It does not show that the parameters are right. Law and ship have the effects of the set, as far as
+    a linear law and the simulator can; the warnings name the rest.
     """
     from kempf.flows.jobs.steer_vessel import SteerRequest, steer_vessel
     from kempf.pipeline.steering.course_keeping import LawSettings
@@ -106,6 +107,7 @@ def _show(done: Steered, figure: Path | None) -> dict[str, Any]:
             "current_m_s": {"north": wind.current_north.mean, "east": wind.current_east.mean},
         },
         "laws": [_law(one) for one in done.laws],
+        "effects": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in done.ship.effect_parameters},
         "figure": str(figure) if figure else None,
         "warnings": list(done.warnings),
     }
@@ -168,6 +170,8 @@ def _tell(done: Steered, figure: Path | None) -> None:
         click.echo(f"  wrong: {shown[1]['parameters']}")
     gains = ", ".join(f"{name} {number(-gain)}" for name, gain in shown[0]["law"]["gain"].items() if gain)
     click.echo(f"  rudder order in rad from the set: {gains} (SI), every {number(shown[0]['law']['step_s'])} s")
+    for p in done.ship.effect_parameters:
+        click.echo(f"  effect: {p.name} {number(p.value)} ± {number(p.std, 2)} {p.unit} (1 s.e.)")
     if figure is not None:
         click.echo(f"  drawn: {figure}")
     for warning in done.warnings:

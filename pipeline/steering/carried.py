@@ -1,0 +1,107 @@
+"""What a linear model about a straight course has of each effect, in words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import degrees
+from typing import Literal
+
+import numpy as np
+
+from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.steering.motion import LinearMotion, ShipEffects, linear_motion
+from kempf.pipeline.steering.rudder_path import LEFT_OUT
+
+How = Literal["carried", "shifts the course", "no part of a straight course", "left out"]
+#: what is taken of a channel that a steady course does not have
+_TAKEN = {"wind_speed": "calm air", "wind_angle": "calm air", "water_depth": "deep water", "roll": "no heel"}
+_NEGLIGIBLE = 1e-12
+
+
+@dataclass(frozen=True)
+class Carried:
+    """One effect in the linear model.
+
+    Attributes
+    ----------
+    effect : str
+    how : str
+        ``carried`` in the matrices or as states; ``shifts the course``: only the rudder, drift or readings of the
+        straight course are others; ``no part of a straight course``; ``left out``: it has no linear model.
+    sentence : str
+        What a user should know; empty where it is carried as it is.
+    """
+
+    effect: str
+    how: How
+    sentence: str
+
+
+def carried(hull: Hull, effects: ShipEffects | None, speed_m_s: float, arm_per_m: float = 0.0) -> tuple[Carried, ...]:
+    """Say of every effect what the linear model has of it.
+
+    Parameters
+    ----------
+    hull : Hull
+    effects : ShipEffects or None
+    speed_m_s : float
+    arm_per_m : float, optional
+        l of eq. (16), 1/m.
+    """
+    if effects is None:
+        return ()
+    whole = linear_motion(hull, effects, speed_m_s, arm_per_m=arm_per_m)
+    found = []
+    for effect in effects.model.effects:
+        name, size = effect.name, float(effects.of(effect.name)[0])
+        if effect.rudder_course is not None:
+            found.append(_on_the_rudder(name, size))
+            continue
+        bare = linear_motion(hull, effects.without(name), speed_m_s, arm_per_m=arm_per_m)
+        found.append(_compared(name, whole, bare, {_TAKEN[c] for c in effect.needs if c in _TAKEN}))
+    return tuple(found)
+
+
+def sentences(found: tuple[Carried, ...]) -> tuple[str, ...]:
+    """Return what a user should know, those of no part together."""
+    absent = [one.effect for one in found if one.how == "no part of a straight course" and not one.sentence]
+    said = [one.sentence for one in found if one.sentence]
+    if absent:
+        verb = "is" if len(absent) == 1 else "are"
+        said.append(f"{', '.join(absent)} {verb} no part of a linear model about a straight course")
+    return tuple(said)
+
+
+def _on_the_rudder(name: str, size: float) -> Carried:
+    if name == "backlash":
+        return Carried(name, "left out", f"backlash of {degrees(size):.2g} deg left out of the linear model")
+    if name in LEFT_OUT:
+        limit = f" of {degrees(1.0 / size):.2g} deg/s" if size > 0.0 else ""
+        return Carried(name, "left out", f"rate limit{limit} left out of the linear model")
+    if name == "dead_time":
+        return Carried(name, "carried", f"dead time of {size:.3g} s is a Padé approximation of the second order")
+    return Carried(name, "carried", "")
+
+
+def _compared(name: str, whole: LinearMotion, bare: LinearMotion, taken: set[str]) -> Carried:
+    if np.any(whole.corners > bare.corners + 1e-6):
+        return Carried(
+            name,
+            "carried",
+            f"{name} has a corner at the straight course: the linear model takes the mean of both sides",
+        )
+    for field in ("A", "B", "C", "D", "noise"):
+        if _differ(getattr(whole, field), getattr(bare, field)):
+            return Carried(name, "carried", "")
+    rest = [[m.rudder_rad, m.sway_m_s, *m.offsets] for m in (whole, bare)]
+    if _differ(*map(np.array, rest)):
+        moved = whole.rudder_rad - bare.rudder_rad
+        how = f": rudder at {degrees(whole.rudder_rad):.2g} deg" if abs(moved) > _NEGLIGIBLE else " as it is measured"
+        return Carried(name, "shifts the course", f"{name} only shifts the straight course{how}")
+    if taken:
+        return Carried(name, "no part of a straight course", f"{name} is left out: {', '.join(sorted(taken))} taken")
+    return Carried(name, "no part of a straight course", "")
+
+
+def _differ(here: np.ndarray, there: np.ndarray) -> bool:
+    return bool(np.any(np.abs(here - there) > _NEGLIGIBLE * np.maximum(np.abs(here), np.abs(there))))

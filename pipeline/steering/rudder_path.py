@@ -1,0 +1,74 @@
+"""From the rudder's reading to the rudder that the hull feels, as a linear system: lags and dead times in a row.
+
+A dead time is the Padé approximation of the second order, all-pass, in the continuous system and in the discrete one
+made from it: both then have the same states, few and whatever the step. At one radian of phase it errs by 0.0014 rad.
+Reference: Golub and Van Loan (2013), "Matrix Computations", 4th ed., sect. 9.3.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.steering.motion import ShipEffects
+
+#: effects on the rudder's course that have no linear model: what a movement smaller than they are does
+LEFT_OUT = ("backlash", "rate_limit")
+#: a shorter time than this is none, s
+_SHORTEST_S = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class RudderPath:
+    """x' = A x + B u, y = C x + D u: u the reading, y what the hull feels, rad.
+
+    Attributes
+    ----------
+    A : ndarray, shape (k, k)
+    B, C : ndarray, shape (k,)
+    D : float
+    states : tuple of str
+        Names; all in rad.
+    """
+
+    A: Float
+    B: Float
+    C: Float
+    D: float
+    states: tuple[str, ...]
+
+    def then(self, other: RudderPath) -> RudderPath:
+        """Return the path that goes on through another."""
+        n, m = len(self.states), len(other.states)
+        A = np.zeros((n + m, n + m))
+        A[:n, :n], A[n:, n:], A[n:, :n] = self.A, other.A, np.outer(other.B, self.C)
+        B = np.concatenate([self.B, other.B * self.D])
+        return RudderPath(
+            A, B, np.concatenate([other.D * self.C, other.C]), other.D * self.D, (*self.states, *other.states)
+        )
+
+
+def rudder_path(effects: ShipEffects | None) -> RudderPath:
+    """Return what the effects on the rudder's course make of it, those without a linear model left out."""
+    path = RudderPath(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 1.0, ())
+    for effect in effects.model.effects if effects is not None else ():
+        if effect.rudder_course is not None and effect.name not in LEFT_OUT and effects is not None:
+            seconds = float(effects.of(effect.name)[0])
+            if seconds > _SHORTEST_S:
+                path = path.then(_LINEAR[effect.name](seconds))
+    return path
+
+
+def _lag(tau_s: float) -> RudderPath:
+    return RudderPath(np.array([[-1.0 / tau_s]]), np.array([1.0 / tau_s]), np.ones(1), 0.0, ("rudder_lag",))
+
+
+def _dead_time(tau_s: float) -> RudderPath:
+    # y = u - z2 with z1' = z2 / tau, z2' = (12 u - 12 z1 - 6 z2) / tau
+    A = np.array([[0.0, 1.0], [-12.0, -6.0]]) / tau_s
+    return RudderPath(A, np.array([0.0, 12.0 / tau_s]), np.array([0.0, -1.0]), 1.0, ("dead_time_1", "dead_time_2"))
+
+
+_LINEAR = {"rudder_lag": _lag, "dead_time": _dead_time}
