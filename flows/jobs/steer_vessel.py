@@ -243,7 +243,7 @@ def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: KnownShip,
     )
 
 
-#: parts of the simulated steering gear by the effect that they are, made from its one parameter
+#: parts of the simulated steering gear by what an effect makes of the rudder's course, made from its size
 _PARTS: dict[str, Callable[[float], Part]] = {
     "rudder_lag": Lag,
     "dead_time": DeadTime,
@@ -256,8 +256,8 @@ def simulated_gear(ship: KnownShip) -> SteeringGear | None:
     """Return what lies between the rudder's reading and the hull of a parameter set, None where nothing does."""
     if ship.effects is None:
         return None
-    sizes = {one.name: float(ship.effects.of(one.name)[0]) for one in ship.effects.model.effects}
-    parts = [_PARTS[name](size) for name, size in sizes.items() if name in _PARTS and size > 0.0]
+    sizes = [(one.rudder_course, float(ship.effects.of(one.name)[0])) for one in ship.effects.model.effects]
+    parts = [_PARTS[course](size) for course, size in sizes if course is not None and size > 0.0]
     zero = -linear_motion(ship.hull, ship.effects, ship.speed_m_s, arm_per_m=ship.arm_per_m).rudder_rad
     return SteeringGear(parts, zero) if parts or zero != 0.0 else None
 

@@ -10,7 +10,6 @@ import numpy as np
 
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.steering.motion import LinearMotion, ShipEffects, linear_motion
-from kempf.pipeline.steering.rudder_path import LEFT_OUT
 
 How = Literal["carried", "shifts the course", "no part of a straight course", "left out"]
 #: what is taken of a channel that a steady course does not have
@@ -55,7 +54,7 @@ def carried(hull: Hull, effects: ShipEffects | None, speed_m_s: float, arm_per_m
     for effect in effects.model.effects:
         name, size = effect.name, float(effects.of(effect.name)[0])
         if effect.rudder_course is not None:
-            found.append(_on_the_rudder(name, size))
+            found.append(_on_the_rudder(name, effect.rudder_course, size))
             continue
         bare = linear_motion(hull, effects.without(name), speed_m_s, arm_per_m=arm_per_m)
         found.append(_compared(name, whole, bare, {_TAKEN[c] for c in effect.needs if c in _TAKEN}))
@@ -72,13 +71,13 @@ def sentences(found: tuple[Carried, ...]) -> tuple[str, ...]:
     return tuple(said)
 
 
-def _on_the_rudder(name: str, size: float) -> Carried:
-    if name == "backlash":
+def _on_the_rudder(name: str, course: str, size: float) -> Carried:
+    if course == "backlash":
         return Carried(name, "left out", f"backlash of {degrees(size):.2g} deg left out of the linear model")
-    if name in LEFT_OUT:
+    if course == "rate_limit":
         limit = f" of {degrees(1.0 / size):.2g} deg/s" if size > 0.0 else ""
-        return Carried(name, "left out", f"rate limit{limit} left out of the linear model")
-    if name == "dead_time":
+        return Carried(name, "left out", f"rate limit{limit} of the rudder left out of the linear model")
+    if course == "dead_time":
         return Carried(name, "carried", f"dead time of {size:.3g} s is a Padé approximation of the second order")
     return Carried(name, "carried", "")
 

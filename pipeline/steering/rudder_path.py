@@ -7,6 +7,7 @@ Reference: Golub and Van Loan (2013), "Matrix Computations", 4th ed., sect. 9.3.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,8 +15,6 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.steering.motion import ShipEffects
 
-#: effects on the rudder's course that have no linear model: what a movement smaller than they are does
-LEFT_OUT = ("backlash", "rate_limit")
 #: a shorter time than this is none, s
 _SHORTEST_S = 1e-3
 
@@ -53,22 +52,25 @@ class RudderPath:
 def rudder_path(effects: ShipEffects | None) -> RudderPath:
     """Return what the effects on the rudder's course make of it, those without a linear model left out."""
     path = RudderPath(np.zeros((0, 0)), np.zeros(0), np.zeros(0), 1.0, ())
-    for effect in effects.model.effects if effects is not None else ():
-        if effect.rudder_course is not None and effect.name not in LEFT_OUT and effects is not None:
+    if effects is None:
+        return path
+    for effect in effects.model.effects:
+        if effect.rudder_course in _LINEAR:
             seconds = float(effects.of(effect.name)[0])
             if seconds > _SHORTEST_S:
-                path = path.then(_LINEAR[effect.name](seconds))
+                path = path.then(_LINEAR[effect.rudder_course](effect.name, seconds))
     return path
 
 
-def _lag(tau_s: float) -> RudderPath:
-    return RudderPath(np.array([[-1.0 / tau_s]]), np.array([1.0 / tau_s]), np.ones(1), 0.0, ("rudder_lag",))
+def _lag(name: str, tau_s: float) -> RudderPath:
+    return RudderPath(np.array([[-1.0 / tau_s]]), np.array([1.0 / tau_s]), np.ones(1), 0.0, (name,))
 
 
-def _dead_time(tau_s: float) -> RudderPath:
+def _dead_time(name: str, tau_s: float) -> RudderPath:
     # y = u - z2 with z1' = z2 / tau, z2' = (12 u - 12 z1 - 6 z2) / tau
     A = np.array([[0.0, 1.0], [-12.0, -6.0]]) / tau_s
-    return RudderPath(A, np.array([0.0, 12.0 / tau_s]), np.array([0.0, -1.0]), 1.0, ("dead_time_1", "dead_time_2"))
+    return RudderPath(A, np.array([0.0, 12.0 / tau_s]), np.array([0.0, -1.0]), 1.0, (f"{name}_1", f"{name}_2"))
 
 
-_LINEAR = {"rudder_lag": _lag, "dead_time": _dead_time}
+#: by what an effect makes of the rudder's course; a play and a rate limit have no linear model
+_LINEAR: dict[str, Callable[[str, float], RudderPath]] = {"rudder_lag": _lag, "dead_time": _dead_time}

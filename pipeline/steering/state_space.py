@@ -184,7 +184,7 @@ def continuous(
     there = [V, R, PSI, *([F] if "F" in slow else []), *moved]
     here = np.array([0, 1, 2, *([3] if "F" in slow else []), *own])
     A[np.ix_(here, here)] = motion.A[np.ix_(there, there)]
-    A[np.ix_(here, range(n - k, n))] = np.outer(motion.B[there], path.C)
+    A[np.ix_(here, np.arange(n - k, n))] = np.outer(motion.B[there], path.C)
     A[n - k :, n - k :], B[here, 0], B[n - k :, 0] = path.A, motion.B[there] * path.D, path.B
     C[:N_MEASURED, here] = motion.C[:, there]
     C[:N_MEASURED, n - k :] = np.outer(motion.D, path.C)

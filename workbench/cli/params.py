@@ -111,7 +111,7 @@ def diff(first: str, second: str, uri: str, as_json: bool) -> None:
         [name, number(d["first"]), number(d["second"]), number(d["difference"]), number(d["in_std"], 3), d["unit"]]
         for name, d in found.items()
     ]
-    print_table(["", "first", "second", "difference", "in s.e.", "unit"], rows)
+    print_table(["", "first", "second", "difference", "in std errors", "unit"], rows)
 
 
 @command.command("export")

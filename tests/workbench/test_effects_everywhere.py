@@ -1,0 +1,191 @@
+"""Every command that takes a parameter set, with one whose rudder lags: the lag shows, or the command says why not."""
+
+from __future__ import annotations
+
+import json
+import runpy
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pytest
+from scipy.io import loadmat
+
+from benchmarks.diagnose import late_rudder
+from kempf.workbench.cli.entry import cli
+from tests.workbench.driving import kempf, tree
+
+VESSEL, NAME = late_rudder.VESSEL, "rudder_lag.tau"
+
+
+class Late:
+    """A warehouse with the plain model of a late ship and that with the lag, which is current."""
+
+    def __init__(self, folder: Path) -> None:
+        late_rudder.write(folder)
+        self.folder, self.uri = folder, folder / "warehouse"
+        assert self.run("ingest", folder / "day.mcap", "--profile", folder / "late.yaml").code == 0
+        made = self.run("effects", "add", "rudder_lag", "--vessel", VESSEL)
+        assert made.code == 0, made
+        sets = {s["model_name"]: s["parameter_set_id"] for s in self.json("params", "list")}
+        self.plain, self.lag = sets["plain"], sets["plain + rudder_lag"]
+
+    def run(self, *arguments: object) -> Any:
+        return kempf(*arguments, "--warehouse", self.uri)
+
+    def json(self, *arguments: object) -> Any:
+        ran = self.run(*arguments, "--json")
+        assert ran.code == 0, ran
+        return ran.json
+
+    def text(self, *arguments: object) -> str:
+        ran = self.run(*arguments)
+        assert ran.code == 0, ran
+        return str(ran.out)
+
+
+@pytest.fixture(scope="module")
+def late(tmp_path_factory: pytest.TempPathFactory) -> Late:
+    return Late(tmp_path_factory.mktemp("late"))
+
+
+@pytest.fixture(scope="module")
+def tau(late: Late) -> dict[str, Any]:
+    return dict(late.json("params", "show", late.lag)["parameters"][NAME])
+
+
+def shown(late: Late, tau: dict[str, Any]) -> None:
+    assert abs(tau["value"] - late_rudder.LAG_S) < 3.0 * tau["std"] and tau["unit"] == "s"
+    assert NAME in late.text("params", "show", late.lag)
+
+
+def differs(late: Late, tau: dict[str, Any]) -> None:
+    told = late.json("params", "diff", late.plain, late.lag)["parameters"][NAME]
+    assert told == {"first": None, "second": tau["value"], "difference": None, "in_std": None, "unit": "s"}
+    assert late.json("params", "diff", late.lag, late.plain)["parameters"][NAME]["first"] == tau["value"]
+    row = next(line.split() for line in late.text("params", "diff", late.plain, late.lag).splitlines() if NAME in line)
+    assert row[1] == "-" and row[-1] == "s"
+
+
+def steering(late: Late, tau: dict[str, Any]) -> None:
+    told = late.json("params", "steering", late.lag)
+    assert told["effects"] == {NAME: tau}
+    assert all(np.isfinite(c["std"]) for c in told["nomoto"]["constants"].values())
+    assert NAME in late.text("params", "steering", late.lag)
+    # the plain model puts the lag into the hull
+    plain = late.json("params", "steering", late.plain)["nomoto"]["constants"]["T"]
+    assert plain["value"] != pytest.approx(told["nomoto"]["constants"]["T"]["value"], rel=0.05)
+
+
+def exported(late: Late, tau: dict[str, Any]) -> None:
+    content = json.loads(late.text("params", "export", late.lag, "--format", "json"))
+    assert content["parameters"][NAME] == tau and content["covariance"]["names"][6:] == [NAME]
+    assert np.sqrt(content["covariance"]["values"][6][6]) == pytest.approx(tau["std"])
+
+
+def as_text(form: str) -> Callable[[Late, dict[str, Any]], None]:
+    def check(late: Late, tau: dict[str, Any]) -> None:
+        text = late.text("export", form, late.lag)
+        assert NAME in text and repr(tau["value"]) in text
+
+    return check
+
+
+def as_control(late: Late, tau: dict[str, Any]) -> None:
+    pytest.importorskip("control", reason="python-control is not installed")
+    path = late.folder / "ship.py"
+    late.text("export", "control", late.lag, "--out", path)
+    made = runpy.run_path(str(path))
+    assert made["PARAMETERS"][NAME] == tau["value"] and made["COVARIANCE"].shape == (7, 7)
+    smooth = made["continuous"]
+    assert smooth.state_labels[-1] == "rudder_lag" and made["UNITS"]["rudder_lag"] == "rad"
+    assert smooth.A[-1, -1] == pytest.approx(-1.0 / tau["value"])
+    assert smooth.B[:-1] == pytest.approx(0.0), "the rudder reaches the hull through its lag alone"
+
+
+def as_mat(late: Late, tau: dict[str, Any]) -> None:
+    path = late.folder / "ship.mat"
+    late.text("export", "mat", late.lag, "--out", path)
+    held = loadmat(path)
+    assert str(held["state_names"][-1, 0][0]) == "rudder_lag"
+    assert held["parameter_covariance"].shape == (7, 7) and held["parameter_values"][6, 0] == tau["value"]
+
+
+def as_mcap(late: Late, tau: dict[str, Any]) -> None:
+    path = late.folder / "runs.mcap"
+    late.text("export", "mcap", "--vessel", VESSEL, "--set", late.lag, "--output", path)
+    assert late.lag.encode() in path.read_bytes()
+
+
+def steered(late: Late, tau: dict[str, Any]) -> None:
+    asked = ("steer", "--vessel", VESSEL, "--set", late.lag, "--minutes", "8")
+    told = late.json(*asked, "--wrong", late.plain)
+    knows, ignores = told["laws"]
+    assert told["effects"] == {NAME: tau}
+    assert (
+        knows["law"]["states"] == ["v", "r", "psi", "F", "V_T", "rudder_lag"] and "rudder_lag" in knows["law"]["gain"]
+    )
+    assert "rudder_lag" not in ignores["law"]["gain"]
+    # two ships' states and estimates: the ship that is steered lags whatever the law thinks of her
+    assert [len(one["closed_loop"]["poles"]) for one in (knows, ignores)] == [4 + 6, 4 + 5]
+    assert knows["performance"]["kept"] and f"effect: {NAME}" in late.text(*asked)
+
+
+def compared(late: Late, tau: dict[str, Any]) -> None:
+    lag, plain = (late.json("compare", "--vessel", VESSEL, "--set", one) for one in (late.lag, late.plain))
+    errors = [one["judged"]["free_run_error_percent"] for one in (lag, plain)]
+    assert errors[0] < 0.8 * errors[1]
+
+
+def built_again(late: Late, tau: dict[str, Any]) -> None:
+    assert late.json("rerun", late.lag)["verdict"] == "bit-identical"
+
+
+def named(late: Late, tau: dict[str, Any]) -> None:
+    late.json("params", "alias", "with_lag", late.lag)
+    assert late.json("params", "show", "with_lag")["parameters"][NAME] == tau
+
+
+CHECKS: dict[tuple[str, ...], Callable[[Late, dict[str, Any]], None]] = {
+    ("params", "show"): shown,
+    ("params", "diff"): differs,
+    ("params", "steering"): steering,
+    ("params", "export"): exported,
+    ("params", "alias"): named,
+    ("export", "yaml"): as_text("yaml"),
+    ("export", "csv"): as_text("csv"),
+    ("export", "control"): as_control,
+    ("export", "mat"): as_mat,
+    ("export", "mcap"): as_mcap,
+    ("steer",): steered,
+    ("compare",): compared,
+    ("rerun",): built_again,
+}
+#: these begin from a set's model and screen what it lacks: tests/flows/test_diagnose.py goes through them
+SCREENING = {("diagnose",), ("report",)}
+_SET = {"set_id", "set_ids", "first", "second"}
+
+
+def _taking_a_set(command: click.Command, path: tuple[str, ...] = ()) -> set[tuple[str, ...]]:
+    if isinstance(command, click.Group):
+        with click.Context(command) as context:
+            inner = {name: command.get_command(context, name) for name in command.list_commands(context)}
+        return set().union(*(_taking_a_set(one, (*path, name)) for name, one in inner.items() if one is not None))
+    return {path} if _SET & {str(p.name) for p in command.params} else set()
+
+
+def test_no_command_that_takes_a_set_is_forgotten() -> None:
+    assert _taking_a_set(cli) == set(CHECKS) | SCREENING
+
+
+@pytest.mark.parametrize("path", [path for path in CHECKS if path != ("params", "alias")], ids=" ".join)
+def test_the_lag_shows(path: tuple[str, ...], late: Late, tau: dict[str, Any]) -> None:
+    before = tree(late.uri)
+    CHECKS[path](late, tau)
+    assert tree(late.uri) == before, "reading a set writes nothing"
+
+
+def test_an_alias_stands_for_it(late: Late, tau: dict[str, Any]) -> None:
+    CHECKS["params", "alias"](late, tau)
