@@ -195,9 +195,10 @@ def share_held(
     normal = np.random.default_rng(seed).standard_normal((draws, centre.size))
     ships = centre + normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T * scale
     if effects is not None:
-        # a lag of nothing would have no state: what is there stays there
+        # a lag of nothing has no state: what is there stays there, and what is not stays away
         low = np.where(effects.model.low == 0.0, 0.01 * effects.values, effects.model.low)
-        ships[:, 6:] = np.clip(ships[:, 6:], low, effects.model.high)
+        drawn = np.clip(ships[:, 6:], low, effects.model.high)
+        ships[:, 6:] = np.where(effects.values == 0.0, 0.0, drawn)
     made = steered_ships(law, ships, speed_m_s, effects)
     largest = np.max(np.abs(np.linalg.eigvals(loop_matrices(law, made))), axis=1)
     return float(np.mean(largest < 1.0))

@@ -15,7 +15,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.steering.motion import ShipEffects
 
-#: a shorter time than this is none, s
+#: a shorter time than this acts like this one, s
 _SHORTEST_S = 1e-3
 
 
@@ -57,8 +57,8 @@ def rudder_path(effects: ShipEffects | None) -> RudderPath:
     for effect in effects.model.effects:
         if effect.rudder_course in _LINEAR:
             seconds = float(effects.of(effect.name)[0])
-            if seconds > _SHORTEST_S:
-                path = path.then(_LINEAR[effect.rudder_course](effect.name, seconds))
+            if seconds > 0.0:
+                path = path.then(_LINEAR[effect.rudder_course](effect.name, max(seconds, _SHORTEST_S)))
     return path
 
 

@@ -31,6 +31,8 @@ OUTPUTS = {"lateral_speed": "m/s", "yaw_rate": "rad/s", "heading": "rad", "cross
 N_MEASURED = 3
 #: changes of the wind force, m/s^2, and of the current, m/s, and the times they take, s
 _CHANGES = ((1.1e-3, 300.0), (0.056, 1800.0))
+#: time constants that a state may forget in within one piece of a step
+_FORGETS = 4.0
 #: units of the states that effects of the catalogue bring along
 _UNITS = {"memory_m1": "m/s", "waves_m1": "rad", "waves_m2": "rad/s"}
 
@@ -237,7 +239,20 @@ def discretised(model: StateSpace, step_s: float) -> StateSpace:
     held[:n, :n], held[:n, n:] = model.A * step_s, model.B * step_s
     both = expm(held)
     A = both[:n, :n]
+    return replace(model, A=A, B=both[:n, n:], Q=_noise_of_a_step(model.A, model.Q, step_s), step_s=step_s)
+
+
+def _noise_of_a_step(A: Float, Q: Float, step_s: float) -> Float:
+    """Integrate the noise over a step, halved where a state forgets so fast that its inverse would overflow."""
+    n = A.shape[0]
+    fastest = float(np.max(np.abs(np.linalg.eigvals(A).real), initial=0.0)) * step_s
+    halvings = max(0, int(np.ceil(np.log2(max(fastest, 1e-300) / _FORGETS))))
+    part_s = step_s / 2**halvings
     loan = np.zeros((2 * n, 2 * n))
-    loan[:n, :n], loan[:n, n:], loan[n:, n:] = -model.A * step_s, model.Q * step_s, model.A.T * step_s
-    Q = A @ expm(loan)[:n, n:]
-    return replace(model, A=A, B=both[:n, n:], Q=0.5 * (Q + Q.T), step_s=step_s)
+    loan[:n, :n], loan[:n, n:], loan[n:, n:] = -A * part_s, Q * part_s, A.T * part_s
+    step = expm(A * part_s)
+    noise: Float = step @ expm(loan)[:n, n:]
+    for _ in range(halvings):
+        noise = step @ noise @ step.T + noise
+        step = step @ step
+    return 0.5 * (noise + noise.T)

@@ -100,6 +100,11 @@ def test_a_lag_and_a_dead_time_are_states_of_the_rudder() -> None:
     assert x[3] == pytest.approx(0.1 * (1.0 - np.exp(-5.0 / 4.0)), rel=1e-12)
 
 
+def test_a_state_that_forgets_at_once_leaves_the_noise_as_it_is() -> None:
+    fast, bare = (continuous(HULL, ModelSpec(), V, effects=e) for e in (having(rudder_lag=1e-3), None))
+    assert discretised(fast, 10.0).Q[:6, :6] == pytest.approx(discretised(bare, 10.0).Q, rel=1e-9, abs=1e-24)
+
+
 def test_each_effect_of_the_catalogue_is_accounted_for() -> None:
     every = {name: tuple(p.steps[0] for p in one.parameters) for name, one in catalogue.catalogue().items()}
     how = {name: carried(HULL, having(**{name: v}), V)[0] for name, v in every.items()}
@@ -160,6 +165,12 @@ def test_a_law_that_knows_of_the_lag_steers_the_late_ship_better(method: str) ->
     covariance = np.zeros((7, 7))
     covariance[:6, :6], covariance[6, 6] = covariance_of(HULL), 4.0**2
     assert share_held(knows, HULL, covariance, V, effects=late, draws=60) == 1.0
+    # so short a lag that its errors reach beyond nothing, and none
+    for tau in (1e-3, 0.0):
+        short = having(rudder_lag=tau)
+        law = course_law(HULL, V, arm_per_m=ARM, settings=settings, effects=short)
+        assert closed_loop(law, HULL, V, short).stable
+        assert share_held(law, HULL, covariance, V, effects=short, draws=60) > 0.9
 
 
 PARTS = {
