@@ -165,7 +165,7 @@ CHECKS: dict[tuple[str, ...], Callable[[Late, dict[str, Any]], None]] = {
 }
 #: these begin from a set's model and screen what it lacks: tests/flows/test_diagnose.py goes through them
 SCREENING = {("diagnose",), ("report",)}
-_SET = {"set_id", "set_ids", "first", "second"}
+_SET = {"set_id", "first", "second", "--set"}
 
 
 def _taking_a_set(command: click.Command, path: tuple[str, ...] = ()) -> set[tuple[str, ...]]:
@@ -173,7 +173,8 @@ def _taking_a_set(command: click.Command, path: tuple[str, ...] = ()) -> set[tup
         with click.Context(command) as context:
             inner = {name: command.get_command(context, name) for name in command.list_commands(context)}
         return set().union(*(_taking_a_set(one, (*path, name)) for name, one in inner.items() if one is not None))
-    return {path} if _SET & {str(p.name) for p in command.params} else set()
+    taken = {word for p in command.params for word in (str(p.name), *p.opts)}
+    return {path} if _SET & taken else set()
 
 
 def test_no_command_that_takes_a_set_is_forgotten() -> None:
