@@ -16,6 +16,7 @@ _GRAVEST = (
     "not converge|did not end|diverged",
     "is positive|is negative|not physical|wrong way|not observable",
     "at a bound|not determined|hardly determine",
+    "linear model|simulated ship",
     "^channels|disagree|cannot be|could not|no zigzag|contradict",
     "not white|lie in their",
     "held out|no water log|wind_arm|no yaw rate",

@@ -73,10 +73,10 @@ def sentences(found: tuple[Carried, ...]) -> tuple[str, ...]:
 
 def _on_the_rudder(name: str, course: str, size: float) -> Carried:
     if course == "backlash":
-        return Carried(name, "left out", f"backlash of {degrees(size):.2g} deg left out of the linear model")
+        return Carried(name, "left out", f"backlash of {degrees(size):.2g} deg is no part of the linear model")
     if course == "rate_limit":
         limit = f" of {degrees(1.0 / size):.2g} deg/s" if size > 0.0 else ""
-        return Carried(name, "left out", f"rate limit{limit} of the rudder left out of the linear model")
+        return Carried(name, "left out", f"rate limit{limit} of the rudder is no part of the linear model")
     if course == "dead_time":
         return Carried(name, "carried", f"dead time of {size:.3g} s is a Padé approximation of the second order")
     return Carried(name, "carried", "")
@@ -98,7 +98,11 @@ def _compared(name: str, whole: LinearMotion, bare: LinearMotion, taken: set[str
         how = f": rudder at {degrees(whole.rudder_rad):.2g} deg" if abs(moved) > _NEGLIGIBLE else " as it is measured"
         return Carried(name, "shifts the course", f"{name} only shifts the straight course{how}")
     if taken:
-        return Carried(name, "no part of a straight course", f"{name} is left out: {', '.join(sorted(taken))} taken")
+        return Carried(
+            name,
+            "no part of a straight course",
+            f"{name} is no part of the linear model: {', '.join(sorted(taken))} taken",
+        )
     return Carried(name, "no part of a straight course", "")
 
 

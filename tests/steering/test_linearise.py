@@ -113,7 +113,7 @@ def test_each_effect_of_the_catalogue_is_accounted_for() -> None:
         gone
     }
     assert {n for n, one in how.items() if one.how == "left out"} == {"backlash", "rate_limit"}
-    assert how["backlash"].sentence == "backlash of 0.57 deg left out of the linear model"
+    assert how["backlash"].sentence == "backlash of 0.57 deg is no part of the linear model"
     assert "Padé" in how["dead_time"].sentence and how["rudder_lag"].sentence == ""
     assert "corner" in how["rudder_asymmetry"].sentence and "calm air" in how["wind_force"].sentence
     assert "rudder at -0.57 deg" in how["neutral_angle"].sentence
