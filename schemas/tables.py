@@ -211,6 +211,16 @@ _ALL = (
         partition_by=("vessel_key",),
     ),
     Table(
+        "diagnosis_evidence",
+        "what a report shows of a diagnosis beyond its verdict: curves, means and parameters",
+        (
+            *_VESSEL,
+            Column("diagnosis_id", "text", "hash of what produced the diagnosis"),
+            Column("evidence_json", "text", "as kempf.schemas.diagnosis_evidence has it"),
+        ),
+        partition_by=("vessel_key",),
+    ),
+    Table(
         "aliases",
         "a name, such as current, that points to a parameter set of a vessel",
         (*_VESSEL, Column("alias", "text", "the name"), _SET),

@@ -24,7 +24,10 @@ if TYPE_CHECKING:
     from deltalake import DeltaTable
 
 #: Tables that grow by single rows; readings come in whole files and are left alone.
-_SMALL = ("vessels", "logs", "lost", "segments", "examinations", "parameter_sets", "diagnoses", "aliases", "runs")
+_SMALL = (
+    *("vessels", "logs", "lost", "segments", "examinations", "parameter_sets"),
+    *("diagnoses", "diagnosis_evidence", "aliases", "runs"),
+)
 #: Rows that are read or skipped together.
 _ROW_GROUP = 8192
 #: Tables that ``history --as-of`` reads at any time there ever was: every version of them is kept.

@@ -1,4 +1,4 @@
-"""The table of diagnoses: rows are added and never changed."""
+"""The tables of diagnoses and of what their reports show: rows are added and never changed."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from json import loads
 from typing import Any
 
+from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, evidence_as_json, evidence_from_json
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import delta
 from kempf.warehouse.canonical import canonical_json, plain, sha256
@@ -90,6 +91,40 @@ def insert(warehouse: Warehouse, one: StoredDiagnosis) -> bool:
             return True
 
     return with_retry(attempt)
+
+
+def keep_evidence(warehouse: Warehouse, vessel: str, name: str, evidence: DiagnosisEvidence) -> None:
+    """Store what the report of a diagnosis shows, in place of what was stored for it before.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel, name : str
+        The diagnosis by its vessel and id.
+    evidence : DiagnosisEvidence
+    """
+    key = vessel_key(vessel)
+    row = {"vessel_key": key, "vessel": vessel, "diagnosis_id": name, "evidence_json": evidence_as_json(evidence)}
+
+    def attempt() -> None:
+        with delta.ensured(warehouse, "diagnosis_evidence") as table:
+            predicate = f"vessel_key = {quoted(key)} AND diagnosis_id = {quoted(name)}"
+            delta.replace(table, "diagnosis_evidence", [row], predicate)
+
+    with_retry(attempt)
+
+
+def evidence(warehouse: Warehouse, vessel: str, name: str) -> DiagnosisEvidence | None:
+    """Return what the report of a diagnosis shows; None where none is stored, or in the form of another version.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    vessel, name : str
+        The diagnosis by its vessel and id.
+    """
+    frame = delta.read(warehouse, "diagnosis_evidence", {"vessel_key": vessel_key(vessel), "diagnosis_id": name})
+    return evidence_from_json(frame["evidence_json"][0]) if frame.height else None
 
 
 def find(warehouse: Warehouse, name: str) -> StoredDiagnosis | None:

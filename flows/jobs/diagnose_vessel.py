@@ -3,25 +3,27 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose_refreshed
-from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, Own, inputs_of, known_effects, named
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, Own, known_effects, named
+from kempf.flows.jobs.stored_diagnosis import inputs_of_diagnosis
 from kempf.flows.jobs.vessel_model import Fitted, store_model
 from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
+from kempf.pipeline.diagnose.evidence import evidence_of
+from kempf.pipeline.diagnose.manoeuvre_evidence import SailedZigzag
 from kempf.pipeline.diagnose.misfit import where_left
+from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.verdict import as_json
 from kempf.pipeline.predict.run_residuals import PhaseInterval, phases_s
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import code_version, diagnoses
+from kempf.warehouse import diagnoses
 from kempf.warehouse.diagnoses import StoredDiagnosis, diagnosis_id
 from kempf.warehouse.store import Warehouse
-
-STANDARD = DiagnosisSettings()
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,32 +62,46 @@ def diagnose_vessel(
         And whether it is new.
     """
     chosen = choose_refreshed(warehouse, vessel, progress)
-    inputs = _inputs(chosen, spec, own, settings)
-    found = diagnoses.find(warehouse, diagnosis_id(inputs))
+    found = diagnoses.find(warehouse, diagnosis_id(inputs_of_diagnosis(chosen, spec, own, settings)))
     if found is not None:
         return found, False
-    return _kept(warehouse, examine(warehouse, chosen, spec, own, settings, progress), spec, own, inputs), True
+    return diagnose_again(warehouse, chosen, spec, own, settings, progress), True
 
 
-def diagnose_in_full(
-    warehouse: Warehouse, vessel: str, spec: ModelSpec, own: Own, settings: DiagnosisSettings, progress: Progress
-) -> tuple[StoredDiagnosis, Examined]:
-    """Diagnose a vessel as `diagnose_vessel`, and return also what is not stored: it is computed in any case."""
-    chosen = choose_refreshed(warehouse, vessel, progress)
-    inputs = _inputs(chosen, spec, own, settings)
+def diagnose_again(
+    warehouse: Warehouse,
+    chosen: Chosen,
+    spec: ModelSpec,
+    own: Own = NONE_OF_ONES_OWN,
+    settings: DiagnosisSettings = STANDARD,
+    progress: Progress = silent,
+) -> StoredDiagnosis:
+    """Diagnose manoeuvres and store what was found, whatever is stored of them.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    chosen : Chosen
+        Manoeuvres.
+    spec : ModelSpec
+        The model to begin from; its effects are taken as given.
+    own : Own, optional
+    settings : DiagnosisSettings, optional
+    progress : Progress, optional
+    """
     examined = examine(warehouse, chosen, spec, own, settings, progress)
-    found = diagnoses.find(warehouse, diagnosis_id(inputs))
-    return found or _kept(warehouse, examined, spec, own, inputs), examined
+    return _kept(warehouse, examined, spec, own, inputs_of_diagnosis(chosen, spec, own, settings))
 
 
 def _kept(
     warehouse: Warehouse, examined: Examined, spec: ModelSpec, own: Own, inputs: dict[str, Any]
 ) -> StoredDiagnosis:
-    """Store a diagnosis and the model that was diagnosed."""
+    """Store a diagnosis, what its report shows, and the model that was diagnosed."""
     chosen, found = examined.chosen, examined.diagnosis
     fitted = Fitted(examined.runs, found.way, found.gross_errors)
     base, _ = store_model(warehouse, chosen, spec, own, fitted=fitted)
-    content = {**as_json(found), "where": where_left(found, _phases(examined))}
+    phases = _phases(examined)
+    content = {**as_json(found), "where": where_left(found, phases)}
     made = StoredDiagnosis(
         diagnosis_id=diagnosis_id(inputs),
         vessel=chosen.vessel,
@@ -97,6 +113,9 @@ def _kept(
         inputs=inputs,
         code_version=inputs["code_version"],
     )
+    with ThreadPoolExecutor(max_workers=usable()) as workers:
+        evidence = evidence_of(found, phases, _zigzags(chosen), examined.runs.skipped, workers)
+    diagnoses.keep_evidence(warehouse, chosen.vessel, made.diagnosis_id, evidence)
     diagnoses.insert(warehouse, made)
     # as it is read back, so that new and known answers are the same
     stored = diagnoses.find(warehouse, made.diagnosis_id)
@@ -143,13 +162,10 @@ def _phases(examined: Examined) -> dict[str, tuple[PhaseInterval, ...]]:
     return {run.name: phases_s(detail[run.name].get("phases", ()), run.start_utc_ns) for run in examined.runs.runs}
 
 
-def _inputs(chosen: Chosen, spec: ModelSpec, own: Own, settings: DiagnosisSettings) -> dict[str, Any]:
-    told = inputs_of(chosen, spec, own).as_json()
+def _zigzags(chosen: Chosen) -> dict[str, SailedZigzag]:
     return {
-        **told,
-        "estimator": "diagnosis",
-        "code_version": code_version.fingerprint("diagnose"),
-        "settings": asdict(settings),
-        "own": own.as_json(),
-        "catalogue": {name: effect.sha256 for name, effect in known_effects(own).items()},
+        segment.segment_id: SailedZigzag(
+            segment.base_heading_deg, segment.executes_utc_ns, tuple(segment.detail.get("overshoots", ()))
+        )
+        for segment in chosen.segments
     }

@@ -18,6 +18,7 @@ from kempf.pipeline.diagnose.confusion_sets import WINDOW, shortlist, undecided
 from kempf.pipeline.diagnose.forward_selection import is_ship, staged
 from kempf.pipeline.diagnose.ridge_reference import Flexible, flexible
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
+from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.pooled_fit import Fit
 from kempf.pipeline.estimate.record.grid_run import Run
@@ -31,25 +32,6 @@ Told = Callable[[str], None]
 _FORETOLD = 10.0
 #: standard errors from nothing below which an effect added before does not earn its place
 _SEEN = 2.0
-
-
-@dataclass(frozen=True)
-class DiagnosisSettings:
-    """Settings of a diagnosis; all of them are part of its identity.
-
-    Attributes
-    ----------
-    level : float
-        Adjusted p-value below which a candidate is refitted.
-    refits : int
-        At most, of one step.
-    most_steps : int
-        Effects added at most.
-    """
-
-    level: float = 0.01
-    refits: int = 6
-    most_steps: int = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +115,7 @@ def diagnose(
     start: Start,
     effects: Mapping[str, Effect],
     workers: Executor,
-    settings: DiagnosisSettings = DiagnosisSettings(),
+    settings: DiagnosisSettings = STANDARD,
     given: Sequence[Effect] = (),
     told: Told = _silent,
 ) -> Diagnosis:

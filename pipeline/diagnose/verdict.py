@@ -121,7 +121,7 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
 def _untestable(candidate: Candidate) -> str:
     """Say why nothing can be told of an effect from these data; empty where something can."""
     if candidate.missing:
-        return f"the logs lack {_listed(list(candidate.missing))}"
+        return f"not in the logs: {_listed(list(candidate.missing))}"
     if candidate.told_by:
         return f"the logs have {_listed(list(candidate.told_by))}, which measures it already"
     if np.isnan(candidate.score):
@@ -205,7 +205,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     for step in diagnosis.steps[1:]:
         (candidate, best), *others = step.chosen_from
         if what == "unexplained":
-            said.append(f"{sized(candidate.effect, best).capitalize()}: {NOT_EXPLAINED}.")
+            size = sized(candidate.effect, best)
+            said.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
             continue
         line = f"{candidate.effect.plain.rstrip('.')}: {sized(candidate.effect, best)}"
         if others:
@@ -230,7 +231,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         else:
             said.append(
                 f"None of the known effects explains the misfit: {len(diagnosis.steps) - 1} of them were needed, and "
-                "the first explains too little to be what is missing."
+                "the first explains too little to be the cause."
             )
         if diagnosis.after.formula:
             terms = "; ".join(f"{one.target}: {one.expression}" for one in diagnosis.after.formula)

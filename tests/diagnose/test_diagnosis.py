@@ -7,9 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kempf.pipeline.diagnose.diagnosis import Diagnosis, DiagnosisSettings, diagnose
+from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.diagnose.forward_selection import added, is_ship, plain, staged
 from kempf.pipeline.diagnose.screen import score
+from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import as_json, finding, sentences, verdict
 from kempf.pipeline.model.terms.own import from_expression
@@ -223,5 +224,5 @@ def test_a_channel_that_the_runs_lack_is_named() -> None:
     runs = tuple(replace(run, channels=run.channels - {"water_depth"}) for run in ship.runs)
     found = replace(ship, runs=runs).diagnosis(("shallow_water",), settings=DiagnosisSettings(most_steps=0))
     (one,) = as_json(found)["candidates"]
-    assert one["verdict"] == "not_testable" and one["why"] == "the logs lack water_depth"
+    assert one["verdict"] == "not_testable" and one["why"] == "not in the logs: water_depth"
     assert np.isnan(one["score"])

@@ -34,16 +34,17 @@ def command(
     uri: str,
     as_json: bool,
 ) -> None:
-    """Write one HTML file that tells what a vessel's model lacks, with every figure in it.
+    """Write the diagnosis of a vessel as one HTML file, with every figure and table in it.
 
-    The file asks for nothing outside itself and can be sent as it is. It diagnoses the vessel as `kempf diagnose` does.
+    The file asks for nothing outside itself and can be sent as it is. A diagnosis that `kempf diagnose` stored is read;
+    one that is not stored is made first.
     """
     from kempf.flows.jobs.standing_model import Own
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
     from kempf.workbench.export import write_new
     from kempf.workbench.new_file import require_new
-    from kempf.workbench.report.build import made
+    from kempf.workbench.report.build import make_report
 
     path = _called_after(vessel) if output is None else output
     require_new(path, "--output")
@@ -52,21 +53,21 @@ def command(
     spec, own = chosen_model(warehouse, vessel, set_id, model, mine)
     own = own.beside(mine)
     with progress() as tell:
-        found = made(warehouse, vessel, spec, own, tell)
-    write_new(path, found.html, "--output")
+        report = make_report(warehouse, vessel, spec, own, tell, say=lambda line: click.echo(line, err=True))
+    write_new(path, report.html, "--output")
     if as_json:
         print_json(
             {
                 "vessel": vessel,
-                "diagnosis_id": found.diagnosis_id,
-                "verdict": found.content.verdict,
-                "headline": found.content.headline,
+                "diagnosis_id": report.diagnosis_id,
+                "verdict": report.content.wording.verdict,
+                "headline": report.content.wording.headline,
                 "out": str(path),
             }
         )
         return
-    click.echo(f"{vessel}: {found.content.headline}")
-    click.echo(f"{path}: {len(found.html) / 1e6:.1f} MB, one file, to be opened in any browser", err=True)
+    click.echo(f"{vessel}: {report.content.wording.headline}")
+    click.echo(f"{path}: {len(report.html) / 1e6:.1f} MB, one file, to be opened in any browser", err=True)
 
 
 #: Letters of a vessel's name that stand in a file's name as they are.

@@ -1,11 +1,11 @@
-"""Correlations of the innovations with themselves and with what the ship was given, with the band of 99 %."""
+"""Correlations of the innovations with themselves and with the inputs of the ship, with the band of 99 %."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from typing import Any
 
-from kempf.workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
+from kempf.workbench.figures.diagnosis_style import BAND, FULL, INK, PLAIN, new_figure, style
 
 #: in the order of the columns; the others stand in the table
 _SHOWN = ("itself", "rudder", "heading_sine", "heading_cosine", "speed", "wind")
@@ -40,13 +40,17 @@ def pairs(correlations: Mapping[str, Any]) -> Pairs:
     return found
 
 
-def draw_correlations(before: Mapping[str, Any], after: Mapping[str, Any], *, improved: bool) -> Any:
+def draw_correlations(
+    before: Mapping[str, Any], after: Mapping[str, Any], first_model: str, last_model: str, *, improved: bool
+) -> Any:
     """Draw one row a channel, one column for itself and each input.
 
     Parameters
     ----------
     before, after : mapping
-        Of the plain model and of the last.
+        Of the first model and of the last.
+    first_model, last_model : str
+        What the two are called.
     improved : bool
         Whether these are two.
 
@@ -67,12 +71,12 @@ def draw_correlations(before: Mapping[str, Any], after: Mapping[str, Any], *, im
                 if one is None:
                     panel.set_visible(False)
                     continue
-                panel.axhspan(-one["band"], one["band"], color="0.87", lw=0, label="99 of 100 belong here")
-                panel.axhline(0.0, color="black", lw=0.5)
+                panel.axhspan(-one["band"], one["band"], color=BAND, lw=0, label="band of 99 %")
+                panel.axhline(0.0, color=INK, lw=0.5)
                 if improved and (channel, other) in first:
                     plain = first[channel, other]
-                    panel.plot(plain["lag_s"], plain["rho"], color=PLAIN, lw=0.9, ls="--", label="plain model")
-                label, colour = ("model with effects", FULL) if improved else ("plain model", PLAIN)
+                    panel.plot(plain["lag_s"], plain["rho"], color=PLAIN, lw=0.9, ls="--", label=first_model)
+                label, colour = (last_model, FULL) if improved else (first_model, PLAIN)
                 panel.plot(one["lag_s"], one["rho"], color=colour, lw=0.9, label=label)
         for panel, other in zip(panels[0], columns, strict=True):
             panel.set_title(WORDS[other])
@@ -94,12 +98,12 @@ def describe_correlations(after: Mapping[str, Any]) -> str:
     """
     found = pairs(after)
     worst = sorted(found, key=lambda key: (-found[key]["outside"] / len(found[key]["lag_s"]), key))[:3]
-    told = "; ".join(
+    words = "; ".join(
         f"{channel.replace('_', ' ')} with {WORDS[other]}, {found[channel, other]['outside']} of "
         f"{len(found[channel, other]['lag_s'])}"
         for channel, other in worst
     )
     return (
-        "Correlations of the whitened one-step innovations with their own past and with what the ship was given, lags "
-        f"to a minute. Lags outside the 99 % band under the last model, the most: {told}."
+        "Correlations of the whitened one-step innovations with their own past and with the inputs of the ship, lags "
+        f"to a minute. Lags outside the 99 % band under the last model, the most: {words}."
     )

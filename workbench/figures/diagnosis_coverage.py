@@ -1,22 +1,22 @@
-"""Coverage: where the manoeuvres have been, and so where the model speaks from experience."""
+"""Coverage: the motions, rudder angles and speeds of the manoeuvres; beyond them the model extrapolates."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
+from kempf.schemas.diagnosis_evidence import ManoeuvreEvidence
 from kempf.workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
-from kempf.workbench.report.content import RunView
 
 
-def draw_coverage(runs: Sequence[RunView]) -> Any:
-    """Draw drift speed against yaw rate, and rudder against speed.
+def draw_coverage(manoeuvres: Sequence[ManoeuvreEvidence]) -> Any:
+    """Draw lateral speed against yaw rate, and rudder against speed.
 
     Parameters
     ----------
-    runs : sequence of RunView
+    manoeuvres : sequence of ManoeuvreEvidence
 
     Returns
     -------
@@ -26,14 +26,13 @@ def draw_coverage(runs: Sequence[RunView]) -> Any:
         figure = new_figure(3.4)
         left, right = figure.subplots(1, 2)
         for held, colour, marker, label in ((False, PLAIN, "o", "fitted"), (True, FULL, "x", "held out")):
-            chosen = [run for run in runs if run.held_out is held]
-            if not chosen:
-                continue
-            drift, turn, rudder, speed = _columns(chosen)
-            look = {"ls": "", "marker": marker, "ms": 2.6, "color": colour, "alpha": 0.5, "rasterized": True}
+            chosen = [one for one in manoeuvres if one.held_out is held]
+            look = {"ls": "", "marker": marker, "ms": 2.6, "color": colour, "alpha": 0.6, "rasterized": True}
             look["mew"] = 0.6 if held else 0.0
-            left.plot(turn, drift, label=f"{label} ({len(chosen)})", **look)
-            right.plot(rudder, speed, label=f"{label} ({len(chosen)})", **look)
+            for k, one in enumerate(chosen):
+                words = f"{label} ({len(chosen)})" if k == 0 else None
+                left.plot(np.degrees(one.turn), one.drift, label=words, **look)
+                right.plot(np.degrees(one.rudder), one.speed, label=words, **look)
         left.set_xlabel("yaw rate r, deg/s")
         left.set_ylabel("lateral speed v, m/s")
         left.set_title("motion")
@@ -45,28 +44,20 @@ def draw_coverage(runs: Sequence[RunView]) -> Any:
         return figure
 
 
-def _columns(runs: Sequence[RunView]) -> tuple[Any, Any, Any, Any]:
-    # where the ship runs away, what was measured
-    states = np.concatenate(
-        [run.full.states[:, :2] if np.all(np.isfinite(run.full.states)) else run.measured[:, :2] for run in runs]
-    )
-    rudder = np.degrees(np.concatenate([run.rudder_rad for run in runs]))
-    return states[:, 0], np.degrees(states[:, 1]), rudder, np.concatenate([run.speed_m_s for run in runs])
-
-
-def describe_coverage(runs: Sequence[RunView]) -> str:
+def describe_coverage(ranges: Mapping[str, tuple[float, float]]) -> str:
     """Return the figure in words.
 
     Parameters
     ----------
-    runs : sequence of RunView
+    ranges : mapping of str to (float, float)
+        As `kempf.schemas.diagnosis_evidence.DiagnosisEvidence.ranges`.
     """
-    drift, turn, rudder, speed = _columns(runs)
-    told = ", ".join(
-        f"{name} {np.nanmin(x):.3g} to {np.nanmax(x):.3g} {unit}"
-        for name, x, unit in (
-            *(("lateral speed", drift, "m/s"), ("yaw rate", turn, "deg/s")),
-            *(("rudder", rudder, "deg"), ("speed", speed, "m/s")),
-        )
+    words = (
+        *(("drift", "lateral speed", 1.0, "m/s"), ("turn", "yaw rate", np.degrees(1.0), "deg/s")),
+        *(("rudder", "rudder", np.degrees(1.0), "deg"), ("speed", "speed", 1.0, "m/s")),
     )
-    return f"Where the manoeuvres have been: {told}."
+    spans = ", ".join(
+        f"{name} {factor * ranges[key][0]:.3g} to {factor * ranges[key][1]:.3g} {unit}"
+        for key, name, factor, unit in words
+    )
+    return f"What the manoeuvres cover: {spans}."

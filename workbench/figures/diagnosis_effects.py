@@ -1,4 +1,4 @@
-"""Ranked effects: score, expected change over its standard error, and what the model swallows of each already."""
+"""Ranked effects: score, expected size over its standard error, and how much of each the model absorbs already."""
 
 from __future__ import annotations
 
@@ -7,21 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from kempf.workbench.figures.diagnosis_style import OTHER, SET_COLOURS, new_figure, style
-from kempf.workbench.report.content import RankedEffect
-from kempf.workbench.report.numbers import with_interval
+from kempf.workbench.figures.diagnosis_style import INK, SET_COLOURS, new_figure, style
+from kempf.workbench.report.content import EffectRow
+from kempf.workbench.report.numbers import with_error
 
-_SHOWN = 14
-#: expected changes further from 0 than this many standard errors are drawn at the edge
-_WIDEST = 25.0
+_SHOWN, _OTHER = 14, "#a5a6a8"
+#: expected sizes further from 0 than this many standard errors are drawn at the edge
+_WIDEST, _WIDTH_95 = 25.0, 1.96
 
 
-def draw_effects(ranked: Sequence[RankedEffect]) -> Any:
+def draw_effects(ranked: Sequence[EffectRow]) -> Any:
     """Draw the effects with the highest scores, the highest on top.
 
     Parameters
     ----------
-    ranked : sequence of RankedEffect
+    ranked : sequence of EffectRow
 
     Returns
     -------
@@ -29,33 +29,33 @@ def draw_effects(ranked: Sequence[RankedEffect]) -> Any:
     """
     from matplotlib.ticker import NullFormatter
 
-    shown = [one for one in ranked if np.isfinite(one.score)][:_SHOWN][::-1]
+    shown = [row for row in ranked if row.tested][:_SHOWN][::-1]
     with style():
         figure = new_figure(1.3 + 0.32 * len(shown))
-        score, size, swallowed = figure.subplots(1, 3, sharey=True, width_ratios=(1.6, 2.9, 1.0))
-        colours = [_colour(one) for one in shown]
+        score, size, absorbed = figure.subplots(1, 3, sharey=True, width_ratios=(1.6, 2.9, 1.0))
+        colours = [_colour(row) for row in shown]
         at = np.arange(len(shown))
-        score.barh(at, [max(one.score, 0.1) for one in shown], color=colours, height=0.65)
+        score.barh(at, [max(row.score, 0.1) for row in shown], color=colours, height=0.65)
         score.set_xscale("log")
         score.xaxis.set_minor_formatter(NullFormatter())
-        score.set_xlim(1.0, max([20.0, *(1.3 * one.score for one in shown)]))
-        score.set_yticks(at, [_label(one) for one in shown])
+        score.set_xlim(1.0, max([20.0, *(1.3 * row.score for row in shown)]))
+        score.set_yticks(at, [f"{row.title}  [{row.set_id}]" if row.set_id else row.title for row in shown])
         score.set_xlabel("score (LM)")
         score.set_title("evidence")
-        size.axvline(0.0, color="black", lw=0.8)
+        size.axvline(0.0, color=INK, lw=0.8)
         widest = 0.0
-        for y, (one, colour) in enumerate(zip(shown, colours, strict=True)):
+        for y, (row, colour) in enumerate(zip(shown, colours, strict=True)):
             # one row an effect: parameters beside each other a little apart
-            for k, (name, change, std, unit) in enumerate(_made(one)):
-                z = float(np.clip(change / std, -_WIDEST, _WIDEST))
+            made = [change for change in row.changes if np.isfinite(change.std) and change.std > 0.0]
+            for k, change in enumerate(made):
+                z = float(np.clip(change.value / change.std, -_WIDEST, _WIDEST))
                 widest = max(widest, abs(z) + 2.5)
-                shift = 0.0 if len(_made(one)) == 1 else 0.22 - 0.44 * k
-                size.errorbar(
-                    [z], [y + shift], xerr=1.96, fmt="o", ms=4, color=colour, ecolor="0.35", elinewidth=1, capsize=2
-                )
+                shift = 0.0 if len(made) == 1 else 0.22 - 0.44 * k
+                bars = {"xerr": _WIDTH_95, "fmt": "o", "ms": 4, "ecolor": INK, "elinewidth": 1, "capsize": 2}
+                size.errorbar([z], [y + shift], color=colour, **bars)
                 side = -1 if z > 0.0 else 1
                 size.annotate(
-                    f"{name} = {with_interval(change, std, unit)}",
+                    f"{change.name} = {with_error(change.value, change.std, change.unit)}",
                     (0.0, y + shift),
                     (5 * side, 0),
                     textcoords="offset points",
@@ -65,40 +65,33 @@ def draw_effects(ranked: Sequence[RankedEffect]) -> Any:
                 )
         size.set_xlim(-max(widest, 12.0), max(widest, 12.0))
         size.set_xlabel("in standard errors; bars 95 %")
-        size.set_title("expected change, with 95 % interval")
-        swallowed.barh(at, [100.0 * one.absorption for one in shown], color="0.6", height=0.45)
-        swallowed.set_xlim(0.0, 100.0)
-        swallowed.set_xlabel("absorption, %")
-        swallowed.set_title("imitated")
-        for panel in (score, size, swallowed):
+        size.set_title("expected size ± 1 s.e.")
+        absorbed.barh(at, [100.0 * row.absorption for row in shown], color=_OTHER, height=0.45)
+        absorbed.set_xlim(0.0, 100.0)
+        absorbed.set_xlabel("absorption, %")
+        absorbed.set_title("absorbed")
+        for panel in (score, size, absorbed):
             panel.grid(visible=False, axis="y")
             panel.tick_params(axis="y", length=0)
         return figure
 
 
-def _made(one: RankedEffect) -> list[tuple[str, float, float, str]]:
-    return [change for change in one.changes if np.isfinite(change[2]) and change[2] > 0.0]
+def _colour(row: EffectRow) -> str:
+    return SET_COLOURS[(int(row.set_id[1:]) - 1) % len(SET_COLOURS)] if row.set_id else _OTHER
 
 
-def _colour(one: RankedEffect) -> str:
-    return OTHER if one.set_id is None else SET_COLOURS[(int(one.set_id[1:]) - 1) % len(SET_COLOURS)]
-
-
-def _label(one: RankedEffect) -> str:
-    return f"{one.title}  [{one.set_id}]" if one.set_id else one.title
-
-
-def describe_effects(ranked: Sequence[RankedEffect]) -> str:
+def describe_effects(ranked: Sequence[EffectRow], first: str) -> str:
     """Return the figure in words, for those who do not see it.
 
     Parameters
     ----------
-    ranked : sequence of RankedEffect
+    ranked : sequence of EffectRow
+    first : str
+        What the model is called that they are tried beside.
     """
-    shown = [one for one in ranked if np.isfinite(one.score)][:3]
-    told = "; ".join(
-        f"{one.title}: score {one.score:.3g}, expected change "
-        + ", ".join(f"{name} = {with_interval(change, std, unit)}" for name, change, std, unit in _made(one))
-        for one in shown
+    highest = "; ".join(
+        f"{row.title}: score {row.score:.3g}, expected "
+        + ", ".join(f"{change.name} = {with_error(change.value, change.std, change.unit)}" for change in row.changes)
+        for row in [row for row in ranked if row.tested][:3]
     )
-    return f"Bars of the score of each effect beside the plain model, the highest three being {told}."
+    return f"Bars of the score of each effect beside the {first}, the highest three (± 1 s.e.) being {highest}."

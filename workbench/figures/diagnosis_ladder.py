@@ -1,4 +1,4 @@
-"""The ladder: free-run error, fitted and held out, and what the disturbances must explain, against effects added."""
+"""The ladder: free-run error, fitted and held out, and disturbances that each model needs, against effects added."""
 
 from __future__ import annotations
 
@@ -8,19 +8,21 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, style
-from kempf.workbench.report.content import Rung
+from kempf.schemas.diagnosis_evidence import FittedModel
+from kempf.workbench.figures.diagnosis_style import FULL, INK, LIMIT, PLAIN, new_figure, style
 
 _MARKERS = (("o", "-"), ("s", "--"), ("^", ":"))
-_SHADES = ("black", "#009E73", "#CC79A7")
+_SHADES = (INK, "#009e73", LIMIT)
 
 
-def draw_ladder(ladder: Sequence[Rung]) -> Any:
+def draw_ladder(ladder: Sequence[FittedModel], first: str) -> Any:
     """Draw the ladder, one place a model.
 
     Parameters
     ----------
-    ladder : sequence of Rung
+    ladder : sequence of FittedModel
+    first : str
+        What the first is called.
 
     Returns
     -------
@@ -31,24 +33,23 @@ def draw_ladder(ladder: Sequence[Rung]) -> Any:
         error, drive = figure.subplots(1, 2)
         at = np.arange(len(ladder))
         for name, colour, marker, line, shift in (
-            ("in_sample", PLAIN, "o", "--", -0.06),
+            ("fitted", PLAIN, "o", "--", -0.06),
             ("held_out", FULL, "s", "-", 0.06),
         ):
-            runs = [_finite(100.0 * getattr(rung, name)) for rung in ladder]
+            runs = [_finite(100.0 * getattr(model, f"{name}_errors")) for model in ladder]
             if not runs[0].size:
                 continue
             for k, values in enumerate(runs):
                 error.plot(
                     np.full(values.size, k + shift), values, marker, ms=3, color=colour, alpha=0.45, mec="none", ls=""
                 )
-            words = "fitted" if name == "in_sample" else "held out"
-            label = f"{words} (mean of {runs[0].size})"
-            mean = [float(np.mean(values)) for values in runs]
+            label = f"{name.replace('_', ' ')} (mean of {runs[0].size})"
+            mean = [100.0 * getattr(model, f"{name}_error") for model in ladder]
             error.plot(at + shift, mean, color=colour, ls=line, marker=marker, ms=6, label=label)
-            for x, y, rung in zip(at + shift, mean, ladder, strict=True):
+            for x, y, model in zip(at + shift, mean, ladder, strict=True):
                 if not np.isfinite(y):
                     continue
-                above = y >= max(float(np.mean(one)) for one in (rung.in_sample, rung.held_out) if one.size)
+                above = y >= 100.0 * np.nanmax([model.fitted_error, model.held_out_error])
                 error.annotate(
                     f"{y:.1f}",
                     (x, y),
@@ -63,17 +64,17 @@ def draw_ladder(ladder: Sequence[Rung]) -> Any:
         error.set_ylabel("free-run error, % of the motion")
         error.set_title("prediction of whole manoeuvres")
         ends: list[float] = []
-        for k, name in enumerate(ladder[0].intensities):
-            share = [100.0 * rung.intensities[name] / ladder[0].intensities[name] for rung in ladder]
+        for k, disturbance in enumerate(ladder[0].disturbances):
+            share = [100.0 * model.disturbances[k].share for model in ladder]
             marker, line = _MARKERS[k % 3]
-            drive.plot(at, share, color=_SHADES[k % 3], marker=marker, ls=line, ms=5, label=name.split(",")[0])
+            drive.plot(at, share, color=_SHADES[k % 3], marker=marker, ls=line, ms=5, label=disturbance.name)
             ends.append(share[-1])
         _label_ends(drive, float(at[-1]), ends)
         drive.set_ylim(0.0, max(108.0, 1.08 * drive.get_ylim()[1]))
-        drive.set_ylabel("intensity, % of the plain model's")
-        drive.set_title("what disturbances must explain")
+        drive.set_ylabel(f"intensity, % of the {first}'s")
+        drive.set_title("disturbances that the model needs")
         for panel in (error, drive):
-            panel.set_xticks(at, [_wrapped(k, rung.added) for k, rung in enumerate(ladder)])
+            panel.set_xticks(at, [_wrapped(f"+ {model.added}" if model.added else first) for model in ladder])
             panel.set_xlim(-0.45, len(ladder) - 0.55)
             panel.grid(visible=False, axis="x")
             panel.legend(loc="best")
@@ -81,7 +82,7 @@ def draw_ladder(ladder: Sequence[Rung]) -> Any:
 
 
 def _finite(values: Float) -> Float:
-    """Return values, NaN where a free run ran away."""
+    """Return values, NaN where a free run diverges."""
     result: Float = np.where(np.isfinite(values), values, np.nan)
     return result
 
@@ -95,21 +96,23 @@ def _label_ends(panel: Any, x: float, ends: Sequence[float]) -> None:
         lowest = place
 
 
-def _wrapped(number: int, text: str) -> str:
+def _wrapped(text: str) -> str:
     from textwrap import fill
 
-    return fill(text if number == 0 else f"+ {text}", 18)
+    return fill(text, 18)
 
 
-def describe_ladder(ladder: Sequence[Rung]) -> str:
+def describe_ladder(ladder: Sequence[FittedModel], first: str) -> str:
     """Return the figure in words.
 
     Parameters
     ----------
-    ladder : sequence of Rung
+    ladder : sequence of FittedModel
+    first : str
+        What the first is called.
     """
     parts = []
-    for rung in ladder:
-        held = f", held out {100 * np.mean(rung.held_out):.1f} %" if rung.held_out.size else ""
-        parts.append(f"{rung.added}: fitted {100 * np.mean(rung.in_sample):.1f} %{held}")
+    for model in ladder:
+        held = f", held out {100 * model.held_out_error:.1f} %" if model.held_out_errors.size else ""
+        parts.append(f"{model.added or first}: fitted {100 * model.fitted_error:.1f} %{held}")
     return f"Free-run error of the manoeuvres by model, in percent of the motion. {'; '.join(parts)}."

@@ -1,84 +1,91 @@
-"""Measured over predicted: one manoeuvre in free run, under the plain model and under the one with effects."""
+"""Measured over predicted: one manoeuvre in free run under the first model and the last, its rudder beneath."""
 
 from __future__ import annotations
 
+from math import isfinite
 from typing import Any
 
 import numpy as np
 
-from kempf.workbench.figures.diagnosis_style import CHANNELS, FULL, MEASURED, PLAIN, new_figure, style
-from kempf.workbench.report.content import RunView
+from kempf.schemas.diagnosis_evidence import ManoeuvreEvidence
+from kempf.workbench.figures.diagnosis_style import CHANNELS, FULL, INK, PLAIN, draw_dots, framed_figure, style
 
 _NAMES = ("lateral_speed", "yaw_rate", "heading")
 _ORDER = (2, 1, 0)
 FREE = "free run"
 
 
-def draw_overlay(view: RunView) -> Any:
-    """Draw heading, yaw rate and lateral speed of a run.
+def draw_overlay(shown: ManoeuvreEvidence, first: str, last: str) -> Any:
+    """Draw heading, yaw rate and lateral speed of a manoeuvre, each with its error, and the rudder.
 
     Parameters
     ----------
-    view : RunView
+    shown : ManoeuvreEvidence
+    first, last : str
+        What the two models are called.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    used = [i for i in _ORDER if np.isfinite(view.measured[:, i]).any()]
+    used = [i for i in _ORDER if np.isfinite(shown.measured[:, i]).any()]
+    models = [(first, shown.before, PLAIN, "--")]
+    if shown.after is not None:
+        models.append((last, shown.after, FULL, "-"))
     with style():
-        figure = new_figure(0.7 + 1.75 * len(used))
-        rows = figure.subplots(*(2 * len(used), 1), sharex=True, squeeze=False, height_ratios=[2.0, 1.0] * len(used))[
-            :, 0
-        ]
-        improved = view.full is not view.plain
-        courses = [("plain model", view.plain, PLAIN, "--")]
-        if improved:
-            courses.append(("model with effects", view.full, FULL, "-"))
+        figure = framed_figure(2.0 + 1.9 * len(used), legend_in=0.25)
+        heights = [*([2.0, 1.0] * len(used)), 1.2]
+        panels = figure.subplots(len(heights), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
         for k, i in enumerate(used):
-            panel, below = rows[2 * k : 2 * k + 2]
+            panel, below = panels[2 * k : 2 * k + 2]
             words, unit, factor = CHANNELS[i]
-            measured = factor * view.measured[:, i]
-            panel.plot(view.time_s, measured, ".", ms=3, color=MEASURED, mec="none", label="measured", rasterized=True)
-            for label, course, colour, line in courses:
-                predicted = factor * course.free[:, i]
-                panel.plot(view.time_s, predicted, color=colour, ls=line, label=label)
-                below.plot(view.time_s, measured - predicted, color=colour, ls=line, lw=0.9)
-            below.axhline(0.0, color="black", lw=0.6)
+            draw_dots(panel, shown.time_s, factor * shown.measured[:, i], "measured")
+            for label, predicted, colour, line in models:
+                panel.plot(shown.time_s, factor * predicted.free_run[:, i], color=colour, ls=line, label=label)
+                below.plot(shown.time_s, factor * predicted.free_run_error[:, i], color=colour, ls=line, lw=0.9)
+            below.axhline(0.0, color=INK, lw=0.6)
             panel.set_ylabel(unit)
             below.set_ylabel(f"error,\n{unit}")
-            panel.set_title(f"{words}, {unit}: fit in {FREE} {_fits(view, _NAMES[i], improved=improved)}")
-        rows[-1].set_xlabel("time from the beginning of the run, s")
-        rows[-1].set_xlim(0.0, view.time_s[-1])
-        figure.align_ylabels(rows)
-        panels = rows
+            panel.set_title(f"{words}, {unit}: fit in {FREE} {_fits(shown, _NAMES[i], first, last)}")
+        rudder = panels[-1]
+        rudder.plot(shown.time_s, np.degrees(shown.rudder), color=INK, lw=1.0)
+        rudder.axhline(0.0, color=INK, lw=0.6)
+        rudder.set_ylabel("deg")
+        rudder.set_title("rudder, deg, positive to starboard")
+        rudder.set_xlabel("time from the beginning of the manoeuvre, s")
+        rudder.set_xlim(0.0, shown.time_s[-1])
+        figure.align_ylabels(panels)
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=3)
+        figure.legend(handles, labels, loc="upper right", ncols=3)
         return figure
 
 
-def _fits(view: RunView, name: str, *, improved: bool) -> str:
-    before = view.plain.fit_percent.get(FREE, {}).get(name)
-    after = view.full.fit_percent.get(FREE, {}).get(name)
-    if before is None:
-        return "diverges"
-    if not improved or after is None:
-        return f"{before:.1f} %"
-    return f"{before:.1f} % (plain), {after:.1f} % (with effects)"
+def _fits(shown: ManoeuvreEvidence, name: str, first: str, last: str) -> str:
+    before = shown.before.fit_percent.get(FREE, {}).get(name)
+    if shown.after is None:
+        return _percent(before)
+    return f"{_percent(before)} ({first}), {_percent(shown.after.fit_percent.get(FREE, {}).get(name))} ({last})"
 
 
-def describe_overlay(view: RunView) -> str:
+def _percent(fit: float | None) -> str:
+    return "diverges" if fit is None or not isfinite(fit) else f"{fit:.1f} %"
+
+
+def describe_overlay(shown: ManoeuvreEvidence, label: str, first: str, last: str) -> str:
     """Return the figure in words.
 
     Parameters
     ----------
-    view : RunView
+    shown : ManoeuvreEvidence
+    label : str
+        Of the manoeuvre.
+    first, last : str
+        What the two models are called.
     """
-    improved = view.full is not view.plain
-    told = ", ".join(
-        f"{words} {_fits(view, name, improved=improved)}"
-        for name, (words, _, _) in zip(_NAMES, CHANNELS, strict=True)
-        if name in view.plain.fit_percent.get(FREE, {})
+    fits = ", ".join(
+        f"{words} {_fits(shown, name, first, last)}"
+        for i, (name, (words, _, _)) in enumerate(zip(_NAMES, CHANNELS, strict=True))
+        if np.isfinite(shown.measured[:, i]).any()
     )
-    kind = "held out" if view.held_out else "fitted"
-    return f"{view.label}, {kind}: measured over predicted in time, horizon free run. Fit: {told}."
+    kind = "held out" if shown.held_out else "fitted"
+    return f"{label}, {kind}: measured over predicted in time, horizon free run, rudder beneath. Fit: {fits}."

@@ -1,100 +1,101 @@
-"""Heading and rudder of a zigzag, its overshoots and what IMO resolution MSC.137(76) allows of them."""
+"""Heading of a zigzag, measured and in free run, with its rudder, overshoots and the limits of IMO MSC.137(76)."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from kempf.workbench.figures.diagnosis_style import FULL, MEASURED, PLAIN, new_figure, style
-from kempf.workbench.report.content import RunView
+from kempf.schemas.diagnosis_evidence import ManoeuvreEvidence
+from kempf.workbench.figures.diagnosis_style import FAINT, FULL, INK, LIMIT, PLAIN, framed_figure, style
 
 _PLACES = {"first overshoot": 0, "second overshoot": 1}
 
 
-def limits(view: RunView) -> dict[int, float]:
+def limits(imo: Mapping[str, Any]) -> dict[int, float]:
     """Return the limits of the overshoots that have one, deg, by number from 0.
 
     Parameters
     ----------
-    view : RunView
+    imo : mapping
+        The criteria as a segment has them.
     """
     found = {}
-    for name, one in view.imo.items():
+    for name, criterion in imo.items():
         for words, place in _PLACES.items():
-            if name.endswith(words) and one.get("limit_deg") is not None:
-                found[place] = float(one["limit_deg"])
+            if name.endswith(words) and criterion.get("limit_deg") is not None:
+                found[place] = float(criterion["limit_deg"])
     return found
 
 
-def draw_zigzag(view: RunView) -> Any:
-    """Draw heading from the base course and rudder in one panel.
+def draw_zigzag(shown: ManoeuvreEvidence, psi0_deg: float, allowed: Mapping[int, float], first: str, last: str) -> Any:
+    """Draw heading from the base course, measured and predicted, over the rudder.
 
     Parameters
     ----------
-    view : RunView
+    shown : ManoeuvreEvidence
+    psi0_deg : float
+        Nominal heading deviation.
+    allowed : mapping of int to float
+        Of `limits`.
+    first, last : str
+        What the two models are called.
 
     Returns
     -------
     matplotlib.figure.Figure
     """
-    heading = _deviation(view, view.measured[:, 2])
-    if not np.isfinite(heading).any():
-        heading = _deviation(view, view.heading_rad)
     with style():
-        figure = new_figure(2.9)
+        figure = framed_figure(3.8, legend_in=0.25)
         panel = figure.subplots()
-        panel.axhline(0.0, color="black", lw=0.5)
+        panel.axhline(0.0, color=INK, lw=0.5)
         for side in (-1, 1):
-            panel.axhline(side * view.psi0_deg, color="0.5", lw=0.7, ls=":")
-        panel.plot(view.time_s, np.degrees(view.rudder_rad), color=PLAIN, lw=1.0, ls="--", label="rudder")
-        panel.plot(view.time_s, heading, color=MEASURED, label="heading from the base course")
-        allowed = limits(view)
-        for k, (at, side, beyond) in enumerate(view.peaks):
-            top = side * (view.psi0_deg + beyond)
-            panel.plot([at, at], [side * view.psi0_deg, top], color=FULL, lw=2.2, label="overshoot" if k == 0 else None)
+            panel.axhline(side * psi0_deg, color=FAINT, lw=0.8, ls=":")
+        panel.plot(shown.time_s, np.degrees(shown.rudder), color=FAINT, lw=1.1, label="rudder")
+        panel.plot(shown.time_s, np.degrees(shown.heading_deviation), color=INK, lw=1.6, label="heading, measured")
+        for label, predicted, colour, line in ((first, shown.before, PLAIN, "--"), (last, shown.after, FULL, "-.")):
+            if predicted is not None:
+                heading = np.degrees(predicted.heading_deviation)
+                panel.plot(shown.time_s, heading, color=colour, lw=1.2, ls=line, label=f"free run, {label}")
+        for k, peak in enumerate(shown.peaks):
+            top = peak.side * (psi0_deg + peak.beyond_deg)
+            panel.plot([peak.at_s, peak.at_s], [peak.side * psi0_deg, top], color=INK, lw=1.0, ls=":")
             panel.annotate(
-                f"{beyond:.1f}°",
-                (at, top),
-                (0, 7 * side),
+                f"{peak.beyond_deg:.1f}°",
+                (peak.at_s, top),
+                (0, 11 * peak.side),
                 textcoords="offset points",
                 ha="center",
                 va="center",
                 fontsize=8,
-                color=FULL,
             )
             if k in allowed:
-                level = side * (view.psi0_deg + allowed[k])
-                width = 0.04 * float(view.time_s[-1])
-                label = None if k != min(allowed) else "largest that IMO allows"
-                panel.plot([at - width, at + width], [level, level], color="#CC79A7", lw=2.4, label=label)
+                level = peak.side * (psi0_deg + allowed[k])
+                width = 0.04 * float(shown.time_s[-1])
+                once = "largest overshoot that IMO allows" if k == min(allowed) else None
+                panel.plot([peak.at_s - width, peak.at_s + width], [level, level], color=LIMIT, lw=2.4, label=once)
         low, high = panel.get_ylim()
         panel.set_ylim(low - 0.08 * (high - low), high + 0.08 * (high - low))
-        panel.set_xlim(0.0, view.time_s[-1])
-        panel.set_xlabel("time from the beginning of the run, s")
-        panel.set_ylabel("deg, positive to starboard")
+        panel.set_xlim(0.0, shown.time_s[-1])
+        panel.set_xlabel("time from the beginning of the manoeuvre, s")
+        panel.set_ylabel("from the base course, deg,\npositive to starboard")
         handles, labels = panel.get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside upper right", ncols=4)
+        figure.legend(handles, labels, loc="upper center", ncols=3)
         return figure
 
 
-def _deviation(view: RunView, heading_rad: Any) -> Any:
-    """Heading from the base course, deg, whichever turn and whichever zero it is counted from."""
-    first = view.time_s <= max(view.executes_s[0] if view.executes_s else 5.0, view.time_s[1])
-    start = np.degrees(np.nanmean(view.heading_rad[first])) - view.base_heading_deg
-    approach = (start + 180.0) % 360.0 - 180.0
-    known = heading_rad[first]
-    if not np.isfinite(known).any():
-        return np.full(heading_rad.shape, np.nan)
-    return np.degrees(heading_rad - np.nanmean(known)) + approach
-
-
-def describe_zigzag(view: RunView) -> str:
+def describe_zigzag(shown: ManoeuvreEvidence, label: str) -> str:
     """Return the figure in words.
 
     Parameters
     ----------
-    view : RunView
+    shown : ManoeuvreEvidence
+    label : str
+        Of the manoeuvre.
     """
-    told = ", ".join(f"{beyond:.1f}" for _, _, beyond in view.peaks) or "none"
-    return f"{view.label}: heading and rudder in time. Overshoots beyond the nominal heading, degrees: {told}."
+    overshoots = ", ".join(f"{peak.beyond_deg:.1f}" for peak in shown.peaks) or "none"
+    return (
+        f"{label}: heading, measured and predicted in free run, and rudder in time. "
+        f"Measured overshoots beyond the nominal heading, degrees: {overshoots}."
+    )

@@ -1,32 +1,38 @@
-"""A vessel's report from the warehouse: diagnosed, gathered, written as a page."""
+"""A vessel's report from the warehouse: what is stored of her diagnosis, written as a page."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from math import nan
+from typing import Any
 
-from kempf.flows.jobs.diagnose_vessel import diagnose_in_full
+from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose_refreshed
 from kempf.flows.jobs.parameter_set_of import channel_warnings
-from kempf.flows.jobs.standing_model import Own
+from kempf.flows.jobs.standing_model import Own, standing
+from kempf.flows.jobs.stored_diagnosis import diagnosed_with_evidence
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.diagnose.diagnosis import DiagnosisSettings
+from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
+from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, FittedParameter
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, examinations, vessels
 from kempf.warehouse.diagnoses import StoredDiagnosis
+from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.report.content import ReportContent
+from kempf.workbench.report.content import EffectRow, ReportContent, ShownManoeuvre
 from kempf.workbench.report.page import page
-from kempf.workbench.report.view_model import gather
+from kempf.workbench.report.wording import ReportWording, wording_of
 
 
 @dataclass(frozen=True, eq=False)
-class Report:
+class MadeReport:
     """A report with what it shows.
 
     Attributes
     ----------
     diagnosis_id : str
-        Of the stored diagnosis that it tells of.
+        Of the stored diagnosis that it shows.
     content : ReportContent
     html : str
     """
@@ -36,15 +42,16 @@ class Report:
     html: str
 
 
-def made(
+def make_report(
     warehouse: Warehouse,
     vessel: str,
     spec: ModelSpec,
     own: Own,
     progress: Progress = silent,
-    settings: DiagnosisSettings | None = None,
-) -> Report:
-    """Make a vessel's report.
+    settings: DiagnosisSettings = STANDARD,
+    say: Callable[[str], None] = lambda _: None,
+) -> MadeReport:
+    """Make a vessel's report; a diagnosis that is stored is read, one that is not is made first.
 
     Parameters
     ----------
@@ -56,47 +63,126 @@ def made(
         Effects beyond the catalogue.
     progress : Progress, optional
     settings : DiagnosisSettings, optional
+    say : callable, optional
+        Takes one line where a stored diagnosis has to be computed again.
 
     Raises
     ------
     NotFound
         ``no_vessel``, ``no_segments``, ``no_runs``.
     """
-    settings = settings or DiagnosisSettings()
-    # the curves are not stored, so a known diagnosis is made again from the same inputs
-    stored, examined = diagnose_in_full(warehouse, vessel, spec, own, settings, progress)
-    profile = vessels.get(warehouse, examined.chosen.profile_sha256)
-    content = gather(
+    chosen = choose_refreshed(warehouse, vessel, progress)
+    stored, evidence = diagnosed_with_evidence(warehouse, chosen, spec, own, settings, progress, say)
+    current = standing(warehouse, vessel)
+    included = () if current is None else tuple(current.model_spec["effects"])
+    profile = vessels.get(warehouse, chosen.profile_sha256)
+    examined = examinations.of_ingests(warehouse, [segment.ingest_id for segment in chosen.segments])
+    channels = {"channels": {one.log_id: one.findings for one in examined.values() if one.findings}}
+    content = content_of(
         vessel,
-        examined.diagnosis,
-        examined.chosen.segments,
-        examined.chosen.file_names,
-        _ship(profile),
-        _provenance(stored, examined.chosen.profile_sha256, examined.runs.spec, settings)
-        + [(f"left out, {name}", why) for name, why in sorted(examined.runs.skipped.items())],
+        stored.content,
+        evidence,
+        chosen,
+        wording_of(vessel, stored.content, evidence, included),
+        warnings=tuple(f"Warning: {words}." for words in channel_warnings(channels)),
+        ship=_ship(profile),
+        provenance=_provenance(stored, chosen, evidence.left_out),
     )
-    said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in examined.chosen.segments])
-    channels = channel_warnings({"channels": {one.log_id: one.findings for one in said.values() if one.findings}})
-    content = replace(content, sentences=(*content.sentences, *(f"Warning: {words}." for words in channels)))
     progress(0, 1, "drawing")
-    return Report(stored.diagnosis_id, content, page(content))
+    return MadeReport(stored.diagnosis_id, content, page(content))
+
+
+def content_of(
+    vessel: str,
+    diagnosis: Mapping[str, Any],
+    evidence: DiagnosisEvidence,
+    chosen: Chosen,
+    wording: ReportWording,
+    *,
+    warnings: tuple[str, ...],
+    ship: Mapping[str, str],
+    provenance: tuple[tuple[str, str], ...],
+) -> ReportContent:
+    """Put together what a report shows.
+
+    Parameters
+    ----------
+    vessel : str
+    diagnosis : mapping
+        Under the command line's keys.
+    evidence : DiagnosisEvidence
+    chosen : Chosen
+        The manoeuvres.
+    wording : ReportWording
+    warnings : tuple of str
+        About the channels of the logs.
+    ship : mapping of str to str
+        Dimensions with units.
+    provenance : tuple of (str, str)
+        Ids, versions and settings, as shown at the end.
+    """
+    segments = {segment.segment_id: segment for segment in chosen.segments}
+    shown = []
+    for number, one in enumerate(evidence.manoeuvres, start=1):
+        segment = segments[one.segment_id]
+        angles = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} zigzag, {segment.first_side} first"
+        start = iso_utc(one.start_utc_ns)[:16].replace("T", " ")
+        shown.append(
+            ShownManoeuvre(
+                number=number,
+                label=f"Manoeuvre {number}: {angles}, {start} UTC",
+                log=chosen.file_names[segment.log_id],
+                psi0_deg=segment.psi0_deg,
+                imo=segment.imo,
+                evidence=one,
+            )
+        )
+    return ReportContent(
+        vessel=vessel,
+        wording=wording,
+        effects=tuple(_effect_row(candidate, wording) for candidate in diagnosis["candidates"]),
+        sets=tuple(diagnosis["sets"]) if wording.claims else (),
+        manoeuvres=tuple(shown),
+        evidence=evidence,
+        warnings=warnings,
+        ship=ship,
+        provenance=provenance,
+    )
+
+
+def _effect_row(candidate: Mapping[str, Any], wording: ReportWording) -> EffectRow:
+    def known(value: float | None) -> float:
+        return nan if value is None else value
+
+    return EffectRow(
+        title=candidate["title"],
+        verdict=wording.effect_verdict(candidate["verdict"]),
+        why=candidate["why"],
+        set_id=(candidate["set_id"] or "") if wording.claims else "",
+        score=known(candidate["score"]),
+        p_adjusted=known(candidate["p_adjusted"]),
+        absorption=known(candidate["absorption"]),
+        changes=tuple(
+            FittedParameter(name=name, unit=change["unit"], value=change["value"], std=change["std"])
+            for name, change in candidate["expected_change"].items()
+        ),
+    )
 
 
 def _ship(profile: VesselProfile) -> dict[str, str]:
-    told = {"length": profile.length_m, "beam": profile.beam_m, "draught": profile.draught_m}
-    return {name: f"{value:g} m" for name, value in told.items() if value is not None}
+    dimensions = {"length": profile.length_m, "beam": profile.beam_m, "draught": profile.draught_m}
+    return {name: f"{value:g} m" for name, value in dimensions.items() if value is not None}
 
 
-def _provenance(
-    stored: StoredDiagnosis, profile_sha256: str, spec: ModelSpec, settings: DiagnosisSettings
-) -> list[tuple[str, str]]:
-    return [
+def _provenance(stored: StoredDiagnosis, chosen: Chosen, left_out: Mapping[str, str]) -> tuple[tuple[str, str], ...]:
+    return (
         ("diagnosis", stored.diagnosis_id),
         ("parameter set it began from", stored.parameter_set_id),
         ("code", stored.code_version),
         ("commit of the source", code_version.git_commit() or "not known"),
         *((f"package {name}", version) for name, version in sorted(code_version.packages().items())),
-        ("vessel profile, SHA-256", profile_sha256),
-        *((f"model, {name}", str(value)) for name, value in sorted(spec.model_dump(mode="json").items())),
-        *((f"setting, {name}", str(value)) for name, value in sorted(asdict(settings).items())),
-    ]
+        ("vessel profile, SHA-256", chosen.profile_sha256),
+        *((f"model, {name}", str(value)) for name, value in sorted(stored.inputs["model"].items())),
+        *((f"setting, {name}", str(value)) for name, value in sorted(stored.inputs["settings"].items())),
+        *((f"left out, {name}", why) for name, why in sorted(left_out.items())),
+    )

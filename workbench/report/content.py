@@ -2,222 +2,162 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from math import isfinite
+from typing import Any, Literal
 
-from kempf.pipeline.channels.series import Float
-from kempf.pipeline.compare.overshoot import Overshoot
-from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
-
-
-@dataclass(frozen=True, eq=False)
-class Course:
-    """What one model says of one run.
-
-    Attributes
-    ----------
-    free : ndarray, shape (n, 3)
-        Free run: lateral speed, m/s, yaw rate, rad/s, heading, rad.
-    whitened : ndarray, shape (n, 3)
-        One-step innovations over their standard deviation; NaN where not measured.
-    states : ndarray, shape (n, 4)
-        v, r, F and M given all measurements of the run, SI.
-    fit_percent : mapping of str to mapping of str to float
-        By horizon in words, then by channel.
-    overshoots : tuple of Overshoot
-        Of the free run.
-    looked : Looked
-        For the search for where the model fails.
-    """
-
-    free: Float
-    whitened: Float
-    states: Float
-    fit_percent: Mapping[str, Mapping[str, float]]
-    overshoots: tuple[Overshoot, ...]
-    looked: Looked
-
-
-@dataclass(frozen=True, eq=False)
-class RunView:
-    """One manoeuvre: what was measured, and what the plain model and the last one say of it.
-
-    Attributes
-    ----------
-    segment_id, label, log : str
-    held_out : bool
-    time_s : ndarray, shape (n,)
-    measured : ndarray, shape (n, 3)
-        NaN where there is none.
-    rudder_rad, heading_rad, speed_m_s : ndarray, shape (n,)
-    phases : tuple of PhaseInterval
-    executes_s : tuple of float
-    peaks : tuple of (float, int, float)
-        Instant, s, side and overshoot beyond the nominal heading, deg, of each overshoot.
-    psi0_deg : float
-    base_heading_deg : float
-    imo : mapping
-        As the segment has it.
-    plain, full : Course
-        The same object where no effect was added.
-    """
-
-    segment_id: str
-    label: str
-    log: str
-    held_out: bool
-    time_s: Float
-    measured: Float
-    rudder_rad: Float
-    heading_rad: Float
-    speed_m_s: Float
-    phases: tuple[PhaseInterval, ...]
-    executes_s: tuple[float, ...]
-    peaks: tuple[tuple[float, int, float], ...]
-    psi0_deg: float
-    base_heading_deg: float
-    imo: Mapping[str, Any]
-    plain: Course
-    full: Course
+from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, FittedParameter, ManoeuvreEvidence
+from kempf.workbench.report.wording import ReportWording
 
 
 @dataclass(frozen=True)
-class RankedEffect:
-    """One effect of the catalogue against the plain model.
+class EffectRow:
+    """One effect of the catalogue beside the first model.
 
     Attributes
     ----------
-    name, title, verdict, why, separated_by : str
-    set_id : str or None
+    title, verdict, why : str
+        The verdict in the report's words.
+    set_id : str
+        Of the confusion set that the report claims it in; empty where it claims none.
     score, p_adjusted, absorption : float
         NaN where it cannot be tested.
-    changes : tuple of (str, float, float, str)
-        Name, expected change, its standard error and unit of each parameter.
-    refitted : str
-        Its size after the refit, in words; empty where it was not added.
+    changes : tuple of FittedParameter
+        Expected size of each of its parameters.
     """
 
-    name: str
     title: str
     verdict: str
     why: str
-    separated_by: str
-    set_id: str | None
+    set_id: str
     score: float
     p_adjusted: float
     absorption: float
-    changes: tuple[tuple[str, float, float, str], ...]
-    refitted: str
+    changes: tuple[FittedParameter, ...]
+
+    @property
+    def tested(self) -> bool:
+        """Whether it has a score."""
+        return isfinite(self.score)
 
 
-@dataclass(frozen=True, eq=False)
-class Rung:
-    """One step of the ladder.
-
-    Attributes
-    ----------
-    added : str
-        Title of the effect, "plain model" on the first.
-    in_sample, held_out : ndarray
-        Relative free-run errors of the single runs, fitted and held out.
-    intensities : mapping of str to float
-        Of the disturbances that the model has, by name with unit.
-    log_likelihood : float
-    parameters : int
-    """
-
-    added: str
-    in_sample: Float
-    held_out: Float
-    intensities: Mapping[str, float]
-    log_likelihood: float
-    parameters: int
-
-
-@dataclass(frozen=True, eq=False)
-class AddedVariable:
-    """What is left of the innovations against what an effect would explain, both cleaned of the fitted parameters.
+@dataclass(frozen=True)
+class ShownManoeuvre:
+    """One manoeuvre with what its segment has.
 
     Attributes
     ----------
-    title : str
-    expected, left : ndarray, shape (N,)
-        Standard deviations of the innovation; expected at the size that the score foretells.
-    score : float
+    number : int
+        In order of time.
+    label : str
+        Number, angles, first side and time.
+    log : str
+        File name.
+    psi0_deg : float
+    imo : mapping
+        Criteria as the segment has them.
+    evidence : ManoeuvreEvidence
     """
 
-    title: str
-    expected: Float
-    left: Float
-    score: float
+    number: int
+    label: str
+    log: str
+    psi0_deg: float
+    imo: Mapping[str, Any]
+    evidence: ManoeuvreEvidence
+
+    @property
+    def short(self) -> str:
+        """Its name in a table."""
+        return f"Manoeuvre\u00a0{self.number}"
 
 
-@dataclass(frozen=True, eq=False)
-class MissingForce:
-    """What acts on the ship beside the model, at the instants of all runs.
-
-    Attributes
-    ----------
-    sway, yaw : ndarray, shape (N,)
-        m/s^2 and rad/s^2: the disturbance's part, the mean of each run taken off.
-    against : mapping of str to ndarray, shape (N,)
-        v, m/s; r, deg/s; rudder, deg; heading, deg.
-    """
-
-    sway: Float
-    yaw: Float
-    against: Mapping[str, Float]
-
-
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True)
 class ReportContent:
     """All that a report shows of one vessel.
 
     Attributes
     ----------
-    vessel, verdict : str
-    headline : str
-        The verdict in one sentence.
-    sentences, next_steps : tuple of str
-    ranked : tuple of RankedEffect
+    vessel : str
+    wording : ReportWording
+        Headline, advice, titles and captions, all of one verdict.
+    effects : tuple of EffectRow
         The highest score first, what cannot be tested last.
-    names, alike : tuple of str, ndarray of shape (k, k)
-        Squared cosines between what the first effects would explain.
-    ladder : tuple of Rung
-    added_variables : tuple of AddedVariable
-    missing_before, missing_after : MissingForce
-        Beside the plain model and beside the last.
-    runs : tuple of RunView
+    sets : tuple of mapping
+        The confusion sets that the report claims, as a diagnosis stores them.
+    manoeuvres : tuple of ShownManoeuvre
         In order of time.
-    where_before, where_after, where_held : mapping
-        Where the plain model and the last one fail on fitted runs, and the last one on held-out runs, as
-        `kempf.pipeline.compare.misfit.where` has it; the last empty where none is held out.
+    evidence : DiagnosisEvidence
+    warnings : tuple of str
+        About the channels of the logs.
     ship : mapping of str to str
     provenance : tuple of (str, str)
         What and its value, in the order shown.
     """
 
     vessel: str
-    verdict: str
-    headline: str
-    sentences: tuple[str, ...]
-    next_steps: tuple[str, ...]
-    ranked: tuple[RankedEffect, ...]
-    names: tuple[str, ...]
-    alike: Float
-    ladder: tuple[Rung, ...]
-    added_variables: tuple[AddedVariable, ...]
-    missing_before: MissingForce
-    missing_after: MissingForce
-    runs: tuple[RunView, ...]
-    where_before: Mapping[str, Any]
-    where_after: Mapping[str, Any]
-    where_held: Mapping[str, Any]
+    wording: ReportWording
+    effects: tuple[EffectRow, ...]
+    sets: tuple[Mapping[str, Any], ...]
+    manoeuvres: tuple[ShownManoeuvre, ...]
+    evidence: DiagnosisEvidence
+    warnings: tuple[str, ...]
     ship: Mapping[str, str]
     provenance: tuple[tuple[str, str], ...]
 
+
+@dataclass(frozen=True)
+class SampleBadge:
+    """Whether a manoeuvre was fitted or held out."""
+
+    held_out: bool
+
     @property
-    def improved(self) -> bool:
-        """Whether an effect was added."""
-        return len(self.ladder) > 1
+    def text(self) -> str:
+        """As it is shown."""
+        return "held out" if self.held_out else "fitted"
+
+
+Cell = str | SampleBadge
+
+
+@dataclass(frozen=True)
+class PictureBlock:
+    """A figure: its SVG, its text for those who do not see it, its caption."""
+
+    svg: bytes
+    alt: str
+    caption: str
+    kind: Literal["picture"] = "picture"
+
+
+@dataclass(frozen=True)
+class TableBlock:
+    """A table; the columns ``numeric`` are set to the right."""
+
+    caption: str
+    head: Sequence[str]
+    rows: Sequence[Sequence[Cell]]
+    numeric: Sequence[int] = ()
+    kind: Literal["table"] = "table"
+
+
+@dataclass(frozen=True)
+class HeadingBlock:
+    """A heading over one manoeuvre."""
+
+    text: str
+    badge: SampleBadge
+    kind: Literal["heading"] = "heading"
+
+
+@dataclass(frozen=True)
+class TextBlock:
+    """A paragraph."""
+
+    text: str
+    kind: Literal["text"] = "text"
+
+
+Block = PictureBlock | TableBlock | HeadingBlock | TextBlock

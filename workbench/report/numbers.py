@@ -1,11 +1,8 @@
-"""Numbers as a person reads them: the digits that the uncertainty leaves, degrees for angles, the interval beside."""
+"""Numbers as a person reads them: the digits that the standard error leaves, degrees for angles, the error beside."""
 
 from __future__ import annotations
 
 from math import degrees, floor, isfinite, log10
-
-#: half width of a 95 % interval in standard errors
-WIDTH_95 = 1.96
 
 
 def in_degrees(value: float, std: float, unit: str) -> tuple[float, float, str]:
@@ -39,19 +36,27 @@ def rounded(value: float, spread: float) -> str:
     return f"{round(value, digits):.{max(0, digits)}f}"
 
 
-def with_interval(value: float, std: float, unit: str) -> str:
-    """Return a value with the half width of its 95 % interval and its unit.
+def with_error(value: float, std: float, unit: str) -> str:
+    """Return a value with its standard error and its unit.
 
     Examples
     --------
-    >>> with_interval(3.9, 0.15, "s")
-    '3.90 ± 0.29 s'
+    >>> with_error(3.9, 0.15, "s"), with_error(-3.11e-5, 5.7e-6, "1/m^2")
+    ('3.90 ± 0.15 s', '(-3.11 ± 0.57)·10⁻⁵ 1/m²')
     """
     value, std, unit = in_degrees(value, std, unit)
-    half = WIDTH_95 * std
-    shown = "" if unit in ("", "1") else f" {unit}"
+    shown = "" if unit in ("", "1") else f" {unit.replace('^2', '²')}"
     if not isfinite(value):
         return "not known"
-    if not isfinite(half):
-        return f"{value:.3g}{shown}"
-    return f"{rounded(value, half)} ± {rounded(half, half)}{shown}"
+    known = isfinite(std) and std > 0.0
+    largest = max(abs(value), std if known else 0.0)
+    power = floor(log10(largest)) if largest and not 1e-3 <= largest < 1e6 else 0
+    value, std = value / 10.0**power, std / 10.0**power
+    text = f"{rounded(value, std)} ± {rounded(std, std)}" if known else f"{value:.3g}"
+    if not power:
+        return f"{text}{shown}"
+    return f"{f'({text})' if known else text}·10{_raised(power)}{shown}"
+
+
+def _raised(power: int) -> str:
+    return str(power).translate(str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"))

@@ -2,26 +2,31 @@
 
 from __future__ import annotations
 
+from base64 import b64encode
 from collections.abc import Callable
+from functools import cache
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from kempf.workbench.report import sections
-from kempf.workbench.report.content import ReportContent
-from kempf.workbench.report.markup import STYLE, escape, listed, section
+from kempf.workbench.report.content import Block, ReportContent
 
-_SECTIONS: tuple[tuple[str, str, Callable[[ReportContent], str]], ...] = (
-    ("effects", "Which effects are missing", sections.effects),
-    ("ladder", "What adding them brings", sections.ladder),
-    ("prediction", "Measured over predicted", sections.prediction),
-    ("innovations", "Where it fails in time", sections.innovations),
-    ("where", "Where it fails by phase, side and manoeuvre", sections.where),
-    ("correlations", "What the innovations still know", sections.correlations),
-    ("added", "The evidence, point by point", sections.added_variables),
-    ("confusion", "What looks alike", sections.confusion),
-    ("force", "The missing force and moment", sections.missing_force),
-    ("coverage", "Where the manoeuvres have been", sections.coverage),
-    ("zigzags", "Zigzags and the IMO criteria", sections.zigzags),
-    ("provenance", "What this report rests on", sections.provenance),
-)
+#: what fills a section, by its anchor; `ReportWording.sections` has the order and the titles
+_BLOCKS: dict[str, Callable[[ReportContent], list[Block]]] = {
+    "effects": sections.effects,
+    "parameters": sections.parameters,
+    "ladder": sections.ladder,
+    "prediction": sections.prediction,
+    "innovations": sections.innovations,
+    "where": sections.where,
+    "correlations": sections.correlations,
+    "added": sections.added_variables,
+    "confusion": sections.confusion,
+    "force": sections.unmodelled,
+    "coverage": sections.coverage,
+    "zigzags": sections.zigzags,
+    "provenance": sections.provenance,
+}
 
 
 def page(content: ReportContent) -> str:
@@ -37,21 +42,19 @@ def page(content: ReportContent) -> str:
     -------
     str
     """
-    title = f"{content.vessel}: what her manoeuvring model lacks"
-    made = [(name, words, draw(content)) for name, words, draw in _SECTIONS]
-    kept = [(name, words, text) for name, words, text in made if text]
-    links = "".join(f'<a href="#{name}">{escape(words)}</a>' for name, words, _ in kept)
-    ship = ", ".join(f"{name} {value}" for name, value in content.ship.items())
-    body = "".join(section(*one) for one in kept)
-    return (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        # whatever a browser or a mail program makes of it, it loads nothing
-        '<meta http-equiv="Content-Security-Policy" content="default-src \'none\'; img-src data:; '
-        "style-src 'unsafe-inline'\">\n"
-        f"<title>{escape(title)}</title>\n<style>{STYLE}</style>\n</head>\n<body>\n<header>\n"
-        f"<h1>{escape(title)}</h1>\n<p>{escape(ship)}</p>\n"
-        f'<p class="headline">{escape(content.headline)}</p>\n'
-        f"{listed(content.sentences)}<h3>What to do next</h3>\n{listed(content.next_steps, ordered=True)}"
-        f'<nav aria-label="Contents">{links}</nav>\n</header>\n<main>\n{body}</main>\n</body>\n</html>\n'
+    filled = [(name, words, _BLOCKS[name](content)) for name, words in content.wording.sections.items()]
+    shown = [entry for entry in filled if entry[2]]
+    return _templates().get_template("report.html").render(content=content, wording=content.wording, sections=shown)
+
+
+@cache
+def _templates() -> Environment:
+    made = Environment(
+        loader=PackageLoader("kempf.workbench.report", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
     )
+    made.filters["data_uri"] = lambda svg: f"data:image/svg+xml;base64,{b64encode(svg).decode('ascii')}"
+    return made

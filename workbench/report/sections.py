@@ -1,11 +1,10 @@
-"""The sections of the page: each figure with the table beside it and the words that say how to read it."""
+"""The sections of the page: each figure with the table beside it. Titles and leads are those of the verdict."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from math import isfinite
 from typing import Any
-
-import numpy as np
 
 from kempf.workbench.figures import (
     diagnosis_added_variable,
@@ -14,196 +13,233 @@ from kempf.workbench.figures import (
     diagnosis_coverage,
     diagnosis_effects,
     diagnosis_ladder,
-    diagnosis_missing_force,
     diagnosis_overlay,
     diagnosis_strip,
+    diagnosis_unmodelled,
     diagnosis_zigzag,
 )
-from kempf.workbench.figures.diagnosis_style import CHANNELS, bytes_of
-from kempf.workbench.report.content import RankedEffect, ReportContent
-from kempf.workbench.report.markup import badge, escape, figure, table
-from kempf.workbench.report.numbers import with_interval
+from kempf.workbench.figures.diagnosis_style import bytes_of
+from kempf.workbench.report.content import (
+    Block,
+    Cell,
+    EffectRow,
+    HeadingBlock,
+    PictureBlock,
+    ReportContent,
+    SampleBadge,
+    ShownManoeuvre,
+    TableBlock,
+    TextBlock,
+)
+from kempf.workbench.report.numbers import with_error
 
-_NAMES = ("heading", "yaw_rate", "lateral_speed")
-_VERDICTS = {"present": "present", "negligible": "too small", "not_testable": "not testable", "absent": "absent"}
+_CHANNELS = {"heading": "heading", "yaw_rate": "yaw rate", "lateral_speed": "lateral speed"}
 
 
-def _p(text: str) -> str:
-    return f"<p>{escape(text)}</p>\n"
+def _picture(figure: Any, alt: str, caption: str) -> PictureBlock:
+    return PictureBlock(bytes_of(figure), alt, caption)
 
 
-def effects(content: ReportContent) -> str:
+def _models(content: ReportContent) -> tuple[str, ...]:
+    words = content.wording
+    return (words.first_model, words.last_model) if content.evidence.improved else (words.first_model,)
+
+
+def _held_out_first(content: ReportContent) -> list[ShownManoeuvre]:
+    return sorted(content.manoeuvres, key=lambda one: not one.evidence.held_out)
+
+
+def effects(content: ReportContent) -> list[Block]:
     """Ranked effects, and the whole catalogue as a table."""
-    text = _p(
-        "Every effect of the catalogue was tried beside the plain model without refitting it. The score tells how "
-        "strongly the measurements ask for an effect; the expected change is its size if it were added, with a 95 % "
-        "interval; the absorption is the share of it that the plain model imitates already: near 100 % nothing can be "
-        "told. Coloured: effects that stood the refit; those of one colour and one set cannot be told apart."
+    first = content.wording.first_model
+    made: list[Block] = []
+    if any(row.tested for row in content.effects):
+        made.append(
+            _picture(
+                diagnosis_effects.draw_effects(content.effects),
+                diagnosis_effects.describe_effects(content.effects, first),
+                f"Effects with the highest scores beside the {first}.",
+            )
+        )
+    head = ("effect", "set", "verdict", "score", "p", "expected size ± 1 s.e.", "absorption", "why")
+    rows = [_effect_row(row) for row in content.effects]
+    return [*made, TableBlock("All effects of the catalogue, by score", head, rows, numeric=(3, 4, 6))]
+
+
+def _effect_row(row: EffectRow) -> tuple[str, ...]:
+    sizes = "; ".join(
+        # a value stays on one line
+        f"{change.name} = {with_error(change.value, change.std, change.unit)}".replace(" ", "\u00a0")
+        for change in row.changes
     )
-    if any(np.isfinite(one.score) for one in content.ranked):
-        drawn = diagnosis_effects.draw_effects(content.ranked)
-        text += figure(bytes_of(drawn), diagnosis_effects.describe_effects(content.ranked))
-    rows = [_effect_row(one) for one in content.ranked]
-    head = ("effect", "set", "verdict", "score", "p", "expected change", "absorption", "why")
-    return text + table(head, rows, "All effects of the catalogue, by score", numeric=(3, 4, 6))
-
-
-def _effect_row(one: RankedEffect) -> tuple[str, ...]:
-    tested = np.isfinite(one.score)
-    changes = "; ".join(f"{name} = {with_interval(value, std, unit)}" for name, value, std, unit in one.changes)
+    absorbed = f"{100.0 * row.absorption:.{1 if row.absorption < 0.995 else 3}f} %" if isfinite(row.absorption) else ""
     return (
-        *(one.title, one.set_id or "", _VERDICTS.get(one.verdict, one.verdict)),
-        f"{one.score:.1f}" if tested else "",
-        _p_value(one.p_adjusted) if tested else "",
-        changes if tested else "",
-        f"{100.0 * one.absorption:.{1 if one.absorption < 0.995 else 3}f} %" if np.isfinite(one.absorption) else "",
-        one.why,
+        *(row.title, row.set_id, row.verdict),
+        f"{row.score:.1f}" if row.tested else "",
+        _p_value(row.p_adjusted) if row.tested else "",
+        sizes if row.tested else "",
+        absorbed,
+        row.why,
     )
 
 
 def _p_value(p: float) -> str:
-    return "below 0.0001" if p < 1e-4 else f"{p:.2g}"
+    return "< 0.0001" if p < 1e-4 else f"{p:.2g}"
 
 
-def ladder(content: ReportContent) -> str:
+def parameters(content: ReportContent) -> list[Block]:
+    """Parameters of the first model and of the last, with their standard errors."""
+    models = content.evidence.models
+    shown = (models[0], models[-1]) if content.evidence.improved else (models[0],)
+    values = [{one.name: with_error(one.value, one.std, one.unit) for one in model.parameters} for model in shown]
+    rows = [(name, *(column.get(name, "-") for column in values)) for name in values[-1]]
+    head = ("parameter", *(f"{name}, ± 1 s.e." for name in _models(content)))
+    unsure = [name for name, model in zip(_models(content), shown, strict=True) if not model.converged]
+    notes = [TextBlock(f"Not converged, the iterations allowed ran out: {name}.") for name in unsure]
+    caption = "Parameters in SI units, angles in degrees, value ± one standard error"
+    return [TableBlock(caption, head, rows, range(1, len(head))), *notes]
+
+
+def ladder(content: ReportContent) -> list[Block]:
     """Error ladder: figure and table."""
-    drawn = diagnosis_ladder.draw_ladder(content.ladder)
-    text = _p(
-        "Left: how far a free run, which takes no measurement in, strays, in percent of the motion. "
-        "Held-out manoeuvres were set aside before the first look and never fitted. Right: how strong the disturbances "
-        "must be for the model to hold; an effect that is real takes work off them."
+    models, first = content.evidence.models, content.wording.first_model
+    drawn = _picture(
+        diagnosis_ladder.draw_ladder(models, first),
+        diagnosis_ladder.describe_ladder(models, first),
+        "Free-run error by manoeuvre and its mean; disturbances that each model needs.",
     )
-    text += figure(bytes_of(drawn), diagnosis_ladder.describe_ladder(content.ladder))
-    names = list(content.ladder[0].intensities)
     rows = []
-    for number, rung in enumerate(content.ladder):
+    for number, model in enumerate(models):
         rows.append(
             (
-                *(str(number), rung.added if number == 0 else f"+ {rung.added}", str(rung.parameters)),
-                *(_mean(rung.in_sample), _mean(rung.held_out), f"{rung.log_likelihood:.1f}"),
-                *(f"{rung.intensities[name]:.3g}" for name in names),
+                *(str(number), f"+ {model.added}" if model.added else first, str(len(model.parameters))),
+                *(_error(model.fitted_error), _error(model.held_out_error, any_there=model.held_out_errors.size > 0)),
+                f"{model.log_likelihood:.1f}",
+                *(f"{level.intensity:.3g}" for level in model.disturbances),
             )
         )
-    head = ("step", "model", "parameters", "fitted, %", "held out, %", "log-likelihood", *names)
-    count = len(head)
-    text += table(head, rows, "Free-run error (mean over manoeuvres) and disturbances", (0, *range(2, count)))
-    return text + _caveat(content)
+    levels = [f"{level.name}, {level.unit}" for level in models[0].disturbances]
+    head = ("step", "model", "parameters", "fitted, %", "held out, %", "log-likelihood", *levels)
+    caption = "Free-run error (mean over manoeuvres, in percent of the motion) and disturbances"
+    return [drawn, TableBlock(caption, head, rows, (0, *range(2, len(head)))), *_caveats(content)]
 
 
-def _mean(values: np.ndarray) -> str:
-    if not values.size:
+def _error(share: float, *, any_there: bool = True) -> str:
+    if not any_there:
         return "none held out"
-    return f"{100.0 * float(np.mean(values)):.2f}" if np.all(np.isfinite(values)) else "runs away"
+    return f"{100.0 * share:.2f}" if isfinite(share) else "diverges"
 
 
-def _caveat(content: ReportContent) -> str:
+def _caveats(content: ReportContent) -> list[Block]:
     """Say plainly where held-out manoeuvres are few, or are predicted no better."""
-    first, last = content.ladder[0].held_out, content.ladder[-1].held_out
-    told = []
-    if 0 < first.size < 3:
-        told.append(
-            f"{'One manoeuvre is' if first.size == 1 else 'Two manoeuvres are'} held out: too few to tell a small "
-            "change of the held-out error from chance."
+    first, last = content.evidence.models[0], content.evidence.models[-1]
+    many = first.held_out_errors.size
+    made: list[Block] = []
+    if 0 < many < 3:
+        held = "One manoeuvre is" if many == 1 else "Two manoeuvres are"
+        made.append(
+            TextBlock(f"{held} held out: too few to distinguish a small change of the held-out error from chance.")
         )
-    if content.improved and first.size and float(np.mean(last)) > float(np.mean(first)):
-        told.append(
-            f"The held-out free run strays no less with the effects ({100 * np.mean(last):.2f} %) than without "
-            f"({100 * np.mean(first):.2f} %): the evidence lies in the likelihood of held-out measurements and in the "
-            "disturbances, not in this error."
+    if content.evidence.improved and last.held_out_error > first.held_out_error:
+        made.append(
+            TextBlock(
+                f"The held-out free-run error is no smaller with the effects ({_error(last.held_out_error)} %) than "
+                f"without ({_error(first.held_out_error)} %): the evidence lies in the likelihood of held-out "
+                "measurements and in the disturbances, not in this error."
+            )
         )
-    return "".join(_p(one) for one in told)
+    return made
 
 
-def prediction(content: ReportContent) -> str:
+def prediction(content: ReportContent) -> list[Block]:
     """Measured over predicted, held-out manoeuvres first, and fit % at every horizon."""
-    text = _p(
-        "Fit is 100 (1 - |y - ŷ| / |y - mean y|) in percent, 100 being perfect. Horizons: one step takes every "
-        "measurement in; 10 s and 60 s ahead go without for so long; the free run takes none in. The initial state and "
-        "a constant wind force and current of each free run are fitted to that manoeuvre, as few for every model; "
-        "at the other horizons the filter finds them on the way, which is why 60 s ahead may do worse than a free run."
-    )
-    text += _fit_table(content)
-    for view in sorted(content.runs, key=lambda one: not one.held_out):
-        text += f"<h3>{escape(view.label)} {badge(held_out=view.held_out)} horizon: free run</h3>\n"
-        drawn = diagnosis_overlay.draw_overlay(view)
-        text += figure(bytes_of(drawn), diagnosis_overlay.describe_overlay(view))
-    return text
+    first, last = content.wording.first_model, content.wording.last_model
+    made: list[Block] = [_fit_table(content)]
+    for one in _held_out_first(content):
+        made += [
+            HeadingBlock(one.label, SampleBadge(one.evidence.held_out)),
+            _picture(
+                diagnosis_overlay.draw_overlay(one.evidence, first, last),
+                diagnosis_overlay.describe_overlay(one.evidence, one.label, first, last),
+                f"{one.short}, measured over predicted, horizon free run; the rudder beneath.",
+            ),
+        ]
+    return made
 
 
-def _fit_table(content: ReportContent) -> str:
-    head = ["manoeuvre", "", "horizon"]
-    channels = [n for n in _NAMES if any(n in f for r in content.runs for f in r.plain.fit_percent.values())]
-    words = {name: CHANNELS[2 - k][0] for k, name in enumerate(_NAMES)}
-    models = ["plain", "with effects"] if content.improved else ["plain"]
-    head += [f"{words[name]}, {model}" for name in channels for model in models]
-    rows = []
-    for view in sorted(content.runs, key=lambda one: not one.held_out):
-        courses = [view.plain, view.full][: len(models)]
-        for horizon in view.plain.fit_percent:
-            row = [view.label.split(",")[0], badge(held_out=view.held_out), horizon]
+def _fit_table(content: ReportContent) -> TableBlock:
+    every = [fits for one in content.manoeuvres for fits in one.evidence.before.fit_percent.values()]
+    channels = [name for name in _CHANNELS if any(name in fits for fits in every)]
+    head = ["manoeuvre", "sample", "horizon"]
+    head += [f"{_CHANNELS[name]}, {model}" for name in channels for model in _models(content)]
+    rows: list[list[Cell]] = []
+    for one in _held_out_first(content):
+        predicted = [each for each in (one.evidence.before, one.evidence.after) if each is not None]
+        for horizon in one.evidence.before.fit_percent:
+            row: list[Cell] = [one.short, SampleBadge(one.evidence.held_out), horizon]
             for name in channels:
-                fits = [course.fit_percent.get(horizon, {}).get(name) for course in courses]
+                fits = [each.fit_percent.get(horizon, {}).get(name) for each in predicted]
                 row += ["" if fit is None else f"{fit:.1f}" for fit in fits]
             rows.append(row)
-    return table(head, rows, "Fit in percent", numeric=range(3, len(head)))
+    return TableBlock("Fit in percent, by horizon", head, rows, range(3, len(head)))
 
 
-def innovations(content: ReportContent) -> str:
-    """Innovation strips of all runs."""
-    text = _p(
-        "What each measurement tells beyond its prediction one step ahead, in standard deviations that the model gives "
-        "it: 95 of 100 belong between the dashed lines, without a pattern. Noise levels of a held-out manoeuvre are "
-        "the mean of the fitted ones. Points beyond 5 are drawn at the edge."
-    )
-    for view in content.runs:
-        text += f"<h3>{escape(view.label)} {badge(held_out=view.held_out)} horizon: one step</h3>\n"
-        text += figure(bytes_of(diagnosis_strip.draw_strip(view)), diagnosis_strip.describe_strip(view))
-    return text
+def innovations(content: ReportContent) -> list[Block]:
+    """One-step errors of all manoeuvres in time."""
+    first, last = content.wording.first_model, content.wording.last_model
+    made: list[Block] = []
+    for one in content.manoeuvres:
+        made += [
+            HeadingBlock(one.label, SampleBadge(one.evidence.held_out)),
+            _picture(
+                diagnosis_strip.draw_strip(one.evidence, first, last),
+                diagnosis_strip.describe_strip(one.evidence, one.label, first, last),
+                f"{one.short}, whitened innovations, horizon one step.",
+            ),
+        ]
+    return made
 
 
-def where(content: ReportContent) -> str:
-    """Where the model fails: phases, sides, what stands out, the worst stretches."""
-    text = _p(
-        "Root mean square of the whitened innovations, one step ahead, of fitted manoeuvres: 1 when a model is right. "
-        "The band is where it lies then with probability 99 %."
-    )
-    rows = []
-    for of, words in (("by_phase", "phase"), ("by_side", "side"), ("by_run", "manoeuvre")):
-        labels = {view.segment_id: view.label.split(",")[0] for view in content.runs}
-        for name, one in content.where_after[of].items():
-            if not one["n"]:
+def where(content: ReportContent) -> list[Block]:
+    """One-step errors by phase, side and manoeuvre; what stands out; the worst windows."""
+    places, names, rows = content.evidence.misfit, _names(content), []
+    for group, words in (("by_phase", "phase"), ("by_side", "side"), ("by_run", "manoeuvre")):
+        for name, last in places.after.get(group, {}).items():
+            if not last["n"]:
                 continue
-            last = _rms(one)
-            row = [words, labels.get(name, name.replace("_", " ")), str(one["n"])]
-            row += [_rms(content.where_before[of][name]), last] if content.improved else [last]
-            rows.append([*row, f"{one['band'][0]:.2f} to {one['band'][1]:.2f}", "outside" if one["outside"] else ""])
-    models = ["plain model", "with effects"] if content.improved else ["plain model"]
-    head = ["by", "", "innovations", *models, "band", ""]
-    text += table(head, rows, "Whitened innovations by phase, side and manoeuvre", range(2, 3 + len(models)))
-    stands = [
+            row = [words, names.get(name, name.replace("_", " ")), str(last["n"])]
+            row += [_rms(places.before[group][name]), _rms(last)] if content.evidence.improved else [_rms(last)]
+            rows.append([*row, f"{last['band'][0]:.2f} to {last['band'][1]:.2f}", "outside" if last["outside"] else ""])
+    head = ["by", "group", "innovations", *_models(content), "band", "outside"]
+    made: list[Block] = [TableBlock("Whitened innovations, root mean square", head, rows, range(2, len(head) - 2))]
+    standing = [
         (
             *(one["of"].removeprefix("by_").replace("_", " "), one["which"].replace("_", " ")),
             *(one["channel"].replace("_", " "), str(one["n"]), _rms(one), _p_value(one["p_adjusted"])),
         )
-        for one in content.where_after["stands_out"]
+        for one in places.after.get("stands_out", ())
     ]
-    if stands:
-        head = ["by", "which", "channel", "innovations", "rms", "p"]
-        text += table(head, stands, "What stands out under the last model, of all groups and bins", (3, 4, 5))
+    if standing:
+        head = ["by", "group", "channel", "innovations", "rms", "p"]
+        caption = f"Groups with the largest one-step errors under the {content.wording.last_model}"
+        made.append(TableBlock(caption, head, standing, (3, 4, 5)))
     else:
-        text += _p("No phase, side, manoeuvre or bin stands out under the last model.")
-    return text + _stretches(content)
+        made.append(TextBlock("No phase, side, manoeuvre or bin stands out under the last model."))
+    return [*made, _worst(content)]
 
 
-def _rms(one: Mapping[str, Any]) -> str:
-    return f"{one['whitened_rms']:.2f}"
+def _names(content: ReportContent) -> dict[str, str]:
+    return {one.evidence.segment_id: one.short for one in content.manoeuvres}
 
 
-def _stretches(content: ReportContent) -> str:
-    labels = {view.segment_id: view.label.split(",")[0] for view in content.runs}
-    rows = []
-    for sample in (content.where_held, content.where_after):
-        for one in sample.get("worst", ())[:10]:
+def _rms(group: Mapping[str, Any]) -> str:
+    return f"{group['whitened_rms']:.2f}"
+
+
+def _worst(content: ReportContent) -> TableBlock:
+    names, rows = _names(content), []
+    for places, held in ((content.evidence.misfit.held_out, True), (content.evidence.misfit.after, False)):
+        for one in places.get("worst", ())[:10]:
             size = (
                 f"{one['whitened_rms']:.1f} standard deviations"
                 if one["measure"] == "one step"
@@ -211,130 +247,155 @@ def _stretches(content: ReportContent) -> str:
             )
             rows.append(
                 (
-                    *(labels[one["run"]], badge(held_out=sample is content.where_held), one["measure"]),
-                    *(one["channel"].replace("_", " "), one["phase"].replace("_", " ")),
-                    *(f"{one['start_s']:.0f} to {one['end_s']:.0f}", one["start"], size),
+                    *(names[one["run"]], SampleBadge(held), one["measure"]),
+                    *(one["channel"].replace("_", " "), (one["phase"] or "").replace("_", " ")),
+                    *(f"{one['start_s']:.0f} to {one['end_s']:.0f}", _clock(one["start"]), size),
                 )
             )
-    head = ("manoeuvre", "", "horizon", "channel", "phase", "s", "begins, UTC", "rms")
-    return table(head, rows, "The worst stretches, to look at in the logs")
+    head = ("manoeuvre", "sample", "horizon", "channel", "phase", "time, s", "begins, UTC", "rms error")
+    return TableBlock("The windows with the largest errors, to look at in the logs", head, rows)
 
 
-def correlations(content: ReportContent) -> str:
+def _clock(iso: str) -> str:
+    return iso[:19].replace("T", " ")
+
+
+def correlations(content: ReportContent) -> list[Block]:
     """Auto- and cross-correlations, fitted manoeuvres alone."""
-    runs = [view for view in content.runs if not view.held_out]
-    text = _p(
-        f"Over the {len(runs)} fitted manoeuvres. If a model is right, its innovations know nothing of their past, "
-        "nor of rudder, heading, speed or wind: 99 of 100 values lie in the grey band, 2.58 / √N."
+    places, improved = content.evidence.misfit, content.evidence.improved
+    if not places.before or not places.after:
+        return []
+    before, after = places.before["correlations"], places.after["correlations"]
+    words = content.wording
+    drawn = diagnosis_correlations.draw_correlations(
+        before, after, words.first_model, words.last_model, improved=improved
     )
-    before, after = content.where_before["correlations"], content.where_after["correlations"]
-    drawn = diagnosis_correlations.draw_correlations(before, after, improved=content.improved)
-    text += figure(bytes_of(drawn), diagnosis_correlations.describe_correlations(after))
+    caption = "Correlations of the innovations (rows) with themselves and with the inputs (columns)."
+    picture = _picture(drawn, diagnosis_correlations.describe_correlations(after), caption)
     first, last = diagnosis_correlations.pairs(before), diagnosis_correlations.pairs(after)
     rows = []
     for key, one in last.items():
         row = [key[0].replace("_", " "), diagnosis_correlations.WORDS[key[1]], str(len(one["lag_s"]))]
-        row += [str(first[key]["outside"]), str(one["outside"])] if content.improved else [str(one["outside"])]
+        row += [str(first[key]["outside"]), str(one["outside"])] if improved else [str(one["outside"])]
         rows.append([*row, f"{one['largest']:+.3f} at {one['largest_lag_s']:.0f} s", f"{one['band']:.3f}"])
-    models = ["outside, plain", "outside, with effects"] if content.improved else ["outside"]
-    head = ["innovation of", "with", "lags", *models, "largest", "band"]
-    return text + table(head, rows, "Lags outside the band", numeric=range(2, len(head)))
+    outside = [f"outside, {model}" for model in _models(content)]
+    head = ["innovation of", "with", "lags", *outside, "largest", "band"]
+    return [picture, TableBlock("Lags outside the band", head, rows, numeric=range(2, len(head)))]
 
 
-def added_variables(content: ReportContent) -> str:
+def added_variables(content: ReportContent) -> list[Block]:
     """Added-variable plots."""
-    if not content.added_variables:
-        return ""
-    which = "each effect that was added" if content.improved else "the effect that came nearest, which was not added"
-    text = _p(
-        f"For {which}: what is left of the innovations against what the effect would explain of them, without what "
-        "the fitted parameters can imitate. Points along the line are evidence; a cloud about the level is none."
-    )
-    drawn = diagnosis_added_variable.draw_added_variable(content.added_variables)
-    return text + figure(bytes_of(drawn), diagnosis_added_variable.describe_added_variable(content.added_variables))
+    shown = content.evidence.added_variables
+    if not shown:
+        return []
+    return [
+        _picture(
+            diagnosis_added_variable.draw_added_variable(shown),
+            diagnosis_added_variable.describe_added_variable(shown),
+            "Added-variable plot: what is left of the innovations over what the effect would explain.",
+        )
+    ]
 
 
-def confusion(content: ReportContent) -> str:
-    """Confusion map."""
-    if len(content.names) < 2:
-        return ""
-    text = _p(
-        "How much of what one effect would explain another would explain alike, for the highest scores beside the "
-        "plain model. Dark pairs cannot be told apart by these manoeuvres."
-    )
-    drawn = diagnosis_confusion.draw_confusion(content.names, content.alike)
-    text += figure(bytes_of(drawn), diagnosis_confusion.describe_confusion(content.names, content.alike))
-    apart = [one for one in content.ranked if one.set_id and one.separated_by]
-    if apart:
-        rows = [(one.set_id or "", one.title, one.refitted, one.separated_by) for one in apart]
-        text += table(("set", "effect", "refitted", "told apart by"), rows, "Effects that stood the refit, by set")
-    return text
-
-
-def missing_force(content: ReportContent) -> str:
-    """Missing force and moment."""
-    text = _p(
-        "What the disturbances must lend the model at every instant, given all measurements, less the mean of "
-        "each run: dots, with medians and quartiles over bins. A slope or a bend against one of these is the shape of "
-        "the force that the model lacks; where the model has it, nothing but a level cloud is left."
-    )
-    before, after = content.missing_before, content.missing_after if content.improved else content.missing_before
-    drawn = diagnosis_missing_force.draw_missing_force(before, after)
-    return text + figure(bytes_of(drawn), diagnosis_missing_force.describe_missing_force(before, after))
-
-
-def coverage(content: ReportContent) -> str:
-    """Coverage maps."""
-    text = _p("Outside of what was sailed, the model is an extrapolation.")
-    drawn = diagnosis_coverage.draw_coverage(content.runs)
-    return text + figure(bytes_of(drawn), diagnosis_coverage.describe_coverage(content.runs))
-
-
-def zigzags(content: ReportContent) -> str:
-    """Zigzag plots, overshoots measured and predicted, criteria."""
-    text = ""
-    for view in content.runs:
-        text += f"<h3>{escape(view.label)} {badge(held_out=view.held_out)}</h3>\n"
-        text += figure(bytes_of(diagnosis_zigzag.draw_zigzag(view)), diagnosis_zigzag.describe_zigzag(view))
-        text += _overshoots(content, view.segment_id)
+def confusion(content: ReportContent) -> list[Block]:
+    """Confusion map, and how to distinguish what is claimed."""
+    confused = content.evidence.confusion
+    if len(confused.titles) < 2:
+        return []
+    made: list[Block] = [
+        _picture(
+            diagnosis_confusion.draw_confusion(confused),
+            diagnosis_confusion.describe_confusion(confused),
+            "Confusion map, in percent: 100 where two effects would explain the same.",
+        )
+    ]
     rows = []
-    for view in content.runs:
-        for name, one in view.imo.items():
-            said = {True: "met", False: "not met", None: "not applicable"}[one.get("passed")]
-            rows.append(
-                (
-                    *(view.label.split(",")[0], name, _degrees(one.get("value_deg")), _degrees(one.get("limit_deg"))),
-                    *(said, one.get("why") or ""),
-                )
+    for one in content.sets:
+        for name in one["effects"]:
+            candidate = content.evidence.candidates[name]
+            sizes = "; ".join(
+                f"{p.name.rpartition('.')[2]} = {with_error(p.value, p.std, p.unit)}" for p in candidate.refitted
             )
-    head = ("manoeuvre", "criterion", "measured, deg", "limit, deg", "", "why not")
-    return text + table(head, rows, "Criteria of IMO resolution MSC.137(76), 5.3.3", numeric=(2, 3))
+            rows.append((one["set_id"], name.replace("_", " "), sizes, candidate.separated_by))
+    if rows:
+        head = ("set", "effect", "refitted, ± 1 s.e.", "distinguished by")
+        made.append(TableBlock("Effects that the refit confirmed, by confusion set", head, rows))
+    return made
 
 
-def _overshoots(content: ReportContent, segment_id: str) -> str:
-    view = next(one for one in content.runs if one.segment_id == segment_id)
+def unmodelled(content: ReportContent) -> list[Block]:
+    """Unmodelled acceleration."""
+    shown = content.evidence.unmodelled_before, content.evidence.unmodelled_after
+    names = content.wording.first_model, content.wording.last_model
+    return [
+        _picture(
+            diagnosis_unmodelled.draw_unmodelled(*shown, *names),
+            diagnosis_unmodelled.describe_unmodelled(*shown, *names),
+            "Unmodelled acceleration over lateral speed, yaw rate, rudder and heading; medians and quartiles.",
+        )
+    ]
+
+
+def coverage(content: ReportContent) -> list[Block]:
+    """Coverage maps."""
+    return [
+        _picture(
+            diagnosis_coverage.draw_coverage([one.evidence for one in content.manoeuvres]),
+            diagnosis_coverage.describe_coverage(content.evidence.ranges),
+            "Motion, rudder and speed of all manoeuvres.",
+        )
+    ]
+
+
+def zigzags(content: ReportContent) -> list[Block]:
+    """Zigzag plots, overshoots measured and predicted, criteria."""
+    first, last = content.wording.first_model, content.wording.last_model
+    made: list[Block] = []
+    for one in content.manoeuvres:
+        allowed = diagnosis_zigzag.limits(one.imo)
+        made += [
+            HeadingBlock(one.label, SampleBadge(one.evidence.held_out)),
+            _picture(
+                diagnosis_zigzag.draw_zigzag(one.evidence, one.psi0_deg, allowed, first, last),
+                diagnosis_zigzag.describe_zigzag(one.evidence, one.label),
+                f"{one.short}: heading from the base course, measured and predicted in free run, and rudder.",
+            ),
+            *_overshoots(content, one),
+        ]
     rows = []
-    for k, one in enumerate(view.plain.overshoots):
-        side = "starboard" if one.side > 0 else "port"
-        row = [str(one.number), side, f"{one.measured_deg:.1f}", _degrees(one.predicted_deg)]
-        if content.improved:
-            row.append(_degrees(view.full.overshoots[k].predicted_deg))
-        rows.append(row)
+    for one in content.manoeuvres:
+        for name, criterion in one.imo.items():
+            said = {True: "met", False: "not met", None: "not applicable"}[criterion.get("passed")]
+            value, limit = _degrees(criterion.get("value_deg")), _degrees(criterion.get("limit_deg"))
+            rows.append((one.short, name, value, limit, said, criterion.get("why") or ""))
+    head = ("manoeuvre", "criterion", "measured, deg", "limit, deg", "result", "why not")
+    return [*made, TableBlock("Criteria of IMO resolution MSC.137(76), 5.3.3", head, rows, numeric=(2, 3))]
+
+
+def _overshoots(content: ReportContent, one: ShownManoeuvre) -> list[Block]:
+    predicted = [each.overshoots for each in (one.evidence.before, one.evidence.after) if each is not None]
+    measured = next((pairs for pairs in predicted if pairs), ())
+    rows = []
+    for k, pair in enumerate(measured):
+        side = "starboard" if pair.side > 0 else "port"
+        columns = [_degrees(pairs[k].predicted_deg) if pairs else "diverges" for pairs in predicted]
+        rows.append((str(pair.number), side, f"{pair.measured_deg:.1f}", *columns))
     if not rows:
-        return ""
-    head = ["overshoot", "side", "measured, deg", "plain model, deg"] + ["with effects, deg"] * content.improved
-    return table(head, rows, "Overshoots, measured and predicted (free run)", numeric=(0, *range(2, len(head))))
+        return []
+    head = ("overshoot", "side", "measured, deg", *(f"{name}, deg" for name in _models(content)))
+    caption = f"{one.short}: overshoots, measured and predicted in free run"
+    return [TableBlock(caption, head, rows, numeric=(0, *range(2, len(head))))]
 
 
 def _degrees(value: float | None) -> str:
-    return "" if value is None else f"{value:.1f}"
+    return "" if value is None or not isfinite(value) else f"{value:.1f}"
 
 
-def provenance(content: ReportContent) -> str:
+def provenance(content: ReportContent) -> list[Block]:
     """List inputs, versions and settings."""
     rows = list(content.provenance)
     rows += [
-        (f"{view.label.split(',')[0]}, {'held out' if view.held_out else 'fitted'}", f"{view.segment_id} of {view.log}")
-        for view in content.runs
+        (f"{one.short}, {SampleBadge(one.evidence.held_out).text}", f"{one.evidence.segment_id} of {one.log}")
+        for one in content.manoeuvres
     ]
-    return table(("what", "which"), rows, "Inputs, versions and settings")
+    return [TableBlock("Inputs, versions and settings", ("what", "which"), rows)]

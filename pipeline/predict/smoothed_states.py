@@ -19,8 +19,8 @@ from kempf.pipeline.predict.free_run import FreeRun
 _V, _R, _PSI, _F, _M, _C1, _C2, _B = range(8)
 
 
-def smoothed(filtered: Filtered, point: Point, free: FreeRun) -> Float:
-    """Return v, r, F and M at every instant given all measurements, shape (n, 4), SI; NaN where the ship runs away.
+def smoothed_states(filtered: Filtered, point: Point, free: FreeRun) -> Float:
+    """Return v, r, F and M at every instant given all measurements, shape (n, 4), SI; NaN where the free run diverges.
 
     Parameters
     ----------
@@ -32,7 +32,7 @@ def smoothed(filtered: Filtered, point: Point, free: FreeRun) -> Float:
     """
     run = filtered.run
     if not np.all(np.isfinite(free.predicted)):
-        # a ship that runs away departs from nothing
+        # no free run to depart from
         return np.full((run.measured.shape[0], 4), np.nan)
     found = smooth(_departures(filtered, point, free.error)).mean
     force, moment = free.constants[_F], free.constants[_M]

@@ -1,0 +1,182 @@
+"""From a diagnosis to all that its report shows: every number and curve, nothing drawn."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from concurrent.futures import Executor
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.added_variable import added_variables
+from kempf.pipeline.diagnose.confusion_sets import ALIKE, alike
+from kempf.pipeline.diagnose.diagnosis import Diagnosis, Step
+from kempf.pipeline.diagnose.judged_run import JudgedRun, judged_fitted, judged_held_out
+from kempf.pipeline.diagnose.manoeuvre_evidence import SailedZigzag, manoeuvre_evidence
+from kempf.pipeline.diagnose.misfit import misfit_of
+from kempf.pipeline.diagnose.unmodelled_acceleration import unmodelled_acceleration
+from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.predict.run_residuals import PhaseInterval
+from kempf.pipeline.predict.smoothed_states import smoothed_states
+from kempf.schemas.diagnosis_evidence import (
+    CandidateEffect,
+    ConfusionMap,
+    DiagnosisEvidence,
+    DisturbanceLevel,
+    FittedModel,
+    FittedParameter,
+    ManoeuvreEvidence,
+    MisfitPlaces,
+)
+from kempf.schemas.model_spec import HULL_PARAMETERS
+
+#: effects in the confusion map
+_MAPPED = 14
+_DISTURBANCES = (
+    ("lateral disturbance force", "m/s² per √s"),
+    ("disturbance moment", "rad/s² per √s"),
+    ("current", "m/s per √s"),
+)
+
+
+def evidence_of(
+    diagnosis: Diagnosis,
+    phases: Mapping[str, Sequence[PhaseInterval]],
+    zigzags: Mapping[str, SailedZigzag],
+    left_out: Mapping[str, str],
+    workers: Executor,
+) -> DiagnosisEvidence:
+    """Gather what a report shows of a diagnosis.
+
+    Parameters
+    ----------
+    diagnosis : Diagnosis
+    phases : mapping of str to sequence of PhaseInterval
+        By run; a run without has none.
+    zigzags : mapping of str to SailedZigzag
+        By run.
+    left_out : mapping of str to str
+        Why a segment was not used, by its id.
+    workers : Executor
+        Manoeuvres share it; nothing depends on it.
+    """
+    first, last = diagnosis.steps[0], diagnosis.steps[-1]
+    before = _Judged(first, diagnosis, phases, workers.map)
+    after = before if last is first else _Judged(last, diagnosis, phases, workers.map)
+    held = {run.name for run in diagnosis.held}
+
+    def shown(number: int) -> ManoeuvreEvidence:
+        judged = before.all[number]
+        name = judged.residuals.filtered.run.name
+        other = None if after is before else after.all[number]
+        return manoeuvre_evidence(judged, other, after.states[number], zigzags[name], held_out=name in held)
+
+    manoeuvres = sorted(workers.map(shown, range(len(before.all))), key=lambda one: (one.start_utc_ns, one.segment_id))
+    return DiagnosisEvidence(
+        models=tuple(_model(step, first) for step in diagnosis.steps),
+        candidates=_candidates(diagnosis),
+        confusion=_confusion(first),
+        added_variables=added_variables(diagnosis),
+        unmodelled_before=unmodelled_acceleration(before.runs, before.states),
+        unmodelled_after=None if after is before else unmodelled_acceleration(after.runs, after.states),
+        manoeuvres=tuple(manoeuvres),
+        ranges=_ranges(manoeuvres),
+        misfit=MisfitPlaces(
+            before=misfit_of(before.fitted), after=misfit_of(after.fitted), held_out=misfit_of(after.held_out)
+        ),
+        left_out=dict(left_out),
+    )
+
+
+class _Judged:
+    """All manoeuvres under one model, with their states given all measurements."""
+
+    def __init__(
+        self,
+        step: Step,
+        diagnosis: Diagnosis,
+        phases: Mapping[str, Sequence[PhaseInterval]],
+        each: Callable[[Callable[[JudgedRun], Float], Sequence[JudgedRun]], Iterable[Float]],
+    ) -> None:
+        self.fitted = judged_fitted(step, phases)
+        self.held_out = judged_held_out(step, diagnosis.held, phases)
+        self.all = (*self.fitted, *self.held_out)
+        self.runs = tuple(one.residuals.filtered.run for one in self.all)
+        self.states = tuple(
+            each(lambda one: smoothed_states(one.residuals.filtered, one.point, one.residuals.free), self.all)
+        )
+
+
+def fitted_parameters(fit: Fit) -> tuple[FittedParameter, ...]:
+    """Return the parameters of hull and effects with their standard errors.
+
+    Parameters
+    ----------
+    fit : Fit
+    """
+    names = [*HULL_PARAMETERS, *fit.model.names]
+    units = [*HULL_PARAMETERS.values(), *(parameter.unit for _, parameter in fit.model.parameters)]
+    values = np.concatenate([fit.hull, fit.values])
+    return tuple(
+        FittedParameter(name=name, unit=unit, value=float(value), std=float(std))
+        for name, unit, value, std in zip(names, units, values, fit.std, strict=True)
+    )
+
+
+def _model(step: Step, first: Step) -> FittedModel:
+    used = np.any([one.levels_used()[:3] for one in step.fit.runs], axis=0)
+    intensities = zip(_DISTURBANCES, step.intensities, first.intensities, used, strict=True)
+    fitted = np.array([run.relative_error for run in step.fitted])
+    held_out = np.array([run.relative_error for run in step.held])
+    return FittedModel(
+        effects=tuple(effect.title for effect in step.fit.model.effects),
+        added="" if step is first or step.added is None else step.added.title,
+        parameters=fitted_parameters(step.fit),
+        fitted_errors=fitted,
+        held_out_errors=held_out,
+        fitted_error=float(np.mean(fitted)),
+        held_out_error=float(np.mean(held_out)) if held_out.size else None,
+        disturbances=tuple(
+            DisturbanceLevel(name=name, unit=unit, intensity=float(level), share=float(level / base))
+            for (name, unit), level, base, there in intensities
+            if there
+        ),
+        log_likelihood=step.fit.log_likelihood,
+        converged=step.fit.converged,
+    )
+
+
+def _candidates(diagnosis: Diagnosis) -> dict[str, CandidateEffect]:
+    refitted: dict[str, tuple[str, tuple[FittedParameter, ...]]] = {}
+    for number, step in enumerate(diagnosis.steps[1:], start=1):
+        for candidate, one in step.chosen_from:
+            last = fitted_parameters(one.fit)[-len(candidate.effect.parameters) :]
+            refitted[candidate.effect.name] = (f"S{number}", last)
+    found = {}
+    for candidate in diagnosis.steps[0].screened:
+        set_id, parameters = refitted.get(candidate.effect.name, ("", ()))
+        found[candidate.effect.name] = CandidateEffect(
+            separated_by=candidate.effect.separated_by,
+            missing_channels=candidate.missing,
+            set_id=set_id,
+            refitted=parameters,
+        )
+    return found
+
+
+def _confusion(first: Step) -> ConfusionMap:
+    shown = [one for one in first.screened if one.direction.size][:_MAPPED]
+    return ConfusionMap(
+        titles=tuple(one.effect.title for one in shown),
+        squared_cosine=np.array([[alike(a, b) for b in shown] for a in shown]).reshape(len(shown), len(shown)),
+        threshold=ALIKE,
+    )
+
+
+def _ranges(manoeuvres: Sequence[ManoeuvreEvidence]) -> dict[str, tuple[float, float]]:
+    found = {}
+    for name in ("drift", "turn", "rudder", "speed"):
+        every = np.concatenate([getattr(one, name) for one in manoeuvres])
+        known = every[np.isfinite(every)]
+        found[name] = (float(np.min(known)), float(np.max(known))) if known.size else (np.nan, np.nan)
+    return found

@@ -1,0 +1,81 @@
+"""The manoeuvres of a diagnosis under one of its models: filtered with their own noise levels, and in free run."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kempf.pipeline.diagnose.diagnosis import Step
+from kempf.pipeline.estimate import sensitivity
+from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.levels import fit_levels
+from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
+
+
+@dataclass(frozen=True, eq=False)
+class JudgedRun:
+    """One manoeuvre under one model.
+
+    Attributes
+    ----------
+    point : Point
+        Parameters of the model, with noise levels fitted to this manoeuvre, held out or not: a noisier sensor is no
+        misfit.
+    residuals : Looked
+        One step ahead and in free run.
+    """
+
+    point: Point
+    residuals: Looked
+
+    @property
+    def settles(self) -> bool:
+        """Whether the filter follows the measurements at all."""
+        return bool(np.isfinite(self.residuals.passed.log_likelihood))
+
+
+def judged_fitted(step: Step, phases: Mapping[str, Sequence[PhaseInterval]]) -> tuple[JudgedRun, ...]:
+    """Return the fitted manoeuvres under the model of a step.
+
+    Parameters
+    ----------
+    step : Step
+    phases : mapping of str to sequence of PhaseInterval
+        By run; a run without has none.
+    """
+    fit = step.fit
+    return tuple(
+        JudgedRun(
+            Point(fit.hull, fit.values, levels),
+            Looked(filtered, line.passed, free, tuple(phases.get(filtered.run.name, ()))),
+        )
+        for filtered, levels, line, free in zip(fit.runs, fit.levels, fit.linearised, step.fitted, strict=True)
+    )
+
+
+def judged_held_out(
+    step: Step, held: Sequence[Run], phases: Mapping[str, Sequence[PhaseInterval]]
+) -> tuple[JudgedRun, ...]:
+    """Return the held-out manoeuvres under the model of a step.
+
+    Parameters
+    ----------
+    step : Step
+    held : sequence of Run
+        In the order of ``step.held``.
+    phases : mapping of str to sequence of PhaseInterval
+        By run; a run without has none.
+    """
+    fit, made = step.fit, []
+    usual = np.mean(fit.levels, axis=0)
+    for run, free in zip(held, step.held, strict=True):
+        filtered = Filtered(run, fit.model, fit.runs[0].spec)
+        levels = fit_levels(filtered, fit.hull, fit.values, usual).levels
+        point = Point(fit.hull, fit.values, levels)
+        passed = sensitivity.passed(filtered, point)
+        made.append(JudgedRun(point, Looked(filtered, passed, free, tuple(phases.get(run.name, ())))))
+    return tuple(made)

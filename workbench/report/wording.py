@@ -1,0 +1,245 @@
+"""The words of a report, all of one verdict: headline, advice, names of the models, titles and leads of the sections.
+
+Nothing else in the report says what the model lacks: only ``explained`` and ``ambiguous`` claim an effect.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from shlex import quote
+from typing import Any
+
+from kempf.schemas.diagnosis_evidence import DiagnosisEvidence
+
+#: the verdicts that claim an effect
+CLAIMING = ("explained", "ambiguous")
+_EFFECT_VERDICTS = {
+    "present": "present",
+    "negligible": "too small to matter",
+    "not_testable": "cannot be tested",
+    "absent": "not confirmed",
+}
+
+
+@dataclass(frozen=True)
+class SectionWords:
+    """Title and lead of a section.
+
+    Attributes
+    ----------
+    title, lead : str
+    """
+
+    title: str
+    lead: str
+
+
+@dataclass(frozen=True)
+class ReportWording:
+    """What a report says, from its verdict.
+
+    Attributes
+    ----------
+    verdict : str
+    title, headline : str
+    findings, next_steps : tuple of str
+        Next steps with the most useful first.
+    first_model, last_model : str
+        What the first and the last model of the ladder are called.
+    sections : mapping of str to SectionWords
+        By the anchor of the section, in order.
+    """
+
+    verdict: str
+    title: str
+    headline: str
+    findings: tuple[str, ...]
+    next_steps: tuple[str, ...]
+    first_model: str
+    last_model: str
+    sections: Mapping[str, SectionWords]
+
+    @property
+    def claims(self) -> bool:
+        """Whether an effect is claimed."""
+        return self.verdict in CLAIMING
+
+    def effect_verdict(self, verdict: str) -> str:
+        """Return what the report calls the verdict on one effect.
+
+        Parameters
+        ----------
+        verdict : str
+            As the diagnosis stores it.
+        """
+        if verdict == "present" and not self.claims:
+            return "not decided"
+        return _EFFECT_VERDICTS.get(verdict, verdict)
+
+
+def wording_of(
+    vessel: str, content: Mapping[str, Any], evidence: DiagnosisEvidence, included: Collection[str] = ()
+) -> ReportWording:
+    """Return the words of a report.
+
+    Parameters
+    ----------
+    vessel : str
+    content : mapping
+        The diagnosis under the command line's keys.
+    evidence : DiagnosisEvidence
+    included : collection of str
+        Names of the effects that the vessel's current model has already.
+    """
+    verdict = str(content["verdict"])
+    given = evidence.models[0].effects
+    first = f"model with {_listed(given)}" if given else "plain model"
+    last = ("model with effects" if verdict in CLAIMING else "model with effects tried") if evidence.improved else first
+    return ReportWording(
+        verdict=verdict,
+        title=f"{vessel}: diagnosis of the manoeuvring model",
+        headline=_headline(verdict, content, first),
+        findings=tuple(content["sentences"]),
+        next_steps=tuple(_next_steps(vessel, verdict, content, evidence, included)),
+        first_model=first,
+        last_model=last,
+        sections=_sections(verdict, evidence, first, last),
+    )
+
+
+def _headline(verdict: str, content: Mapping[str, Any], first: str) -> str:
+    titles = _titles(content)
+    effects = " and ".join(" or ".join(titles[name] for name in group["effects"]) for group in content["sets"])
+    return {
+        "insufficient_data": "Not decided: too few manoeuvres to distinguish an effect from chance.",
+        "adequate": f"The {first} is adequate: no effect that was tried predicts unfitted manoeuvres better.",
+        "explained": f"The {first} lacks {effects}. With it included, no systematic misfit remains.",
+        "ambiguous": f"The {first} lacks {effects}; these data cannot distinguish between them.",
+        "unexplained": f"Not explained: a systematic misfit of the {first} remains that no known effect accounts for.",
+    }[verdict]
+
+
+def _next_steps(
+    vessel: str, verdict: str, content: Mapping[str, Any], evidence: DiagnosisEvidence, included: Collection[str]
+) -> list[str]:
+    name, titles, steps = quote(vessel), _titles(content), []
+    if verdict == "insufficient_data":
+        steps.append("Sail at least three zigzags, to both sides, at two rudder angles and on two headings.")
+    if verdict == "unexplained":
+        steps.append(
+            "See where the misfit remains: one-step errors, correlations and unmodelled acceleration below. Then try a "
+            f'term of your own: kempf effects try "yaw: r*abs(r)" --vessel {name}.'
+        )
+    for group in content["sets"] if verdict in CLAIMING else ():
+        there = [effect for effect in group["effects"] if effect in included]
+        if there:
+            steps.append(f"Nothing to include: the current model has {titles[there[0]]} already.")
+        else:
+            steps.append(f"Include it in the model: kempf effects add {group['effects'][0]} --vessel {name}.")
+        if len(group["effects"]) > 1:
+            alike = _listed([titles[effect] for effect in group["effects"]])
+            steps.append(f"To distinguish {alike}: {_sentence(group['separated_by'])}")
+    if verdict == "adequate":
+        steps.append("Use the model as it is, with the standard errors of its parameters.")
+    untested: dict[str, list[str]] = {}
+    for candidate in content["candidates"]:
+        missing = evidence.candidates[candidate["effect"]].missing_channels
+        if missing and candidate["verdict"] == "not_testable":
+            channels = _listed([channel.replace("_", " ") for channel in missing])
+            untested.setdefault(channels, []).append(candidate["title"])
+    steps += [f"Log {channels}: without it {_listed(names)} cannot be tested." for channels, names in untested.items()]
+    if verdict != "insufficient_data" and not evidence.models[0].held_out_errors.size:
+        steps.append("Sail one manoeuvre more: three are needed to hold one out and judge the prediction by it.")
+    return steps
+
+
+def _sections(verdict: str, evidence: DiagnosisEvidence, first: str, last: str) -> dict[str, SectionWords]:
+    claims, improved = verdict in CLAIMING, evidence.improved
+    fitted = sum(not one.held_out for one in evidence.manoeuvres)
+    coloured = (
+        "Coloured: effects that the refit confirmed; those of one colour and one set cannot be distinguished."
+        if claims
+        else "No effect is claimed, so none is coloured."
+    )
+    return {
+        "effects": SectionWords(
+            "Effects that are missing" if claims else "Effects that were tried",
+            f"Every effect of the catalogue was tried beside the {first} without refitting it. The score is the "
+            "evidence for an effect; the expected size, ± 1 s.e., is what it would be if it were included; the "
+            f"absorption is the share of it that the {first} imitates already: near 100 % it cannot be tested. "
+            f"{coloured}",
+        ),
+        "parameters": SectionWords(
+            "Parameters",
+            "Hull derivatives of eq. (16), divided by powers of the speed, and the parameters of the effects: "
+            "value ± 1 s.e. (one standard error, with the noise levels unknown).",
+        ),
+        "ladder": SectionWords(
+            ("What including them brings" if claims else "Errors with the effects tried")
+            if improved
+            else f"Errors of the {first}",
+            "Left: error of a free run, which takes no measurement in, in percent of the motion. Held-out manoeuvres "
+            "were set aside before the first fit. Right: how strong the disturbances must be for the model to hold; "
+            "they fall where an effect accounts for what they had to explain before.",
+        ),
+        "prediction": SectionWords(
+            "Measured over predicted",
+            "Fit is 100 (1 - |y - ŷ| / |y - mean y|) in percent, 100 being perfect. Horizons: one step takes every "
+            "measurement in; 10 s and 60 s ahead go without for so long; the free run takes none in. The initial "
+            "state and a constant wind force and current of each free run are fitted to that manoeuvre, as few for "
+            "every model; at the other horizons the filter estimates them on the way, which is why 60 s ahead may do "
+            "worse than a free run.",
+        ),
+        "innovations": SectionWords(
+            "One-step errors in time",
+            "Each measurement less its prediction one step ahead, in standard deviations of that prediction: 95 of 100 "
+            "belong between the dashed lines, without a pattern. Points beyond 5 are drawn at the edge.",
+        ),
+        "where": SectionWords(
+            "One-step errors by phase, side and manoeuvre",
+            "Root mean square of the whitened innovations of fitted manoeuvres: 1 when a model is right. The band is "
+            "where it lies then with probability 99 %.",
+        ),
+        "correlations": SectionWords(
+            "Correlations of the one-step errors",
+            f"Over the {fitted} fitted manoeuvre{'s' * (fitted != 1)}. If a model is right, its innovations are "
+            "uncorrelated with their past and with rudder, heading, speed and wind: 99 of 100 values lie in the grey "
+            "band, 2.58 / √N.",
+        ),
+        "added": SectionWords(
+            "The evidence, point by point",
+            f"For {'each effect that was added' if improved else 'the strongest candidate, which was not added'}: what "
+            "is left of the innovations against what the effect would explain of them, without what the fitted "
+            "parameters can imitate. Points along the line are evidence; a cloud about the level is none.",
+        ),
+        "confusion": SectionWords(
+            "Effects that look alike",
+            "How much of what one effect would explain another would explain alike, for the highest scores beside the "
+            f"{first}. Pairs near 100 % cannot be distinguished by these manoeuvres.",
+        ),
+        "force": SectionWords(
+            "Unmodelled sway and yaw acceleration",
+            "What must act on the ship beside the model at every instant, given all measurements, less the mean of "
+            "each manoeuvre: dots, with medians and quartiles over bins. A slope or a bend is the shape of a force "
+            "that is not in the model; a level cloud is disturbance alone.",
+        ),
+        "coverage": SectionWords("What the manoeuvres cover", "Beyond it, the model extrapolates."),
+        "zigzags": SectionWords(
+            "Zigzags and the IMO criteria",
+            "Heading as measured and as the free run predicts it on the logged rudder. Overshoots are those measured.",
+        ),
+        "provenance": SectionWords("Inputs, versions and settings", "What this report was made from."),
+    }
+
+
+def _titles(content: Mapping[str, Any]) -> dict[str, str]:
+    return {candidate["effect"]: candidate["title"] for candidate in content["candidates"]}
+
+
+def _sentence(text: str) -> str:
+    return text if text.endswith(".") else f"{text}."
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
