@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
@@ -180,9 +181,39 @@ def read_profiles(paths: Sequence[Path]) -> VesselProfile:
     Raises
     ------
     UsageError
-        One is no profile, or two disagree.
+        One is no profile, or two disagree. ``profile_draft``: a ``?`` of a draft is left in one.
     """
-    return profiles.merge([(str(p), profiles.parse(read_yaml(p, "vessel profile"), str(p))) for p in paths])
+    return profiles.merge([(str(p), profiles.parse(_completed(p), str(p))) for p in paths])
+
+
+def _completed(path: Path) -> Any:
+    """Return what a profile says, in which nothing is left of the ``?`` of a draft."""
+    content = read_yaml(path, "vessel profile")
+    if _has_guess(content):
+        text = read_bytes(path, "vessel profile").decode("utf-8", errors="replace")
+        lines = [
+            str(k) for k, line in enumerate(text.splitlines(), 1) if re.search(r"\?[\"']?\s*([,}#]|$)", _said(line))
+        ]
+        raise UsageError(
+            "profile_draft",
+            f"{path} is still a draft: a ? is left in line{'s' if len(lines) > 1 else ''} {', '.join(lines)}.",
+            "Correct what these lines say and delete the ?, or take the lines out.",
+            {"path": str(path), "lines": [int(line) for line in lines]},
+        )
+    return content
+
+
+def _said(line: str) -> str:
+    """Return a line without its comment."""
+    return re.sub(r"(^|\s)#.*", "", line)
+
+
+def _has_guess(content: Any) -> bool:
+    if isinstance(content, dict):
+        return any(_has_guess(value) for value in content.values())
+    if isinstance(content, list):
+        return any(_has_guess(value) for value in content)
+    return isinstance(content, str) and content.endswith("?")
 
 
 def read_model(path: Path) -> ModelSpec:

@@ -102,10 +102,10 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     return Decoded(rows, layout.rows, layout.rows, time, sources, ("row",), reason, channels, notes)
 
 
-def columns_found(data: bytes, source: Source | None) -> list[str]:
+def columns_found(data: bytes, source: Source | None, most: int | None = _SHOWN) -> list[str]:
     """Return the first names of columns that a file's header shows, for a person who writes its profile."""
     layout = _layout(data, source or Source(match="*"))
-    return list(layout.columns[:_SHOWN])
+    return list(layout.columns[:most])
 
 
 def _layout(data: bytes, source: Source) -> Layout:

@@ -136,7 +136,7 @@ def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source |
             "no_source_for_log",
             f"{name} is delimited text, for which the profile has {lacks}; "
             f"the columns found in it are {', '.join(repr(c) for c in found) or 'none'}.",
-            "Add a source to the profile with the time column and the channels. " + _TOLD,
+            f"`kempf profile draft {name}` writes a profile to complete: the time column and the channels. " + _TOLD,
             {"name": name, "columns": found, "patterns": [s.match for s in profile.sources]},
         )
     return delimited.decode(name, data, source)

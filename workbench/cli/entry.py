@@ -40,6 +40,7 @@ COMMANDS = {
     "reprocess": "Bring the whole fleet up to date with its profiles and the code.",
     "compact": "Put the many small files of the tables into few; delete what nothing refers to.",
     "vessels": "List vessels, show and set their profiles.",
+    "profile": "Draft the profile of a log that does not describe itself.",
     "logs": "List the logs, show what was rejected in one and why.",
     "demo": "Simulate a trial, ingest it, identify the ship and compare with the truth.",
     "reproduce-paper": "Repeat the paper's experiment: its figures, its accuracy beside ours.",
