@@ -77,6 +77,7 @@ def changed(folder: Path, change: Change) -> Path:
     """Copy the source and make one change in the copy."""
     for room in ROOMS:
         shutil.copytree(ROOT / room, folder / room)  # with what was compiled
+    shutil.copytree(ROOT / "kempf", folder / "kempf", symlinks=True)
     path = folder / change.file
     text = path.read_text(encoding="utf-8")
     if text.count(change.before) != 1:
