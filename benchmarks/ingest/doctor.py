@@ -84,11 +84,11 @@ def trap_rows(data: Path) -> list[list[str]]:
 
 
 def _mends(fault: dict[str, object]) -> tuple[object, ...]:
-    from kempf.pipeline.channels.doctor.corrections import Mend
+    from kempf.pipeline.channels.doctor.corrections import Correction
 
     entries = fault["entries"]
     assert isinstance(entries, dict)
-    return tuple(Mend(key, ChannelMap.model_validate(entry)) for key, entry in entries.items())
+    return tuple(Correction(key, ChannelMap.model_validate(entry)) for key, entry in entries.items())
 
 
 def lie_about(logs: Sequence[tuple[str, Log]]) -> tuple[dict[str, Score], float, float]:
@@ -145,7 +145,7 @@ def by_size(logs: Sequence[tuple[str, Log]]) -> dict[str, tuple[tuple[float, ...
     def share(kind: str, channel: str, value: float) -> float:
         hits = 0
         for _, log in logs:
-            lying = Fault(kind, (channel,), value, "turned" if kind == "offset" else "late").mended(log)  # type: ignore[arg-type]
+            lying = Fault(kind, (channel,), value, "turned" if kind == "offset" else "late").corrected(log)  # type: ignore[arg-type]
             hits += named(examine(lying), Told(lying, kind, (channel,)))[0]
         return hits / len(logs)
 

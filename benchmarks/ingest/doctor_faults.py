@@ -118,7 +118,7 @@ def _frame(prepare: Callable[[Log], Log], log: Log) -> Told:
     log = prepare(log)
     earth = ("velocity_north", "velocity_east")
     channels = earth if "velocity_north" in log.series else ("velocity_forward", "velocity_starboard")
-    lying = Fault("frame", channels).mended(log)
+    lying = Fault("frame", channels).corrected(log)
     other = ("velocity_forward", "velocity_starboard") if channels == earth else earth
     return Told(lying, "frame", other)
 

@@ -12,7 +12,7 @@ from kempf.flows.jobs.spool import spooled
 from kempf.pipeline.channels.doctor.corrections import entries
 from kempf.pipeline.channels.doctor.examine import Examination, examine
 from kempf.pipeline.channels.doctor.log import Log
-from kempf.pipeline.channels.doctor.verdict import told
+from kempf.pipeline.channels.doctor.verdict import as_content
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import logs, vessels
@@ -55,7 +55,7 @@ def examine_instruments(instruments: Instruments, profile: VesselProfile, file_n
     units = {channel: mapped.unit for channel, (_, mapped) in known.items()}
     log = Log.of(instruments, profile.length_m, units)
     found = examine(log)
-    return Examined(file_name, log_format, log, found, told(found, known, log_format))
+    return Examined(file_name, log_format, log, found, as_content(found, known, log_format))
 
 
 def examine_file(path: Path, profile: VesselProfile) -> Examined:

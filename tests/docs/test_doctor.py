@@ -12,6 +12,7 @@ from kempf.pipeline.channels.doctor import (
     misalignment,
     rudder_order,
     rudder_turn,
+    standstill,
     track,
     water_speed,
 )
@@ -19,7 +20,7 @@ from kempf.pipeline.channels.doctor.examine import examine
 from kempf.pipeline.channels.doctor.faults import Kind
 from kempf.pipeline.channels.doctor.outcome import SURE
 from tests.docs.console import follow
-from tests.doctor import made
+from tests.doctor import closed_form_ship
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "doctor.md").read_text(encoding="utf-8")
@@ -30,10 +31,10 @@ def test_the_example_runs_to_its_output(tmp_path: Path) -> None:
     assert (tmp_path / "ferry.png").stat().st_size > 10_000
 
 
-def test_every_check_is_told() -> None:
-    told = re.findall(r"`([a-z_.]+)`", TEXT.partition("| check |")[2].partition("\n\n")[0])
-    patterns = [name.replace(".", r"\.").replace(r"\.\.\.", r"[a-z_]*") for name in told]
-    for outcome in examine(made.log()).outcomes:
+def test_every_check_is_listed() -> None:
+    listed = re.findall(r"`([a-z_.]+)`", TEXT.partition("| check |")[2].partition("\n\n")[0])
+    patterns = [name.replace(".", r"\.").replace(r"\.\.\.", r"[a-z_]*") for name in listed]
+    for outcome in examine(closed_form_ship.log()).outcomes:
         assert any(re.fullmatch(pattern, outcome.check) for pattern in patterns), outcome.check
 
 
@@ -54,11 +55,13 @@ def test_thresholds_are_the_codes() -> None:
     assert f"within {track._ANGLES_DEG[1]:g} deg" in row("bearing_")
     assert f"within {rudder_turn._NEUTRAL_DEG:g} deg" in row("rudder_angle_")
     assert f"within {rudder_order._OFFSETS_DEG[1]:g} deg" in row("rudder_order_angle")
+    assert f"for {standstill._LEAST_S:.0f} s or more" in row("heading_standstill")
+    assert f"at most {standstill._TURN_DEG:g} deg" in row("heading_standstill")
     assert (SURE, heading_course.STREAM_SHARE) == (4.0, 1 / 8)
     assert f"{heading_course.STREAM_STD_M_S:g} m/s, or an eighth" in TEXT
 
 
-def test_every_kind_of_fault_is_told() -> None:
+def test_every_kind_of_fault_is_listed() -> None:
     table = TEXT.partition("| fault |")[2].partition("\n\n")[0]
     for kind in get_args(Kind):
         assert kind.replace("_", " ") in table, kind

@@ -11,16 +11,16 @@ from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.parameter_set_of import channel_warnings
 from kempf.warehouse import examinations, logs
 from kempf.warehouse.store import Warehouse
-from tests.doctor import made
+from tests.doctor import closed_form_ship
 from tests.workbench.driving import kempf
 
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     names = ("heading", "yaw_rate", "rudder_angle", "speed_over_ground", "course_over_ground")
-    (tmp_path / "made.csv").write_bytes(made.text(made.channels(*names)))
+    (tmp_path / "made.csv").write_bytes(closed_form_ship.text(closed_form_ship.channels(*names)))
     for name, spoilt in (("wrong", {"rudder": {"positive": "port"}}), ("right", {})):
-        content = made.profile(*names, **spoilt).model_dump(mode="json", exclude_defaults=True)
+        content = closed_form_ship.profile(*names, **spoilt).model_dump(mode="json", exclude_defaults=True)
         (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(content), encoding="utf-8")
     return tmp_path
 
@@ -75,7 +75,7 @@ def test_a_doctor_who_fails_costs_no_log(folder: Path, monkeypatch: pytest.Monke
     def broken(*_: object) -> None:
         raise ZeroDivisionError("nothing to divide by")
 
-    monkeypatch.setattr("kempf.flows.jobs.ingest_logs.examine_instruments", broken)
+    monkeypatch.setattr("kempf.flows.jobs.search_log.examine_instruments", broken)
     place = Warehouse(str(folder / "warehouse"))
     from kempf.flows.jobs.files import read_profiles
 

@@ -9,7 +9,7 @@ import pytest
 from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.readings import READING_SCHEMA
 from kempf.schemas.channels import CHANNEL_COLUMNS, CHANNELS
-from tests.doctor import made
+from tests.doctor import closed_form_ship
 
 
 def columns(frame: pl.DataFrame, channel: str) -> tuple[np.ndarray, np.ndarray]:
@@ -19,10 +19,12 @@ def columns(frame: pl.DataFrame, channel: str) -> tuple[np.ndarray, np.ndarray]:
 
 
 def test_times_move_and_nothing_is_lost() -> None:
-    data = made.text(made.channels("heading", "yaw_rate", "rudder_angle"))
+    data = closed_form_ship.text(closed_form_ship.channels("heading", "yaw_rate", "rudder_angle"))
     names = ("heading", "yaw_rate", "rudder_angle")
-    plain = read_log("made.csv", data, made.profile(*names))
-    moved = read_log("made.csv", data, made.profile(*names, hdg={"delay_s": 1.25}, rot={"clock_rate": 1.01}))
+    plain = read_log("made.csv", data, closed_form_ship.profile(*names))
+    moved = read_log(
+        "made.csv", data, closed_form_ship.profile(*names, hdg={"delay_s": 1.25}, rot={"clock_rate": 1.01})
+    )
     assert (moved.tally, moved.rejected.height) == (plain.tally, plain.rejected.height)
     assert dict(moved.frame.schema) == READING_SCHEMA
     assert moved.frame["record"].is_sorted()

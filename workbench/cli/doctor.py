@@ -21,10 +21,10 @@ from kempf.workbench.terminal import number, one_line, print_json, print_table
 def command(
     path: Path, profiles: tuple[Path, ...], figure: Path | None, everything: bool, uri: str, as_json: bool
 ) -> None:
-    """Find the channels of a log that lie: sign, unit, frame, swap, clock, delay, mounting.
+    """Find the channels of a log that are wrong: sign, unit, frame, swap, clock, delay, mounting, standstill.
 
-    PATH is a raw log, read with the profile; or the id or file name of a log in the warehouse. Instruments that see one
-    motion are held against each other; with three witnesses the odd one out is named, with two it is one of them.
+    PATH is a raw log, read with the profile; or the id or file name of a log in the warehouse. Instruments that measure
+    the same motion are compared: of three, the one that disagrees is named; of two, it is one of them.
     """
     from kempf.flows.jobs.examine_log import examine_file, examine_held
     from kempf.flows.jobs.files import read_profiles
@@ -51,9 +51,10 @@ def command(
 
 
 def tell(name: str, content: dict[str, Any], *, everything: bool) -> None:
-    """Print a verdict with its evidence and the lines that mend it."""
+    """Print a verdict with its evidence and the lines that correct it."""
     findings = content["findings"]
-    click.echo(f"{one_line(name)}: {_HEADS[content['verdict']].format(len(findings))}")
+    many = f"{len(findings)} contradiction{'' if len(findings) == 1 else 's'} between its channels"
+    click.echo(f"{one_line(name)}: {_HEADS[content['verdict']].format(many)}")
     for k, finding in enumerate(findings, start=1):
         click.echo(f"{k}. {finding['words']}")
         for outcome in finding["evidence"]:
@@ -62,7 +63,7 @@ def tell(name: str, content: dict[str, Any], *, everything: bool) -> None:
             for line in fault["profile"]:
                 click.echo(f"   profile: {line}")
             if not fault["profile"]:
-                click.echo(f"   profile: none mends it ({fault['words']}): mend it where the log is made")
+                click.echo(f"   profile: no line corrects it ({fault['words']}): correct it where the log is recorded")
     if content.get("why"):
         click.echo(one_line(content["why"])[:600])
     if everything:
@@ -73,7 +74,7 @@ def tell(name: str, content: dict[str, Any], *, everything: bool) -> None:
 
 _HEADS = {
     "clean": "the channels agree",
-    "faults": "{} of its channels' stories cannot be true",
+    "faults": "{}",
     "untested": "nothing could be tested",
     "failed": "the doctor failed",
 }

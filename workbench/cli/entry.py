@@ -24,7 +24,7 @@ INTERRUPTED = 130
 
 COMMANDS = {
     "ingest": "Take raw logs in: read, check, keep, find the zigzags.",
-    "doctor": "Find the channels of a log that lie, and the profile line that mends them.",
+    "doctor": "Find channels that contradict each other, and the profile line that corrects them.",
     "segments": "List the zigzags found.",
     "identify": "Identify a model from every zigzag of a vessel.",
     "params": "List, show, compare and export parameter sets; what they say of her steering.",

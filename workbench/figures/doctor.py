@@ -1,4 +1,4 @@
-"""The doctor's figure: what the checks measured beside what honest channels give, the motions before and after."""
+"""The doctor's figure: what the checks measured beside what sound channels give, the motions before and after."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def draw(found: Examined, path: Path) -> None:
     import matplotlib.pyplot as plt
 
     rows = [(outcome, figure) for outcome in found.examination.outcomes for figure in outcome.figures]
-    mended = found.log
+    corrected = found.log
     for finding in found.examination.findings:
-        mended = finding.faults[0].mended(mended) if finding.faults else mended
-    sides = [("as it came", found.log)] + ([("mended", mended)] if mended is not found.log else [])
+        corrected = finding.faults[0].corrected(corrected) if finding.faults else corrected
+    sides = [("as it came", found.log)] + ([("corrected", corrected)] if corrected is not found.log else [])
     height = 0.24 * max(len(rows), 1) + 1.0
     sheet = plt.figure(figsize=(12, height + 7.5), layout="constrained")
     upper, lower = np.asarray(sheet.subfigures(2, 1, height_ratios=[height, 7.5]))
@@ -75,7 +75,7 @@ def _forest(panel: Axes, rows: list[tuple[Any, Figure]]) -> None:
     panel.set_yticks([-k for k in range(len(rows))], [f"{o.check}: {f.name}" for o, f in rows], fontsize=7)
     panel.set_xlim(-4.2, 6.0)
     panel.set_xticks([-1, 1], ["expected from", "to"])
-    panel.set_title("figures with 4 standard errors; grey: what honest channels give", fontsize=9)
+    panel.set_title("figures with 4 standard errors; grey: what sound channels give", fontsize=9)
 
 
 def _band(figure: Figure) -> tuple[float, float]:

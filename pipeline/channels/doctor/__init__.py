@@ -1,1 +1,1 @@
-"""The channel doctor: which channel of a log lies, how, and what would mend it. One check a file; blame last."""
+"""The channel doctor: which channel of a log is wrong, how, and what would correct it. One check a file."""

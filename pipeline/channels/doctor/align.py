@@ -44,7 +44,7 @@ class Alignment:
     left_over : float
         Size of what does not go together over the size of the second's changes.
     explains : float
-        Size of what this lag leaves over that a lag between the bounds of honest clocks would leave; 1 for the same.
+        Size of what this lag leaves over that a lag between the bounds of sound clocks would leave; 1 for the same.
     """
 
     slope: float
@@ -75,18 +75,25 @@ def edges_of(*series: Series, window_s: float = 0.0) -> Nanoseconds:
 
 
 def align(
-    first: Series, second: Series, honest_s: tuple[float, float] = (-1.0, 1.0), *, circle: bool = False
+    first: Series,
+    second: Series,
+    usual_s: tuple[float, float] = (-1.0, 1.0),
+    *,
+    circle: bool = False,
+    longest_s: float = LONGEST_S,
 ) -> Alignment | None:
     """Compare two running totals, such as the heading and the integral of the yaw rate.
 
     Parameters
     ----------
     first, second : Series
-    honest_s : (float, float), optional
-        Lags that honest clocks may show, s.
+    usual_s : (float, float), optional
+        Lags that sound clocks may show, s.
     circle : bool, optional
         Whether the second is a direction, whose changes are right but for whole turns: one that was interpolated across
         north loses a turn.
+    longest_s : float, optional
+        Lag that is looked for on either side, s; 0 for none, which takes a moment only.
 
     Returns
     -------
@@ -101,13 +108,15 @@ def align(
     x = np.diff(first.at(edges, gap_limit_s(first)))
     if circle:
         x = np.where(np.abs(x) < _QUARTER, x, np.nan)
+    if not longest_s:
+        return _refined(x, second, edges, (0.0, 0.0), (1.0, 1.0), circle=circle, rounds=1)
     step = max(0.5 * second.period_s, 0.5)
     span = float(edges[-1] - edges[0]) / SECOND_NS
-    longest = min(LONGEST_S, span / 8.0)
+    longest = min(longest_s, span / 8.0)
     lags = np.arange(-np.floor(longest / step), np.floor(longest / step) + 1) * step
     sums = _sums(x, second, edges, lags, circle=circle)
     common = _left_over(np.sum(sums, axis=0))
-    honest = (lags >= honest_s[0] - step) & (lags <= honest_s[1] + step)
+    honest = (lags >= usual_s[0] - step) & (lags <= usual_s[1] + step)
     usual = float(np.min(common[honest])) if honest.any() else 1.0
     found = (float(lags[int(np.argmin(common))]), 0.0, float(np.min(common)))
     if honest.any():
@@ -120,7 +129,7 @@ def align(
         grown = _growing(sums, lags, span)
         if grown[2] < _BETTER * found[2]:
             found = grown
-    return _refined(x, second, edges, (found[0], found[1]), (found[2], usual), circle=circle)
+    return _refined(x, second, edges, (found[0], found[1]), (found[2], usual), circle=circle, rounds=_ROUNDS)
 
 
 def _read_later(edges: Nanoseconds, lag: float, rate: float) -> Nanoseconds:
@@ -190,7 +199,14 @@ def _growing(sums: Float, lags: Float, span_s: float) -> tuple[float, float, flo
 
 
 def _refined(
-    x: Float, second: Series, edges: Nanoseconds, guess: tuple[float, float], left: tuple[float, float], *, circle: bool
+    x: Float,
+    second: Series,
+    edges: Nanoseconds,
+    guess: tuple[float, float],
+    left: tuple[float, float],
+    *,
+    circle: bool,
+    rounds: int,
 ) -> Alignment | None:
     """Improve lag and growth by Gauss and Newton's steps; their standard errors are those of the last one."""
     lag, rate = guess
@@ -200,7 +216,7 @@ def _refined(
     middle = edges[:-1] + np.diff(edges) // 2
     along = (middle - middle[middle.size // 2]) / SECOND_NS
     found: Fit | None = None
-    for _ in range(_ROUNDS):
+    for _ in range(rounds):
         last = (lag, rate)
         at = _read_later(edges, lag, rate)
         y = _changes(second, at, circle=circle)

@@ -11,9 +11,9 @@ from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable, worst
 from kempf.pipeline.channels.series import SECOND_NS, Series
 
-#: Over a whole log two clocks may drift apart by so much, s: less is no gross lie.
+#: Over a whole log two clocks may drift apart by so much, s: less is no gross fault.
 _DRIFT_S = 1.0
-#: Motions that leave more than this over have no lag to speak of, and a lag that an honest one does nearly as well as.
+#: Motions that leave more than this over have no lag to speak of, and a lag that the usual one does nearly as well as.
 _TOGETHER, _NO_BETTER = 0.35, 0.8
 #: A lag so short is within the reach of its own standard error, s.
 _SHORT_S = 3.0
@@ -22,7 +22,7 @@ _SHORT_S = 3.0
 def clock_figures(
     found: Alignment, lags_s: tuple[float, float], over: Series, own_s: float = 0.0
 ) -> tuple[Figure, Figure]:
-    """Return the lag and its growth with what honest clocks give.
+    """Return the lag and its growth with what sound clocks give.
 
     Parameters
     ----------
@@ -65,7 +65,7 @@ def clock_outcome(
     lag, growth = figures
     far = max(lag.low - lag.value, lag.value - lag.high)
     if far > _SHORT_S and found.explains > _NO_BETTER:
-        return untestable(name, channels, "no lag fits much better than that of honest clocks")
+        return untestable(name, channels, "no lag fits much better than that of sound clocks")
     words = (
         f"{' and '.join(sides[1])} {'lags' if lag.value >= 0 else 'leads'} {' and '.join(sides[0])} by "
         f"{abs(lag.value):.2f} +- {lag.std:.2g} s in the middle of the log, and by {growth.value:.2g} +- "

@@ -1,10 +1,12 @@
-"""The lines of the vessel profile that take a lie back."""
+"""The lines of the vessel profile that correct a fault."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import pi
+
+import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import VELOCITIES
@@ -19,8 +21,8 @@ _OFFSET, _DELAY, _RATE = 1, 2, 6
 
 
 @dataclass(frozen=True)
-class Mend:
-    """One entry of ``channels`` in a source of the profile, as it should stand.
+class Correction:
+    """One entry of ``channels`` in a source of the profile, as it should be.
 
     Attributes
     ----------
@@ -44,7 +46,7 @@ class Mend:
 def entries(
     source: Source | None, log_format: str, instruments: Mapping[str, str]
 ) -> dict[str, tuple[str, ChannelMap]]:
-    """Return the entry of the profile behind each channel; one that it leaves unsaid of an NMEA log is made up.
+    """Return the entry of the profile behind each channel; the usual one where it says nothing of an NMEA log.
 
     Parameters
     ----------
@@ -59,16 +61,16 @@ def entries(
     dict of str to (str, ChannelMap)
         Key and entry by channel.
     """
-    found: dict[str, tuple[str, ChannelMap]] = {}
+    entry: dict[str, tuple[str, ChannelMap]] = {}
     given = source.channels if source is not None else {}
     for channel, instrument in instruments.items():
         for key, mapped in given.items():
             whose = log_format == "delimited" or key.startswith(instrument + ".")
             if mapped.channel == channel and whose:
-                found[channel] = (key, mapped)
-        if log_format == "nmea" and channel not in found:
-            found[channel] = (f"{instrument}.{channel}", ChannelMap(channel=channel, unit=_usual(channel)))
-    return found
+                entry[channel] = (key, mapped)
+        if log_format == "nmea" and channel not in entry:
+            entry[channel] = (f"{instrument}.{channel}", ChannelMap(channel=channel, unit=_usual(channel)))
+    return entry
 
 
 def _usual(channel: str) -> str:
@@ -77,8 +79,8 @@ def _usual(channel: str) -> str:
     return "rpm" if channel == "shaft_speed" else unit
 
 
-def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> tuple[Mend, ...]:
-    """Return the entries that take a fault back; none where the profile cannot say it.
+def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> tuple[Correction, ...]:
+    """Return the entries that correct a fault; none where the profile cannot.
 
     Parameters
     ----------
@@ -87,13 +89,13 @@ def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_forma
         From `entries`.
     log_format : {"delimited", "mcap", "nmea"}
     """
-    if any(channel not in known for channel in fault.channels):
+    if fault.kind == "stuck" or any(channel not in known for channel in fault.channels):
         return ()
     if fault.kind in ("swap", "frame"):
         if log_format == "nmea":
             return ()  # a sentence fixes which channel it carries
-        return tuple(Mend(known[old][0], _renamed(known[old][1], new)) for old, new in _exchanged(fault))
-    return tuple(Mend(known[c][0], _mended(fault, c, known[c][1])) for c in fault.channels)
+        return tuple(Correction(known[old][0], _renamed(known[old][1], new)) for old, new in _exchanged(fault))
+    return tuple(Correction(known[c][0], _corrected(fault, c, known[c][1])) for c in fault.channels)
 
 
 def _exchanged(fault: Fault) -> list[tuple[str, str]]:
@@ -107,7 +109,7 @@ def _renamed(mapped: ChannelMap, channel: str) -> ChannelMap:
     return mapped.model_copy(update={"channel": channel})
 
 
-def _mended(fault: Fault, channel: str, mapped: ChannelMap) -> ChannelMap:
+def _corrected(fault: Fault, channel: str, mapped: ChannelMap) -> ChannelMap:
     if fault.kind == "latency":
         return mapped.model_copy(update={"delay_s": round(mapped.delay_s + fault.value, _DELAY)})
     if fault.kind == "clock_scale":
@@ -148,16 +150,45 @@ def _turned(channel: str, mapped: ChannelMap) -> ChannelMap:
     return mapped.model_copy(update={"scale": -mapped.scale, "offset": offset})
 
 
-def put_into(source: Source | None, mends: tuple[Mend, ...], match: str) -> Source:
-    """Return a source with some entries as they should stand.
+def setting(fault: Fault) -> str:
+    """Return what corrects a fault in the entry of its channel, whatever else that says; empty where nothing does.
+
+    Examples
+    --------
+    >>> setting(Fault("unit", ("yaw_rate",), -1 / 60, "deg/min taken for deg/s, with the wrong sign"))
+    'unit: deg/min`, and `positive: port'
+    >>> setting(Fault("offset", ("heading",), 0.5, "turned", 0.01))
+    'offset: 28.6'
+    """
+    channel, degrees = fault.channels[0], f"{np.rad2deg(fault.value):.{_OFFSET}f}"
+    turned = "positive: port" if channel in _SIDED else "scale: -1"
+    if fault.kind == "unit":
+        unit = f"unit: {fault.name.partition(' taken for ')[0]}"
+        return f"{unit}`, and `{turned}" if fault.value < 0.0 else unit
+    if fault.kind == "offset":
+        return (
+            f"{turned}, offset: {degrees}" if fault.name.startswith("counted anticlockwise") else f"offset: {degrees}"
+        )
+    if fault.kind in ("swap", "frame"):
+        return "channel: " + " and ".join(new for _, new in _exchanged(fault))
+    return {
+        "sign": turned,
+        "scale": f"scale: {fault.value:.4g}",
+        "latency": f"delay_s: {fault.value:.{_DELAY}f}",
+        "clock_scale": f"clock_rate: {1.0 + fault.value:.{_RATE}f}",
+    }.get(fault.kind, "")
+
+
+def put_into(source: Source | None, corrections: tuple[Correction, ...], match: str) -> Source:
+    """Return a source with some entries as they should be.
 
     Parameters
     ----------
     source : Source or None
-        As it stands; None for an NMEA log that needed none.
-    mends : tuple of Mend
+        As it is; None for an NMEA log that needed none.
+    corrections : tuple of Correction
     match : str
         File pattern where there is no source yet.
     """
     held = source if source is not None else Source(match=match)
-    return held.model_copy(update={"channels": {**held.channels, **{mend.key: mend.mapped for mend in mends}}})
+    return held.model_copy(update={"channels": {**held.channels, **{one.key: one.mapped for one in corrections}}})

@@ -1,9 +1,10 @@
-"""The door of the doctor: every check on a log, and who is to blame for what disagrees."""
+"""The door of the doctor: every check on a log, and which fault explains what disagrees."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Protocol
 
 from kempf.pipeline.channels.doctor import (
     heading_course,
@@ -11,6 +12,7 @@ from kempf.pipeline.channels.doctor import (
     misalignment,
     rudder_order,
     rudder_turn,
+    standstill,
     track,
     water_speed,
 )
@@ -18,8 +20,17 @@ from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
 from kempf.pipeline.channels.doctor.outcome import Outcome
 
-#: Every check: what it is called with, and the channels without which it says nothing.
-CHECKS: tuple[Callable[[Log], list[Outcome]], ...] = (
+
+class Check(Protocol):
+    """One check; without its channels it returns nothing."""
+
+    def __call__(self, log: Log, *, thorough: bool = True) -> list[Outcome]:
+        """Compare channels; not ``thorough``: only what takes a moment, which shows a fault but need not name it."""
+        ...
+
+
+#: Every check.
+CHECKS: tuple[Check, ...] = (
     heading_rate.examine,
     heading_course.examine,
     misalignment.examine,
@@ -27,24 +38,29 @@ CHECKS: tuple[Callable[[Log], list[Outcome]], ...] = (
     water_speed.examine,
     rudder_turn.examine,
     rudder_order.examine,
+    standstill.examine,
 )
-#: Lies that are taken back one after the other, at most.
+#: Faults that are corrected one after the other, at most.
 _MOST_FAULTS = 4
-#: A mend that leaves so much more over than the best one, over all checks together, is not as good.
+#: A correction that leaves so much more over than the best one, over all checks together, is not as good.
 _WORSE = 1.15
+#: Faults whose correction takes channels out, and the checks of these with them.
+_REMOVES = ("frame", "stuck")
+#: Readings of a channel that a short examination looks at, at most.
+_FEW = 400
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One lie: what could be to blame for it, and what shows it.
+    """One contradiction: the faults that could cause it, and what shows it.
 
     Attributes
     ----------
     faults : tuple of Fault
-        One where a majority of the witnesses names it; several where it is one of these. Empty: nothing that the
-        doctor knows explains it.
+        A single one where most of the other channels confirm it; several where it is one of these. Empty: no known
+        fault explains it.
     evidence : tuple of Outcome
-        The checks that disagree because of it, before it was mended.
+        The checks that disagree because of it, before it was corrected.
     """
 
     faults: tuple[Fault, ...]
@@ -87,11 +103,32 @@ def ask(log: Log) -> list[list[Outcome]]:
     return [check(log) for check in CHECKS]
 
 
+def examine_window(log: Log) -> Examination:
+    """Examine a short part of a log: in a moment where the channels agree, like a whole log where any are in doubt.
+
+    Parameters
+    ----------
+    log : Log
+        The part, from `Log.between`.
+
+    Returns
+    -------
+    Examination
+        Clocks are compared only where something is in doubt: a lag shows in the whole log.
+    """
+    few = log.thinned(_FEW)
+    # a channel that repeats itself shows in all its readings only
+    outcomes = [o for check in CHECKS for o in check(log if check is standstill.examine else few, thorough=False)]
+    if any(o.state == "disagree" or o.doubtful for o in outcomes):
+        return examine(log)
+    return Examination((), tuple(outcomes), _untested(log, tuple(outcomes)))
+
+
 def examine(log: Log) -> Examination:
     """Examine a log.
 
-    What disagrees is explained by the lie whose taking back makes most checks agree and none disagree that did agree
-    before; lies that do so equally well are all named. What still disagrees is explained in the same way.
+    What disagrees is explained by the fault whose correction makes most checks agree and none disagree that agreed
+    before; faults that do so equally well are all named. What still disagrees is explained in the same way.
 
     Parameters
     ----------
@@ -107,22 +144,26 @@ def examine(log: Log) -> Examination:
     set of components whose being faulty is consistent with everything that was observed.
     """
     first = answers = ask(log)
-    came = log
+    original = log
     findings: list[Finding] = []
     for _ in range(_MOST_FAULTS):
         explained = _explained(log, answers)
         if explained is None:
             break
-        faults, mended, answers_then = explained
+        faults, corrected, answers_then = explained
         before = _by_name(answers)
-        findings.append(Finding(faults, tuple(before[name] for name in mended)))
-        log, answers = faults[0].mended(log), answers_then
+        findings.append(Finding(faults, tuple(before[name] for name in corrected)))
+        log, answers = faults[0].corrected(log), answers_then
     left = tuple(_wrong(answers).values())
     if left:
         findings.append(Finding((), left))
     outcomes = tuple(_by_name(first).values())
+    return Examination(tuple(findings), outcomes, _untested(original, outcomes))
+
+
+def _untested(log: Log, outcomes: tuple[Outcome, ...]) -> tuple[str, ...]:
     tested = {c for o in outcomes if o.state != "untestable" for c in o.channels}
-    return Examination(tuple(findings), outcomes, tuple(sorted(set(came.series) - tested)))
+    return tuple(sorted(set(log.series) - tested))
 
 
 def _by_name(answers: list[list[Outcome]]) -> dict[str, Outcome]:
@@ -135,29 +176,29 @@ def _wrong(answers: list[list[Outcome]]) -> dict[str, Outcome]:
 
 @dataclass(frozen=True)
 class _Trial:
-    """What a mend does: checks it makes agree, and the answers behind it."""
+    """A correction that was tried: the checks that it makes agree, and all answers after it."""
 
     fault: Fault
-    mends: frozenset[str]
+    corrects: frozenset[str]
     after: list[list[Outcome]]
 
     @property
     def tested(self) -> dict[str, float]:
-        """What each check that could be made leaves over behind the mend."""
+        """What each check that could be made leaves over after the correction."""
         return {name: o.left_over for name, o in _by_name(self.after).items() if o.state != "untestable"}
 
 
 def _explained(
     log: Log, answers: list[list[Outcome]]
 ) -> tuple[tuple[Fault, ...], tuple[str, ...], list[list[Outcome]]] | None:
-    """Return the faults that explain most, the names of what they explain, and the answers behind the first mend."""
+    """Return the faults that explain most, the names of what they explain, and the answers after the first's."""
     suspects = _suspects(answers, log.units)
     trials = [trial for fault, by in suspects if (trial := _tried(log, fault, by, answers)) is not None]
     if not trials:
         return None
-    most = max(trials, key=lambda t: (len(t.mends), -t.fault.simplicity))
-    rivals = [t for t in trials if t.mends == most.mends]
-    # over the checks that all of them can be held against
+    most = max(trials, key=lambda t: (len(t.corrects), -t.fault.simplicity))
+    rivals = [t for t in trials if t.corrects == most.corrects]
+    # over the checks that all of them can be compared in
     shared = set.intersection(*(set(t.tested) for t in rivals))
     left = {t.fault.key: sum(t.tested[n] for n in sorted(shared)) / max(len(shared), 1) for t in rivals}
     rivals = [t for t in rivals if left[t.fault.key] <= _WORSE * min(left.values()) + 0.005]
@@ -167,57 +208,59 @@ def _explained(
         best.setdefault(trial.fault.channels, trial)
     chosen = sorted(best.values(), key=lambda t: (t.fault.simplicity, left[t.fault.key]))
     kept = [t for t in chosen if t.fault.simplicity <= max(chosen[0].fault.simplicity, 2)]
-    return tuple(t.fault for t in kept), tuple(sorted(kept[0].mends)), kept[0].after
+    return tuple(t.fault for t in kept), tuple(sorted(kept[0].corrects)), kept[0].after
 
 
 def _suspects(answers: list[list[Outcome]], units: Mapping[str, str]) -> list[tuple[Fault, set[int]]]:
     """Return the faults that what disagrees suggests, each with the places in `CHECKS` of those that suspect it."""
-    found: dict[tuple[object, ...], tuple[Fault, set[int]]] = {}
+    suspects: dict[tuple[object, ...], tuple[Fault, set[int]]] = {}
     for k, outcome in ((k, o) for k, some in enumerate(answers) for o in some if o.state == "disagree"):
         for fault in outcome.suspects:
             taken_for = fault.name.partition(" taken for ")[2].partition(",")[0]
             if taken_for and units.get(fault.channels[0], taken_for) != taken_for:
                 continue
-            held, by = found.get(fault.key, (fault, set()))
+            held, by = suspects.get(fault.key, (fault, set()))
             # two checks may estimate one fault: the surer estimate is tried
-            found[fault.key] = (fault if fault.std < held.std else held, by | {k})
-    return list(found.values())
+            suspects[fault.key] = (fault if fault.std < held.std else held, by | {k})
+    return list(suspects.values())
 
 
 def _tried(log: Log, fault: Fault, by: set[int], answers: list[list[Outcome]]) -> _Trial | None:
-    mended = fault.mended(log)
-    if mended is log:
+    corrected = fault.corrected(log)
+    if corrected is log:
         return None
-    after = _asked_again(mended, fault, by, answers)
+    after = _asked_again(corrected, fault, by, answers)
     if after is None:
         return None
     now, wrong = _by_name(after), _wrong(answers)
-    mends = frozenset(name for name in wrong if name not in now or now[name].state != "disagree")
-    # a check that is only silenced is not mended, unless it has gone with the channels it compared
-    if not any(name in now and now[name].state == "agree" for name in mends) and fault.kind != "frame":
+    corrects = frozenset(name for name in wrong if name not in now or now[name].state != "disagree")
+    # a check that is only silenced is not corrected, unless it has gone with the channels it compared
+    if not any(name in now and now[name].state == "agree" for name in corrects) and fault.kind not in _REMOVES:
         return None
-    return _Trial(fault, mends, after)
+    return _Trial(fault, corrects, after)
 
 
 def _touched(fault: Fault) -> set[str]:
     return set(fault.channels) | (set(VELOCITIES["earth"] + VELOCITIES["body"]) if fault.kind == "frame" else set())
 
 
-def _asked_again(mended: Log, fault: Fault, by: set[int], answers: list[list[Outcome]]) -> list[list[Outcome]] | None:
-    """Return the answers behind a mend; None as soon as a check disagrees that did not before, or it mends nothing."""
+def _asked_again(
+    corrected: Log, fault: Fault, by: set[int], answers: list[list[Outcome]]
+) -> list[list[Outcome]] | None:
+    """Return the answers after a correction; None as soon as a check newly disagrees, or where it corrects nothing."""
     touched, after = _touched(fault), [list(some) for some in answers]
-    # those checks first that suspect it: most mends fail there
+    # those checks first that suspect it: most corrections fail there
     for n, k in enumerate(sorted(range(len(CHECKS)), key=lambda k: (k not in by, k))):
         if n == len(by) and not any(_fewer(answers[j], after[j]) for j in by):
             return None
         if not any(touched & set(o.channels) for o in answers[k]) and fault.kind != "frame":
             continue
-        after[k] = CHECKS[k](mended)
+        after[k] = CHECKS[k](corrected)
         before = {o.check: o.state for o in answers[k]}
         if any(o.state == "disagree" and before.get(o.check) != "disagree" for o in after[k]):
             return None
         if (
-            fault.kind != "frame"
+            fault.kind not in _REMOVES
             and not any(o.state == "agree" for o in after[k])
             and any(o.state == "agree" for o in answers[k])
         ):

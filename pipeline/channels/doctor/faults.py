@@ -1,8 +1,8 @@
-"""The lies a channel can tell, each with the change to the readings that takes it back."""
+"""The faults that a channel can have, each with the change to the readings that corrects it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from math import pi
 from typing import Literal
@@ -12,9 +12,9 @@ import numpy as np
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
-Kind = Literal["sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale"]
+Kind = Literal["sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck"]
 
-#: What may stand in a log under the name of the canonical unit: factor on the reading that mends it, by name.
+#: What a log may hold under the name of the canonical unit: the factor on the reading that corrects it, by name.
 UNITS: dict[str, dict[str, float]] = {
     "rad": {"rad taken for deg": 180.0 / pi, "deg taken for rad": pi / 180.0},
     "rad/s": {
@@ -36,24 +36,31 @@ UNITS: dict[str, dict[str, float]] = {
 }
 
 
+#: Pairs of units that are seldom taken for each other.
+_SELDOM = ("km/h taken for kn", "kn taken for km/h")
+
+
 @dataclass(frozen=True)
 class Fault:
-    """One lie of one instrument.
+    """One fault of one instrument.
 
     Attributes
     ----------
-    kind : {"sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale"}
+    kind : {"sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck"}
     channels : tuple of str
-        That lie together.
+        That share the fault.
     value : float
         What is done about it: the factor for a unit or a scale, the angle that is added (rad) for an offset, the
-        seconds that are taken off for a latency, the rate (s/s) at which the clock runs too fast for a clock scale.
+        seconds that are taken off for a latency, the rate (s/s) at which the clock runs too fast for a clock scale,
+        the seconds for which a channel is stuck.
     name : str
         Which fault of the kind, such as ``kn taken for m/s``.
     std : float
         Standard error of ``value`` where it was estimated; 0 where it is exact.
     simplicity : int
         Smaller is asked first: a wrong sign before a compass turned by 90 degrees and counting backwards.
+    start_utc_ns : int
+        When a channel that is stuck begins to be, UTC ns.
     """
 
     kind: Kind
@@ -62,18 +69,25 @@ class Fault:
     name: str = ""
     std: float = 0.0
     simplicity: int = 1
+    start_utc_ns: int = 0
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], str]:
         """What tells two faults apart; estimates of one are one."""
         return self.kind, self.channels, self.name
 
-    def mended(self, log: Log) -> Log:
+    def corrected(self, log: Log) -> Log:
         """Return the log without this fault."""
         own = {name: log.series[name] for name in self.channels if name in log.series}
         if len(own) < len(self.channels):
             return log
-        return log.with_series(_MENDS[self.kind](self, own))
+        return log.with_series(_CORRECTIONS[self.kind](self, own))
+
+
+def unit_faults(channels: tuple[str, ...], dimension: str) -> Iterator[Fault]:
+    """Yield the wrong units that channels may be in, by the canonical unit of their dimension."""
+    for name, factor in UNITS[dimension].items():
+        yield Fault("unit", channels, factor, name, simplicity=2 if name in _SELDOM else 1)
 
 
 def _each(own: Mapping[str, Series], change: Mapping[str, Float]) -> dict[str, Series | None]:
@@ -119,14 +133,21 @@ def _latency(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None
 
 
 def _clock_scale(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
-    found: dict[str, Series | None] = {}
+    corrected: dict[str, Series | None] = {}
     for name, one in own.items():
         since = (one.time_utc_ns - one.time_utc_ns[0]).astype(np.float64)
-        found[name] = _moved(one, one.time_utc_ns[0] + np.rint(since / (1.0 + fault.value)).astype(np.int64))
-    return found
+        corrected[name] = _moved(one, one.time_utc_ns[0] + np.rint(since / (1.0 + fault.value)).astype(np.int64))
+    return corrected
 
 
-_MENDS = {
+def _stuck(fault: Fault, own: Mapping[str, Series]) -> dict[str, Series | None]:
+    (name,) = fault.channels
+    time, end = own[name].time_utc_ns, fault.start_utc_ns + round(fault.value * SECOND_NS)
+    kept = (time < fault.start_utc_ns) | (time > end)
+    return {name: Series(time[kept], own[name].value[kept]) if np.count_nonzero(kept) > 1 else None}
+
+
+_CORRECTIONS = {
     "sign": _sign,
     "unit": _unit,
     "scale": _unit,
@@ -135,4 +156,5 @@ _MENDS = {
     "frame": _frame,
     "latency": _latency,
     "clock_scale": _clock_scale,
+    "stuck": _stuck,
 }

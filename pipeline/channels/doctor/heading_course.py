@@ -8,12 +8,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.channels.doctor.align import align
+from kempf.pipeline.channels.doctor.align import LONGEST_S, align
 from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
-from kempf.pipeline.channels.doctor.faults import UNITS, Fault
-from kempf.pipeline.channels.doctor.heading_rate import swing
-from kempf.pipeline.channels.doctor.log import Log, Velocity, turning
+from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
+from kempf.pipeline.channels.doctor.log import Log, Velocity, fastest_turn
 from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.robust_regression import quantile, swing
 from kempf.pipeline.channels.series import Series
 
 #: Components of a stream that is not known, one standard deviation: four of these are faster than any that ships are
@@ -26,14 +26,20 @@ _BODY_SLOPES = (-0.5, 0.5)
 #: Largest drift angle in a turn, rad: ships in their tightest circle make about 20 degrees.
 DRIFT_RAD = 0.45
 _LEAST_TURN = float(np.deg2rad(20.0))
-#: How far before the point about which the bow turns an antenna stands, in ship lengths.
+#: How far before the point about which the bow turns an antenna is mounted, in ship lengths.
 _LEADS = 0.25
 #: What is left over of two motions that go together.
 _TOGETHER = 0.6
 
 
-def examine(log: Log) -> list[Outcome]:
+def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Compare the turning of the bow with that of every velocity that the log has.
+
+    Parameters
+    ----------
+    log : Log
+    thorough : bool, optional
+        False: only at lags that sound clocks show, and not with the way from fix to fix.
 
     Returns
     -------
@@ -47,11 +53,9 @@ def examine(log: Log) -> list[Outcome]:
     """
     found: list[Outcome] = []
     heading = log.series.get("heading")
-    for kind in ("course", "earth", "body", "track"):
-        velocity = log.velocity(kind)
-        if velocity is None or heading is None:
-            continue
-        found += _compare(log, kind, heading, velocity)
+    if heading is not None:
+        for kind, velocity in log.velocities(track=thorough):
+            found += _compare(log, kind, heading, velocity, thorough=thorough)
     return found
 
 
@@ -60,23 +64,22 @@ def stream_std(speed_m_s: float) -> float:
     return min(STREAM_STD_M_S, STREAM_SHARE * speed_m_s)
 
 
-def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> list[Outcome]:
-    names = (f"heading_{kind}", f"heading_{kind}_clock")
+def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorough: bool) -> list[Outcome]:
+    names = [f"heading_{kind}", *([f"heading_{kind}_clock"] if thorough else [])]
     channels = ("heading", *velocity.channels)
     way = velocity.under_way
     direction = Series(velocity.time_utc_ns[way], velocity.direction[way])
     turned = max(swing(heading.value), swing(direction.value)) if len(direction) else 0.0
     if turned < _LEAST_TURN:
         return [untestable(name, channels, "the ship hardly turned while she made way") for name in names]
-    speed = float(np.median(np.abs(velocity.value[way])))
-    fast = float(np.percentile(np.abs(turning(heading).value), 95.0)) if len(turning(heading)) else 0.0
+    speed = quantile(np.abs(velocity.value[way]), 0.5)
     if velocity.blurred(heading):
         return [untestable(name, channels, "the fixes are too coarse to show the turns") for name in names]
-    own = _own_lag(log, fast, speed)
+    own = _own_lag(log, heading, speed)
     late = 1.0 + heading.period_s + direction.period_s
-    # the antenna may stand before the point about which she turns: then the course leads
+    # the antenna may be ahead of the point about which she turns: then the course leads
     honest = (-late - _LEADS * own, late + own)
-    both = align(heading, direction, honest, circle=True)
+    both = align(heading, direction, honest, circle=True, longest_s=LONGEST_S if thorough else 0.0)
     if both is None:
         return [untestable(name, channels, "too little of it overlaps") for name in names]
     std = float(np.hypot(both.slope_std, 0.5 * stream_std(speed) / speed))
@@ -87,7 +90,7 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> list[O
     if both.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
         state = "untestable"  # a slope through noise
     turn = Outcome(names[0], channels, state, words, (figure,), both.left_over, _suspects(kind, velocity.channels))
-    if kind == "body":
+    if kind == "body" or not thorough:
         return [turn]
     figures = clock_figures(both, honest, heading, own)
     return [turn, clock_outcome(names[1], (("heading",), velocity.channels), both, figures)]
@@ -101,10 +104,10 @@ _WORDS = {
 }
 
 
-def _own_lag(log: Log, fast: float, speed: float) -> float:
+def _own_lag(log: Log, heading: Series, speed: float) -> float:
     """Return by how much the course may lag behind the heading because she drifts in a turn, s."""
     # the bow turns about a point no farther ahead than the ship is long
-    return DRIFT_RAD / max(fast, 1e-6) if log.length_m is None else log.length_m / speed
+    return DRIFT_RAD / max(fastest_turn(heading), 1e-6) if log.length_m is None else log.length_m / speed
 
 
 def _suspects(kind: str, channels: tuple[str, str]) -> tuple[Fault, ...]:
@@ -112,14 +115,14 @@ def _suspects(kind: str, channels: tuple[str, str]) -> tuple[Fault, ...]:
     hers = [
         Fault("sign", ("heading",)),
         Fault("offset", ("heading",), ninety, "counted anticlockwise from east", simplicity=2),
-        *(Fault("unit", ("heading",), factor, name) for name, factor in UNITS["rad"].items()),
+        *unit_faults(("heading",), "rad"),
     ]
     if kind == "course":
         course = (channels[1],)
         hers += [
             Fault("sign", course),
             Fault("offset", course, ninety, "counted anticlockwise from east", simplicity=2),
-            *(Fault("unit", course, factor, name) for name, factor in UNITS["rad"].items()),
+            *unit_faults(course, "rad"),
         ]
     elif kind == "track":
         hers += [Fault("swap", channels), Fault("sign", channels[:1]), Fault("sign", channels[1:])]

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from kempf.pipeline.channels.doctor.robust_regression import quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
@@ -62,21 +63,18 @@ class Velocity:
     def under_way(self) -> NDArray[np.bool_]:
         """Where she makes so much way that the direction means something, shape (n,)."""
         speed = np.abs(self.value)
-        fast = float(np.percentile(speed, 98.0)) if speed.size else 0.0
+        fast = quantile(speed, 0.98) if speed.size else 0.0
         known: NDArray[np.bool_] = speed > max(_UNDER_WAY * fast, _SLOWEST_M_S)
         return known
 
     def blurred(self, heading: Series) -> bool:
         """Return whether she turns so far within the time of one mean that the means do not show it."""
-        rate = turning(heading).value
-        return (
-            self.over_s > 0.0 and bool(rate.size) and float(np.percentile(np.abs(rate), 95.0)) * self.over_s > _BLURRED
-        )
+        return self.over_s > 0.0 and fastest_turn(heading) * self.over_s > _BLURRED
 
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """The channels of one log as the doctor looks at them; a mend makes another log.
+    """The channels of one log as the doctor looks at them; a correction makes another log.
 
     Attributes
     ----------
@@ -94,7 +92,7 @@ class Log:
 
     @classmethod
     def of(cls, instruments: Instruments, length_m: float | None = None, units: Mapping[str, str] | None = None) -> Log:
-        """Return the channels that a log has of its own; what was computed from others is no witness."""
+        """Return the channels that a log has of its own; what was computed from others confirms nothing."""
         own = {name: one for name, one in instruments.series.items() if name not in instruments.derived}
         return cls({name: one for name, one in own.items() if len(one) > 1}, length_m, units or {})
 
@@ -126,6 +124,24 @@ class Log:
         value = own + 1j * beside
         return Velocity(names, time, value, np.unwrap(np.angle(value)))
 
+    def velocities(self, *, track: bool = True) -> Iterator[tuple[str, Velocity]]:
+        """Yield the velocities that the log has with their keys of `VELOCITIES`, if asked for that of the track too."""
+        for kind in VELOCITIES:
+            velocity = self.velocity(kind) if track or kind != "track" else None
+            if velocity is not None:
+                yield kind, velocity
+
+    def between(self, start_ns: int, end_ns: int) -> Log:
+        """Return the log with the readings of a time only, UTC ns, both ends included."""
+        parts = {name: one.between(start_ns, end_ns) for name, one in self.series.items()}
+        return replace(self, series={name: one for name, one in parts.items() if len(one) > 1})
+
+    def thinned(self, most: int) -> Log:
+        """Return the log with so many readings of each channel at most, as many left out between any two of them."""
+        every = {name: max(len(one) // most, 1) for name, one in self.series.items()}
+        thin = {n: Series(one.time_utc_ns[:: every[n]], one.value[:: every[n]]) for n, one in self.series.items()}
+        return replace(self, series=thin)
+
     def over_ground(self, kind: str) -> Velocity | None:
         """Return a velocity in the earth's frame; a body-fixed one is turned by the heading."""
         found = self.velocity(kind)
@@ -152,7 +168,7 @@ class Log:
         noise = fix_noise(place)
         coarse = max(round(30.0 / period), 1)
         gone = np.abs(place[coarse:] - place[:-coarse]) / (seconds[coarse:] - seconds[:-coarse])
-        fast = float(np.percentile(gone, 90.0)) if gone.size else 0.0
+        fast = quantile(gone, 0.9) if gone.size else 0.0
         step = int(np.clip(np.ceil(_CLEAR * noise / max(fast, 1e-3) / period), 1, coarse))
         long = seconds[step:] - seconds[:-step]
         near = long < 3.0 * step * period
@@ -182,7 +198,15 @@ def fix_noise(place: Complex) -> float:
     if place.size < 3:
         return _FINEST_M
     bend = np.abs(place[2:] - 2.0 * place[1:-1] + place[:-2])
-    return max(float(np.percentile(bend, 90.0)) / _BEND, _FINEST_M)
+    return max(quantile(bend, 0.9) / _BEND, _FINEST_M, _rounding(place.real), _rounding(place.imag))
+
+
+def _rounding(place: Float) -> float:
+    """Return the error of a coordinate that is rounded so coarsely that it mostly repeats itself, m."""
+    step = np.abs(np.diff(place))
+    if np.mean(step == 0.0) < 0.5 or not step.any():
+        return 0.0
+    return float(np.min(step[step > 0.0])) / float(np.sqrt(12.0))
 
 
 def turning(heading: Series) -> Series:
@@ -195,6 +219,12 @@ def turning(heading: Series) -> Series:
     near = step < 3.0 * max(apart * heading.period_s, 1.0)
     middle = time[:-apart] + (time[apart:] - time[:-apart]) // 2
     return Series(middle[near], ((value[apart:] - value[:-apart]) / step)[near])
+
+
+def fastest_turn(heading: Series) -> float:
+    """Return how fast a direction changes when it changes fast, rad/s: the 95th percentile; 0 where it is not known."""
+    rate = turning(heading).value
+    return quantile(np.abs(rate), 0.95) if rate.size else 0.0
 
 
 def integral(rate: Series) -> Series:

@@ -8,11 +8,11 @@ from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD, stream_std
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity, turning
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
-from kempf.pipeline.channels.doctor.robust_regression import posterior
+from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 
-#: Leeway of a ship under way, one standard deviation, rad, and the deviation of a compass that is no gross lie.
+#: Leeway of a ship under way, one standard deviation, rad, and the deviation of a compass that is no gross fault.
 _LEEWAY_RAD, _DEVIATION_DEG = float(np.deg2rad(2.0)), 5.0
 #: Readings are averaged by sectors of heading, and by whether she turns to port, not, or to starboard: this many
 #: sectors, the share of the greatest rate that counts as turning, and the error that one average keeps however many
@@ -25,13 +25,19 @@ _TOGETHER = 0.5
 _FEWEST = 12
 
 
-def examine(log: Log) -> list[Outcome]:
+def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Find the angle between the bow and the velocity through the water, as the velocity over ground shows it.
 
     Seen from the bow, the velocity over ground is a constant A (the way she makes), plus a stream C that turns
     backwards as she turns, plus a drift S r that goes with the yaw rate: w = A + C exp(-i psi) + S r. The angle of A
     is how far heading or course are turned. Legs on several headings tell A and C apart; where they do not, what is
-    known of streams beforehand stands in the standard error.
+    known of streams beforehand is part of the standard error.
+
+    Parameters
+    ----------
+    log : Log
+    thorough : bool, optional
+        False: not with the way from fix to fix.
 
     Returns
     -------
@@ -41,12 +47,7 @@ def examine(log: Log) -> list[Outcome]:
     heading = log.series.get("heading")
     if heading is None:
         return []
-    found = []
-    for kind in ("course", "earth", "body", "track"):
-        velocity = log.velocity(kind)
-        if velocity is not None:
-            found.append(_compare(kind, heading, velocity))
-    return found
+    return [_compare(kind, heading, velocity) for kind, velocity in log.velocities(track=thorough)]
 
 
 def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
@@ -57,8 +58,8 @@ def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
     if seen is None:
         return untestable(name, channels, "too few readings while she made way")
     relative, bow, rate, duration = seen
-    speed = float(np.median(np.abs(relative)))
-    fast = max(float(np.percentile(np.abs(rate), 95.0)), 1e-6)
+    speed = quantile(np.abs(relative), 0.5)
+    fast = max(quantile(np.abs(rate), 0.95), 1e-6)
     prior = np.array([np.inf, np.inf, *[stream_std(speed)] * 2, *[DRIFT_RAD * speed / fast] * 2])
     noise = speed * np.hypot(_SECTOR_STD, _SECOND_STD / np.sqrt(duration))
     observed, noise = np.concatenate([relative.real, relative.imag]), np.concatenate([noise, noise])
@@ -107,7 +108,7 @@ def _seen_from_the_bow(kind: str, heading: Series, velocity: Velocity) -> tuple[
         return None
     time, bow, turn = velocity.time_utc_ns[good], bow[good], turn[good]
     relative = velocity.value[good] * (1.0 if kind == "body" else np.exp(-1j * bow))
-    fast = float(np.percentile(np.abs(turn), 95.0))
+    fast = quantile(np.abs(turn), 0.95)
     side = np.where(np.abs(turn) > _TURNING * fast, np.sign(turn), 0.0) + 1.0
     sector = np.floor(np.mod(bow, 2 * np.pi) / (2 * np.pi / _SECTORS)).astype(np.int64) * 3 + side.astype(np.int64)
     order = np.argsort(sector, kind="stable")

@@ -1,4 +1,4 @@
-"""What a check says: the channels agree, they disagree, or it cannot be told from them."""
+"""What a check says: the channels agree, they disagree, or these data cannot show which."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ State = Literal["agree", "disagree", "untestable"]
 
 #: How many standard errors outside what is expected a figure must lie: one in 16,000 by chance, a dozen figures a log
 SURE = 4.0
+#: The same for a figure too uncertain to be sure of: it is doubtful.
+DOUBTFUL = 2.0
 
 
 @dataclass(frozen=True)
@@ -24,7 +26,7 @@ class Figure:
     value, std : float
         With the standard error, what is unknown of current and leeway included.
     low, high : float
-        What honest channels give, their ordinary errors included.
+        What sound channels give, their ordinary errors included.
     unit : str
     """
 
@@ -43,7 +45,7 @@ class Figure:
 
     @property
     def state(self) -> State:
-        """Judge the figure: outside beyond doubt, within, or too uncertain to have shown a fault."""
+        """Outside beyond doubt, within, or too uncertain to have shown a fault."""
         if not (isfinite(self.value) and isfinite(self.std)):
             return "untestable"
         if self.outside > SURE:
@@ -71,7 +73,7 @@ class Outcome:
         One sentence with the evidence.
     figures : tuple of Figure
     left_over : float
-        Size of what does not go together over the size of what there is; tells which of two mends fits better.
+        Size of what does not go together over the size of what there is; shows which of two corrections fits better.
     suspects : tuple of Fault
         What could have caused a disagreement.
     """
@@ -83,6 +85,11 @@ class Outcome:
     figures: tuple[Figure, ...] = ()
     left_over: float = 0.0
     suspects: tuple[Fault, ...] = field(default=(), repr=False)
+
+    @property
+    def doubtful(self) -> bool:
+        """Whether a figure lies well outside what is expected, and no figure is sure to."""
+        return self.state != "disagree" and any(figure.outside > DOUBTFUL for figure in self.figures)
 
 
 def untestable(check: str, channels: tuple[str, ...], why: str) -> Outcome:

@@ -1,4 +1,4 @@
-"""A straight fit that a few wild values do not bend, with standard errors that own up to correlated residuals."""
+"""Robust statistics: quantiles, and Huber's regression with standard errors that allow for correlated residuals."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from kempf.pipeline.channels.series import Float
 #: Huber's limit in robust standard deviations: 95 % as efficient as least squares on Gaussian noise.
 _HUBER = 1.345
 _ROUNDS = 12
+#: Change of the scaled coefficients, as a share of the residuals' spread, that ends the rounds.
+_SETTLED = 1e-3
 #: Lags, in rows, over which the correlation of the residuals is summed.
 _LAGS = 30
 
@@ -30,6 +32,19 @@ class Fit:
     value: Float
     std: Float
     left_over: float
+
+
+def quantile(values: Float, share: float) -> float:
+    """Return the value below which a share of some values lie, not interpolated: these are asked for often."""
+    place = round(share * (values.size - 1))
+    return float(np.partition(values, place)[place])
+
+
+def swing(values: Float) -> float:
+    """Return how far values range, one in a hundred at either end left out."""
+    low, high = round(0.01 * (values.size - 1)), round(0.99 * (values.size - 1))
+    ordered = np.partition(values, (low, high))
+    return float(ordered[high] - ordered[low])
 
 
 def fit(columns: Float, observed: Float) -> Fit | None:
@@ -60,26 +75,37 @@ def fit(columns: Float, observed: Float) -> Fit | None:
     unit = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
     A = A / unit
     for _ in range(_ROUNDS):
+        last = value
         normal = (A * weight[:, None]).T @ A
         value = np.linalg.lstsq(normal, (A * weight[:, None]).T @ y, rcond=1e-12)[0]
         residual = y - A @ value
-        scale = 1.4826 * float(np.median(np.abs(residual)))
-        if not scale > 0.0:
+        scale = _spread(residual)
+        if not scale > 0.0 or np.max(np.abs(value - last)) < _SETTLED * scale:
             break
         weight = np.minimum(1.0, _HUBER * scale / np.maximum(np.abs(residual), 1e-300))
     residual = y - A @ value
     inverse = np.linalg.pinv((A * weight[:, None]).T @ A, hermitian=True)
-    score = A * (weight * residual)[:, None]
-    meat = score.T @ score
-    for lag in range(1, min(_LAGS, y.size // 4) + 1):
-        step = score[lag:].T @ score[:-lag]
-        meat += (1.0 - lag / (_LAGS + 1.0)) * (step + step.T)
-    covariance = inverse @ meat @ inverse
-    # Newey and West's sum can fall below nought by chance; what white residuals give is the least
+    covariance = inverse @ _summed_products(A * (weight * residual)[:, None], min(_LAGS, y.size // 4)) @ inverse
+    # the sum of correlated products can be small by chance; what white residuals give is the least
     least = np.diag(inverse) * scale**2
     spread = float(np.sqrt(np.mean(y**2)))
     left = float(np.sqrt(np.average(residual**2, weights=weight))) / spread if spread > 0.0 else 1.0
     return Fit(value / unit, np.sqrt(np.maximum(np.diag(covariance), least)) / unit, left)
+
+
+def _spread(residual: Float) -> float:
+    """Return the standard deviation of Gaussian residuals, from their median size."""
+    return 1.4826 * quantile(np.abs(residual), 0.5)
+
+
+def _summed_products(score: Float, lags: int) -> Float:
+    """Return Newey and West's sum over lags with Bartlett's weights: products of running sums over lags + 1 rows."""
+    padded = np.zeros((score.shape[0] + 2 * lags + 1, score.shape[1]))
+    padded[lags + 1 : lags + 1 + score.shape[0]] = score
+    total = np.cumsum(padded, axis=0)
+    running = total[lags + 1 :] - total[: -lags - 1]
+    summed: Float = running.T @ running / (lags + 1.0)
+    return summed
 
 
 def posterior(columns: Float, observed: Float, noise_std: Float, prior_std: Float) -> Fit:
@@ -95,17 +121,20 @@ def posterior(columns: Float, observed: Float, noise_std: Float, prior_std: Floa
         Standard deviation about nought that is known of each coefficient; infinite for nothing.
     """
     value: Float = np.zeros(columns.shape[1])
-    covariance: Float = np.eye(columns.shape[1])
     more = 1.0
     weight = np.ones(observed.size)
-    A, y = columns / noise_std[:, None], observed / noise_std
+    A, y, known = columns / noise_std[:, None], observed / noise_std, np.diag(prior_std**-2.0)
     for _ in range(_ROUNDS):
-        precision: Float = (A * (weight / more**2)[:, None]).T @ A + np.diag(prior_std**-2.0)
-        covariance = np.asarray(np.linalg.pinv(precision, hermitian=True), dtype=np.float64)
-        value = covariance @ ((A * (weight / more**2)[:, None]).T @ y)
+        last = value
+        weighted = (A * (weight / more**2)[:, None]).T
+        precision = weighted @ A + known
+        value = np.asarray(np.linalg.lstsq(precision, weighted @ y, rcond=1e-15)[0], dtype=np.float64)
+        if np.max(np.abs(value - last)) < _SETTLED * np.max(np.abs(value)):
+            break
         residual = y - A @ value
-        more = max(1.0, 1.4826 * float(np.median(np.abs(residual))))
+        more = max(1.0, _spread(residual))
         weight = np.minimum(1.0, _HUBER * more / np.maximum(np.abs(residual), 1e-300))
+    covariance = np.linalg.pinv(precision, hermitian=True)
     spread = float(np.sqrt(np.mean(observed**2)))
     left = float(np.sqrt(np.average((observed - columns @ value) ** 2, weights=weight))) / max(spread, 1e-300)
     return Fit(value, np.sqrt(np.maximum(np.diag(covariance), 0.0)), left)

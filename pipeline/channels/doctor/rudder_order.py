@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault
-from kempf.pipeline.channels.doctor.heading_rate import swing
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable, worst
-from kempf.pipeline.channels.doctor.robust_regression import fit
+from kempf.pipeline.channels.doctor.robust_regression import fit, swing
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS
 
@@ -20,7 +19,7 @@ _SHIFTS = np.arange(-30.0, 30.5, 0.5)
 _LEAST = float(np.deg2rad(2.0))
 
 
-def examine(log: Log) -> list[Outcome]:
+def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Compare rudder order and rudder angle.
 
     Returns
@@ -54,7 +53,7 @@ def examine(log: Log) -> list[Outcome]:
     if found is None:
         return [untestable(name, _CHANNELS, "too little of it overlaps")]
     slope, offset = float(found.value[0]), float(found.value[1])
-    # the rudder on its way between two orders is neither lag nor lie
+    # the rudder on its way between two orders is neither lag nor fault
     slope_std = float(np.hypot(found.std[0], 0.05 * abs(slope)))
     figures = (
         Figure("rudder angle for 1 ordered", slope, slope_std, *_SLOPES),

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.doctor.align import edges_of
 from kempf.pipeline.channels.doctor.faults import Fault
-from kempf.pipeline.channels.doctor.heading_rate import swing
 from kempf.pipeline.channels.doctor.log import Log, integral, turning
 from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable, worst
-from kempf.pipeline.channels.doctor.robust_regression import Fit, fit
+from kempf.pipeline.channels.doctor.robust_regression import Fit, fit, quantile, swing
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
@@ -25,18 +24,24 @@ _LEAST_TURN = float(np.deg2rad(10.0))
 _NEUTRAL_DEG, _NEUTRAL_STD_DEG = 12.0, 3.0
 #: The turn may answer so late, s, at most: the rudder's own shift that is tried.
 _SHIFTS = np.arange(-30.0, 31.0, 1.0)
-#: Shifts that an honest rudder shows: the turn answers at once or after some seconds, and does not foresee the rudder.
-HONEST_S = (-8.0, 4.0)
+#: Shifts that a sound rudder shows: the turn answers at once or after some seconds, and does not foresee the rudder.
+USUAL_S = (-8.0, 4.0)
 _FAR_BETTER = 0.6
 #: What the rudder must explain of the change of the rate beyond what the rate itself explains.
 _EXPLAINS = 0.05
-#: What it must explain to tell when it was put over, and how well that is told then, s.
+#: What it must explain to show when it was put over, and how well it shows that then, s.
 _CLOCKED, _SHIFT_STD_S = 0.3, 1.0
 _FEWEST = 16
 
 
-def examine(log: Log) -> list[Outcome]:
-    """Hold each rudder channel against each witness of the turn.
+def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
+    """Compare each rudder channel with the turn, as the heading and as the yaw rate show it.
+
+    Parameters
+    ----------
+    log : Log
+    thorough : bool, optional
+        False: only at shifts that a sound rudder shows, and with the yaw rate alone where there is one.
 
     Returns
     -------
@@ -52,23 +57,25 @@ def examine(log: Log) -> list[Outcome]:
     for rudder in ("rudder_angle", "rudder_order"):
         if rudder not in log.series:
             continue
-        for name, channels, turned in _witnesses(log):
-            found += _compare(f"{rudder}_{name}", (rudder, *channels), log, turned)
+        for name, channels, turned in _turns(log, all_of_them=thorough):
+            found += _compare(f"{rudder}_{name}", (rudder, *channels), log, turned, thorough=thorough)
     return found
 
 
-def _witnesses(log: Log) -> list[tuple[str, tuple[str, ...], tuple[Series, Series]]]:
-    """Return what tells the turn: name, channels, the angle turned and the rate of turn."""
+def _turns(log: Log, *, all_of_them: bool) -> list[tuple[str, tuple[str, ...], tuple[Series, Series]]]:
+    """Return what shows the turn: name, channels, the angle turned and the rate of turn."""
     found: list[tuple[str, tuple[str, ...], tuple[Series, Series]]] = []
     heading, rate = log.series.get("heading"), log.series.get("yaw_rate")
-    if heading is not None and len(turning(heading)) > 1:
+    if heading is not None and (all_of_them or rate is None) and len(turning(heading)) > 1:
         found.append(("heading", ("heading",), (heading, turning(heading))))
     if rate is not None:
         found.append(("rate", ("yaw_rate",), (integral(rate), rate)))
     return found
 
 
-def _compare(name: str, channels: tuple[str, ...], log: Log, turned: tuple[Series, Series]) -> list[Outcome]:
+def _compare(
+    name: str, channels: tuple[str, ...], log: Log, turned: tuple[Series, Series], *, thorough: bool
+) -> list[Outcome]:
     rudder = log.series[channels[0]]
     angle, rate = turned
     moved, swung = swing(rudder.value), swing(angle.value)
@@ -85,16 +92,18 @@ def _compare(name: str, channels: tuple[str, ...], log: Log, turned: tuple[Serie
     edges = edges_of(rudder, angle, rate, window_s=_window(rudder))
     if edges.size < _FEWEST:
         return [untestable(name, channels, "too short to tell her answer from chance")]
-    answered = _best(edges, rudder, angle, rate, _makes_way(log, edges))
+    shifts = _SHIFTS if thorough else np.array([USUAL_S[0], 0.5 * (USUAL_S[0] + USUAL_S[1]), USUAL_S[1]])
+    answered = _best(edges, rudder, angle, rate, _makes_way(log, edges), shifts)
     if answered is None:
         return [untestable(name, channels, "too little of it overlaps")]
     found, shift, explains = answered
-    return [_judged(name, channels, found, explains), _clock(f"{name}_clock", channels, found, shift, explains)]
+    answer = _judged(name, channels, found, explains)
+    return [answer, _clock(f"{name}_clock", channels, found, shift, explains)] if thorough else [answer]
 
 
 def _window(rudder: Series) -> float:
     """Return a window a fraction of the time between two rudder movements, s."""
-    middle = 0.5 * sum(np.percentile(rudder.value, [5.0, 95.0]))
+    middle = 0.5 * (quantile(rudder.value, 0.05) + quantile(rudder.value, 0.95))
     side = np.sign(rudder.value - middle)
     crossings = np.flatnonzero(np.diff(side[side != 0]) != 0).size
     span = float(rudder.time_utc_ns[-1] - rudder.time_utc_ns[0]) / SECOND_NS
@@ -107,7 +116,7 @@ def _makes_way(log: Log, edges: Nanoseconds) -> NDArray[np.bool_]:
         speed = log.series.get(name)
         if speed is not None:
             at = np.abs(speed.at(edges, np.inf))
-            slow = at < 0.5 * float(np.percentile(np.abs(speed.value), 90.0))
+            slow = at < 0.5 * quantile(np.abs(speed.value), 0.9)
             return ~(slow[1:] | slow[:-1])
     return np.ones(max(edges.size - 1, 0), dtype=np.bool_)
 
@@ -131,50 +140,57 @@ def _averaged(series: Series, over_s: float) -> Series:
 
 
 def _best(
-    edges: Nanoseconds, rudder: Series, angle: Series, rate: Series, way: NDArray[np.bool_]
+    edges: Nanoseconds, rudder: Series, angle: Series, rate: Series, way: NDArray[np.bool_], shifts: Float
 ) -> tuple[Fit, float, float] | None:
     """Return the fit at the shift of the rudder that explains most, that shift (s) and what the rudder explains."""
     turn, jump, total = _table(edges, rudder, angle, rate)
     jump = np.where(way, jump, np.nan)
     long = np.diff(edges) / SECOND_NS
     gap = gap_limit_s(rudder)
-    without = _residual(np.column_stack([turn, long]), jump)
-    if not without:
+    moved = edges[None, :] + np.rint(shifts * SECOND_NS).astype(np.int64)[:, None]
+    put = np.diff(total.at(moved.reshape(-1), gap).reshape(moved.shape))
+    without, *shifted = _mean_squares(np.concatenate([np.zeros((1, turn.size)), put]), turn, long, jump)
+    if not 0.0 < without < np.inf:
         return None
-    left = np.full(_SHIFTS.size, np.inf)
-    moved = edges[None, :] + np.rint(_SHIFTS * SECOND_NS).astype(np.int64)[:, None]
-    for k, put in enumerate(np.diff(total.at(moved.reshape(-1), gap).reshape(moved.shape))):
-        left[k] = _residual(np.column_stack([put, turn, long]), jump) or np.inf
-    honest = (HONEST_S[0] <= _SHIFTS) & (HONEST_S[1] >= _SHIFTS)
+    left = np.array(shifted)
+    honest = (USUAL_S[0] <= shifts) & (USUAL_S[1] >= shifts)
     usual = float(np.min(left[honest]))
     # a shift that no gear and no hull makes has to be far better than one that they do
     k = int(np.argmin(left)) if np.min(left) < _FAR_BETTER * usual else int(np.argmin(np.where(honest, left, np.inf)))
     if not np.isfinite(left[k]):
         return None
-    put = np.diff(total.at(edges + round(_SHIFTS[k] * SECOND_NS), gap))
-    found = fit(np.column_stack([put, turn, long]), jump)
-    return None if found is None else (found, float(_SHIFTS[k]), 1.0 - float(left[k]) / without)
+    found = fit(np.column_stack([put[k], turn, long]), jump)
+    return None if found is None else (found, float(shifts[k]), 1.0 - float(left[k]) / without)
 
 
-def _residual(columns: Float, observed: Float) -> float | None:
-    good = np.isfinite(observed) & np.all(np.isfinite(columns), axis=1)
-    if np.count_nonzero(good) < _FEWEST:
-        return None
-    A, y = columns[good], observed[good]
-    unit = np.maximum(np.sqrt(np.mean(A**2, axis=0)), 1e-300)
-    value = np.linalg.lstsq(A / unit, y, rcond=1e-10)[0]
-    return float(np.mean((y - (A / unit) @ value) ** 2))
+def _mean_squares(put: Float, turn: Float, long: Float, observed: Float) -> Float:
+    """Return the mean square that the fit with each row of ``put`` leaves over; infinite for too few windows.
+
+    Parameters
+    ----------
+    put : ndarray, shape (n_fits, n)
+    turn, long, observed : ndarray, shape (n,)
+    """
+    columns = np.stack([put, *np.broadcast_arrays(turn, long, put)[:2]], axis=2)
+    good = np.isfinite(observed) & np.all(np.isfinite(columns), axis=2)
+    count = np.count_nonzero(good, axis=1)
+    A, y = np.where(good[..., None], columns, 0.0), np.where(good, observed, 0.0)
+    A = A / np.maximum(np.sqrt(np.sum(A**2, axis=1, keepdims=True) / np.maximum(count, 1)[:, None, None]), 1e-300)
+    turned = np.swapaxes(A, 1, 2)
+    value = np.linalg.pinv(turned @ A, rcond=1e-10, hermitian=True) @ (turned @ y[..., None])
+    left: Float = np.sum((y - (A @ value)[..., 0]) ** 2, axis=1) / np.maximum(count, 1)
+    return np.where(count < _FEWEST, np.inf, left)
 
 
 def _clock(name: str, channels: tuple[str, ...], found: Fit, shift: float, explains: float) -> Outcome:
     """Judge the shift of the rudder at which she answers best."""
     if explains < _CLOCKED or abs(found.value[0]) < SURE * found.std[0]:
         return untestable(name, channels, "her answer to the rudder is too faint to tell when it was put over")
-    figure = Figure("time of the rudder behind that of her answer", shift, _SHIFT_STD_S, *HONEST_S, "s")
+    figure = Figure("time of the rudder behind that of her answer", shift, _SHIFT_STD_S, *USUAL_S, "s")
     when = "before" if shift > 0 else "after"
     words = f"she turns as if the rudder had been put over {abs(shift):.0f} s {when} the log says"
-    middle = 0.5 * (HONEST_S[0] + HONEST_S[1])
-    late, std = shift - middle, 0.5 * (HONEST_S[1] - HONEST_S[0])
+    middle = 0.5 * (USUAL_S[0] + USUAL_S[1])
+    late, std = shift - middle, 0.5 * (USUAL_S[1] - USUAL_S[0])
     suspects = (
         Fault("latency", channels[:1], late, "late" if late > 0 else "early", std),
         Fault("latency", channels[1:], -late, "early" if late > 0 else "late", std),

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.channels.doctor.faults import UNITS, Fault
+from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Complex, Log, fix_noise
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable, worst
+from kempf.pipeline.channels.doctor.robust_regression import quantile
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
-#: Ratios of the two ways that are no lie, and angles between them, deg.
+#: Ratios of the two ways that are no fault, and angles between them, deg.
 RATIOS, _ANGLES_DEG = (0.85, 1.18), (-6.0, 6.0)
 #: Share of the way that may point elsewhere.
 _ASTRAY = 0.15
@@ -20,7 +21,7 @@ _MOST, _OVER, _CLEAR, _FEWEST = 240, 4.0, 30.0, 8
 _LEAST_WINDOWS = 2.5
 
 
-def examine(log: Log) -> list[Outcome]:
+def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Compare the way between the fixes with the integral of every velocity over ground that the log has.
 
     Returns
@@ -47,8 +48,8 @@ def examine(log: Log) -> list[Outcome]:
         length_channels = channels if kind == "body" else ("latitude", "longitude", *speed)
         # in a turn to one side only, a fix that is late looks turned
         step = np.diff(velocity.time_utc_ns) / SECOND_NS
-        late = 1.0 + float(np.median(step))
-        one_sided = late * abs(float(np.median(np.diff(velocity.direction) / step)))
+        late = 1.0 + quantile(step, 0.5)
+        one_sided = late * abs(quantile(np.diff(velocity.direction) / step, 0.5))
         found += [_length(f"path_{kind}", length_channels, speed, ways), _direction(kind, channels, ways, one_sided)]
     if not found and "speed_over_ground" in log.series:
         found += _without_course(log, track)
@@ -59,11 +60,11 @@ def _ways(track: tuple[Nanoseconds, Complex], time: Nanoseconds, velocity: Compl
     """Return the displacements by the fixes and by the velocity, each shape (n,); None for too few."""
     start, end = max(int(track[0][0]), int(time[0])), min(int(track[0][-1]), int(time[-1]))
     span = (end - start) / SECOND_NS
-    fast = float(np.percentile(np.abs(velocity), 75.0))
+    fast = quantile(np.abs(velocity), 0.75)
     gone = abs(np.diff(track[1])).sum() / max((track[0][-1] - track[0][0]) / SECOND_NS, 1e-9)
     # whichever of the two is in the wrong unit, the smaller speed makes the window long enough
     speed = max(min(fast, float(gone)), 1e-3)
-    periods = [float(np.median(np.diff(t))) / SECOND_NS for t in (track[0], time)]
+    periods = [quantile(np.diff(t) / SECOND_NS, 0.5) for t in (track[0], time)]
     way = _CLEAR * fix_noise(track[1])
     window = max(way / speed, 4.0 * max(periods))
     if span < _LEAST_WINDOWS * window:
@@ -76,10 +77,10 @@ def _ways(track: tuple[Nanoseconds, Complex], time: Nanoseconds, velocity: Compl
     moved = _between(track[0], track[1], begin, stop, gap)
     step = np.diff(time) / SECOND_NS
     total = np.concatenate([[0.0], np.cumsum(0.5 * (velocity[1:] + velocity[:-1]) * step)])
-    told = _between(time, total, begin, stop, gap)
-    good = np.isfinite(moved) & np.isfinite(told)
-    good &= np.maximum(np.abs(moved), np.abs(told)) > 0.5 * way
-    return (moved[good], told[good]) if np.count_nonzero(good) >= _FEWEST else None
+    gone = _between(time, total, begin, stop, gap)
+    good = np.isfinite(moved) & np.isfinite(gone)
+    good &= np.maximum(np.abs(moved), np.abs(gone)) > 0.5 * way
+    return (moved[good], gone[good]) if np.count_nonzero(good) >= _FEWEST else None
 
 
 def _between(time: Nanoseconds, place: Complex, begin: Nanoseconds, stop: Nanoseconds, gap: float) -> Complex:
@@ -89,25 +90,25 @@ def _between(time: Nanoseconds, place: Complex, begin: Nanoseconds, stop: Nanose
 
 
 def _length(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ways: tuple[Complex, Complex]) -> Outcome:
-    moved, told = np.abs(ways[0]), np.abs(ways[1])
-    good = (moved > 0.0) & (told > 0.0)
+    moved, gone = np.abs(ways[0]), np.abs(ways[1])
+    good = (moved > 0.0) & (gone > 0.0)
     if np.count_nonzero(good) < _FEWEST:
         return untestable(name, channels, "one of the two stands still")
-    return length_outcome(name, channels, speed, np.log(told[good] / moved[good]))
+    return length_outcome(name, channels, speed, np.log(gone[good] / moved[good]))
 
 
 def length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ratios: Float) -> Outcome:
     """Judge the logarithms of the ratios of the way by the velocity to the way by the fixes, shape (n,)."""
-    middle = float(np.median(ratios))
-    spread = 1.4826 * float(np.median(np.abs(ratios - middle)))
+    middle = quantile(ratios, 0.5)
+    spread = 1.4826 * quantile(np.abs(ratios - middle), 0.5)
     ratio = float(np.exp(middle))
     # the windows overlap: a quarter of them is independent
     std = ratio * spread / np.sqrt(max(ratios.size / 4.0, 1.0))
     figure = Figure("way by the velocity over way by the fixes", ratio, max(std, 1e-4 * ratio), *RATIOS)
     words = f"{' and '.join(speed)} add up to {ratio:.3g} +- {std:.1g} times the way between the fixes"
     suspects = [
-        *(Fault("unit", speed, factor, unit) for unit, factor in UNITS["m/s"].items()),
-        *(Fault("unit", ("latitude", "longitude"), factor, unit) for unit, factor in UNITS["rad"].items()),
+        *unit_faults(speed, "m/s"),
+        *unit_faults(("latitude", "longitude"), "rad"),
         *((Fault("swap", ("latitude", "longitude")),) if {"latitude", "longitude"} <= set(channels) else ()),
         Fault("scale", speed, 1.0 / ratio, "scale", std / ratio**2, simplicity=3),
     ]
@@ -115,15 +116,15 @@ def length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...],
 
 
 def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, Complex], one_sided: float) -> Outcome:
-    moved, told = ways
-    turn = moved * np.conj(told)
+    moved, gone = ways
+    turn = moved * np.conj(gone)
     unit = turn / np.maximum(np.abs(turn), 1e-300)
     mean = complex(np.mean(unit))
     angle = float(np.angle(mean))
     # what points elsewhere than the mean, of the whole
     astray = 1.0 - abs(mean)
     off = np.angle(unit * np.exp(-1j * angle))
-    own = 1.4826 * float(np.median(np.abs(off))) / np.sqrt(max(off.size / 4.0, 1.0))
+    own = 1.4826 * quantile(np.abs(off), 0.5) / np.sqrt(max(off.size / 4.0, 1.0))
     std = float(np.hypot(own, one_sided))
     figures = (
         Figure(
@@ -150,7 +151,7 @@ def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, Comple
             Fault("sign", course),
             Fault("offset", course, np.pi / 2, "counted anticlockwise from east", simplicity=2),
             Fault("offset", course, angle, "turned", std, simplicity=2),
-            *(Fault("unit", course, factor, unit) for unit, factor in UNITS["rad"].items()),
+            *unit_faults(course, "rad"),
         ]
     else:
         suspects += [

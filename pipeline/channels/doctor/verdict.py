@@ -1,4 +1,4 @@
-"""What the doctor says, in words and as JSON: findings with their evidence and the lines that mend them."""
+"""What the doctor says, in words and as JSON: findings with their evidence and the lines that correct them."""
 
 from __future__ import annotations
 
@@ -16,7 +16,9 @@ from kempf.schemas.profile import ChannelMap
 _FRAMES = {"body-fixed": "earth-fixed ones are expected", "earth-fixed": "body-fixed ones are expected"}
 
 
-def told(examination: Examination, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> dict[str, Any]:
+def as_content(
+    examination: Examination, known: Mapping[str, tuple[str, ChannelMap]], log_format: str
+) -> dict[str, Any]:
     """Return an examination as JSON content.
 
     Parameters
@@ -42,7 +44,7 @@ def told(examination: Examination, known: Mapping[str, tuple[str, ChannelMap]], 
 def _finding(finding: Finding, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> dict[str, Any]:
     faults = []
     for fault in finding.faults:
-        mends = propose(fault, known, log_format)
+        corrections = propose(fault, known, log_format)
         faults.append(
             {
                 "kind": fault.kind,
@@ -50,8 +52,8 @@ def _finding(finding: Finding, known: Mapping[str, tuple[str, ChannelMap]], log_
                 "words": words(fault),
                 "value": fault.value,
                 "std": fault.std,
-                "profile": [mend.line for mend in mends],
-                "entries": {mend.key: mend.mapped.model_dump(exclude_defaults=True) for mend in mends},
+                "profile": [one.line for one in corrections],
+                "entries": {one.key: one.mapped.model_dump(exclude_defaults=True) for one in corrections},
             }
         )
     return {
@@ -86,7 +88,8 @@ def _figure(figure: Figure) -> dict[str, Any]:
 def sentence(finding: Finding) -> str:
     """Return a finding as one sentence."""
     if not finding.faults:
-        return f"{_listed(finding.channels)} contradict each other, and no single lie that is known explains it"
+        which = "one" if len(finding.channels) == 2 else "at least one"
+        return f"{listed(finding.channels)} disagree; {which} of them is wrong, and no known fault explains it"
     if len(finding.faults) == 1:
         return words(finding.faults[0])
     return "one of these: " + "; or ".join(words(fault) for fault in finding.faults)
@@ -102,7 +105,7 @@ def words(fault: Fault) -> str:
     >>> words(Fault("latency", ("heading",), 2.5, "late", 0.04))
     'heading is 2.50 +- 0.04 s late'
     """
-    return _WORDS[fault.kind](_listed(fault.channels), fault)
+    return _WORDS[fault.kind](listed(fault.channels), fault)
 
 
 def _of_offset(names: str, fault: Fault) -> str:
@@ -126,11 +129,13 @@ _WORDS: dict[str, Callable[[str, Fault], str]] = {
         f"{names} is {abs(fault.value):.2f} +- {fault.std:.1g} s {'late' if fault.value > 0 else 'early'}"
     ),
     "scale": lambda names, fault: f"{names} is to be multiplied by {fault.value:.4g} +- {fault.std:.1g}",
+    "stuck": lambda names, _: f"{names} stands still",
     "offset": _of_offset,
     "clock_scale": _of_clock,
 }
 
 
-def _listed(channels: tuple[str, ...]) -> str:
+def listed(channels: tuple[str, ...]) -> str:
+    """Return channels as words: a, b and c."""
     assert all(channel in CHANNELS for channel in channels)
     return channels[0] if len(channels) == 1 else f"{', '.join(channels[:-1])} and {channels[-1]}"

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.channels.doctor.faults import UNITS, Fault
+from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.heading_course import STREAM_STD_M_S
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
-from kempf.pipeline.channels.doctor.robust_regression import posterior
+from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import Float, Series
 
-#: Ratios of the two that are no lie: a log is out by a tenth, and reads low in a turn.
+#: Ratios of the two that are no fault: a log is out by a tenth, and reads low in a turn.
 _RATIOS = (0.8, 1.25)
 _FEWEST = 12
 #: Sectors of course that readings are averaged by, and the error that an average keeps, as a share of the speed.
@@ -21,8 +21,14 @@ _SECTORS, _SECTOR_STD = 36, 0.05
 _ZERO_M_S = 0.1
 
 
-def examine(log: Log) -> list[Outcome]:
+def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Compare the log with every velocity over ground, a constant stream taken out as far as the headings tell it.
+
+    Parameters
+    ----------
+    log : Log
+    thorough : bool, optional
+        False: not with the way from fix to fix.
 
     Returns
     -------
@@ -32,12 +38,11 @@ def examine(log: Log) -> list[Outcome]:
     water, heading = log.series.get("speed_through_water"), log.series.get("heading")
     if water is None:
         return []
-    found = []
-    for kind in ("course", "earth", "body", "track"):
-        velocity = log.velocity(kind)
-        if velocity is not None and not (velocity.over_s and (heading is None or velocity.blurred(heading))):
-            found.append(_compare(kind, water, velocity))
-    return found
+    return [
+        _compare(kind, water, velocity)
+        for kind, velocity in log.velocities(track=thorough)
+        if not (velocity.over_s and (heading is None or velocity.blurred(heading)))
+    ]
 
 
 def _compare(kind: str, water: Series, velocity: Velocity) -> Outcome:
@@ -45,14 +50,14 @@ def _compare(kind: str, water: Series, velocity: Velocity) -> Outcome:
     name, channels = f"water_speed_{kind}", ("speed_through_water", *speed_channels)
     way = velocity.under_way
     own = water.at(velocity.time_utc_ns, gap_limit_s(water))
-    fast = float(np.percentile(np.abs(water.value), 98.0))
+    fast = quantile(np.abs(water.value), 0.98)
     good = way & np.isfinite(own) & (np.abs(np.nan_to_num(own)) > 0.4 * fast)
     if np.count_nonzero(good) < _FEWEST or not float(np.median(np.abs(own[good]))) > 0.0:
         return untestable(name, channels, "one of the two stands still, or they hardly overlap")
     own, over, direction = _by_sector(own[good], velocity.value[good])
-    # U = k w + the stream along the way; on several courses the stream can be told from k
+    # U = k w + the stream along the way; on several courses the stream can be separated from k
     columns = np.column_stack([own, np.cos(direction), np.sin(direction)])
-    speed = float(np.median(np.abs(over)))
+    speed = quantile(np.abs(over), 0.5)
     prior = np.array([np.inf, *[STREAM_STD_M_S] * 2])
     fitted = posterior(columns, over, np.full(over.shape, _SECTOR_STD * speed), prior)
     if fitted.value[0] == 0.0:
@@ -64,13 +69,13 @@ def _compare(kind: str, water: Series, velocity: Velocity) -> Outcome:
     words = f"the log reads {ratio:.2f} +- {std:.2g} times the speed over ground, the stream taken out"
     suspects = [
         Fault("sign", ("speed_through_water",)),
-        *(Fault("unit", ("speed_through_water",), factor, unit) for unit, factor in UNITS["m/s"].items()),
+        *unit_faults(("speed_through_water",), "m/s"),
         Fault("scale", ("speed_through_water",), slope, "scale", float(fitted.std[0]), simplicity=3),
     ]
     if kind != "track":
-        suspects += [Fault("unit", speed_channels, factor, unit) for unit, factor in UNITS["m/s"].items()]
+        suspects += unit_faults(speed_channels, "m/s")
     else:
-        suspects += [Fault("unit", speed_channels, factor, unit) for unit, factor in UNITS["rad"].items()]
+        suspects += unit_faults(speed_channels, "rad")
         suspects += [Fault("swap", speed_channels)]
     return Outcome(
         name,

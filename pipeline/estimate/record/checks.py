@@ -1,7 +1,7 @@
 """Whether a segment is a manoeuvre that can be identified from, before any estimator sees it.
 
-One instrument at a time, in columns: the rudder is put over, the ship answers, she makes way. Whether instruments
-contradict each other is asked in `kempf.pipeline.estimate.record.agreement`.
+The rudder is put over, the ship answers, she makes way ahead. Whether instruments contradict each other is asked in
+`kempf.pipeline.estimate.record.channel_faults`.
 """
 
 from __future__ import annotations
@@ -11,6 +11,7 @@ import numpy as np
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, noise_std
 from kempf.pipeline.channels.series import Float, Series
+from kempf.pipeline.estimate.record.channel_faults import FARTHEST_RAD
 from kempf.schemas.errors import DataRejected
 
 #: executes that a record must hold: the first turns her one way, the second shows how she comes back
@@ -118,6 +119,31 @@ def check_manoeuvre(rudder: Series, heading: Series) -> tuple[str, ...]:
             "else than the rudder; sail a zigzag of more legs",
         )
     return ()
+
+
+def check_course(lateral: LateralSpeed) -> None:
+    """Ask whether the ship goes where her bow points, give or take drift and stream, as eq. (18) needs.
+
+    Parameters
+    ----------
+    lateral : LateralSpeed
+
+    Raises
+    ------
+    DataRejected
+        ``course_not_along_heading``.
+    """
+    drift = np.abs(lateral.drift_rad[np.isfinite(lateral.drift_rad)])
+    usual = float(np.median(drift)) if drift.size else 0.0
+    if usual > FARTHEST_RAD:
+        raise DataRejected(
+            "course_not_along_heading",
+            f"The course over ground lies {np.rad2deg(usual):.0f} deg off the heading in the median; a ship under way "
+            f"ahead stays within {np.rad2deg(FARTHEST_RAD):.0f}.",
+            "Check unit, sign and offset of heading and course_over_ground in the vessel profile, and whether she went "
+            "astern; in a stream as fast as the ship, repeat at higher speed.",
+            {"median_angle_rad": usual},
+        )
 
 
 def check_way(speed_m_s: Float) -> tuple[str, ...]:

@@ -7,13 +7,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kempf.pipeline.channels.corners import with_corners
+from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 from kempf.pipeline.channels.smooth import without_spikes
-from kempf.pipeline.estimate.record.agreement import Channels, check_agreement
-from kempf.pipeline.estimate.record.checks import check_manoeuvre, check_sway, check_way
+from kempf.pipeline.estimate.record.channel_faults import EXAMINED, check_channels
+from kempf.pipeline.estimate.record.checks import check_course, check_manoeuvre, check_sway, check_way
 from kempf.pipeline.estimate.record.jumps import find_jumps
 from kempf.pipeline.estimate.record.speed_error import SpeedError, rudder_of_speed_error
 from kempf.pipeline.estimate.record.water_speed import water_speed
@@ -21,8 +22,6 @@ from kempf.schemas.errors import DataRejected
 
 #: columns of `Record.measured`
 MEASUREMENTS = ("lateral_speed", "yaw_rate", "heading")
-#: channels that are held against those that identification needs
-_COMPARED = ("speed_through_water", "latitude", "longitude")
 #: a log slower than this changes little in between; longer gaps are refused
 _MAX_SPEED_GAP_S = 60.0
 _MIN_INSTANTS = 40
@@ -124,22 +123,24 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     rudder = _need(instruments, "rudder_angle", start_utc_ns, end_utc_ns)
     course = _need(instruments, "course_over_ground", start_utc_ns, end_utc_ns)
     ground_speed = _need(instruments, "speed_over_ground", start_utc_ns, end_utc_ns)
+    heading_std, rudder_std = noise_std(heading), float(np.nan_to_num(noise_std(rudder)))
     lateral = lateral_speed(
         ground_speed,
         course,
         heading,
         speed_std_m_s=noise_std(ground_speed),
         course_std_rad=noise_std(course),
-        heading_std_rad=noise_std(heading),
+        heading_std_rad=heading_std,
     )
     yaw = _cut(instruments, "yaw_rate", start_utc_ns, end_utc_ns)
     if yaw is None:
         warnings.append("no yaw rate channel: the yaw rate is estimated through the heading")
-    others = [_cut(instruments, name, start_utc_ns, end_utc_ns) for name in _COMPARED]
-    yaw, said = check_agreement(Channels(heading, course, ground_speed, yaw, *others), lateral)
+    usable, said = check_channels(_window(instruments, start_utc_ns, end_utc_ns))
+    yaw = yaw if usable else None
     warnings += said
+    check_course(lateral)
     lateral = _without_jumps(lateral, warnings)
-    moved = with_corners(rudder, float(np.nan_to_num(noise_std(rudder))))
+    moved = with_corners(rudder, rudder_std)
     timed = [lateral.time_utc_ns, heading.time_utc_ns, moved.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
@@ -154,7 +155,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     warnings += check_sway(lateral, heading, rudder, yaw) if yaw is not None else ()
     measured = _measured(instants, lateral, yaw, heading)
     by_speed = rudder_of_speed_error(heading, rudder, instants, delta)
-    noise = np.array([float(np.nanmedian(lateral.std_m_s)), noise_std(yaw) if yaw else np.nan, noise_std(heading)])
+    noise = np.array([float(np.nanmedian(lateral.std_m_s)), noise_std(yaw) if yaw else np.nan, heading_std])
     return Record(
         start_utc_ns=int(instants[0]),
         time_s=(instants - instants[0]).astype(np.float64) / SECOND_NS,
@@ -164,7 +165,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         heading_rad=heading.at(instants, gap_limit_s(heading)),
         heading_origin_rad=float(heading.value[0]),
         rudder_period_s=rudder.period_s,
-        rudder_noise_rad_sqrt_s=np.full(instants.size, _intensity(rudder)),
+        rudder_noise_rad_sqrt_s=np.full(instants.size, rudder_std * float(np.sqrt(rudder.period_s))),
         speed_error=SpeedError(by_speed / np.maximum(np.abs(speed), _SLOWEST_M_S), error_std, error_time_s),
         lateral=lateral,
         noise_start=noise,
@@ -204,6 +205,12 @@ def _cut(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> 
             {"channel": channel, "values": len(part), "not_finite": wrong},
         )
     return part if len(part) >= _MIN_INSTANTS // 2 else None
+
+
+def _window(instruments: Instruments, start_ns: int, end_ns: int) -> Log:
+    """Return what the log itself has of a segment, for the channel doctor."""
+    own = {name: _cut(instruments, name, start_ns, end_ns) for name in EXAMINED if name not in instruments.derived}
+    return Log({name: series for name, series in own.items() if series is not None})
 
 
 def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> Series:
@@ -267,11 +274,6 @@ def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:
         for name in ("value_m_s", "std_m_s", "forward_m_s", "drift_rad")
     }
     return replace(lateral, **sound)
-
-
-def _intensity(rudder: Series) -> float:
-    """Intensity of the noise of the rudder's readings, rad s^0.5."""
-    return float(np.nan_to_num(noise_std(rudder))) * float(np.sqrt(rudder.period_s))
 
 
 def _trimmed(instants: Nanoseconds, speed: Float, warnings: list[str]) -> tuple[Nanoseconds, Float]:

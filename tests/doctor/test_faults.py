@@ -1,4 +1,4 @@
-"""Every kind of lie is named, alone where a third witness is there, as one of two where there is none."""
+"""Every kind of fault is named, alone where a third channel confirms it, as one of two where none does."""
 
 from __future__ import annotations
 
@@ -7,11 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kempf.pipeline.channels.doctor.examine import CHECKS, ask, examine
+from kempf.pipeline.channels.doctor.corrections import setting
+from kempf.pipeline.channels.doctor.examine import CHECKS, ask, examine, examine_window
 from kempf.pipeline.channels.doctor.faults import UNITS, Fault
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from tests.doctor import made
+from tests.doctor import closed_form_ship
 
 SWAP = Fault("swap", ("latitude", "longitude"))
 GNSS = ("speed_over_ground", "course_over_ground")
@@ -28,18 +29,18 @@ def changed(log: Log, name: str, factor: float = 1.0, add: float = 0.0) -> Log:
     return log.with_series({name: Series(one.time_utc_ns, one.value * factor + add)})
 
 
-def test_an_honest_log_is_clean_and_every_channel_tested() -> None:
-    found = examine(made.log())
+def test_a_sound_log_is_clean_and_every_channel_tested() -> None:
+    found = examine(closed_form_ship.log())
     assert (found.verdict, found.findings, found.untested) == ("clean", (), ())
     assert {o.check for o in found.outcomes if o.state != "agree"} <= {
         "heading_track",
         "heading_track_clock",
         "legs_track",
     }
-    assert len(CHECKS) == 7
+    assert len(CHECKS) == 8
 
 
-LIES = {
+FAULTS = {
     "rate sign": (lambda log: changed(log, "yaw_rate", -1.0), Fault("sign", ("yaw_rate",))),
     "rate unit": (
         lambda log: changed(log, "yaw_rate", 1 / 60),
@@ -73,25 +74,25 @@ LIES = {
         Fault("unit", ("speed_through_water",), 1 / 3.6, "km/h taken for m/s"),
     ),
     "west positive": (lambda log: changed(log, "longitude", -1.0), Fault("sign", ("longitude",))),
-    "swapped": (SWAP.mended, SWAP),
+    "swapped": (SWAP.corrected, SWAP),
 }  # fmt: skip
 
 
-@pytest.mark.parametrize("name", LIES)
+@pytest.mark.parametrize("name", FAULTS)
 def test_the_odd_one_out_is_named_alone_with_its_size(name: str) -> None:
-    lie, told = LIES[name]
+    spoil, expected = FAULTS[name]
     # what a column was taken for is in the profile; a radian of rate cannot have been taken for two things
     units = {"yaw_rate": "deg/min", "speed_over_ground": "m/s", "speed_through_water": "m/s"}
-    found = examine(replace(lie(made.log()), units=units))
-    assert [f.key for f in found.findings[0].faults] == [told.key]
+    found = examine(replace(spoil(closed_form_ship.log()), units=units))
+    assert [f.key for f in found.findings[0].faults] == [expected.key]
     assert len(found.findings) == 1
     fault = found.findings[0].faults[0]
-    assert fault.value == pytest.approx(told.value, abs=max(4.0 * fault.std, 0.05 * abs(told.value)))
+    assert fault.value == pytest.approx(expected.value, abs=max(4.0 * fault.std, 0.05 * abs(expected.value)))
     assert found.findings[0].evidence
 
 
 def test_frames_taken_for_each_other() -> None:
-    log, psi = made.log(), made.truth()["heading"]
+    log, psi = closed_form_ship.log(), closed_form_ship.truth()["heading"]
     velocity = log.velocity("course")
     assert velocity is not None
     time, bare = velocity.time_utc_ns, log.with_series(dict.fromkeys(GNSS))
@@ -99,63 +100,98 @@ def test_frames_taken_for_each_other() -> None:
         (("velocity_forward", "velocity_starboard"), velocity.value),
         (("velocity_north", "velocity_east"), velocity.value * np.exp(-1j * psi)),
     ):
-        lying = bare.with_series({names[0]: Series(time, value.real), names[1]: Series(time, value.imag)})
-        (finding,) = examine(lying).findings
+        spoilt = bare.with_series({names[0]: Series(time, value.real), names[1]: Series(time, value.imag)})
+        (finding,) = examine(spoilt).findings
         assert [(f.kind, f.channels) for f in finding.faults] == [("frame", names)]
 
 
 @pytest.mark.parametrize(("by_s", "rate"), [(6.0, 0.0), (0.0, 0.01)])
 def test_clocks(by_s: float, rate: float) -> None:
-    lying = late(made.log(), "yaw_rate", by_s, rate)
-    (finding,) = examine(lying).findings
+    spoilt = late(closed_form_ship.log(), "yaw_rate", by_s, rate)
+    (finding,) = examine(spoilt).findings
     faults = {f.channels: f for f in finding.faults}
     fault = faults["yaw_rate",]
     assert (fault.kind, len(faults) <= 2) == ("clock_scale" if rate else "latency", True)
     assert fault.value == pytest.approx(rate or by_s, rel=0.05)
 
 
-def test_two_witnesses_make_one_of_these() -> None:
-    (finding,) = examine(changed(made.log("heading", "yaw_rate"), "yaw_rate", -1.0)).findings
+def test_two_channels_make_one_of_these() -> None:
+    (finding,) = examine(changed(closed_form_ship.log("heading", "yaw_rate"), "yaw_rate", -1.0)).findings
     assert {f.channels for f in finding.faults} == {("heading",), ("yaw_rate",)}
 
 
-def test_two_lies_at_once_are_both_found() -> None:
-    lying = changed(changed(made.log(), "rudder_angle", -1.0), "speed_over_ground", 3600 / 1852)
-    lying = replace(lying, units={"speed_over_ground": "m/s"})
-    found = {f.channels for x in examine(lying).findings for f in x.faults}
+def test_two_faults_at_once_are_both_found() -> None:
+    spoilt = changed(changed(closed_form_ship.log(), "rudder_angle", -1.0), "speed_over_ground", 3600 / 1852)
+    spoilt = replace(spoilt, units={"speed_over_ground": "m/s"})
+    found = {f.channels for x in examine(spoilt).findings for f in x.faults}
     assert found == {("rudder_angle",), ("speed_over_ground",)}
 
 
 def test_what_nothing_confirms_cannot_be_tested() -> None:
-    found = examine(made.log("heading"))
+    found = examine(closed_form_ship.log("heading"))
     assert (found.verdict, found.untested) == ("untested", ("heading",))
-    still = {n: Series(s.time_utc_ns[:120], s.value[:120] * 0.0) for n, s in made.log().series.items()}
+    still = {n: Series(s.time_utc_ns[:120], s.value[:120] * 0.0) for n, s in closed_form_ship.log().series.items()}
     assert not examine(Log(still)).findings
 
 
-def test_a_compass_that_stands_still_contradicts_without_a_mend() -> None:
-    log = changed(made.log("heading", "yaw_rate"), "heading", 0.0)
+def test_a_compass_that_stands_still_is_named_without_a_line() -> None:
+    log = changed(closed_form_ship.log("heading", "yaw_rate"), "heading", 0.0)
     (finding,) = examine(log).findings
-    assert (finding.faults, finding.channels) == ((), ("heading", "yaw_rate"))
+    assert [(f.kind, f.channels, setting(f)) for f in finding.faults] == [("stuck", ("heading",), "")]
+    assert "heading_standstill" in {outcome.check for outcome in finding.evidence}
 
 
-def test_a_contradiction_that_no_lie_explains_is_told_without_a_culprit() -> None:
-    log = made.log("heading", "yaw_rate")
+def held(log: Log, name: str, from_s: float, to_s: float) -> Log:
+    one = log.series[name]
+    seconds = one.seconds_since(closed_form_ship.START_NS)
+    value = one.value.copy()
+    value[(seconds >= from_s) & (seconds <= to_s)] = np.interp(from_s, seconds, value)
+    return log.with_series({name: Series(one.time_utc_ns, value)})
+
+
+@pytest.mark.parametrize("name", ["heading", "yaw_rate"])
+def test_a_channel_that_stands_still_for_a_while_is_named(name: str) -> None:
+    (finding,) = examine(held(closed_form_ship.log(), name, 270.0, 330.0)).findings
+    (fault,) = finding.faults
+    assert (fault.kind, fault.channels) == ("stuck", (name,))
+    assert fault.value == pytest.approx(60.0, abs=1.0)
+    assert fault.start_utc_ns == closed_form_ship.START_NS + 270 * SECOND_NS
+
+
+def test_a_coarse_compass_on_a_straight_course_is_sound() -> None:
+    log = closed_form_ship.log("heading", "yaw_rate", "speed_over_ground", "course_over_ground")
+    random = np.random.Generator(np.random.PCG64(2))
+    for name, value in (("heading", 0.7), ("course_over_ground", 0.7), ("yaw_rate", np.deg2rad(0.03))):
+        noise = 0.0 if name == "heading" else 2e-3 * random.standard_normal(len(log.series[name]))
+        log = log.with_series({name: Series(closed_form_ship.time_ns(), np.full(len(log.series[name]), value) + noise)})
+    assert examine(log).findings == ()
+
+
+def test_a_window_says_what_the_whole_says() -> None:
+    sound = closed_form_ship.log().between(closed_form_ship.START_NS, closed_form_ship.START_NS + 900 * SECOND_NS)
+    assert examine_window(sound).findings == examine(sound).findings == ()
+    for name, (spoil, _) in FAULTS.items():
+        window = spoil(sound)
+        assert examine_window(window).findings == examine(window).findings, name
+
+
+def test_a_contradiction_that_no_fault_explains_names_none() -> None:
+    log = closed_form_ship.log("heading", "yaw_rate")
     random = np.random.Generator(np.random.PCG64(1))
     walk = 0.01 * np.cumsum(random.standard_normal(len(log.series["yaw_rate"])))
     found = examine(log.with_series({"yaw_rate": Series(log.series["yaw_rate"].time_utc_ns, walk)}))
     assert [x.faults for x in found.findings] in ([()], [])
 
 
-def test_a_mend_undoes_its_lie() -> None:
-    log = made.log()
+def test_a_correction_undoes_its_fault() -> None:
+    log = closed_form_ship.log()
     for fault in (
         Fault("sign", ("yaw_rate",)),
         Fault("unit", ("yaw_rate",), 60.0),
         Fault("latency", ("heading",), 2.5),
     ):
         back = replace(fault, value=1 / 60 if fault.kind == "unit" else -fault.value)
-        again = back.mended(fault.mended(log)).series[fault.channels[0]]
+        again = back.corrected(fault.corrected(log)).series[fault.channels[0]]
         assert np.allclose(again.value, log.series[fault.channels[0]].value)
         assert np.array_equal(again.time_utc_ns, log.series[fault.channels[0]].time_utc_ns)
 
@@ -168,5 +204,5 @@ def test_every_unit_has_its_inverse() -> None:
 
 
 def test_it_says_the_same_twice() -> None:
-    log = changed(made.log(), "heading", -1.0)
+    log = changed(closed_form_ship.log(), "heading", -1.0)
     assert [o.figures for some in ask(log) for o in some] == [o.figures for some in ask(log) for o in some]

@@ -8,11 +8,11 @@ import numpy as np
 import pytest
 
 from kempf.flows.jobs.examine_log import Examined, examine_instruments
-from kempf.pipeline.channels.doctor.corrections import Mend, put_into
+from kempf.pipeline.channels.doctor.corrections import Correction, put_into
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.profile import ChannelMap, VesselProfile
-from tests.doctor import made
+from tests.doctor import closed_form_ship
 
 
 def look(data: bytes, profile: VesselProfile) -> Examined:
@@ -24,7 +24,9 @@ def mended(profile: VesselProfile, content: dict[str, Any]) -> VesselProfile:
     source = profile.source_for("made.csv")
     for finding in content["findings"]:
         entries = finding["faults"][0]["entries"]
-        source = put_into(source, tuple(Mend(k, ChannelMap.model_validate(e)) for k, e in entries.items()), "made.csv")
+        source = put_into(
+            source, tuple(Correction(k, ChannelMap.model_validate(e)) for k, e in entries.items()), "made.csv"
+        )
     assert source is not None
     return profile.model_copy(update={"sources": [source]})
 
@@ -41,7 +43,7 @@ def mended(profile: VesselProfile, content: dict[str, Any]) -> VesselProfile:
     ],
 )
 def test_a_spoilt_entry_is_written_as_it_was(spoilt: dict[str, Any], line: str) -> None:
-    data, profile = made.text(made.channels()), made.profile(**spoilt)
+    data, profile = closed_form_ship.text(closed_form_ship.channels()), closed_form_ship.profile(**spoilt)
     found = look(data, profile)
     (finding,) = found.content["findings"]
     assert finding["faults"][0]["profile"] == [line]
@@ -58,7 +60,7 @@ def test_a_spoilt_entry_is_written_as_it_was(spoilt: dict[str, Any], line: str) 
     ],
 )
 def test_an_estimate_comes_back_to_where_it_was(spoilt: dict[str, Any], key: str, value: float) -> None:
-    data, profile = made.text(made.channels()), made.profile(**spoilt)
+    data, profile = closed_form_ship.text(closed_form_ship.channels()), closed_form_ship.profile(**spoilt)
     found = look(data, profile)
     (finding,) = found.content["findings"]
     (column,) = spoilt
@@ -71,17 +73,17 @@ def test_an_estimate_comes_back_to_where_it_was(spoilt: dict[str, Any], key: str
 
 
 def test_swaps_and_frames_exchange_the_entries() -> None:
-    values = made.channels()
+    values = closed_form_ship.channels()
     velocity = values["speed_over_ground"] * np.exp(1j * values["course_over_ground"])
     rest = {n: v for n, v in values.items() if n not in ("speed_over_ground", "course_over_ground")}
-    data = made.text({**rest, "velocity_north": velocity.real, "velocity_east": velocity.imag})
+    data = closed_form_ship.text({**rest, "velocity_north": velocity.real, "velocity_east": velocity.imag})
     names = (*rest, "velocity_north", "velocity_east")
     right = ["ve: {channel: velocity_east, unit: m/s}", "vn: {channel: velocity_north, unit: m/s}"]
     for spoilt in (
         {"vn": {"channel": "velocity_east"}, "ve": {"channel": "velocity_north"}},
         {"vn": {"channel": "velocity_forward"}, "ve": {"channel": "velocity_starboard"}},
     ):
-        profile = made.profile(*names, **spoilt)
+        profile = closed_form_ship.profile(*names, **spoilt)
         found = look(data, profile)
         (finding,) = found.content["findings"]
         assert sorted(finding["faults"][0]["profile"]) == right

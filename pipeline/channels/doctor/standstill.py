@@ -1,0 +1,119 @@
+"""A heading or yaw rate that repeats one reading while the ship turns."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from kempf.pipeline.channels.doctor.faults import Fault
+from kempf.pipeline.channels.doctor.log import Log, integral
+from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.robust_regression import swing
+from kempf.pipeline.channels.series import SECOND_NS, Series
+
+#: A channel stands still when it repeats itself so long, in so many readings, while the ship turns so far.
+_LEAST_S, _LEAST_READINGS, _TURN_DEG = 10.0, 10, 5.0
+_TURN_RAD = float(np.deg2rad(_TURN_DEG))
+#: The course also swings with drift and stream: it has to turn so many times as far.
+_COURSE = 3.0
+#: No rate gyro has a larger bias, rad/s: its integral turns no farther than that by itself.
+_BIAS_RAD_S = float(np.deg2rad(0.05))
+#: Of many times at which a coarse channel repeats itself, the longest are looked at.
+_MOST = 50
+#: A heading that swings less than this in the whole log while the ship swings five times as far is noise.
+_DEAD_RAD, _UNLIKE = float(np.deg2rad(1.0)), 0.5
+
+
+def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
+    """Find the times at which heading or yaw rate stand still.
+
+    Returns
+    -------
+    list of Outcome
+        ``heading_standstill``, compared with the yaw rate, else with the course; ``yaw_rate_standstill``.
+    """
+    heading, rate, velocity = log.series.get("heading"), log.series.get("yaw_rate"), log.velocity("course")
+    if heading is None or (rate is None and velocity is None):
+        return []
+    way = None if velocity is None else Series(velocity.time_utc_ns, velocity.under_way.astype(np.float64))
+    if rate is None:
+        assert velocity is not None
+        course = Series(velocity.time_utc_ns, velocity.direction)
+        found = _heading_turns(heading, course, way, _COURSE * _TURN_RAD)
+        return [_judged("heading", "course_over_ground", found, swing(course.value))]
+    turn = integral(rate)
+    return [
+        _judged("heading", "yaw_rate", _heading_turns(heading, turn, way, _TURN_RAD, _BIAS_RAD_S), swing(turn.value)),
+        _judged("yaw_rate", "heading", _rate_turns(rate, heading, way), swing(heading.value)),
+    ]
+
+
+def _judged(channel: str, other: str, found: tuple[Series, float] | None, in_all: float) -> Outcome:
+    name, channels = f"{channel}_standstill", (channel, other)
+    if found is None and in_all < 2.0 * _TURN_RAD:
+        return untestable(name, channels, "the ship hardly turned")
+    turned = 0.0 if found is None else found[1]
+    figure = Figure("turned while it repeats itself", float(np.rad2deg(turned)), 0.1, 0.0, _TURN_DEG, "deg")
+    if found is None:
+        return Outcome(name, channels, "agree", f"{channel} does not repeat itself while the ship turns", (figure,))
+    start, end = int(found[0].time_utc_ns[0]), int(found[0].time_utc_ns[-1])
+    words = (
+        f"{channel} repeats itself for {(end - start) / SECOND_NS:.0f} s, in which the ship turns by "
+        f"{figure.value:.0f} deg by the {other}"
+    )
+    fault = Fault("stuck", (channel,), (end - start) / SECOND_NS, start_utc_ns=start)
+    return Outcome(name, channels, "disagree", words, (figure,), 1.0, (fault,))
+
+
+def _repeats(series: Series, way: Series | None) -> Iterator[Series]:
+    """Yield the times under way at which a channel repeats one reading, the longest first."""
+    edges = np.concatenate([[0], np.flatnonzero(np.diff(series.value) != 0.0) + 1, [len(series)]])
+    first, last = edges[:-1], edges[1:] - 1
+    long = series.time_utc_ns[last] - series.time_utc_ns[first]
+    enough = np.flatnonzero((long >= _LEAST_S * SECOND_NS) & (last - first >= _LEAST_READINGS))
+    for k in enough[np.argsort(-long[enough], kind="stable")][:_MOST]:
+        start, end = int(series.time_utc_ns[first[k]]), int(series.time_utc_ns[last[k]])
+        made = None if way is None else way.between(start, end).value
+        if made is None or not made.size or float(np.mean(made)) > 0.5:
+            yield series.between(start, end)
+
+
+def _heading_turns(
+    heading: Series, turn: Series, way: Series | None, least: float, bias_rad_s: float = 0.0
+) -> tuple[Series, float] | None:
+    """Return the longest standstill of a heading and how far the ship turns in it, rad; None where there is none."""
+    if swing(heading.value) < _DEAD_RAD and len(turn) > _LEAST_READINGS and _turned(turn, bias_rad_s) > 5.0 * _DEAD_RAD:
+        along = np.interp(heading.time_utc_ns, turn.time_utc_ns, turn.value)
+        if np.ptp(heading.value) == 0.0 or abs(float(np.corrcoef(along, heading.value)[0, 1])) < _UNLIKE:
+            return heading, _turned(turn, bias_rad_s)
+    for still in _repeats(heading, way):
+        meanwhile = turn.between(int(still.time_utc_ns[0]), int(still.time_utc_ns[-1]))
+        if len(meanwhile) > 2 and (turned := _turned(meanwhile, bias_rad_s)) > least:
+            return still, turned
+    return None
+
+
+def _turned(turn: Series, bias_rad_s: float) -> float:
+    """Return how far a direction turns beyond what a bias of its rate makes of it, rad."""
+    seconds = turn.seconds_since(int(turn.time_utc_ns[0]))
+    straight = np.polynomial.polynomial.polyfit(seconds, turn.value, 1)
+    bent = swing(turn.value - np.polynomial.polynomial.polyval(seconds, straight)) if bias_rad_s else 0.0
+    return max(bent, swing(turn.value) - bias_rad_s * float(seconds[-1]))
+
+
+def _rate_turns(rate: Series, heading: Series, way: Series | None) -> tuple[Series, float] | None:
+    """Return the longest standstill of a yaw rate and how far the heading departs from its integral, rad."""
+    steps = np.abs(np.diff(rate.value))
+    rounding = float(np.min(steps[steps > 0.0], initial=np.inf))
+    for still in _repeats(rate, way):
+        start, end = int(still.time_utc_ns[0]), int(still.time_utc_ns[-1])
+        meanwhile = heading.between(start, end)
+        if len(meanwhile) < 2:
+            continue
+        # a steady turn repeats its rate, and the heading turns with it; a coarse rate is right within a step
+        missed = swing(meanwhile.value - still.value[0] * meanwhile.seconds_since(start))
+        missed -= rounding * (end - start) / SECOND_NS if np.isfinite(rounding) else 0.0
+        if missed > _TURN_RAD:
+            return still, missed
+    return None
