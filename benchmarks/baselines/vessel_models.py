@@ -24,9 +24,9 @@ from benchmarks import result_page
 from benchmarks.baselines.estimators import default_settings, estimate
 from benchmarks.baselines.multiple_models import accelerations
 from benchmarks.baselines.smoothed_regression import SmoothedRegressionSettings
+from benchmarks.baselines.start import ranked_starts
 from benchmarks.identify.estimators import HULLS, SEEDS, sail, truth_of
 from kempf.pipeline.estimate.classical.resample import even, step_of
-from kempf.pipeline.estimate.classical.start import ranked_starts
 from kempf.pipeline.estimate.record.record import Record
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 

@@ -11,11 +11,12 @@ from tempfile import TemporaryDirectory
 from benchmarks import result_page
 from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.write import logs_of
+from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.standing_model import PLAIN
-from kempf.flows.jobs.vessel_runs import vessel_runs
+from kempf.flows.jobs.vessel_runs import assembled
 from kempf.pipeline.diagnose.forward_selection import plain
 from kempf.pipeline.diagnose.screen import screen
 from kempf.schemas.effects import catalogue
@@ -40,7 +41,7 @@ def main() -> None:
             warehouse = Warehouse(str(Path(place) / "warehouse"))
             logs = sorted(p for p in folder.iterdir() if p.name != "profile.yaml")
             ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
-            runs = vessel_runs(warehouse, "speed", PLAIN)
+            runs = assembled(warehouse, choose(warehouse, "speed"), PLAIN)
             with ThreadPoolExecutor(max_workers=_CORES) as workers:
                 fit, _ = plain(runs.runs, runs.spec, runs.start, workers)
                 chosen = dict(list(catalogue().items())[:_CANDIDATES])

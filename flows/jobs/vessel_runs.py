@@ -7,7 +7,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from functools import cached_property
 
-from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose
+from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.parameter_set_of import arm_of
 from kempf.flows.process.cores import usable
@@ -54,26 +54,6 @@ class VesselRuns:
         """Hull and noise levels to start a fit from; the held-out runs have no part in the hull."""
         with ThreadPoolExecutor(max_workers=usable()) as workers:
             return start_of(self.records, self.runs, self.spec, split(self.runs)[0], workers)
-
-
-def vessel_runs(warehouse: Warehouse, vessel: str, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:
-    """Read every zigzag of a vessel that can be used.
-
-    Parameters
-    ----------
-    warehouse : Warehouse
-    vessel : str
-    spec : ModelSpec
-        Disturbances; effects are not looked at.
-    progress : Progress, optional
-
-    Raises
-    ------
-    NotFound
-        ``no_segments``, ``no_runs``: none can be used; the details say why.
-    """
-    chosen = choose(warehouse, vessel)
-    return assembled(warehouse, chosen, spec, progress)
 
 
 def assembled(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:

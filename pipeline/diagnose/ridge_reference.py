@@ -79,8 +79,6 @@ class Flexible:
     gains : ndarray, shape (runs,)
     shrinkage : float
         Of those tried, the one that gains most.
-    coefficients : ndarray, shape (len(TERMS),)
-        Size of every term of `TERMS`, fitted to all runs.
     formula : tuple of Term
         The few terms that explain most of it; exploratory.
     columns : ndarray, shape (N, len(TERMS))
@@ -92,7 +90,6 @@ class Flexible:
     gain: float
     gains: Float
     shrinkage: float
-    coefficients: Float
     formula: tuple[Term, ...]
     columns: Float
     parts: tuple[slice, ...]
@@ -138,9 +135,8 @@ def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> Flexible:
     parts = tuple(slice(a, b) for a, b in pairwise(ends))
     tried = {shrinkage: _gains(Z, known.u, parts, shrinkage) for shrinkage in _SHRINKAGE}
     best = max(tried, key=lambda shrinkage: float(np.sum(tried[shrinkage])))
-    coefficients: Float = unit * np.linalg.solve(Z.T @ Z + _penalty(Z, best), Z.T @ known.u)
     formula = search(clean * kept, known.u, list(parts), TERMS)
-    return Flexible(float(np.sum(tried[best])), tried[best], best, coefficients, formula, Z, parts)
+    return Flexible(float(np.sum(tried[best])), tried[best], best, formula, Z, parts)
 
 
 def _penalty(Z: Float, shrinkage: float) -> Float:

@@ -45,11 +45,6 @@ class Spans:
         """Return some of the stretches, chosen by mask or by ascending index."""
         return Spans(self.buffer, self.start[chosen], self.stop[chosen])
 
-    def joined(self, extra: int = 0) -> Bytes:
-        """Return the bytes of all stretches behind each other, each with ``extra`` bytes that follow it."""
-        offsets, data = self._gathered(extra)
-        return data[: int(offsets[-1])]
-
     def binary(self) -> pl.Series:
         """Return the stretches as a column of bytes."""
         offsets, data = self._gathered(0)

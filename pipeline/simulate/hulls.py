@@ -9,8 +9,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 from math import radians
 
-import numpy as np
-
 
 @dataclass(frozen=True)
 class HullParameters:
@@ -43,28 +41,6 @@ class HullParameters:
     def stability(self) -> float:
         """Determinant a11 a22 - a12 a21, 1/m^2; positive for a ship that is stable on a straight course."""
         return self.a11 * self.a22 - self.a12 * self.a21
-
-    def steady_turn(
-        self, speed_m_s: float, rudder_rad: float, force_m_s2: float, arm_per_m: float
-    ) -> tuple[float, float]:
-        """Return the equilibrium (v, r) of eq. (16), m/s and rad/s, at a constant speed.
-
-        Parameters
-        ----------
-        speed_m_s : float
-            Speed through the water V.
-        rudder_rad : float
-            Rudder angle delta.
-        force_m_s2 : float
-            Normalised wind force F.
-        arm_per_m : float
-            Its arm l, 1/m.
-        """
-        V = speed_m_s
-        A = np.array([[self.a11 * V, self.a12 * V], [self.a21 * V, self.a22 * V]])
-        b = np.array([self.b1 * V**2 * rudder_rad + force_m_s2, self.b2 * V**2 * rudder_rad + arm_per_m * force_m_s2])
-        v, r = np.linalg.solve(A, -b)
-        return float(v), float(r)
 
 
 @dataclass(frozen=True)

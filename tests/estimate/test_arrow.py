@@ -26,18 +26,30 @@ def arrow(members: int, seed: int = 0) -> Arrow:
     return Arrow(all_of[:, :SHARED, :SHARED].sum(axis=0), all_of[:, :SHARED, SHARED:], all_of[:, SHARED:, SHARED:])
 
 
+def dense_of(one: Arrow) -> np.ndarray:
+    """The arrow as one matrix, without what was shown."""
+    n, (members, _, width) = one.shared.shape[0], one.coupling.shape
+    matrix = np.zeros((n + members * width, n + members * width))
+    matrix[:n, :n] = one.shared
+    for i in range(members):
+        here = slice(n + i * width, n + (i + 1) * width)
+        matrix[:n, here], matrix[here, :n] = one.coupling[i], one.coupling[i].T
+        matrix[here, here] = one.own[i]
+    return matrix
+
+
 def score_of(one: Arrow, seed: int = 1) -> np.ndarray:
     random = np.random.default_rng(seed)
-    result: np.ndarray = np.sqrt(np.diag(one.dense)) * random.standard_normal(one.dense.shape[0])
+    result: np.ndarray = np.sqrt(np.diag(dense_of(one))) * random.standard_normal(dense_of(one).shape[0])
     return result
 
 
 def free_of(one: Arrow, seed: int) -> np.ndarray:
-    return np.random.default_rng(seed).uniform(size=one.dense.shape[0]) > 0.2
+    return np.random.default_rng(seed).uniform(size=dense_of(one).shape[0]) > 0.2
 
 
 def scaled_difference(one: Arrow, a: np.ndarray, b: np.ndarray) -> float:
-    scale = np.sqrt(np.diag(one.dense))
+    scale = np.sqrt(np.diag(dense_of(one)))
     return float(np.max(np.abs((a - b) * scale)) / np.max(np.abs(b * scale)))
 
 
@@ -47,7 +59,7 @@ def test_steps_are_those_of_the_dense_matrix(members: int, damping: float) -> No
     one = arrow(members)
     for seed in range(3):
         free = free_of(one, seed)
-        expected = damped_step(score_of(one), one.dense, free, damping)
+        expected = damped_step(score_of(one), dense_of(one), free, damping)
         found = ArrowSteps().damped(score_of(one), one, free, damping)
         assert scaled_difference(one, found, expected) < 1e-7
         assert np.all(found[~free] == 0.0)
@@ -56,10 +68,10 @@ def test_steps_are_those_of_the_dense_matrix(members: int, damping: float) -> No
 def test_steps_shown_correct_it_as_bfgs_corrects_the_dense_matrix() -> None:
     one = arrow(3)
     free = free_of(one, 5)
-    truth = arrow(3, seed=9).dense  # another curvature, which the steps show
-    steps, dense, shown = ArrowSteps(), one.dense, one
+    truth = dense_of(arrow(3, seed=9))  # another curvature, which the steps show
+    steps, dense, shown = ArrowSteps(), dense_of(one), one
     for seed in range(4):
-        step = np.where(free, score_of(one, seed) / np.diag(one.dense), 0.0)
+        step = np.where(free, score_of(one, seed) / np.diag(dense_of(one)), 0.0)
         fall = truth @ step
         dense, shown = bfgs(dense, step, fall, free), steps.updated(shown, step, fall, free)
         expected = damped_step(score_of(one), dense, free, 0.0)
@@ -71,11 +83,11 @@ def test_steps_shown_correct_it_as_bfgs_corrects_the_dense_matrix() -> None:
 
 def test_the_complement_is_the_hulls_information_with_all_levels_unknown() -> None:
     one = arrow(5)
-    free = np.ones(one.dense.shape[0], dtype=bool)
+    free = np.ones(dense_of(one).shape[0], dtype=bool)
     free[[8, 20]] = False
     complement, carried = one.masked(free).eliminated()
     index = np.flatnonzero(free)
-    covariance = np.linalg.inv(one.dense[np.ix_(index, index)])[:SHARED, :SHARED]
+    covariance = np.linalg.inv(dense_of(one)[np.ix_(index, index)])[:SHARED, :SHARED]
     scale = np.sqrt(np.diag(covariance))
     np.testing.assert_allclose(
         np.linalg.inv(complement) / np.outer(scale, scale), covariance / np.outer(scale, scale), atol=1e-7

@@ -11,8 +11,8 @@ from scipy.linalg import expm
 from kempf.pipeline.estimate.paper.least_squares import Regression, regress
 from kempf.pipeline.estimate.paper.procedure import Course, Pass, ProcedureSettings, iterate, judge
 from kempf.pipeline.model.vehicle import LinearVehicle, SlowDisturbance
-from kempf.pipeline.simulate.depth_channel import DEPTH_STATE, DepthChannel, DepthRecord, sail_depth
 from kempf.schemas.errors import DataRejected, UsageError
+from tests.estimate.depth_channel import DEPTH_STATE, DepthChannel, DepthRecord, sail_depth
 
 FORCE = SlowDisturbance("force", (1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), 0.02)
 MOMENT = SlowDisturbance("moment", (0.0, 1.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0), 0.02)

@@ -16,10 +16,11 @@ from typing import Any
 
 import numpy as np
 
+from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.standing_model import PLAIN
-from kempf.flows.jobs.vessel_runs import vessel_runs
+from kempf.flows.jobs.vessel_runs import assembled
 from kempf.pipeline.diagnose.forward_selection import staged
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.predict.free_run import free_run
@@ -43,7 +44,7 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
         logs = sorted(p for p in folder.iterdir() if p.name != "profile.yaml")
         ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
         try:
-            found = vessel_runs(warehouse, folder.name, PLAIN)
+            found = assembled(warehouse, choose(warehouse, folder.name), PLAIN)
             chosen, left = split(found.runs)
             fitted, start = [found.runs[i] for i in chosen], found.start.of(chosen)
             with ThreadPoolExecutor(max_workers=cpu_count()) as workers:

@@ -11,7 +11,7 @@ from kempf.pipeline.estimate.classical.resample import step_of
 from kempf.pipeline.estimate.plausibility import doubts
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate, Value, discrete_values, hull_values
-from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+from kempf.schemas.model_spec import ModelSpec
 
 NO_UNCERTAINTY = np.full((6, 6), np.nan)
 
@@ -88,8 +88,3 @@ def told(
 def disturbed(spec: ModelSpec) -> bool:
     """Whether a model was asked for in which something acts besides the ship; a moment left open counts for none."""
     return spec.wind != "none" or spec.moment == "gauss-markov" or spec.current != "none"
-
-
-def named(hull: Float) -> dict[str, float]:
-    """Return the six parameters by name."""
-    return dict(zip(HULL_PARAMETERS, (float(p) for p in hull), strict=True))

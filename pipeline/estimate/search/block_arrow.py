@@ -37,18 +37,6 @@ class Arrow:
     own: Float
     shown: tuple[tuple[Float, Float], ...] = ()
 
-    @property
-    def dense(self) -> Float:
-        """The arrow as one matrix, without what was shown; for tests."""
-        n, (members, _, width) = self.shared.shape[0], self.coupling.shape
-        matrix = np.zeros((n + members * width, n + members * width))
-        matrix[:n, :n] = self.shared
-        for i in range(members):
-            here = slice(n + i * width, n + (i + 1) * width)
-            matrix[:n, here], matrix[here, :n] = self.coupling[i], self.coupling[i].T
-            matrix[here, here] = self.own[i]
-        return matrix
-
     def masked(self, free: Mask) -> Arrow:
         """Return it with the rows and columns of what is not free taken out, a one on their diagonal."""
         n, (members, _, width) = self.shared.shape[0], self.coupling.shape

@@ -9,6 +9,7 @@ from kempf.pipeline.estimate.classical.resample import step_of
 from kempf.pipeline.estimate.classical.step import innovations
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.model.ship import mariner_like
+from kempf.schemas.model_spec import HULL_PARAMETERS
 
 #: lengths whose Mariner-like ship is tried, m: the ladder of the default estimator
 LENGTHS_M = tuple(float(f"{1.5 * 1.6**k:.4g}") for k in range(12))
@@ -39,3 +40,8 @@ def ranked_starts(record: Record) -> list[tuple[float, Float]]:
             found.append((float(np.prod(np.var(e, axis=0))), length, hull))
     found.sort(key=lambda entry: entry[:2])
     return [(length, hull) for _, length, hull in found]
+
+
+def named(hull: Float) -> dict[str, float]:
+    """Return the six parameters by name."""
+    return dict(zip(HULL_PARAMETERS, (float(p) for p in hull), strict=True))
