@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
 from json import loads
 from typing import Any
 
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, evidence_as_json, evidence_from_json
-from kempf.schemas.errors import NotFound
 from kempf.warehouse import delta
 from kempf.warehouse.canonical import canonical_json, plain, sha256
 from kempf.warehouse.keys import quoted, vessel_key
@@ -130,46 +129,18 @@ def evidence(warehouse: Warehouse, vessel: str, name: str) -> DiagnosisEvidence 
 def find(warehouse: Warehouse, name: str) -> StoredDiagnosis | None:
     """Return a diagnosis by its id, None where there is none."""
     frame = delta.read(warehouse, "diagnoses", {"diagnosis_id": name})
-    return _stored(frame.rows(named=True))[0] if frame.height else None
+    return _stored(frame.row(0, named=True)) if frame.height else None
 
 
-def of_vessel(warehouse: Warehouse, vessel: str) -> list[StoredDiagnosis]:
-    """Return every diagnosis of a vessel, by first instant, then id."""
-    frame = delta.read(warehouse, "diagnoses", {"vessel_key": vessel_key(vessel)})
-    return _stored(frame.sort("start_utc_ns", "diagnosis_id").rows(named=True))
-
-
-def newest(warehouse: Warehouse, vessel: str, code_version: str) -> StoredDiagnosis:
-    """Return the diagnosis of a vessel that this code made from the most manoeuvres.
-
-    Raises
-    ------
-    NotFound
-        ``no_diagnosis``.
-    """
-    found = [one for one in of_vessel(warehouse, vessel) if one.code_version == code_version]
-    if not found:
-        raise NotFound(
-            "no_diagnosis",
-            f"{vessel!r} has not been diagnosed by this version of the code.",
-            f"Run `kempf diagnose --vessel {vessel}`.",
-            {"vessel": vessel},
-        )
-    return max(found, key=lambda one: (len(one.inputs["segments"]), one.start_utc_ns, one.diagnosis_id))
-
-
-def _stored(rows: Sequence[Mapping[str, Any]]) -> list[StoredDiagnosis]:
-    return [
-        StoredDiagnosis(
-            r["diagnosis_id"],
-            r["vessel"],
-            r["parameter_set_id"],
-            r["start_utc_ns"],
-            r["verdict"],
-            tuple(r["effects"]),
-            loads(r["content_json"]),
-            loads(r["inputs_json"]),
-            r["code_version"],
-        )
-        for r in rows
-    ]
+def _stored(r: Mapping[str, Any]) -> StoredDiagnosis:
+    return StoredDiagnosis(
+        r["diagnosis_id"],
+        r["vessel"],
+        r["parameter_set_id"],
+        r["start_utc_ns"],
+        r["verdict"],
+        tuple(r["effects"]),
+        loads(r["content_json"]),
+        loads(r["inputs_json"]),
+        r["code_version"],
+    )

@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks.baselines.start import named, ranked_starts
+from benchmarks.baselines.step import exact_step
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import njit
 from kempf.pipeline.estimate.classical.report import told
 from kempf.pipeline.estimate.classical.resample import even, step_of
-from kempf.pipeline.estimate.classical.step import exact_step
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate, Value
 from kempf.schemas.errors import DataRejected

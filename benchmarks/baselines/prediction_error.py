@@ -19,10 +19,10 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from benchmarks.baselines.start import named, ranked_starts
+from benchmarks.baselines.step import exact_step, innovations
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.classical.report import NO_UNCERTAINTY, told
 from kempf.pipeline.estimate.classical.resample import even, step_of, without_means
-from kempf.pipeline.estimate.classical.step import exact_step, innovations
 from kempf.pipeline.estimate.one_step_fit import one_step_fit
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate, Value

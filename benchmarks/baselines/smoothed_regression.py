@@ -16,11 +16,11 @@ import numpy as np
 
 from benchmarks.baselines.multiple_models import accelerations
 from benchmarks.baselines.start import named, ranked_starts
+from benchmarks.baselines.step import exact_step
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import njit
 from kempf.pipeline.estimate.classical.report import NO_UNCERTAINTY, told
 from kempf.pipeline.estimate.classical.resample import even, step_of
-from kempf.pipeline.estimate.classical.step import exact_step
 from kempf.pipeline.estimate.paper.least_squares import regress
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from benchmarks.baselines.step import innovations
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.classical.resample import step_of
-from kempf.pipeline.estimate.classical.step import innovations
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.model_spec import HULL_PARAMETERS

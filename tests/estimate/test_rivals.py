@@ -14,9 +14,9 @@ from scipy.linalg import expm
 from benchmarks.baselines import multiple_models, smoothed_regression
 from benchmarks.baselines.estimators import NAMES, default_settings, estimate
 from benchmarks.baselines.start import ranked_starts
+from benchmarks.baselines.step import exact_step, innovations
 from kempf.pipeline.estimate.classical import subspace
 from kempf.pipeline.estimate.classical.resample import even, step_of, without_means
-from kempf.pipeline.estimate.classical.step import exact_step, innovations
 from kempf.pipeline.estimate.result import Estimate
 from kempf.pipeline.model.ship import Hull, discretise, mariner_like
 from kempf.pipeline.simulate.disturbances import CALM
