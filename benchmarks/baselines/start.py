@@ -1,4 +1,4 @@
-"""Where the rivals begin: Mariner-like ships of all lengths, as the default estimator does."""
+"""Where the baselines begin: Mariner-like ships of all lengths, as the default estimator does."""
 
 from __future__ import annotations
 
