@@ -146,7 +146,8 @@ def page(found: list[Told], verify_s: float) -> list[str]:
         p = told.preview
         first = p["parameters"][0] if p["parameters"] else None
         largest = f"{first['largest_in_std']:+.2g} ({first['vessel']}, {first['parameter']})" if first else "-"
-        counts = [str(p[k]) for k in ("sets", "identical", "moved")]
+        same = p["up_to_date"] + p["identical"]  # of code that does the same, and of code that comes to the same
+        counts = [str(p["sets"]), str(same), str(p["moved"])]
         rows.append([told.change.words, *counts, f"{told.agreed} of {told.sets}", largest])
     lines = [*table(head, rows), ""]
     most = max(found, key=lambda told: told.preview["moved"])
