@@ -5,17 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import yaml
 from pydantic import ValidationError
 
+from kempf.schemas import yaml_text
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
-from kempf.schemas.unique_keys import require_unique_keys
 
 _LONGEST = 50_000
-_DEEPEST = 20
-#: libyaml's, ten times as fast, where PyYAML was built with it
-_Safe: Any = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _NEXT = "Correct it; docs/effects.md shows an effect file that works."
 
 
@@ -68,27 +64,12 @@ def _content(text: str, where: str) -> dict[str, Any]:
     if len(text) > _LONGEST:
         raise invalid(where, f"it is {len(text)} characters long, {_LONGEST} is the most")
     try:
-        _check_shape(text)
-        loader = _Safe(text)
-        root = loader.get_single_node()
-        require_unique_keys(root)
-        content = None if root is None else loader.construct_document(root)
-    except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError, TypeError) as error:
-        raise invalid(where, f"it is not valid YAML: {' '.join(str(error).split())[:300]}") from error
+        content = yaml_text.load(text)
+    except yaml_text.NotYaml as error:
+        raise invalid(where, f"it is not valid YAML: {str(error)[:300]}") from error
     if not isinstance(content, dict):
         raise invalid(where, f"expected keys such as 'name' and 'terms', found {type(content).__name__}")
     return content
-
-
-def _check_shape(text: str) -> None:
-    """Refuse what takes more memory or stack than its length: aliases of aliases, brackets within brackets."""
-    depth = 0
-    for event in yaml.parse(text, Loader=_Safe):
-        if isinstance(event, yaml.AliasEvent):
-            raise ValueError("it holds an alias ('*name')")
-        depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
-        if depth > _DEEPEST:
-            raise ValueError("it is nested too deep to be read")
 
 
 def _fault(error: Any, content: Mapping[str, Any]) -> str:

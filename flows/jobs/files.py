@@ -9,22 +9,14 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, BinaryIO
 
-import yaml
 from pydantic import ValidationError
 
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas import profile as profiles
+from kempf.schemas import yaml_text
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.schemas.unique_keys import require_unique_keys
-
-#: Keys and values in a file that a person wrote; a few hundred bytes of nested aliases can stand for billions.
-_MOST_NODES = 100_000
-
-#: Brackets that may stand within each other; a profile has two or three.
-_DEEPEST = 32
-
 
 #: Largest file that is read whole, bytes: a person writes some thousand, and what takes the parser of YAML a second is
 #: refused. A raw log is opened, and its reader says what is too much.
@@ -128,51 +120,21 @@ def read_yaml(path: Path, what: str) -> Any:
     """
     data = read_bytes(path, what)
     try:
-        loader = _Loader(data)
-        root = loader.get_single_node()
-        too_large = root is not None and _written_out(root, {}) > _MOST_NODES
-        require_unique_keys(root)
-        content = None if root is None or too_large else loader.construct_document(root)
-    except (yaml.YAMLError, ValueError, LookupError, AttributeError, OverflowError) as error:
-        told = " ".join(str(error).split())
+        return yaml_text.load(data)
+    except yaml_text.TooLarge as error:
+        raise UsageError(
+            "yaml_too_large",
+            f"The {what} {path} is not read: {error}.",
+            "Write it without nested aliases.",
+            {"path": str(path)},
+        ) from error
+    except yaml_text.NotYaml as error:
         raise UsageError(
             "not_yaml",
-            f"The {what} {path} is not valid YAML: {told}.",
+            f"The {what} {path} is not valid YAML: {error}.",
             "Correct the line it names.",
             {"path": str(path)},
         ) from error
-    except RecursionError as error:
-        raise UsageError(
-            "not_yaml", f"The {what} {path} is nested too deep to be read.", "Write it flat.", {"path": str(path)}
-        ) from error
-    if too_large:
-        raise UsageError(
-            "yaml_too_large",
-            f"The {what} {path} stands for more than {_MOST_NODES} keys and values once its aliases are written out.",
-            "Write it without nested aliases.",
-            {"path": str(path)},
-        )
-    return content
-
-
-class _Loader(yaml.SafeLoader):
-    """Refuses deep nesting at once: each further level costs the parser more than the one before."""
-
-    def fetch_flow_collection_start(self, token_class: type[yaml.Token]) -> None:
-        if self.flow_level >= _DEEPEST:
-            raise yaml.scanner.ScannerError(None, None, f"nested deeper than {_DEEPEST} brackets", self.get_mark())
-        super().fetch_flow_collection_start(token_class)
-
-
-def _written_out(node: yaml.Node, known: dict[int, int]) -> int:
-    """Return how many keys and values a node stands for, each alias counted as what it stands for."""
-    if id(node) not in known:
-        known[id(node)] = _MOST_NODES + 1  # what a node counts for that holds itself
-        below = node.value if isinstance(node, yaml.SequenceNode) else []
-        if isinstance(node, yaml.MappingNode):
-            below = [one for pair in node.value for one in pair]
-        known[id(node)] = 1 + sum(_written_out(one, known) for one in below)
-    return known[id(node)]
 
 
 def read_profiles(paths: Sequence[Path]) -> VesselProfile:

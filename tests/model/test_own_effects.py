@@ -174,7 +174,7 @@ def test_a_user_s_own_effect_bears_no_name_of_the_catalogue() -> None:
         (("terms:", "needs: [barometer]\nterms:"), "barometer"),
         (("terms:", "code: print(1)\nterms:"), "code: Extra inputs"),
         (("terms:", "more: !!python/object/apply:os.system [ls]\nterms:"), "not valid YAML"),
-        (("plain: My own drag.", "plain: &a My own drag.\ntitle: *a"), "alias"),
+        (("terms:", "more: &a [*a]\nterms:"), "once its aliases are written out"),
         (("terms: {", "terms: {{"), "not valid YAML"),
         (("name: mine", "name: mine\nname: yours"), "'name' is written twice, in lines 2 and 3"),
         (("low: -1", "low: -1, low: -2"), "'low' is written twice, in lines 7 and 7"),

@@ -221,7 +221,7 @@ def test_nobody_says_whose_the_log_is(logs: Path, tmp_path: Path):
         ("wind_correlation_rate_per_s: 0", "model_invalid", "wind_correlation_rate_per_s"),
         ("effects: [sails]", "model_unknown", "sails"),
         ("base: guesswork", "model_unknown", "guesswork"),
-        ("name: [", "not_yaml", "line 1"),
+        ("name: [", "not_yaml", "did not find expected node content"),
         ("name: x\nname: y\n", "not_yaml", "'name' is written twice, in lines 1 and 2"),
         (BOMB, "yaml_too_large", "100000"),
     ],
