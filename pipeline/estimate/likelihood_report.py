@@ -173,7 +173,7 @@ def _warnings(
     if bias is not None and abs(bias["value"]) > _BIASED * bias["std"]:
         shown = np.rad2deg([bias["value"], bias["std"]])
         warnings.append(
-            f"the rate gyro reads {shown[0]:+.3f} +- {shown[1]:.3f} deg/s beside the heading's rate of change; "
+            f"the rate gyro reads {shown[0]:+.3f} ± {shown[1]:.3f} deg/s (1 s.e.) beside the heading's rate of change; "
             "allowed for in the estimate"
         )
     return warnings

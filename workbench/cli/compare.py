@@ -232,7 +232,7 @@ def _tell_correlation(channel: str, told: dict[str, Any]) -> None:
         name, one = min(found, key=lambda pair: float(pair[1]["p_adjusted"]))
         click.echo(
             f"  {channel}: errors go with {name.replace('_', ' ')} {one['largest_lag_s']:g} s before, correlation "
-            f"{one['largest']:+.2f} (99 % band +-{one['band']:.2f})"
+            f"{one['largest']:+.2f} (99 % band ±{one['band']:.2f})"
         )
 
 
@@ -252,4 +252,4 @@ def _signed(value: float | None) -> str:
 
 def _with_error(told: dict[str, Any]) -> str:
     error = told["std_error"]
-    return f"{told['mean']:.2f}" + ("" if error is None else f" +- {error:.2f}")
+    return f"{told['mean']:.2f}" + ("" if error is None else f" ± {error:.2f} (1 s.e.)")

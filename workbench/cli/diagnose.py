@@ -120,7 +120,7 @@ def _tell(told: Mapping[str, Any], *, everything: bool) -> None:
         for one in told["candidates"]
         if everything or one["verdict"] in ("present", "negligible") or one["score"] is not None
     ]
-    head = ["effect", "set", "score", "expected change", "absorbed", "verdict", "why"]
+    head = ["effect", "set", "score", "expected change, ± 1 s.e.", "absorbed", "verdict", "why"]
     print_table(head, rows if everything else rows[:_SHOWN], "Screened beside the plain model")
     if not everything and len(told["candidates"]) > _SHOWN:
         click.echo(f"  of {len(told['candidates'])} effects; --all shows every one, also what cannot be tested")
@@ -131,7 +131,7 @@ def _tell(told: Mapping[str, Any], *, everything: bool) -> None:
 
 def _change(change: Mapping[str, Mapping[str, Any]]) -> str:
     told = [
-        f"{n} {number(c['value'], 3)} +- {number(c['std'], 2)} {c['unit'].removesuffix('1')}".rstrip()
+        f"{n} {number(c['value'], 3)} ± {number(c['std'], 2)} {c['unit'].removesuffix('1')}".rstrip()
         for n, c in change.items()
     ]
     return ", ".join(told)

@@ -61,7 +61,7 @@ def _tell_try(told: Mapping[str, Any]) -> None:
     click.echo(f"  absorbed by the model as it is: {number(candidate['absorption'])}")
     for one in refits:
         for parameter, value in one["parameters"].items():
-            shown = f"  {parameter} = {number(value['value'])} +- {number(value['std'], 2)} {value['unit']}"
+            shown = f"  {parameter} = {number(value['value'])} ± {number(value['std'], 2)} {value['unit']}"
             click.echo(shown.rstrip())
         gains = [*one["gains_left_out"], *one["gains_held_out"]]
         better = sum(g > 0 for g in gains)

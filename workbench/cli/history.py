@@ -231,7 +231,7 @@ def _tell_change(change: dict[str, Any]) -> None:
     print_table(["", "before", "change", "std", "%", "std %", "low", "high", "moved", "unit"], rows, f"  {head}{doubt}")
     for by in change["alone"]:
         click.echo(
-            f"  {by['parameter']} alone would explain it: {number(by['change'], 3)} +- {number(by['std'], 2)} "
+            f"  {by['parameter']} alone would explain it: {number(by['change'], 3)} ± {number(by['std'], 2)} (1 s.e.) "
             f"{by['unit']} ({by['percent']:+.1f} %)"
         )
 
