@@ -25,7 +25,7 @@ _GOES_ON = "... "
 _FILE = re.compile(r"^# ([\w-]+\.\w+)$")
 _LEFT_OUT = "..."
 
-_ID = r"(?:ps|seg|run|dx)-[0-9a-f]{16}|(?=[0-9a-f]*\d)[0-9a-f]{12,64}(?:-dirty)?"
+_ID = r"(?:ps|seg|run|dx)-[0-9a-f]{8}(?:[0-9a-f]{8})?|(?=[0-9a-f]*\d)[0-9a-f]{12,64}(?:-dirty)?"
 _NUMBER = r"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:e[-+]?\d+)?"
 _PIECES = re.compile(rf"(?P<id>(?<![\w-])(?:{_ID})(?![\w]))|(?P<number>{_NUMBER})|(?P<blank>\s+)|(?P<other>.)")
 

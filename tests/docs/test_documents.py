@@ -47,8 +47,8 @@ def test_decision_on_the_current_quotes_its_benchmark() -> None:
     assert set(quoted) <= set(measured)
 
 
-def test_readme_quotes_the_benchmarks() -> None:
-    text = " ".join((ROOT / "README.md").read_text(encoding="utf-8").split())
+def test_honesty_quotes_the_benchmarks() -> None:
+    text = " ".join((ROOT / "docs" / "honesty.md").read_text(encoding="utf-8").split())
     results = ROOT / "benchmarks" / "results"
     coverage = re.search(r"within 3 standard errors: (\d+ of \d+)", (results / "monte_carlo.md").read_text("utf-8"))
     assert coverage
@@ -63,11 +63,16 @@ def test_readme_quotes_the_benchmarks() -> None:
 
 
 def test_what_does_not_exist_yet_does_not_exist() -> None:
-    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    text = (ROOT / "docs" / "honesty.md").read_text(encoding="utf-8")
     section = text.partition("## What does not exist yet")[2].partition("\n## ")[0]
     named = re.findall(r"\(`(\w+)`", section)
     assert named == []
     assert not set(named) & set(COMMANDS)
+
+
+def test_readme_leads_to_every_page() -> None:
+    linked = set(LINK.findall((ROOT / "README.md").read_text(encoding="utf-8")))
+    assert {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")} <= linked
 
 
 def test_changelog_names_every_command() -> None:

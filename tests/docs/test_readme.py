@@ -1,16 +1,24 @@
-"""The README is true: its commands run in an empty folder and print what it shows."""
+"""README, first logs and tables are true: the commands of each run in an empty folder and print what the page shows."""
 
 from pathlib import Path
 
 import pytest
 
-from tests.docs.console import Names, difference, follow, same_line
+from tests.docs.console import Names, blocks, difference, follow, same_line
 
-README = Path(__file__).parents[2] / "README.md"
+ROOT = Path(__file__).parents[2]
 
 
-def test_readme_shows_what_its_commands_print(tmp_path: Path) -> None:
-    assert follow(README.read_text(encoding="utf-8"), tmp_path) >= 10
+@pytest.mark.parametrize(("page", "commands"), [("README", 7), ("docs/first_logs", 14), ("docs/tables", 3)])
+def test_pages_show_what_their_commands_print(page: str, commands: int, tmp_path: Path) -> None:
+    text = (ROOT / f"{page}.md").read_text(encoding="utf-8")
+    assert follow(text, tmp_path, f"export PYTHONPATH='{ROOT}'", "unset KEMPF_WAREHOUSE") == commands
+
+
+def test_readme_fits_its_page_and_its_tour_a_screen() -> None:
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert text.count("\n") <= 130
+    assert sum(len(lines) for kind, _, lines in blocks(text) if kind == "console") <= 45
 
 
 @pytest.mark.parametrize(
