@@ -35,7 +35,7 @@ ROOMS = {
     "simulate": set(),
 }
 #: What the warehouse may know of the pipeline: the types that it stores.
-STORED = ("kempf.pipeline.ingest.readings.", "kempf.pipeline.ingest.log_file.")
+STORED = tuple(f"kempf.pipeline.ingest.{name}." for name in ("decoded", "readings", "log_file"))
 #: Libraries with one door, and the files that are it.
 DOORS = {
     "prefect": ("flows/fleet/engine.py", "flows/fleet/flows.py"),

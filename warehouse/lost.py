@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kempf.pipeline.ingest.readings import LogReadings, LostStretch
+from kempf.pipeline.ingest.decoded import LostStretch
+from kempf.pipeline.ingest.readings import LogReadings
 from kempf.warehouse import delta
 from kempf.warehouse.keys import one_of, vessel_key
 from kempf.warehouse.retry import with_retry

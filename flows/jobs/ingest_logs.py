@@ -18,8 +18,9 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.release_memory import give_back
 from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.channels.instruments import from_readings
+from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.readings import LogReadings, LostStretch, Tally
+from kempf.pipeline.ingest.readings import LogReadings, Tally
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.profile import VesselProfile, overlay
 from kempf.warehouse import code_version, examinations, logs, lost, segments, vessels

@@ -10,9 +10,10 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import TYPE_CHECKING
 
+from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.read import read_parts
-from kempf.pipeline.ingest.readings import LogReadings, LostStretch, Readings, Tally
+from kempf.pipeline.ingest.readings import LogReadings, Readings, Tally
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.store import not_writable
 

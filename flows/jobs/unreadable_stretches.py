@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from kempf.pipeline.ingest.readings import LostStretch
+from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.warehouse.instant import iso_utc
 
 

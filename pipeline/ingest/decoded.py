@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from enum import StrEnum
 from typing import Protocol
 
 import numpy as np
 import polars as pl
 from numpy.typing import NDArray
-
-from kempf.pipeline.ingest.readings import LostStretch, Reason
 
 Float = NDArray[np.float64]
 Flag = NDArray[np.bool_]
@@ -19,9 +18,47 @@ Nanoseconds = NDArray[np.int64]
 #: Stands where a record has no time: no log was written in the year 1677.
 NO_TIME = np.int64(np.iinfo(np.int64).min)
 
+
+class Reason(StrEnum):
+    """Why a record or value is refused."""
+
+    CHECKSUM = "checksum"  # the sentence's checksum is absent or wrong
+    MALFORMED = "malformed"  # it cannot be decoded: too few fields, broken JSON, cut line, bad time
+    NO_CHANNEL = "no_channel"  # whole, but it carries none of the canonical channels (AIS, satellites in view, ...)
+    VOID = "void"  # the instrument itself says that the data are not valid
+    NO_TIME = "no_time"  # no time can be given to it
+    CLOCK_UNSET = "clock_unset"  # a year in which no clock was set: before 2000 or after 2100
+    CLOCK_BACK = (
+        "clock_back"  # earlier than a record of the same source before it, or alone far ahead of its neighbours
+    )
+    DUPLICATE = "duplicate"  # same source, same time, same content as a record before it
+    SAME_INSTANT = "same_instant"  # same source, channel and time as a record before it, other content
+    NOT_A_NUMBER = "not_a_number"  # the field is there but is no finite number
+    OUT_OF_RANGE = "out_of_range"  # outside the physical range of the channel
+
+
 #: Reasons by code; code 0 is a record that is still good.
 REASONS: tuple[Reason, ...] = tuple(Reason)
 CODE: dict[Reason, int] = {reason: i + 1 for i, reason in enumerate(REASONS)}
+
+
+@dataclass(frozen=True)
+class LostStretch:
+    """A stretch of a damaged log that could not be read.
+
+    Attributes
+    ----------
+    since_ns, until_ns : int or None
+        By the logger's clock, UTC nanoseconds; None where nothing tells.
+    messages : int or None
+        How many records are lost, where the file tells.
+    why : str
+    """
+
+    since_ns: int | None
+    until_ns: int | None
+    messages: int | None
+    why: str
 
 
 class Pieces(Protocol):

@@ -9,13 +9,12 @@ import numpy as np
 import polars as pl
 from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Nanoseconds, Values
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Nanoseconds, Reason, Values
 from kempf.pipeline.ingest.mapping import check_once
-from kempf.pipeline.ingest.readings import Reason
 from kempf.pipeline.ingest.sniff import separator_of
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, spans_of, trimmed
-from kempf.pipeline.ingest.text import decimal_time, iso_time
-from kempf.pipeline.ingest.text.numerals import number
+from kempf.pipeline.ingest.text.cells import number
+from kempf.pipeline.ingest.text.times import decimal_times, iso_instants
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import Source, TimeColumn, start_ns
 
@@ -263,10 +262,10 @@ def _one_tab(buffer: Bytes, rows: Spans) -> tuple[Bytes, Spans]:
 def _times(text: pl.Series, column: TimeColumn) -> tuple[Nanoseconds, NDArray[np.bool_], list[str]]:
     """Read the time column; return UTC nanoseconds, which are good, and notes."""
     if column.unit is None:
-        instant, good, zoned = iso_time.parse(spans_of(text))
+        instant, good, zoned = iso_instants(spans_of(text))
         bare = bool(np.any(good & ~zoned))
         return instant, good, ["Times without a zone are taken as UTC."] if bare else []
-    elapsed, good = decimal_time.to_ns(text, column.unit)
+    elapsed, good = decimal_times(text, column.unit)
     start = start_ns(column.start) if column.start is not None else 0
     good &= np.abs(elapsed) < _FARTHEST
     return np.where(good, elapsed, 0) + start, good, []

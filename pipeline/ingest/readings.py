@@ -10,11 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from enum import StrEnum
 from typing import Protocol
 
 import polars as pl
 
+from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.schemas.channels import CHANNEL_COLUMNS
 
 #: Columns of `Readings.frame`; the channel columns are Float64 in SI, null where the record does not carry them.
@@ -34,24 +34,6 @@ REJECTED_SCHEMA: dict[str, pl.DataType] = {
     "reason": pl.String(),
     "raw": pl.String(),
 }
-
-
-class Reason(StrEnum):
-    """Why a record or value is refused."""
-
-    CHECKSUM = "checksum"  # the sentence's checksum is absent or wrong
-    MALFORMED = "malformed"  # it cannot be decoded: too few fields, broken JSON, cut line, bad time
-    NO_CHANNEL = "no_channel"  # whole, but it carries none of the canonical channels (AIS, satellites in view, ...)
-    VOID = "void"  # the instrument itself says that the data are not valid
-    NO_TIME = "no_time"  # no time can be given to it
-    CLOCK_UNSET = "clock_unset"  # a year in which no clock was set: before 2000 or after 2100
-    CLOCK_BACK = (
-        "clock_back"  # earlier than a record of the same source before it, or alone far ahead of its neighbours
-    )
-    DUPLICATE = "duplicate"  # same source, same time, same content as a record before it
-    SAME_INSTANT = "same_instant"  # same source, channel and time as a record before it, other content
-    NOT_A_NUMBER = "not_a_number"  # the field is there but is no finite number
-    OUT_OF_RANGE = "out_of_range"  # outside the physical range of the channel
 
 
 @dataclass(frozen=True)
@@ -79,25 +61,6 @@ class Tally:
             self.values_rejected + other.values_rejected,
             {reason: self.by_reason.get(reason, 0) + other.by_reason.get(reason, 0) for reason in reasons},
         )
-
-
-@dataclass(frozen=True)
-class LostStretch:
-    """A stretch of a damaged log that could not be read.
-
-    Attributes
-    ----------
-    since_ns, until_ns : int or None
-        By the logger's clock, UTC nanoseconds; None where nothing tells.
-    messages : int or None
-        How many records are lost, where the file tells.
-    why : str
-    """
-
-    since_ns: int | None
-    until_ns: int | None
-    messages: int | None
-    why: str
 
 
 class LogReadings(Protocol):

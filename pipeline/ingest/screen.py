@@ -12,10 +12,10 @@ import pyarrow as pa
 from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.clock import Clock
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Values
-from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Reason, Tally
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Reason, Values
+from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
 from kempf.pipeline.ingest.spans import Index
-from kempf.pipeline.ingest.text.iso_time import DAY_NS, days_since_1970
+from kempf.pipeline.ingest.text.times import DAY_NS, days_since_1970
 from kempf.schemas.channels import CHANNELS
 
 Code = NDArray[np.int8]

@@ -14,7 +14,7 @@ import zstandard
 
 from kempf.flows.jobs.files import opened_log, read_bytes, read_profiles
 from kempf.pipeline.ingest.read import read_log
-from kempf.pipeline.ingest.text.decimal_time import to_ns
+from kempf.pipeline.ingest.text.times import decimal_times
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import VesselProfile, parse
@@ -23,7 +23,7 @@ HALF = b"2025-05-03T07:47:01.147Z $HEHDT,11.37,T*2B\n"
 
 
 def test_digits_of_other_scripts_are_no_time() -> None:
-    ns, good = to_ns(pl.Series(["٣٠", "40"]), "s")
+    ns, good = decimal_times(pl.Series(["٣٠", "40"]), "s")
     assert good.tolist() == [False, True]
     assert ns[1] == 40_000_000_000
 

@@ -5,8 +5,7 @@ import polars as pl
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kempf.pipeline.ingest.text.cells import Cells, leading_digits, words
-from kempf.pipeline.ingest.text.numerals import number
+from kempf.pipeline.ingest.text.cells import Cells, leading_digits, number, words
 
 plain = st.decimals(allow_nan=False, allow_infinity=False, places=8, min_value=-(10**9), max_value=10**9).map(str)
 short = st.from_regex(r"\A[-+]?[0-9]{0,10}\.?[0-9]{0,10}\Z")

@@ -10,9 +10,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from kempf.pipeline.ingest.decoded import CODE
+from kempf.pipeline.ingest.decoded import CODE, Reason
 from kempf.pipeline.ingest.nmea.decode import decode
-from kempf.pipeline.ingest.readings import Reason
 from kempf.pipeline.ingest.screen import screen
 
 SHARED = Path(__file__).parents[2].parent / "shared"

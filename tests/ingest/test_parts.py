@@ -13,10 +13,10 @@ from mcap.writer import Writer
 from polars.testing import assert_frame_equal
 
 from kempf.pipeline.ingest.clock_corrections import OwnClocks
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.mcap import decode
 from kempf.pipeline.ingest.read import read_log, read_parts
-from kempf.pipeline.ingest.readings import Reason, joined
+from kempf.pipeline.ingest.readings import joined
 from kempf.pipeline.ingest.screen import Screen, screen
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.profile import Source, VesselProfile

@@ -11,7 +11,7 @@ from pathlib import Path
 import polars as pl
 import pytest
 
-from kempf.pipeline.ingest.readings import LostStretch
+from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.tables import TABLES, arrow_schema
 from kempf.warehouse import (

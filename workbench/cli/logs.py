@@ -11,7 +11,7 @@ from kempf.workbench.cli.options import json_option, vessel_option, warehouse_op
 from kempf.workbench.terminal import one_line, print_json, print_note, print_table
 
 if TYPE_CHECKING:
-    from kempf.pipeline.ingest.readings import LostStretch
+    from kempf.pipeline.ingest.decoded import LostStretch
     from kempf.warehouse.examinations import StoredExamination
     from kempf.warehouse.logs import LogRow
 

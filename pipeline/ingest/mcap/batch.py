@@ -13,11 +13,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.chunk import CHUNK_LIMIT, head_of, unpacked
 from kempf.pipeline.ingest.mcap.records import MESSAGE_INDEX
 from kempf.pipeline.ingest.mcap.walk import HEAD, heads
-from kempf.pipeline.ingest.readings import LostStretch
 from kempf.pipeline.ingest.spans import Bytes, Index, as_bytes
 
 _INDEX_ENTRY = np.dtype([("log_time", "<u8"), ("offset", "<u8")])

@@ -9,7 +9,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Values
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.batch import Batch, joined
 from kempf.pipeline.ingest.mcap.payloads import PayloadsBuilder
@@ -17,7 +17,6 @@ from kempf.pipeline.ingest.mcap.records import Channel
 from kempf.pipeline.ingest.mcap.stream import McapStream
 from kempf.pipeline.ingest.mcap.topics import Route
 from kempf.pipeline.ingest.messages.columns import NoReaderError
-from kempf.pipeline.ingest.readings import Reason
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.known_messages import OFFERED, TAKEN, plain_name

@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
 from kempf.pipeline.ingest.mcap.chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
@@ -37,7 +38,6 @@ from kempf.pipeline.ingest.mcap.records import (
 from kempf.pipeline.ingest.mcap.summary import read_summary
 from kempf.pipeline.ingest.mcap.unchunked import FIRST_WINDOW, WINDOW, believed, chunk_behind
 from kempf.pipeline.ingest.mcap.walk import HEAD, walk
-from kempf.pipeline.ingest.readings import LostStretch
 from kempf.pipeline.ingest.sniff import MCAP_MAGIC
 from kempf.pipeline.ingest.spans import Index, as_bytes
 from kempf.pipeline.ingest.unpack import allowance, too_large, too_many

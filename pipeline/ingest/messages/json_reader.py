@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.ingest.messages.columns import Columns
 from kempf.pipeline.ingest.messages.json_walk import ABSENT, NUMBER, OTHER, TEXT, walk
 from kempf.pipeline.ingest.spans import Spans
-from kempf.pipeline.ingest.text.numerals import number
+from kempf.pipeline.ingest.text.cells import number
 
 #: A tree of field names; the leaves are empty.
 Tree = dict[str, "Tree"]

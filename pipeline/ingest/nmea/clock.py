@@ -6,14 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds
-from kempf.pipeline.ingest.nmea.dates import date, mend_rollover, time_of_day, year_month_day
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds, Reason
 from kempf.pipeline.ingest.nmea.fields import Said
 from kempf.pipeline.ingest.nmea.frames import Frames
-from kempf.pipeline.ingest.nmea.spread import spread
-from kempf.pipeline.ingest.readings import Reason
 from kempf.pipeline.ingest.spans import Index
-from kempf.pipeline.ingest.text.iso_time import DAY_NS, SECOND_NS
+from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS, date, time_of_day, year_month_day
 from kempf.schemas.nmea import SATELLITES, SENTENCES
 
 #: Evidence asked for before untimed sentences are given to the fix that follows them.
@@ -24,6 +21,15 @@ _LEAD_S = 1.0
 
 #: A date that holds for no longer than this between two others that agree is that of a field updated late, ns.
 _BRIEF_NS = 60 * SECOND_NS
+
+#: GPS counts weeks modulo 1024: a receiver that missed the overflow is so many days late (IS-GPS-200, 20.3.3.3.1.1).
+ROLLOVER_NS = 1024 * 7 * DAY_NS
+
+#: A plain log that is longer than this is not looked at for late weeks of one of its receivers.
+_LONGEST_LOG_NS = 14 * DAY_NS
+
+#: Sentences are spread over so many usual distances of the fixes at most: a longer one is a pause of the log.
+_PAUSE = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,7 +131,7 @@ def _delays(
         )
         source[what.record] = np.where(good, frames.address[what.record] * 4 + sum(kinds), -1)
     record, at = np.flatnonzero(source >= 0), np.flatnonzero(fix)
-    delay, shared = spread(own[at], at, record, source[record], follows=follows)
+    delay, shared = _spread(own[at], at, record, source[record], follows=follows)
     delays = np.zeros(own.size, dtype=np.int64)
     delays[record] = delay
     several = np.flatnonzero(np.bincount(frames.address[record[shared > 1]]))
@@ -152,7 +158,7 @@ def _told(frames: Frames, said: dict[str, Said]) -> tuple[_Told, int]:
             midnight[what.record] = year_month_day(fields.at(4), fields.at(3), fields.at(2))
     dated = (of_day != NO_TIME) & (midnight != NO_TIME)
     full = np.where(dated, midnight + of_day, NO_TIME)
-    full, late = mend_rollover(full, dated, frames.stamp_ns)
+    full, late = _correct_rollover(full, dated, frames.stamp_ns)
     return _Told(of_day, full, void), late
 
 
@@ -245,3 +251,92 @@ def _follows(said: dict[str, Said]) -> bool:
     # NaN compares false: what is void bears no witness
     next_wins, last_wins = int(np.sum(between & (after < ahead))), int(np.sum(between & (ahead < after)))
     return next_wins >= _LEAST_AGREEMENTS and next_wins > _RATIO * last_wins
+
+
+def _correct_rollover(full: Nanoseconds, dated: Flag, stamp: Nanoseconds) -> tuple[Nanoseconds, int]:
+    """Put dates that are 1024 or 2048 weeks late where the log shows it.
+
+    It shows it where the lines bear stamps of another clock, or where another receiver, or the same one at another
+    instant, tells a date that is later by just that.
+
+    Parameters
+    ----------
+    full : ndarray of int64, shape (n,)
+        Instants that sentences tell with their date.
+    dated : ndarray of bool, shape (n,)
+        Which sentences do.
+    stamp : ndarray of int64, shape (n,)
+        Time of arrival, `NO_TIME` where there is none.
+
+    Returns
+    -------
+    full : ndarray of int64, shape (n,)
+    corrected : int
+        Number of sentences whose date was put right.
+    """
+    at = np.flatnonzero(dated)
+    if at.size == 0:
+        return full, 0
+    own = full[at]
+    known = stamp[at] != NO_TIME
+    latest = own.max()
+    reference = np.where(known, stamp[at], latest)
+    # the stamps are minutes off at most; another receiver may tell its date at the other end of the log
+    slack = np.where(known, DAY_NS, _LONGEST_LOG_NS)
+    weeks = (reference - own + ROLLOVER_NS // 2) // ROLLOVER_NS
+    late = (weeks > 0) & (np.abs(reference - own - weeks * ROLLOVER_NS) <= slack)
+    if not late.any():
+        return full, 0
+    full = full.copy()
+    full[at[late]] += weeks[late] * ROLLOVER_NS
+    return full, int(np.sum(late))
+
+
+def _spread(
+    fix_ns: Nanoseconds, fix: Index, record: Index, source: Index, *, follows: bool
+) -> tuple[Nanoseconds, Index]:
+    """Return how far behind their fix sentences were said.
+
+    A receiver tells its fix once a second, a compass its heading ten times: the ten would all have the time of the fix.
+    Those of one source that come between two fixes are taken for evenly spaced.
+
+    Parameters
+    ----------
+    fix_ns, fix : ndarray of int64, shape (m,)
+        Instants of the fixes and their records, ascending; several may tell one instant.
+    record, source : ndarray of int64, shape (n,)
+        Records, ascending, of the sentences that were given the time of a fix, and which source they come from.
+    follows : bool
+        Whether they were given that of the fix behind them.
+
+    Returns
+    -------
+    delay_ns : ndarray of int64, shape (n,)
+        To be added to the time of the fix; below zero where ``follows``.
+    shared : ndarray of int64, shape (n,)
+        How many sentences of its source share its fix, itself among them.
+    """
+    none = np.zeros(record.size, dtype=np.int64), np.ones(record.size, dtype=np.int64)
+    if fix.size == 0 or record.size == 0:
+        return none
+    opens = np.concatenate(([True], fix_ns[1:] != fix_ns[:-1]))
+    epoch_of_fix = np.cumsum(opens) - 1
+    instant = fix_ns[opens]
+    distance = np.diff(instant)
+    if not bool(np.any(distance > 0)):
+        return none
+    usual = int(np.median(distance[distance > 0]))
+    # what comes before the first fix or behind the last is taken to be as long as usual
+    distance = np.append(usual, distance) if follows else np.append(distance, usual)
+    distance = np.clip(distance, 0, _PAUSE * usual)
+    at = np.searchsorted(fix, record) if follows else np.searchsorted(fix, record) - 1
+    epoch = epoch_of_fix[np.clip(at, 0, fix.size - 1)]
+    order = np.argsort(source, kind="stable")
+    heads = np.flatnonzero(np.concatenate(([True], (np.diff(source[order]) != 0) | (np.diff(epoch[order]) != 0))))
+    count = np.diff(heads, append=record.size)
+    shared, place = np.repeat(count, count), np.arange(record.size) - np.repeat(heads, count)
+    step = distance[epoch[order]] // shared
+    result = np.empty((2, record.size), dtype=np.int64)
+    result[0, order] = (place - (shared - 1)) * step if follows else place * step
+    result[1, order] = shared
+    return result[0], result[1]

@@ -6,13 +6,11 @@ from itertools import pairwise
 
 import numpy as np
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Decoded, Values
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Decoded, Reason, Values
 from kempf.pipeline.ingest.nmea.clock import clock_of
+from kempf.pipeline.ingest.nmea.compass_and_rudder import both_rudders, make_true
 from kempf.pipeline.ingest.nmea.fields import Said, read_type
 from kempf.pipeline.ingest.nmea.frames import Frames, frames_of
-from kempf.pipeline.ingest.nmea.magnetic import make_true
-from kempf.pipeline.ingest.nmea.rudders import both_rudders
-from kempf.pipeline.ingest.readings import Reason
 from kempf.pipeline.ingest.spans import Bytes, Index, as_bytes
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import UsageError

@@ -1,7 +1,7 @@
 """What NMEA sentences say: fields by the table in `kempf.schemas.nmea`, in columns, one sentence type at a time.
 
 When they say it is settled in `clock`; which of two rudders and which magnetic variation holds, by looking at the
-whole log, in `rudders` and `magnetic`.
+whole log, in `compass_and_rudder`.
 """
 
 from __future__ import annotations
@@ -13,9 +13,8 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.decoded import CODE, Flag, Float
+from kempf.pipeline.ingest.decoded import CODE, Flag, Float, Reason
 from kempf.pipeline.ingest.nmea.frames import Frames
-from kempf.pipeline.ingest.readings import Reason
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.cells import Cells
 from kempf.schemas.channels import CHANNELS
@@ -170,7 +169,7 @@ def east(letter: Cells) -> Float:
 
 
 def _read_magnetic(said: Said) -> None:
-    """Read the magnetic heading with its deviation, east positive, rad; the variation is added in `magnetic`."""
+    """Read the magnetic heading with its deviation, east positive, rad; the variation is added later."""
     heading = said.fields.at(1)
     value = heading.number()
     if bool(np.any(said.fields.count >= 3)):
@@ -180,7 +179,7 @@ def _read_magnetic(said: Said) -> None:
 
 
 def _read_starboard(said: Said) -> None:
-    """Read the rudder of a ship with one; `rudders` looks for a second one."""
+    """Read the rudder of a ship with one; `compass_and_rudder` looks for a second one."""
     angle, status = said.fields.at(1), said.fields.at(2)
     void = ~status.is_one_of(("A",)) & (said.fields.count >= 2)
     said.values["rudder_angle"] = (angle.number() * _DEGREE, angle.there() & ~void)

@@ -11,13 +11,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Flag, Nanoseconds
-from kempf.pipeline.ingest.nmea.checksum import checksum_right
-from kempf.pipeline.ingest.nmea.tags import BACKSLASH, Tags, tags_of
-from kempf.pipeline.ingest.readings import Reason
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Code, Flag, Nanoseconds, Reason
+from kempf.pipeline.ingest.nmea.tags import BACKSLASH, Tags, checksum_right, tags_of
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, first_within, is_blank, trimmed
-from kempf.pipeline.ingest.text import iso_time
 from kempf.pipeline.ingest.text.cells import words
+from kempf.pipeline.ingest.text.times import iso_instants
 
 _FEED, _RETURN, _BLANK, _DOLLAR, _BANG, _STAR, _COMMA = 10, 13, 32, 36, 33, 42, 44
 
@@ -256,5 +254,5 @@ def _stamps(lines: Spans, first: Index, tags: Tags) -> tuple[Nanoseconds, Flag, 
     else:
         stop = trimmed(Spans(buffer, start, stop)).stop
     stamp = Spans(buffer, start, stop)
-    time, good, zoned = iso_time.parse(stamp)
+    time, good, zoned = iso_instants(stamp)
     return np.where(good, time, tags.time_utc_ns), good | tags.timed, zoned | (tags.timed & ~good)

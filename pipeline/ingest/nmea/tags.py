@@ -1,4 +1,4 @@
-"""TAG blocks in front of NMEA sentences: where they end, their own checksum, the time of arrival they tell.
+"""TAG blocks in front of NMEA sentences: where they end, the time of arrival in them; the checksum of both.
 
 The other parameters of a TAG block (source, destination, group, line count, text) carry no
 reading and are stepped over.
@@ -15,16 +15,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.ingest.decoded import Flag, Nanoseconds
-from kempf.pipeline.ingest.nmea.checksum import checksum_right
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, first_within
 from kempf.pipeline.ingest.text.cells import Cells
-from kempf.pipeline.ingest.text.iso_time import SECOND_NS
+from kempf.pipeline.ingest.text.times import SECOND_NS
 
 BACKSLASH = 92
 _COLON, _C, _COMMA, _STAR = 58, 99, 44, 42
 
 #: Seconds since 1970 that are later than this are milliseconds.
 _SECONDS_END = 100_000_000_000
+
+
+_HEX = np.full(256, -1, dtype=np.int16)
+_HEX[48:58], _HEX[65:71], _HEX[97:103] = np.arange(10), np.arange(10, 16), np.arange(10, 16)
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,13 +53,44 @@ class Tags:
     broken: Flag
 
 
+def checksum_right(buffer: Bytes, prefix: Bytes, first: Index, star: Index) -> Flag:
+    """Tell which stretches are followed by their own checksum.
+
+    The exclusive or of a stretch is that of the prefixes at its two ends, so one pass over the buffer serves
+    every line.
+
+    Parameters
+    ----------
+    buffer : ndarray of uint8
+    prefix : ndarray of uint8
+        Exclusive or of the bytes up to each place.
+    first, star : ndarray of int64, shape (n,)
+        Places of the byte before the stretch and of the ``*`` behind it.
+
+    Returns
+    -------
+    ndarray of bool, shape (n,)
+
+    References
+    ----------
+    IEC 61162-1:2016, 7.2.3.7.
+    """
+    if buffer.size == 0:
+        return np.zeros(first.shape, dtype=np.bool_)
+    last = buffer.size - 1
+    own = prefix[np.maximum(star - 1, 0)] ^ prefix[first]
+    high, low = _HEX[buffer[np.minimum(star + 1, last)]], _HEX[buffer[np.minimum(star + 2, last)]]
+    right: Flag = (star > first) & (high >= 0) & (low >= 0) & (own == high * 16 + low)
+    return right
+
+
 def tags_of(buffer: Bytes, prefix: Bytes, openings: Index, strokes: Index, lines: Spans) -> Tags:
     """Find the TAG blocks of some lines.
 
     Parameters
     ----------
     buffer, prefix : ndarray of uint8
-        See `kempf.pipeline.ingest.nmea.checksum.checksum_right`.
+        See `checksum_right`.
     openings, strokes : ndarray of int64
         Places of ``$`` or ``!``, and of backslashes, ascending.
     lines : Spans

@@ -1,7 +1,7 @@
 """Short texts within one byte buffer read as numbers, words and digits: eight bytes of every text at a time.
 
 A text of up to eight characters is one 64-bit word, so a whole column is checked and converted by a few operations on
-arrays of words. What is too long or too odd for that goes the way of `numerals`, which decides what a number is; both
+arrays of words. What is too long or too odd for that goes the way of `number`, which decides what a number is; both
 ways give the same bits.
 """
 
@@ -10,11 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import Flag, Float
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, is_blank, trimmed
-from kempf.pipeline.ingest.text.numerals import number
 
 Word = NDArray[np.uint64]
 
@@ -186,7 +186,7 @@ class Cells:
         Returns
         -------
         ndarray of float64, shape (n,)
-            The bits that `kempf.pipeline.ingest.text.numerals.number` gives.
+            The bits that `number` gives.
         """
         buffer, stop, length = self.buffer, self.stop, self.stop - self.start
         if buffer.size == 0 or length.size == 0:
@@ -220,6 +220,24 @@ class Cells:
             odd = Spans(buffer, self.start[rest], stop[rest])
             value[rest] = _one_by_one(odd)
         return value
+
+
+def number(text: pl.Series) -> Float:
+    """Convert decimal text to numbers.
+
+    Parameters
+    ----------
+    text : polars.Series of String, shape (n,)
+        With a decimal point, never a comma, and without blanks around it.
+
+    Returns
+    -------
+    ndarray of float64, shape (n,)
+        NaN where the text is null or no finite number.
+    """
+    value = text.cast(pl.Float64, strict=False).fill_null(float("nan")).to_numpy().copy()
+    value[~np.isfinite(value)] = np.nan
+    return value
 
 
 def as_word(text: str) -> np.uint64:

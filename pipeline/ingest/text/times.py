@@ -1,12 +1,17 @@
-"""ISO 8601 instants in columns, exact to the nanosecond."""
+"""Times in text, exact to the nanosecond: ISO 8601 instants, decimal numbers, hhmmss.ss and ddmmyy of NMEA."""
 
 from __future__ import annotations
 
+from decimal import ROUND_HALF_EVEN, Decimal, InvalidOperation
+
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.spans import Spans
+from kempf.pipeline.ingest.decoded import NO_TIME, Flag, Nanoseconds
+from kempf.pipeline.ingest.spans import Index, Spans
 from kempf.pipeline.ingest.text.cells import (
+    Cells,
     Word,
     all_digits,
     eight_digits,
@@ -15,14 +20,20 @@ from kempf.pipeline.ingest.text.cells import (
     words,
 )
 
-_Int = NDArray[np.int64]
-_Flag = NDArray[np.bool_]
-
 DAY_NS = 86_400_000_000_000
 SECOND_NS = 1_000_000_000
 
 _MONTH_DAYS = np.array([0, 31, 28, 31, 30, 31, 30, 31, 31, 30, 31, 30, 31])
 _POWER = 10 ** np.arange(10, dtype=np.int64)
+
+#: Two-digit years from here on are of the last century.
+_CENTURY = 70
+
+#: Decimal places of one nanosecond in each unit.
+_PLACES = {"s": 9, "ms": 6, "us": 3, "ns": 0}
+
+#: Largest count of nanoseconds that is taken for a time, about 290 years.
+_LARGEST = 9_200_000_000_000_000_000
 
 
 def days_since_1970(
@@ -49,7 +60,7 @@ def days_since_1970(
     return 365 * y + y // 4 - y // 100 + y // 400 + of_year - 719_468, exists
 
 
-def parse(text: Spans) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+def iso_instants(text: Spans) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
     """Read instants such as ``2025-05-03T07:47:01.147Z``; a zone of any offset is taken off.
 
     Parameters
@@ -99,7 +110,7 @@ _MAY_STAND_BETWEEN = np.array([ord(sign) << 16 for sign in "Tt "], dtype=np.uint
 _SECONDS = np.uint64(0xFFFFFF)
 
 
-def _minutes(first: Word, second: Word) -> tuple[_Int, _Flag]:
+def _minutes(first: Word, second: Word) -> tuple[Index, Flag]:
     """Read YYYY-MM-DDThh:mm, cut in two words, as minutes since 1970."""
     date, dashes = _between_signs(first, "0000-00-")
     clock, signs = _between_signs(second & ~_BETWEEN, "00 00:00")
@@ -112,7 +123,7 @@ def _minutes(first: Word, second: Word) -> tuple[_Int, _Flag]:
     return days * 1_440 + hour * 60 + minute, good
 
 
-def _between_signs(word: Word, form: str) -> tuple[_Int, _Flag]:
+def _between_signs(word: Word, form: str) -> tuple[Index, Flag]:
     """Read the digits of words of one form, ``0`` where a digit stands; a sign counts as the digit zero.
 
     A blank in the form is a byte that has been cleared. A form of fewer than eight characters is of the last digits.
@@ -125,7 +136,7 @@ def _between_signs(word: Word, form: str) -> tuple[_Int, _Flag]:
     return value, ((word & mask) == signs) & all_digits(digits)
 
 
-def _fraction(text: Spans) -> tuple[_Int, _Int, _Flag]:
+def _fraction(text: Spans) -> tuple[Index, Index, Flag]:
     """Read up to nine digits of a second; further digits, up to sixteen in all, are cut off."""
     end = text.buffer.size
     place = text.start + 19
@@ -145,7 +156,7 @@ def _fraction(text: Spans) -> tuple[_Int, _Int, _Flag]:
     return value, place + count, ~point | (count > 0)
 
 
-def _zone(text: Spans, place: _Int) -> tuple[_Int, _Flag, _Flag]:
+def _zone(text: Spans, place: Index) -> tuple[Index, Flag, Flag]:
     """Read nothing, Z, +hh, +hhmm or +hh:mm; return the seconds to take off, whether it is there, whether it fits."""
     rest = text.stop - place
     sign = text.buffer[np.minimum(place, text.buffer.size - 1)]
@@ -165,3 +176,127 @@ def _zone(text: Spans, place: _Int) -> tuple[_Int, _Flag, _Flag]:
         seconds[told] = np.where(good, (hour * 3_600 + minute * 60) * np.where(sign[told] == ord("-"), -1, 1), 0)
         zoned[told] = fits[told] = good
     return seconds, zoned, fits
+
+
+def time_of_day(cells: Cells) -> Nanoseconds:
+    """Read hhmmss.ss as nanoseconds of the day; `NO_TIME` where it is none.
+
+    Parameters
+    ----------
+    cells : Cells, shape (n,)
+
+    Returns
+    -------
+    ndarray of int64, shape (n,)
+        Decimals of a second beyond the ninth are cut off.
+    """
+    value, good = _digits(cells, 6)
+    length = cells.stop - cells.start
+    size = max(cells.buffer.size - 1, 0)
+    point = length > 6
+    if point.any():
+        good &= ~point | (cells.buffer[np.minimum(cells.start + 6, size)] == ord("."))
+    early = words(cells.buffer, np.minimum(cells.start + 7, size + 1))
+    told = np.clip(length - 7, 0, None)
+    count = leading_digits(early)
+    first = np.minimum(np.where(point, told, 0), 8)
+    fraction = eight_digits(first_digits(early, np.minimum(first, count))) * _POWER[9 - first]
+    long = np.flatnonzero(told > 8)
+    if long.size:
+        late = words(cells.buffer, np.minimum(cells.start[long] + 15, size + 1))
+        count[long] += np.where(count[long] == 8, leading_digits(late), 0)
+        fraction[long] += (late & np.uint64(0xFF)).astype(np.int64) - ord("0")
+    good &= (told <= count) | ~point
+    hours, minutes, seconds = value // 10_000, value // 100 % 100, value % 100
+    # 60 is a leap second; it becomes the first of the next minute
+    good &= (hours < 24) & (minutes < 60) & (seconds <= 60)
+    return np.where(good, (hours * 3_600 + minutes * 60 + seconds) * SECOND_NS + fraction, NO_TIME)
+
+
+def date(cells: Cells) -> Nanoseconds:
+    """Read ddmmyy as nanoseconds of its midnight since 1970; `NO_TIME` where it is none."""
+    value, good = _digits(cells, 6)
+    good &= cells.stop - cells.start == 6
+    # neighbours mostly share their day: each is read once
+    heads = np.flatnonzero(np.diff(value, prepend=-1))
+    often = np.diff(heads, append=value.size)
+    value = value[heads]
+    day, month, year = value // 10_000, value // 100 % 100, value % 100
+    days, exists = days_since_1970(year + np.where(year >= _CENTURY, 1900, 2000), month, day)
+    return np.where(good & np.repeat(exists, often), np.repeat(days * DAY_NS, often), NO_TIME)
+
+
+def year_month_day(year: Cells, month: Cells, day: Cells) -> Nanoseconds:
+    """Read the three fields of ZDA as nanoseconds of the midnight since 1970; `NO_TIME` where they are no date."""
+    parts = [cells.number() for cells in (year, month, day)]
+    known = np.isfinite(parts[0]) & np.isfinite(parts[1]) & np.isfinite(parts[2])
+    whole = [np.where(known & (np.abs(part) < 10_000), part, 0).astype(np.int64) for part in parts]
+    for part, integer in zip(parts, whole, strict=True):
+        known &= part == integer
+    known &= (whole[0] > 1900) & (whole[0] < 2200)
+    days, exists = days_since_1970(*(np.where(known, integer, 1) for integer in whole))
+    return np.where(known & exists, days * DAY_NS, NO_TIME)
+
+
+def _digits(cells: Cells, count: int) -> tuple[Index, Flag]:
+    """Read the first digits of each text."""
+    word = first_digits(words(cells.buffer, cells.start), np.full(cells.start.shape, count))
+    good = all_digits(word) & (cells.stop - cells.start >= count)
+    return np.where(good, eight_digits(word), 0), good
+
+
+def decimal_times(text: pl.Series, unit: str) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
+    """Convert decimal text in ``unit`` to nanoseconds.
+
+    Parameters
+    ----------
+    text : polars.Series of String, shape (n,)
+        Such as ``.050000000`` or ``1.714e9``; without blanks around it.
+    unit : {"s", "ms", "us", "ns"}
+
+    Returns
+    -------
+    ns : ndarray of int64, shape (n,)
+        Rounded to the nearest nanosecond, half to even; zero where the text is no number.
+    good : ndarray of bool, shape (n,)
+    """
+    places = _PLACES[unit]
+    frame = text.fill_null("").alias("text").to_frame()
+    plain = (
+        frame.lazy()
+        .with_columns(
+            plain=pl.col("text").str.contains(r"^[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)$"),
+            negative=pl.col("text").str.starts_with("-"),
+            whole=pl.col("text").str.extract(r"^[+-]?([0-9]*)", 1).fill_null(""),
+            part=pl.col("text").str.extract(r"\.([0-9]*)$", 1).fill_null(""),
+        )
+        .with_columns(
+            # more digits than a nanosecond, or than an integer holds, go the slow and exact way
+            plain=pl.col("plain")
+            & (pl.col("part").str.slice(places).str.strip_chars("0") == "")
+            & (pl.col("whole").str.len_bytes() <= 18 - places),
+        )
+        .with_columns(digits=pl.col("whole") + pl.col("part").str.slice(0, places).str.pad_end(places, "0"))
+        .with_columns(ns=pl.col("digits").cast(pl.Int64, strict=False).fill_null(0))
+        .with_columns(ns=pl.when("negative").then(-pl.col("ns")).otherwise("ns"))
+        .select("text", "plain", "ns")
+        .collect(engine="in-memory")
+    )
+    ns = plain["ns"].to_numpy().astype(np.int64)
+    good = plain["plain"].to_numpy().copy()
+    for i in np.flatnonzero(~good):
+        exact = _exact(plain["text"][int(i)], places)
+        good[i] = exact is not None
+        ns[i] = exact or 0
+    return np.where(good, ns, 0), good
+
+
+def _exact(text: str, places: int) -> int | None:
+    try:
+        number = Decimal(text)
+        if not text.isascii() or not number.is_finite() or "_" in text or number.adjusted() > 20:
+            return None
+        ns = int(number.scaleb(places).to_integral_value(rounding=ROUND_HALF_EVEN))
+    except (InvalidOperation, ValueError):
+        return None
+    return ns if abs(ns) < _LARGEST else None
