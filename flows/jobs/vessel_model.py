@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -19,7 +19,7 @@ from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.diagnose.diagnosis import Step, step_of
+from kempf.pipeline.diagnose.diagnosis import step_of
 from kempf.pipeline.diagnose.forward_selection import staged
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import rung
@@ -110,7 +110,7 @@ def store_model(
     for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
         if name not in there:
             told = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
-            made.append(_as_parameter_set(fit, fitted, profile, inputs, chosen.vessel, told, parent))
+            made.append(_model_set(fit, fitted, profile, inputs, chosen.vessel, told, parent))
     parameter_sets.insert(warehouse, made)
     return made[-1], True
 
@@ -139,7 +139,7 @@ def build_model(
     spec = ModelSpec.model_validate(dict(inputs.model_spec))
     runs = assemble(instruments, profile, list(zip(inputs.settings["segments"], inputs.bounds, strict=True)), spec)
     fitted = fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
-    return _as_parameter_set(fitted.fits[-1], fitted, profile, inputs, vessel, told, parent)
+    return _model_set(fitted.fits[-1], fitted, profile, inputs, vessel, told, parent)
 
 
 def build_single(
@@ -172,53 +172,13 @@ def build_single(
     """
     spec, (bounds,) = ModelSpec.model_validate(dict(inputs.model_spec)), inputs.bounds
     runs = assemble({bounds.log_id: instruments}, profile, [(segment_ids[0], bounds)], spec)
-    fit = fitted_model(runs, spec, Own.from_json(inputs.settings["own"])).fits[-1]
-    (record,) = runs.records
+    fitted = fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
+    fit, (record,) = fitted.fits[-1], runs.records
     passed = fit.linearised[0].passed
     one_step = one_step_fit(fit.runs[0].run.measured, passed.innovation, passed.variance)
-    covariance = fit.covariance
-    discrete = discrete_values(fit.hull, np.nan_to_num(covariance[:6, :6]), record.mean_speed_m_s, _STEP_S)
-    std = np.sqrt(np.diag(covariance)[:6])
-    return ParameterSet(
-        parameter_set_id=parameter_set_id(inputs),
-        vessel=vessel,
-        model_name=" + ".join((spec.name, *spec.effects)),
-        model_spec=spec.model_dump(mode="json"),
-        model_sha256=spec.sha256,
-        estimator=inputs.estimator,
-        settings=dict(inputs.settings),
-        segment_ids=segment_ids,
-        log_ids=inputs.log_ids,
-        start_utc_ns=bounds.start_utc_ns,
-        parameters=_parameters(fit),
-        discrete=stored(discrete),
-        noise=_noise(fit, runs.spec),
-        covariance_names=(*HULL_PARAMETERS, *fit.model.names),
-        covariance=tuple(tuple(float(x) for x in row) for row in covariance),
-        fit=one_step,
-        iterations=[],
-        convergence={
-            "converged": fit.converged,
-            "reason": fit.reason,
-            "iterations": fit.iterations,
-            "log_likelihood": fit.log_likelihood,
-            "measurements": fit.count,
-            "speed_m_s": record.mean_speed_m_s,
-            "step_s": _STEP_S,
-            "grid_step_s": fit.runs[0].run.step_s,
-            "gross_error_instants_s": _gross_errors(fit, runs),
-            "levels": {segment_ids[0]: list(fit.levels[0])},
-        },
-        warnings=(
-            *record.warnings,
-            *(() if fit.converged else (f"not converged: {fit.reason}",)),
-            *doubts(fit.hull, std, one_step),
-            *without_arm(spec, arm_of(spec, profile)),
-            *channel_warnings(told),
-        ),
-        parent=spec.parent,
-        provenance=told,
-    )
+    made = _as_parameter_set(fit, fitted, profile, inputs, vessel, segment_ids, told)
+    said = (*record.warnings, *made.warnings, *doubts(fit.hull, fit.std[:6], one_step))
+    return replace(made, noise=_noise(fit, runs.spec), fit=one_step, warnings=said, parent=spec.parent)
 
 
 def _noise(fit: Fit, spec: ModelSpec) -> tuple[Stored, ...]:
@@ -235,7 +195,7 @@ def _noise(fit: Fit, spec: ModelSpec) -> tuple[Stored, ...]:
     )
 
 
-def _as_parameter_set(
+def _model_set(
     fit: Fit,
     fitted: Fitted,
     profile: VesselProfile,
@@ -244,23 +204,45 @@ def _as_parameter_set(
     told: dict[str, Any],
     parent: str | None,
 ) -> ParameterSet:
-    runs, spec = fitted.runs, ModelSpec.model_validate(dict(inputs.model_spec))
-    if parent is None and spec.effects:
-        raise NotFound("no_parent", f"The model {spec.effects} has no parent.", "Make it with `kempf effects add`.")
+    """Return the set of all manoeuvres together, with what the model predicts of those held out."""
+    runs, effects = fitted.runs, inputs.model_spec["effects"]
+    if parent is None and effects:
+        raise NotFound("no_parent", f"The model {effects} has no parent.", "Make it with `kempf effects add`.")
     _, left = split(runs.runs)
     step = step_of(fit, [runs.runs[i] for i in left])
-    covariance = fit.covariance
+    made = _as_parameter_set(fit, fitted, profile, inputs, vessel, tuple(inputs.settings["segments"]), told)
+    alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
+    return replace(
+        made,
+        model_name=" + ".join(("plain", *effects)),
+        fit={"horizon": "free run", "rung": rung(0, step)},
+        convergence={**made.convergence, "held_out": [run.name for run in step.held], "left_out": runs.skipped},
+        warnings=(*(f"left out: {name} ({why})" for name, why in sorted(runs.skipped.items())), *alone, *made.warnings),
+        parent=parent,
+    )
+
+
+def _as_parameter_set(
+    fit: Fit,
+    fitted: Fitted,
+    profile: VesselProfile,
+    inputs: Inputs,
+    vessel: str,
+    segment_ids: tuple[str, ...],
+    told: dict[str, Any],
+) -> ParameterSet:
+    """Return what every set of a fit with effects holds."""
+    spec, covariance = ModelSpec.model_validate(dict(inputs.model_spec)), fit.covariance
     speed = float(np.mean([np.mean(one.run.speed_m_s) for one in fit.runs]))
-    held = [run.name for run in step.held]
     return ParameterSet(
         parameter_set_id=parameter_set_id(inputs),
         vessel=vessel,
-        model_name=" + ".join(("plain", *spec.effects)),
+        model_name=" + ".join((spec.name, *spec.effects)),
         model_spec=spec.model_dump(mode="json"),
         model_sha256=spec.sha256,
         estimator=inputs.estimator,
         settings=dict(inputs.settings),
-        segment_ids=tuple(inputs.settings["segments"]),
+        segment_ids=segment_ids,
         log_ids=inputs.log_ids,
         start_utc_ns=min(bounds.start_utc_ns for bounds in inputs.bounds),
         parameters=_parameters(fit),
@@ -268,7 +250,7 @@ def _as_parameter_set(
         noise=(),
         covariance_names=(*HULL_PARAMETERS, *fit.model.names),
         covariance=tuple(tuple(float(x) for x in row) for row in covariance),
-        fit={"horizon": "free run", "rung": rung(0, step)},
+        fit={},
         iterations=[],
         convergence={
             "converged": fit.converged,
@@ -280,13 +262,15 @@ def _as_parameter_set(
             "step_s": _STEP_S,
             "grid_step_s": fit.runs[0].run.step_s,
             "gross_errors": fitted.gross_errors,
-            "gross_error_instants_s": _gross_errors(fit, runs),
-            "held_out": held,
+            "gross_error_instants_s": _gross_errors(fit, fitted.runs),
             "levels": {one.run.name: list(levels) for one, levels in zip(fit.runs, fit.levels, strict=True)},
-            "left_out": runs.skipped,
         },
-        warnings=_warnings(step, runs) + without_arm(spec, arm_of(spec, profile)) + channel_warnings(told),
-        parent=parent,
+        warnings=(
+            *(() if fit.converged else (f"not converged: {fit.reason}",)),
+            *without_arm(spec, arm_of(spec, profile)),
+            *channel_warnings(told),
+        ),
+        parent=None,
         provenance=told,
     )
 
@@ -306,12 +290,3 @@ def _parameters(fit: Fit) -> tuple[Stored, ...]:
         Stored(n, float(v), float(s) if np.isfinite(s) else None, u)
         for n, v, s, u in zip(names, values, std, units, strict=True)
     )
-
-
-def _warnings(step: Step, runs: VesselRuns) -> tuple[str, ...]:
-    said = [f"left out: {name} ({why})" for name, why in sorted(runs.skipped.items())]
-    if not step.fit.converged:
-        said.append(f"not converged: {step.fit.reason}")
-    if not step.held:
-        said.append("no manoeuvre is held out: fewer than three can be used, so the errors are in sample")
-    return tuple(said)
