@@ -114,9 +114,10 @@ def _decode(
 ) -> Iterator[Decoded]:
     """Call the reader of the format; each is imported where it is used, `kempf --help` pays for none."""
     if log_format == "nmea":
+        from kempf.pipeline.ingest.mapping import nmea_corrections
         from kempf.pipeline.ingest.nmea.decode import decode as nmea
 
-        yield nmea(_whole(name, log), name, source)
+        yield nmea(_whole(name, log), nmea_corrections(name, source))
     elif log_format == "mcap":
         from kempf.pipeline.ingest.mcap.decode import decode as mcap
 

@@ -5,6 +5,7 @@ from datetime import UTC, datetime
 
 import pytest
 
+from kempf.pipeline.ingest.mapping import nmea_corrections
 from kempf.pipeline.ingest.nmea import frames as nmea_frames
 from kempf.pipeline.ingest.nmea.decode import decode
 from kempf.pipeline.ingest.nmea.frames import frames_of
@@ -30,7 +31,7 @@ def stamped(*bodies, at="2025-05-03T07:47:01.147Z"):
 
 def read(text, source=None) -> Readings:
     data = text if isinstance(text, bytes) else text.encode()
-    readings = screen(decode(data, "test.nmea", source), "nmea")
+    readings = screen(decode(data, nmea_corrections("test.nmea", source)), "nmea")
     tally = readings.tally
     assert tally.records_read == tally.records_kept + tally.records_rejected
     assert tally.values_read == tally.values_kept + tally.values_rejected
@@ -299,7 +300,7 @@ def test_the_profile_corrects_one_sentence_by_name():
 def test_a_profile_key_that_fits_no_sentence_is_a_usage_error(key):
     source = Source(match="*", channels={key: ChannelMap(channel="rudder_angle", unit="deg")})
     with pytest.raises(UsageError, match="fits none of them"):
-        decode(stamped("AGRSA,3.0,A,,").encode(), "a.nmea", source)
+        nmea_corrections("a.nmea", source)
 
 
 @pytest.mark.parametrize("size", [1, 7, 64, 1000])

@@ -21,7 +21,7 @@ def tag(content):
 
 
 def read(*lines, end="\r\n"):
-    readings = screen(decode(end.join([*lines, ""]).encode(), "test.nmea"), "nmea")
+    readings = screen(decode(end.join([*lines, ""]).encode()), "nmea")
     tally = readings.tally
     assert tally.records_read == tally.records_kept + tally.records_rejected == len(lines)
     return readings

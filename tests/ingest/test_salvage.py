@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from kempf.pipeline.ingest import unpack
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap import chunk as mcap_chunk
+from kempf.pipeline.ingest.mcap import records as mcap_records
 from kempf.pipeline.ingest.mcap.stream import McapStream
 from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.errors import DataRejected, KempfError
@@ -321,7 +321,7 @@ def bomb(size, compression, pack, claim=None):
 @pytest.mark.parametrize("compression", [b"zstd", b"lz4"])
 @pytest.mark.parametrize("claim", [None, 1000])
 def test_a_chunk_that_is_a_bomb_is_refused_and_the_rest_is_read(compression, claim, monkeypatch):
-    monkeypatch.setattr(mcap_chunk, "CHUNK_LIMIT", 1 << 22)
+    monkeypatch.setattr(mcap_records, "CHUNK_LIMIT", 1 << 22)
     pack = {b"zstd": zstandard.ZstdCompressor().compress, b"lz4": lz4.frame.compress}[compression]
     evil = bomb(1 << 24, compression, lambda size: pack(bytes(size)), claim)
     begin = time.process_time()

@@ -11,8 +11,7 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.pipeline.ingest.mcap.batch import Batch, joined
-from kempf.pipeline.ingest.mcap.payloads import PayloadsBuilder
+from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
 from kempf.pipeline.ingest.mcap.records import Channel
 from kempf.pipeline.ingest.mcap.stream import McapStream
 from kempf.pipeline.ingest.mcap.topics import Route

@@ -21,19 +21,22 @@ from numpy.typing import NDArray
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.batch import Batch, Piece, joined, lost_chunk, messages_of, stretch
-from kempf.pipeline.ingest.mcap.chunk import CHUNK_LIMIT, DamagedChunkError, head_of, unpacked
 from kempf.pipeline.ingest.mcap.records import (
     CHANNEL,
     CHUNK,
+    CHUNK_LIMIT,
     DATA_END,
     FIRST_PRIVATE,
     FOOTER,
     MESSAGE,
     SCHEMA,
     Channel,
+    DamagedChunkError,
     Schema,
+    head_of,
     parse_channel,
     parse_schema,
+    unpacked,
 )
 from kempf.pipeline.ingest.mcap.summary import read_summary
 from kempf.pipeline.ingest.mcap.unchunked import FIRST_WINDOW, WINDOW, believed, chunk_behind

@@ -12,8 +12,12 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.compiled import njit
-from kempf.pipeline.ingest.messages.cdr_program import DEEPEST, END, LOOP, PICK, READ, SKIP, STRING
 
+#: Instructions, each with up to four numbers.
+SKIP, READ, STRING, SEQUENCE, PICK, LOOP, END = range(7)
+
+#: Deepest nesting of messages.
+DEEPEST = 16
 #: Bytes of the encapsulation in front of a message.
 _ENCAPSULATION = 4
 #: A message may be longer than its definition by what rounds it up to a multiple of eight.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import pairwise
 
 import numpy as np
@@ -12,14 +13,14 @@ from kempf.pipeline.ingest.nmea.compass_and_rudder import both_rudders, make_tru
 from kempf.pipeline.ingest.nmea.fields import Said, read_type
 from kempf.pipeline.ingest.nmea.frames import Frames, frames_of
 from kempf.pipeline.ingest.spans import Bytes, Index, as_bytes
-from kempf.schemas.channels import CHANNELS
-from kempf.schemas.errors import UsageError
-from kempf.schemas.nmea import SENTENCES, SPECIAL
-from kempf.schemas.profile import Source
-from kempf.schemas.units import factor_to_si
+from kempf.schemas.nmea import SENTENCES
+
+#: Channel -> address of the sentence -> factor on the value in SI, and offset in SI.
+Corrections = Mapping[str, Mapping[str, tuple[float, float]]]
+_NONE: Corrections = {}
 
 
-def decode(data: bytes, name: str = "log", source: Source | None = None) -> Decoded:
+def decode(data: bytes, corrections: Corrections = _NONE) -> Decoded:
     """Decode an NMEA 0183 log.
 
     A record is a line that is not blank. RMC, ZDA, GGA and GLL tell their own time; any other sentence has that of its
@@ -31,23 +32,14 @@ def decode(data: bytes, name: str = "log", source: Source | None = None) -> Deco
     ----------
     data : bytes
         The whole file, decompressed.
-    name : str
-        Name of the file, for messages.
-    source : Source, optional
-        What the profile says of the log: a key such as ``AGRSA.rudder_angle`` gives that sentence's value another unit,
-        sign or offset.
+    corrections : mapping, optional
+        What the profile gives another unit, sign or offset, see `kempf.pipeline.ingest.mapping.nmea_corrections`.
 
     Returns
     -------
     Decoded
-
-    Raises
-    ------
-    UsageError
-        A key of the source is not of that form, or maps to another channel.
     """
     frames = frames_of(as_bytes(data))
-    mended = _mended(name, source, frames)
     n = len(frames.lines)
     reason = frames.reason.copy()
     kind = _kinds(frames)
@@ -67,9 +59,10 @@ def decode(data: bytes, name: str = "log", source: Source | None = None) -> Deco
         for channel, (read_value, there) in what.values.items():
             value = read_value
             put = there & (what.reason == 0)
-            for code, (factor, offset) in mended.get(channel, {}).items():
-                mine = frames.address[what.record] == code
-                value = np.where(mine, value * factor + offset, value)
+            for address, (factor, offset) in corrections.get(channel, {}).items():
+                if address in frames.names:
+                    mine = frames.address[what.record] == frames.names.index(address)
+                    value = np.where(mine, value * factor + offset, value)
             channels.setdefault(channel, Values.empty(n)).put(what.record[put], value[put])
     clock = clock_of(frames, said)
     unread = (frames.reason == CODE[Reason.CHECKSUM]) | (frames.reason == CODE[Reason.MALFORMED])
@@ -77,31 +70,6 @@ def decode(data: bytes, name: str = "log", source: Source | None = None) -> Deco
     notes = [*clock.notes, *notes, *_notes(frames, kind, reason)]
     lines = np.arange(time.size, dtype=np.int64)
     return Decoded(lines, frames.lines, frames.body, time, frames.address, frames.names, reason, channels, notes)
-
-
-def _mended(name: str, source: Source | None, frames: Frames) -> dict[str, dict[int, tuple[float, float]]]:
-    """Return what the profile corrects: channel -> address -> factor on the value in SI and offset in SI."""
-    mended: dict[str, dict[int, tuple[float, float]]] = {}
-    if source is None or source.time is not None:
-        # a source with a time column describes delimited text that happens to share the pattern
-        return mended
-    for key, mapped in source.channels.items():
-        address, _, channel = key.partition(".")
-        units = {f.channel: f.unit for f in SENTENCES[address[2:]].fields} if address[2:] in SENTENCES else {}
-        units |= SPECIAL.get(address[2:], {})
-        if channel not in units or mapped.channel != channel:
-            raise UsageError(
-                "nmea_key_unknown",
-                f"{name} is an NMEA log, whose sentences fix channel and unit; the profile's key {key!r} for "
-                f"{mapped.channel} fits none of them.",
-                "Leave the channels of the source out, or write '<talker and sentence>.<channel>' such as "
-                "'AGRSA.rudder_angle', with that same channel, to correct its sign, unit or offset.",
-                {"name": name, "key": key},
-            )
-        if address in frames.names:
-            factor = mapped.factor / factor_to_si(units[channel], CHANNELS[channel].unit, key)
-            mended.setdefault(channel, {})[frames.names.index(address)] = (factor, mapped.offset_si)
-    return mended
 
 
 def _kinds(frames: Frames) -> Index:
