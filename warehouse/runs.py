@@ -38,17 +38,6 @@ class Run:
         object.__setattr__(self, "message", plain(self.message))
 
 
-def record(warehouse: Warehouse, run: Run) -> bool:
-    """Store how a run stands, in place of how it stood; no commit where it stands so already.
-
-    Returns
-    -------
-    bool
-        Whether anything changed.
-    """
-    return bool(record_all(warehouse, [run]))
-
-
 def record_all(warehouse: Warehouse, runs: Sequence[Run]) -> tuple[str, ...]:
     """Store how runs stand, in place of how they stood, in at most one commit.
 

@@ -76,17 +76,13 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
     return judged(stored, rebuilt(stored, *raw_inputs(warehouse, stored)), tolerance)
 
 
-def raw_inputs(
-    warehouse: Warehouse, stored: ParameterSet, known: Mapping[tuple[str, str], Instruments] | None = None
-) -> tuple[dict[str, Instruments], VesselProfile]:
+def raw_inputs(warehouse: Warehouse, stored: ParameterSet) -> tuple[dict[str, Instruments], VesselProfile]:
     """Read what a parameter set was made from again from the raw bytes.
 
     Parameters
     ----------
     warehouse : Warehouse
     stored : ParameterSet
-    known : mapping of (str, str) to Instruments, optional
-        Logs that were read already, by ingest and hash of the profile.
 
     Returns
     -------
@@ -101,13 +97,11 @@ def raw_inputs(
     KempfError
         ``raw_bytes_damaged``.
     """
-    profile_sha256 = str(stored.provenance["inputs"]["profile_sha256"])
-    profile = vessels.get(warehouse, profile_sha256)
+    profile = vessels.get(warehouse, str(stored.provenance["inputs"]["profile_sha256"]))
     instruments = {}
     for ingest_id in stored.provenance["ingest_ids"]:
         row = logs.of_ingest(warehouse, str(ingest_id))
-        there = (known or {}).get((row.ingest_id, profile_sha256))
-        instruments[row.log_id] = there or read_again(warehouse, row, profile)
+        instruments[row.log_id] = read_again(warehouse, row, profile)
     return instruments, profile
 
 

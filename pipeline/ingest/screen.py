@@ -90,11 +90,6 @@ class Screen:
         return held, settled
 
 
-def screen(decoded: Decoded, log_format: str) -> Readings:
-    """Check all records of a log that came in one part, see `Screen`."""
-    return Screen(log_format).part(decoded)
-
-
 def _checked(decoded: Decoded, reason: Code, log_format: str) -> Readings:
     """Check everything but the clocks."""
     shared = _sharing_an_instant(decoded, reason)

@@ -130,7 +130,7 @@ def test_an_old_set_is_built_again_after_compaction_and_vacuum(own: Warehouse, m
 
     names = [s.parameter_set_id for s in parameter_sets.get_all(own, "mariner")]
     for i in range(3):
-        runs.record(own, runs.Run("run-0", "other", None, str(i)))
+        runs.record_all(own, [runs.Run("run-0", "other", None, str(i))])
     assert own.folder is not None
     compaction.compact(own, more_files_than=1)
     for path in own.folder.rglob("*"):

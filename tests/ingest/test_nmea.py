@@ -10,7 +10,7 @@ from kempf.pipeline.ingest.nmea import frames as nmea_frames
 from kempf.pipeline.ingest.nmea.decode import decode
 from kempf.pipeline.ingest.nmea.frames import frames_of
 from kempf.pipeline.ingest.readings import Readings
-from kempf.pipeline.ingest.screen import screen
+from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.spans import as_bytes
 from kempf.schemas.errors import UsageError
 from kempf.schemas.profile import ChannelMap, Source
@@ -31,7 +31,7 @@ def stamped(*bodies, at="2025-05-03T07:47:01.147Z"):
 
 def read(text, source=None) -> Readings:
     data = text if isinstance(text, bytes) else text.encode()
-    readings = screen(decode(data, nmea_corrections("test.nmea", source)), "nmea")
+    readings = Screen("nmea").part(decode(data, nmea_corrections("test.nmea", source)))
     tally = readings.tally
     assert tally.records_read == tally.records_kept + tally.records_rejected
     assert tally.values_read == tally.values_kept + tally.values_rejected

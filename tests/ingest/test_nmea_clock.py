@@ -5,7 +5,7 @@ from datetime import UTC, datetime, timedelta
 import pytest
 
 from kempf.pipeline.ingest.nmea.decode import decode
-from kempf.pipeline.ingest.screen import screen
+from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.sniff import sniff
 
 
@@ -21,7 +21,7 @@ def tag(content):
 
 
 def read(*lines, end="\r\n"):
-    readings = screen(decode(end.join([*lines, ""]).encode()), "nmea")
+    readings = Screen("nmea").part(decode(end.join([*lines, ""]).encode()))
     tally = readings.tally
     assert tally.records_read == tally.records_kept + tally.records_rejected == len(lines)
     return readings
@@ -201,5 +201,5 @@ def test_a_log_of_carriage_returns_that_begins_in_the_middle_of_a_line_is_told_b
 
 
 def test_a_line_without_a_sentence_before_one_with_two_changes_nothing():
-    readings = screen(decode((rmc(START) + "\nnothing\n$HE" + sentence("HEHDT,1.0,T") + "\n").encode()), "nmea")
+    readings = Screen("nmea").part(decode((rmc(START) + "\nnothing\n$HE" + sentence("HEHDT,1.0,T") + "\n").encode()))
     assert readings.tally.by_reason == {"checksum": 1, "malformed": 1}

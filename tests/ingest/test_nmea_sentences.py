@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from kempf.pipeline.ingest.decoded import CODE, Reason
 from kempf.pipeline.ingest.nmea.decode import decode
-from kempf.pipeline.ingest.screen import screen
+from kempf.pipeline.ingest.screen import Screen
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 DEG, KN = math.pi / 180, 1852 / 3600
@@ -202,7 +202,7 @@ def test_generated_sentences_against_the_independent_decoder(bodies):
 
 def read(*bodies):
     lines = "".join(f"2025-05-03T07:47:{k // 10:02d}.{k % 10}00Z {sentence(b)}\r\n" for k, b in enumerate(bodies))
-    return screen(decode(lines.encode()), "nmea")
+    return Screen("nmea").part(decode(lines.encode()))
 
 
 def column(readings, name):
@@ -292,5 +292,5 @@ def test_what_is_left_aside_is_counted():
     good = (
         f"2025-05-03T07:47:01.147Z {sentence('PGRMC,A,,,')}\r\n2025-05-03T07:47:01.147Z {sentence('HEHDT,1.0,T')}\r\n"
     )
-    notes = screen(decode((line * 2 + good).encode()), "nmea").notes
+    notes = Screen("nmea").part(decode((line * 2 + good).encode())).notes
     assert notes == ("Sentences without a channel: AIVDM, PGRMC; of them 1 proprietary, 2 AIS or encapsulated.",)

@@ -17,7 +17,7 @@ from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.mcap import decode
 from kempf.pipeline.ingest.read import read_log, read_parts
 from kempf.pipeline.ingest.readings import joined
-from kempf.pipeline.ingest.screen import Screen, screen
+from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.profile import Source, VesselProfile
 
@@ -69,7 +69,7 @@ def test_the_screen_does_not_see_where_a_log_is_cut(seed: int) -> None:
     at = sorted(draw.randrange(len(whole) + 1) for _ in range(draw.choice([1, 2, 7, 30])))
     checks = Screen("nmea")
     found = joined([checks.part(part) for part in cut(whole, at)])
-    equal(found, screen(whole, "nmea"))
+    equal(found, Screen("nmea").part(whole))
 
 
 def test_little_is_held_back() -> None:
@@ -85,7 +85,7 @@ def test_a_log_of_thousands_of_parts_holds_no_more_than_a_link_a_source() -> Non
     checks = Screen("nmea")
     # each part holds something back for the next; a chain of all parts would be too deep to be walked
     found = joined([checks.part(part) for part in cut(whole, list(range(1, n)))])
-    equal(found, screen(whole, "nmea"))
+    equal(found, Screen("nmea").part(whole))
 
 
 def untidy_log(n: int = 300) -> bytes:
@@ -129,7 +129,7 @@ SOURCE = Source.model_validate(
 
 
 def test_clocks_of_their_own_begin_with_the_log_and_not_with_the_part() -> None:
-    readings = screen(untidy(5, 300), "delimited")
+    readings = Screen("delimited").part(untidy(5, 300))
     source = Source.model_validate(
         {"match": "*", "channels": {"h": {"channel": "heading", "unit": "deg", "clock_rate": 1.05}}}
     )

@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def put(warehouse: Warehouse, status: str, name: str = "run-1") -> None:
-    runs.record(warehouse, runs.Run(name, "ingest", None, status))
+    runs.record_all(warehouse, [runs.Run(name, "ingest", None, status)])
 
 
 def stands(warehouse: Warehouse) -> dict[str, str]:
@@ -44,7 +44,7 @@ def test_what_another_process_wrote_is_seen(warehouse: Warehouse) -> None:
     assert stands(warehouse) == {"run-1": "one"}
     code = (
         "from warehouse import runs; from kempf.warehouse.store import Warehouse\n"
-        f"runs.record(Warehouse({warehouse.uri!r}), runs.Run('run-1', 'ingest', None, 'two'))"
+        f"runs.record_all(Warehouse({warehouse.uri!r}), [runs.Run('run-1', 'ingest', None, 'two')])"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, timeout=60)
     assert stands(warehouse) == {"run-1": "two"}

@@ -52,8 +52,6 @@ class Record:
         its first value.
     heading_rad : ndarray, shape (n,)
         True heading interpolated to the instants, not counted from anything; NaN in its gaps.
-    heading_origin_rad : float
-        The heading's first value.
     rudder_period_s : float
         Median time between readings of the rudder; in between its course is a guess, a straight line.
     lateral : LateralSpeed
@@ -69,7 +67,6 @@ class Record:
     rudder_rad: Float
     measured: Float
     heading_rad: Float
-    heading_origin_rad: float
     rudder_period_s: float
     rudder_noise_rad_sqrt_s: Float
     speed_error: SpeedError
@@ -163,7 +160,6 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         rudder_rad=delta,
         measured=measured,
         heading_rad=heading.at(instants, gap_limit_s(heading)),
-        heading_origin_rad=float(heading.value[0]),
         rudder_period_s=rudder.period_s,
         rudder_noise_rad_sqrt_s=np.full(instants.size, rudder_std * float(np.sqrt(rudder.period_s))),
         speed_error=SpeedError(by_speed / np.maximum(np.abs(speed), _SLOWEST_M_S), error_std, error_time_s),
