@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
+from kempf.flows.jobs.chosen_set import named_set
 from kempf.flows.jobs.identify_vessel import build
 from kempf.flows.jobs.pool_vessel import POOLED, build_pooled
 from kempf.flows.jobs.spool import spooled
@@ -15,7 +16,7 @@ from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import NotFound
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
+from kempf.warehouse import agreement, code_version, logs, raw, vessels
 from kempf.warehouse.agreement import Difference
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet
@@ -61,7 +62,7 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
     ----------
     warehouse : Warehouse
     name : str
-        Its id, or a beginning of it.
+        Its id, a beginning of it, or an alias.
     tolerance : float, optional
         Largest relative difference that still counts as equal.
 
@@ -72,7 +73,7 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
     KempfError
         ``raw_bytes_damaged``.
     """
-    stored = parameter_sets.get(warehouse, name)
+    stored = named_set(warehouse, name)
     return judged(stored, rebuilt(stored, *raw_inputs(warehouse, stored)), tolerance)
 
 

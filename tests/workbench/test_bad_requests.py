@@ -5,8 +5,11 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+import click
 import pytest
 
+from kempf.workbench.cli.entry import cli
+from kempf.workbench.cli.given_once import GivenOnce
 from tests.workbench.driving import kempf, refused, tree
 
 BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
@@ -37,6 +40,34 @@ def test_a_vessel_that_does_not_exist(filled: Path, arguments: tuple[str, ...]):
     human = kempf(*arguments, "--warehouse", filled)
     assert (human.code, human.out) == (4, "")
     assert human.err.startswith("error [no_vessel] There is no vessel 'nobody'; known: mariner.\n  ")
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ("diagnose", "--vessel", "mariner", "--set", "ps-1", "--set", "ps-2"),
+        ("export", "mcap", "--vessel", "mariner", "--out", "x.mcap", "--set", "ps-1", "--set", "ps-2"),
+        ("steer", "--vessel", "mariner", "--set=ps-1", "--set=ps-2"),
+        ("effects", "undo", "--vessel", "mariner", "--vessel", "other"),
+    ],
+)
+def test_an_option_given_twice_is_refused_and_not_dropped(filled: Path, arguments: tuple[str, ...]):
+    error = refused(kempf(*arguments, "--warehouse", filled, "--json"), 2, "usage")
+    assert error["message"].endswith("is given 2 times; this command takes one.")
+
+
+def test_every_command_refuses_an_option_given_twice():
+    def walk(command: click.Command) -> None:
+        if not isinstance(command, click.Group):
+            assert isinstance(command, GivenOnce), command.name
+            return
+        with click.Context(command) as context:
+            for name in command.list_commands(context):
+                inner = command.get_command(context, name)
+                assert inner is not None
+                walk(inner)
+
+    walk(cli)
 
 
 @pytest.mark.parametrize(

@@ -146,6 +146,11 @@ def built_again(late: Late, tau: dict[str, Any]) -> None:
 def named(late: Late, tau: dict[str, Any]) -> None:
     late.json("params", "alias", "with_lag", late.lag)
     assert late.json("params", "show", "with_lag")["parameters"][NAME] == tau
+    commands = ["params show", "params diff", "params steering", "params export", "export yaml", "export csv", "rerun"]
+    for command in commands:
+        beside = [late.plain] if command == "params diff" else []
+        by_id, by_name = (late.json(*command.split(), *beside, one) for one in (late.lag, "with_lag"))
+        assert by_name == by_id, command
 
 
 CHECKS: dict[tuple[str, ...], Callable[[Late, dict[str, Any]], None]] = {

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, warehouse_option
 from kempf.workbench.terminal import print_json, print_table
 
 
-@click.command("compact")
+@click.command("compact", cls=GivenOnce)
 @click.option(
     "--more-files-than",
     type=click.IntRange(min=1),

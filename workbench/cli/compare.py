@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.schemas.errors import ThresholdExceeded, UsageError
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.ranked_warnings import MOST
 from kempf.workbench.terminal import number, print_json, print_note, print_table, progress, short_ids
@@ -23,7 +24,7 @@ _LEVEL = 0.01
 _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
 
 
-@click.command("compare")
+@click.command("compare", cls=GivenOnce)
 @vessel_option(required=True)
 @click.option(
     "--set",

@@ -5,8 +5,10 @@ from __future__ import annotations
 import click
 from click.shell_completion import get_completion_class
 
+from kempf.workbench.cli.given_once import GivenOnce
 
-@click.command("completion")
+
+@click.command("completion", cls=GivenOnce)
 @click.argument("shell", type=click.Choice(["bash", "zsh", "fish"]))
 def command(shell: str) -> None:
     """Print the completion script; for bash add `eval "$(kempf completion bash)"` to ~/.bashrc."""

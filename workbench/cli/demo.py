@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from kempf.warehouse.parameter_set import ParameterSet
 
 
-@click.command("demo")
+@click.command("demo", cls=GivenOnce)
 @click.option(
     "--folder",
     type=click.Path(path_type=Path),

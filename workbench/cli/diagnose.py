@@ -8,13 +8,14 @@ from typing import Any
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
 
 _SHOWN = 12
 
 
-@click.command("diagnose")
+@click.command("diagnose", cls=GivenOnce)
 @vessel_option()
 @click.option("--fleet", is_flag=True, help="Every vessel of the warehouse, as a Prefect flow, and a summary.")
 @click.option("--set", "set_id", metavar="ID", help="Begin from the model of this parameter set.")

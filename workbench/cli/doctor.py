@@ -7,11 +7,12 @@ from typing import Any
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
 from kempf.workbench.terminal import number, one_line, print_json, print_table
 
 
-@click.command("doctor")
+@click.command("doctor", cls=GivenOnce)
 @click.argument("path", metavar="PATH|LOG", type=click.Path(path_type=Path))
 @profile_option
 @click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help="Draw what disagrees, PNG, SVG or PDF.")

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.workbench.cli import effects_of_vessel
+from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option
 from kempf.workbench.terminal import print_json, print_table
 
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
     from kempf.schemas.effect import Effect
 
 
-@click.group("effects")
+@click.group("effects", cls=GivenOnceGroup)
 def command() -> None:
     """Physical effects: list and show them, try one of your own, add one to a vessel's model."""
 

@@ -9,13 +9,14 @@ from typing import Any
 import click
 
 from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import tell_rungs
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.ranked_warnings import show_warnings
 from kempf.workbench.terminal import number, print_json, print_note, print_table, progress
 
 
-@click.command("try")
+@click.command("try", cls=GivenOnce)
 @click.argument("formula")
 @vessel_option(required=True)
 @click.option("--name", default="own", show_default=True, help="What the effect is called.")
@@ -74,7 +75,7 @@ def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
     return str(told["refused"][-1]["why"] if told["refused"] else candidate["why"])
 
 
-@click.command("add")
+@click.command("add", cls=GivenOnce)
 @click.argument("name")
 @vessel_option(required=True)
 @click.option("--formula", help="The effect is your own: its formula.")
@@ -134,7 +135,7 @@ def _scaled(value: float | None, factor: float) -> float | None:
     return None if value is None else value * factor
 
 
-@click.command("undo")
+@click.command("undo", cls=GivenOnce)
 @vessel_option(required=True)
 @warehouse_option
 @json_option

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from kempf.schemas.errors import NotFound, UsageError
+from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import print_json, print_note, progress
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 F = TypeVar("F", bound=Callable[..., Any])
 
 
-@click.group("export")
+@click.group("export", cls=GivenOnceGroup)
 def command() -> None:
     """Write a parameter set, or runs with their predictions, as a file that other programs read.
 
@@ -157,12 +158,12 @@ def _linear(uri: str, set_id: str, speed: float | None, step: float, course: flo
 
 
 def _text(form: str, set_id: str, out: Path | None, uri: str, as_json: bool) -> None:
+    from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
-    from kempf.warehouse import parameter_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import as_text
 
-    one = parameter_sets.get(Warehouse(uri), set_id)
+    one = named_set(Warehouse(uri), set_id)
     print_note(said_of_sets([one]))
     _deliver(form, one.parameter_set_id, as_text(one, form), out, as_json)
 

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
 
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
     from kempf.warehouse.history import Comparable, History
 
 
-@click.command("history")
+@click.command("history", cls=GivenOnce)
 @vessel_option(required=True, multiple=True)
 @click.option("--parameter", metavar="NAME", help="Only this parameter, such as b2.")
 @click.option("--as-of", metavar="TIME", help="What was known at this time, ISO 8601; without a zone it is UTC.")

@@ -11,6 +11,7 @@ import click
 from kempf.flows.process.progress import Progress
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import KempfError
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.parameter_set_table import tell_set
 from kempf.workbench.terminal import print_json, progress
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
     from kempf.warehouse.store import Warehouse
 
 
-@click.command("identify")
+@click.command("identify", cls=GivenOnce)
 @vessel_option(required=True)
 @click.option("--model", metavar="FILE|ID", help="Model file, YAML, or a parameter set whose model it is.")
 @click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",

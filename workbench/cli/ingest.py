@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, profile_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.ranked_warnings import of_several, show_warnings
 from kempf.workbench.terminal import one_line, print_json, progress
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
     from kempf.pipeline.ingest.readings import Tally
 
 
-@click.command("ingest")
+@click.command("ingest", cls=GivenOnce)
 @click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path))
 @vessel_option()
 @profile_option

@@ -7,11 +7,12 @@ from typing import Any
 import click
 
 from kempf.schemas.errors import NotFound
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_note, print_table
 
 
-@click.command("ladder")
+@click.command("ladder", cls=GivenOnce)
 @vessel_option(required=True)
 @warehouse_option
 @json_option

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import one_line, print_json, print_note, print_table
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from kempf.warehouse.logs import LogRow
 
 
-@click.group("logs")
+@click.group("logs", cls=GivenOnceGroup)
 def command() -> None:
     """List the logs, show one with what its channels say, and what was rejected in it and why."""
 

@@ -39,25 +39,15 @@ def verbose_option(function: F) -> F:
 
 
 def vessel_option(*, required: bool = False, multiple: bool = False) -> Callable[[F], F]:
-    """Add ``--vessel``: one name, which must not be given twice, or with ``multiple`` a tuple of them."""
+    """Add ``--vessel``: one name, or with ``multiple`` a tuple of them."""
     return click.option(
         "--vessel",
         "vessel",
         required=required,
-        multiple=True,
-        callback=None if multiple else _only_one,
+        multiple=multiple,
         metavar="NAME",
         help="Name of the vessel." + (" May be repeated." if multiple else ""),
     )
-
-
-def _only_one(context: click.Context, option: click.Parameter, given: tuple[str, ...]) -> str | None:
-    """Return the one value of an option; of several, click itself would drop all but the last."""
-    if len(given) > 1:
-        raise click.UsageError(
-            f"{option.opts[0]} is given {len(given)} times ({', '.join(given)}); this command takes one.", context
-        )
-    return given[0] if given else None
 
 
 def profile_option(function: F) -> F:

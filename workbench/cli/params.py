@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_note, print_table
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from kempf.pipeline.steering.nomoto import Constant
 
 
-@click.group("params")
+@click.group("params", cls=GivenOnceGroup)
 def command() -> None:
     """List, show, compare and export parameter sets, and what they say of her steering."""
 

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option
 from kempf.workbench.terminal import print_json
 
 
-@click.group("profile")
+@click.group("profile", cls=GivenOnceGroup)
 def command() -> None:
     """Write the profile of a vessel."""
 

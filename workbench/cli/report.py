@@ -7,11 +7,12 @@ from pathlib import Path
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import print_json, progress
 
 
-@click.command("report")
+@click.command("report", cls=GivenOnce)
 @vessel_option(required=True)
 @click.option("--set", "set_id", metavar="ID", help="Begin from the model of this parameter set.")
 @click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Begin from this model, YAML.")

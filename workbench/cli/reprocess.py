@@ -9,11 +9,12 @@ from typing import Any
 import click
 
 from kempf.schemas.errors import DataRejected
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import print_json, print_table, progress
 
 
-@click.command("reprocess")
+@click.command("reprocess", cls=GivenOnce)
 @vessel_option(multiple=True)
 @click.option(
     "--changed-only/--everything",

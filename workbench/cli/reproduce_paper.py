@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
     from kempf.flows.jobs.reproduce_paper import Experiment, Reproduction
 
 
-@click.command("reproduce-paper")
+@click.command("reproduce-paper", cls=GivenOnce)
 @click.option(
     "--folder",
     type=click.Path(path_type=Path),

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kempf.schemas.errors import DataRejected, ThresholdExceeded, UsageError
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
 
@@ -17,7 +18,7 @@ if TYPE_CHECKING:
     from kempf.warehouse.store import Warehouse
 
 
-@click.command("rerun")
+@click.command("rerun", cls=GivenOnce)
 @click.argument("set_id", required=False)
 @click.option("--all", "all_sets", is_flag=True, help="Every parameter set, or with --vessel every one of hers.")
 @click.option(

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, one_line, print_json, print_note, print_table, short_ids
 
 
-@click.command("segments")
+@click.command("segments", cls=GivenOnce)
 @vessel_option()
 @warehouse_option
 @json_option

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table
 
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 _FIGURES = (".png", ".svg", ".pdf")
 
 
-@click.command("steer")
+@click.command("steer", cls=GivenOnce)
 @vessel_option(required=True)
 @click.option("--set", "set_id", metavar="ID", help="Parameter set; default: the current one of the vessel.")
 @click.option(

@@ -6,11 +6,12 @@ from pathlib import Path
 
 import click
 
+from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table
 
 
-@click.group("vessels")
+@click.group("vessels", cls=GivenOnceGroup)
 def command() -> None:
     """List vessels, show and set their profiles."""
 
