@@ -19,21 +19,21 @@ def summary(diagnoses: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
     Returns
     -------
     list of dict
-        ``vessel``, ``verdict``, ``effects`` (those that the data do not tell apart), ``since`` (ISO 8601, the first
+        ``vessel``, ``verdict``, ``effects`` (those that the data do not distinguish), ``since`` (ISO 8601, the first
         manoeuvre in which they are seen), ``held_out_before``, ``held_out_after`` (free-run errors), ``note``.
     """
     rows = []
     for one in diagnoses:
         ladder = one.get("ladder", [])
         ends = (ladder[0]["held_out_error"], ladder[-1]["held_out_error"]) if ladder else (None, None)
-        told = {"vessel": one["vessel"], "verdict": one["verdict"]}
+        verdict = {"vessel": one["vessel"], "verdict": one["verdict"]}
         error = {"held_out_before": ends[0], "held_out_after": ends[1]}
         note = one["error"]["message"] if "error" in one else ""
         for found in one.get("sets", []):
             since = found["since_utc_ns"]
             rows.append(
                 {
-                    **told,
+                    **verdict,
                     "effects": " or ".join(found["effects"]),
                     "since": "" if since is None else iso_utc(since),
                     **error,
@@ -41,5 +41,5 @@ def summary(diagnoses: Sequence[Mapping[str, Any]]) -> list[dict[str, Any]]:
                 }
             )
         if not one.get("sets"):
-            rows.append({**told, "effects": "", "since": "", **error, "note": note})
+            rows.append({**verdict, "effects": "", "since": "", **error, "note": note})
     return rows

@@ -84,12 +84,12 @@ def ingest(
 
 @task(name="identify-vessel", retries=1, retry_delay_seconds=5)
 def identify_task(warehouse: str, vessel: str, estimator: str, spec: dict[str, Any]) -> list[dict[str, Any]]:
-    """Identify every zigzag of one vessel."""
+    """Identify every manoeuvre of one vessel."""
     request = Request(ModelSpec.model_validate(spec), estimator)
     run = flow_run.get_id()
-    told = str(run) if run else None
-    outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=told)
-    pool_vessel(Warehouse(warehouse), vessel, request, outcomes, flow_run=told)
+    run_id = str(run) if run else None
+    outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=run_id)
+    pool_vessel(Warehouse(warehouse), vessel, request, outcomes, flow_run=run_id)
     return [
         {
             "segment": o.segment.segment_id,
@@ -156,7 +156,7 @@ class _Run:
     run: str | None
 
     def do(self, batches: Sequence[list[str]], tell: Callable[[int], None]) -> list[dict[str, Any]]:
-        """Run batches as tasks, tell how many vessels are done; those of a lost batch are reported as failed."""
+        """Run batches as tasks, report how many vessels are done; those of a lost batch are reported as failed."""
         code = responsible_code()
         futures: dict[Any, list[str]] = {
             reprocess_batch.submit(self.warehouse, batch, self.changed_only, self.run, code): batch for batch in batches
@@ -178,8 +178,8 @@ def reprocess(
     """Bring the fleet up to date with its profiles and the code.
 
     Vessels whose inputs did not change since their last run are not looked at again. The run ends as Failed where a
-    vessel failed in a way that is new, or that another attempt may mend; all others are done all the same. Failures
-    that the run before told of already, of data that are refused, leave it Completed.
+    vessel failed in a way that is new, or that another attempt may overcome; all others are done all the same. Failures
+    that the run before reported already, of data that are refused, leave it Completed.
 
     Parameters
     ----------
@@ -196,8 +196,8 @@ def reprocess(
         One report a vessel, sorted by name; where the run ends as Failed a caller gets the error
         `kempf.flows.fleet.report.VesselsFailed`, which has them too.
     """
-    told = flow_run.get_id()
-    one = _Run(warehouse, changed_only, str(told) if told else None)
+    run_id = flow_run.get_id()
+    one = _Run(warehouse, changed_only, str(run_id) if run_id else None)
     todo = plan.plan(Warehouse(warehouse), vessels, changed_only=changed_only)
     get_run_logger().info("%d vessels, %d with something to do", todo.vessels, len(todo.due))
     shown = create_progress_artifact(_percent(len(todo.kept), todo.vessels), "kempf-progress", _PROGRESS)
@@ -250,15 +250,15 @@ def _percent(done: int, total: int) -> float:
 @task(name="diagnose-batch", retries=1, retry_delay_seconds=5)
 def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any]) -> list[dict[str, Any]]:
     """Diagnose vessels one after the other, each on all cores; one that fails is reported, the others are done."""
-    model, told = ModelSpec.model_validate(spec), []
+    model, documents = ModelSpec.model_validate(spec), []
     for vessel in vessels:
         try:
             found, _ = diagnose_vessel(Warehouse(warehouse), vessel, model)
-            told.append(found.show())
+            documents.append(found.show())
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
-            told.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).to_json()["error"]})
-        get_run_logger().info("%s: %s", vessel, told[-1]["verdict"])
-    return told
+            documents.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).to_json()["error"]})
+        get_run_logger().info("%s: %s", vessel, documents[-1]["verdict"])
+    return documents
 
 
 @flow(name="diagnose")

@@ -83,7 +83,7 @@ def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_on
     """Say which vessels have something to do, and write down that the others have not.
 
     A vessel has nothing to do where her state is the one that her last run left, and nothing failed in it that another
-    attempt may mend.
+    attempt may overcome.
 
     Parameters
     ----------
@@ -185,12 +185,12 @@ def lost(batch: Sequence[str], error: BaseException) -> list[Report]:
     reports = []
     for vessel in batch:
         report = VesselReport(vessel)
-        told = KempfError(
+        failure = KempfError(
             "batch_lost",
             f"The worker that had {vessel!r} in a batch of {len(batch)} did not come back: {error}.",
             "Run it again; look at the worker's log, and at its memory.",
         )
-        report.fail(vessel, told)
+        report.fail(vessel, failure)
         reports.append(report.show())
     return reports
 

@@ -1,4 +1,4 @@
-"""How a run over the fleet is told: a table, a summary, one sentence, and whether somebody should be woken."""
+"""How a run over the fleet is reported: a table, a summary, one sentence, and whether somebody should be woken."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ class VesselsFailed(DataRejected):
 
 
 def alarming(report: Mapping[str, Any]) -> bool:
-    """Return whether a vessel failed in a way that nobody knows of yet, or that another attempt may mend."""
+    """Return whether a vessel failed in a way that has not been reported yet, or that another attempt may overcome."""
     return any(not (failure["lasting"] and failure["known"]) for failure in report["failures"])
 
 
@@ -48,11 +48,11 @@ def sentence(reports: Reports) -> str:
     '1 vessels: 1 changed'
     """
     counts = Counter(str(report["status"]) for report in reports)
-    told = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
+    counted = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
     names = [str(report["vessel"]) for report in reports if alarming(report)]
     woken = f"; look at {', '.join(names[:5])}{' ...' if names[5:] else ''}" if names else ""
     known = sum(1 for report in reports if report["failures"] and not alarming(report))
-    return f"{len(reports)} vessels: {told or 'none'}" + (f" ({known} as the run before)" if known else "") + woken
+    return f"{len(reports)} vessels: {counted or 'none'}" + (f" ({known} as the run before)" if known else "") + woken
 
 
 def table(reports: Reports) -> list[dict[str, Any]]:

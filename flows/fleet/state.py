@@ -1,4 +1,4 @@
-"""What each vessel's results rest on, told by a few reads of whole tables instead of many reads a vessel.
+"""What each vessel's results rest on, read by a few reads of whole tables instead of many reads a vessel.
 
 A vessel whose state is the one that her last reprocessing left has nothing to do: the same bytes, profile and code
 give the same sets. The state is compared by its digest, never by a time.
@@ -25,7 +25,7 @@ _Rows = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class VesselState:
-    """What one vessel stands at.
+    """What the results of one vessel rest on now.
 
     Attributes
     ----------
@@ -55,8 +55,8 @@ class VesselState:
     @property
     def digest(self) -> str:
         """SHA-256 of the state and of the code that is responsible for it, 64 hex digits."""
-        told = [self.vessel, *self.inputs, self.ingest_ids, self.set_ids, self.aliases]
-        return sha256(canonical_json([responsible_code(), *told]))
+        content = [self.vessel, *self.inputs, self.ingest_ids, self.set_ids, self.aliases]
+        return sha256(canonical_json([responsible_code(), *content]))
 
 
 def responsible_code() -> list[str]:

@@ -146,7 +146,7 @@ def compare_vessel(
             compared = compare_run(
                 *(one, Point(hull, values, levels[k].foreseen), asked),
                 held_out=held[k],
-                levels_from=levels[k].told,
+                levels_from=levels[k].source,
                 own_levels=levels[k].own,
                 phases=phases_s(segment.detail.get("phases", ()), one.run.start_utc_ns),
                 turns=_turns(segment, one.run),
@@ -160,7 +160,7 @@ def compare_vessel(
     if not runs:
         raise DataRejected(
             "nothing_to_compare",
-            f"{chosen.parameter_set_id} predicts none of the {len(filtered)} runs of {vessel!r}: "
+            f"{chosen.parameter_set_id} predicts none of the {len(filtered)} manoeuvres of {vessel!r}: "
             + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:3]),
             "Ask for another horizon, or compare another parameter set with --set.",
             {"skipped": skipped},
@@ -197,8 +197,8 @@ class _Seen:
 
 def _seen(warehouse: Warehouse, vessel: str, chosen: ParameterSet) -> _Seen:
     inputs: Mapping[str, Any] = chosen.provenance.get("inputs") or {}
-    told = chosen.convergence
-    unseen = {*(told.get("held_out") or ()), *(told.get("left_out") or ())}
+    fit = chosen.convergence
+    unseen = {*(fit.get("held_out") or ()), *(fit.get("left_out") or ())}
     bounds = list(inputs.get("segments", ()))
     # a model with effects names its held-out runs among its segments, in the order of the bounds
     names = chosen.settings.get("segments") or [""] * len(bounds)
@@ -209,7 +209,7 @@ def _seen(warehouse: Warehouse, vessel: str, chosen: ParameterSet) -> _Seen:
 
 
 def _is_seen(segment: Segment, seen: _Seen) -> bool:
-    """Tell whether a set was identified from a segment, under this id, with other bounds, or from another log of it."""
+    """Return whether a set was made from a segment, under this id, with other bounds, or from another log of it."""
     return (
         segment.segment_id in seen.ids
         or any(
@@ -226,7 +226,7 @@ class _Levels:
 
     foreseen: Float
     own: Float
-    told: str
+    source: str
 
 
 def _levels(
@@ -234,22 +234,26 @@ def _levels(
 ) -> list[_Levels]:
     """Return the noise levels of each run; a held-out run is predicted with the mean of the fitted ones' logarithms."""
     kept: Mapping[str, Any] = chosen.convergence.get("levels") or {}
-    own, told = [], []
+    own, sources = [], []
     for k, one in enumerate(filtered):
         if one.run.name in kept and not held[k]:
             own.append(np.array(kept[one.run.name], dtype=np.float64))
-            told.append("fitted with the parameters")
+            sources.append("fitted with the parameters")
         else:
             found = fit_levels(one, hull, values, start.levels[k])
             own.append(found.levels)
-            told.append("fitted to this run, parameters held" + ("" if found.converged else "; not converged"))
+            sources.append("fitted to this manoeuvre, parameters held" + ("" if found.converged else "; not converged"))
     seen = [levels for levels, out in zip(own, held, strict=True) if not out]
     mean = np.mean(seen, axis=0) if seen else None
     return [
         _Levels(levels, levels, words)
         if mean is None or not out
-        else _Levels(mean, levels, "mean of the fitted runs' logarithms; in where: fitted to this run, parameters held")
-        for levels, out, words in zip(own, held, told, strict=True)
+        else _Levels(
+            mean,
+            levels,
+            "mean of the fitted ones' logarithms; in where: fitted to this manoeuvre, parameters held",
+        )
+        for levels, out, words in zip(own, held, sources, strict=True)
     ]
 
 

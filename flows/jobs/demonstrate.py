@@ -51,7 +51,7 @@ class Demonstration:
     Attributes
     ----------
     folder : Path
-        Where the raw logs, the profile and the warehouse lie.
+        Where the raw logs, the profile and the warehouse go.
     vessel : str
     truth : dict of str to float
         The six parameters that the simulator used.

@@ -141,7 +141,7 @@ def examine(
     screened = {name: known[name] for name in only} if only else known
     count = 0
 
-    def told(what: str) -> None:
+    def step(what: str) -> None:
         nonlocal count
         count += 1
         # how many steps it takes is not known beforehand
@@ -151,7 +151,7 @@ def examine(
         made = diagnose(
             *(runs.runs, runs.spec, runs.start, screened, workers, settings),
             given=named(spec.effects, known),
-            told=told,
+            told=step,
         )
     progress(count, count, "done")
     return Examined(chosen, runs, made)

@@ -204,9 +204,9 @@ def _identify_log(
         if name not in missing:
             return IdentifyOutcome(segment, parameter_sets.get(warehouse, name))
         used = [s.ingest_id for s in (segment, *others)]
-        told = provenance.collect(warehouse, inputs, used, job.flow_run, job.table_versions)
+        origin = provenance.collect(warehouse, inputs, used, job.flow_run, job.table_versions)
         try:
-            made = build(held[row.log_id], profile, inputs, row.vessel, (segment.segment_id,), told, held)
+            made = build(held[row.log_id], profile, inputs, row.vessel, (segment.segment_id,), origin, held)
         except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
             return IdentifyOutcome(segment, None, error=wrapped(error))
         return IdentifyOutcome(segment, made, new=True)
@@ -277,7 +277,7 @@ def build(
     inputs: Inputs,
     vessel: str,
     segment_ids: tuple[str, ...],
-    told: dict[str, Any],
+    origin: dict[str, Any],
     others: Mapping[str, Instruments] | None = None,
 ) -> ParameterSet:
     """Compute the parameter set that some inputs describe; nothing is stored.
@@ -291,7 +291,7 @@ def build(
         One segment.
     vessel : str
     segment_ids : tuple of str
-    told : dict
+    origin : dict
         Provenance.
     others : mapping of str to Instruments, optional
         Series by log, where the inputs name companions.
@@ -309,11 +309,11 @@ def build(
         )
     bounds, spec = inputs.bounds[0], ModelSpec.model_validate(dict(inputs.model_spec))
     if spec.effects:
-        return build_single(instruments, profile, inputs, vessel, segment_ids, told)
+        return build_single(instruments, profile, inputs, vessel, segment_ids, origin)
     arm = arm_of(spec, profile)
     record = make_record(instruments, bounds.start_utc_ns, bounds.end_utc_ns)
     if KEY in inputs.settings:
         result = estimate_of(record, spec.with_arm(arm), arm or 0.0, profile, inputs, others or {})
     else:
         result = estimate(inputs.estimator, record, spec.with_arm(arm), arm or 0.0, dict(inputs.settings))
-    return as_parameter_set(result, inputs, vessel, segment_ids, told, without_arm(spec, arm))
+    return as_parameter_set(result, inputs, vessel, segment_ids, origin, without_arm(spec, arm))

@@ -154,7 +154,7 @@ def _shared(one: ParameterSet, other: ParameterSet) -> float:
 
 
 def _bounds(one: ParameterSet) -> list[Bounds]:
-    return [Bounds(**told) for told in one.provenance["inputs"]["segments"]]
+    return [Bounds(**bounds) for bounds in one.provenance["inputs"]["segments"]]
 
 
 def _moves(one: ParameterSet, becomes: ParameterSet) -> Iterator[Move]:

@@ -18,7 +18,7 @@ def arm_of(spec: ModelSpec, profile: VesselProfile) -> float | None:
 
 
 def without_arm(spec: ModelSpec, arm: float | None) -> tuple[str, ...]:
-    """Return the warning that belongs to an arm that nobody knows."""
+    """Return the warning that belongs to an arm that is not known."""
     if arm is not None or spec.wind != "force":
         return ()
     acts = {
@@ -33,7 +33,7 @@ def as_parameter_set(
     inputs: Inputs,
     vessel: str,
     segment_ids: tuple[str, ...],
-    told: dict[str, Any],
+    origin: dict[str, Any],
     warnings: tuple[str, ...] = (),
 ) -> ParameterSet:
     """Return the set that an estimate from these inputs is stored as.
@@ -44,7 +44,7 @@ def as_parameter_set(
     inputs : Inputs
     vessel : str
     segment_ids : tuple of str
-    told : dict
+    origin : dict
         Provenance.
     warnings : tuple of str, optional
         Beside the estimate's own.
@@ -69,21 +69,21 @@ def as_parameter_set(
         fit=result.fit,
         iterations=list(result.iterations),
         convergence=result.report,
-        warnings=(*result.warnings, *warnings, *channel_warnings(told)),
+        warnings=(*result.warnings, *warnings, *channel_warnings(origin)),
         parent=spec.parent,
-        provenance=told,
+        provenance=origin,
     )
 
 
-def channel_warnings(told: Mapping[str, Any]) -> tuple[str, ...]:
+def channel_warnings(origin: Mapping[str, Any]) -> tuple[str, ...]:
     """Return what the channel doctor said of the logs behind a set, as its warnings.
 
     Parameters
     ----------
-    told : mapping
+    origin : mapping
         Provenance; a set from before there was a doctor has nothing of him.
     """
-    found = dict(told.get("channels") or {})
+    found = dict(origin.get("channels") or {})
     return tuple(
         f"channels of log {log[:12]}: {words}; see `kempf doctor {log[:12]}`"
         for log in sorted(found)

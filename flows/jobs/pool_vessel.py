@@ -129,9 +129,9 @@ def pool_segments(
             progress(done, len(ingests), f"pooling {len(chosen)} segments: reading {rows[ingest_id].file_name}")
             instruments[log_id] = channels_of(warehouse, ingest_id)
         progress(len(ingests), len(ingests), f"pooling {len(chosen)} segments")
-        told = provenance.collect(warehouse, inputs, list(ingests.values()), flow_run)
+        origin = provenance.collect(warehouse, inputs, list(ingests.values()), flow_run)
         profile = vessels.get(warehouse, profile_sha256)
-        made = build_pooled(instruments, profile, inputs, vessel, tuple(s.segment_id for s in chosen), told)
+        made = build_pooled(instruments, profile, inputs, vessel, tuple(s.segment_id for s in chosen), origin)
         new.keep([made])
     if made.convergence.get("converged") and new.may_move(request.spec, adopt=adopt):
         new.point(made.parameter_set_id)
@@ -164,7 +164,7 @@ def build_pooled(
     inputs: Inputs,
     vessel: str,
     segment_ids: tuple[str, ...],
-    told: dict[str, Any],
+    origin: dict[str, Any],
 ) -> ParameterSet:
     """Compute the pooled set that some inputs describe; nothing is stored.
 
@@ -178,7 +178,7 @@ def build_pooled(
     vessel : str
     segment_ids : tuple of str
         In the order of the inputs' bounds.
-    told : dict
+    origin : dict
         Provenance.
 
     Raises
@@ -195,4 +195,4 @@ def build_pooled(
         members.append(Member(name, with_rudder_inflow(record, spec), arm or 0.0))
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         result = pooling.identify(members, spec.with_arm(arm), MaximumLikelihoodSettings(**settings), workers)
-    return as_parameter_set(result, inputs, vessel, segment_ids, told, without_arm(spec, arm))
+    return as_parameter_set(result, inputs, vessel, segment_ids, origin, without_arm(spec, arm))

@@ -12,7 +12,7 @@ from kempf.warehouse.store import Warehouse
 
 
 def set_vessel(warehouse: Warehouse, vessel: str, paths: Sequence[Path]) -> bool:
-    """Put the profile that some files tell in place of a vessel's current one.
+    """Replace a vessel's current profile by that of some files.
 
     Parameters
     ----------

@@ -232,7 +232,7 @@ class _Job:
         _withdraw(self.warehouse, work.vessel, work.report)
 
     def _model(self, work: _Work) -> None:
-        """Bring the model with effects that she stands at up to date; where that fails she stands where she was."""
+        """Bring her current model with effects up to date; where that fails it stays as it was."""
         now = standing(self.warehouse, work.vessel)
         if now is None:
             return
@@ -251,7 +251,7 @@ class _Job:
 def _leave(warehouse: Warehouse, works: Sequence[_Work]) -> None:
     """Note the digest of the state in which nothing is left to do, where that is sure.
 
-    Not sure: a failure that another attempt may mend; a log, a profile or a set that somebody else added meanwhile.
+    Not sure: a failure that another attempt may overcome; a log, a profile or a set that somebody else added meanwhile.
     """
     sure = [work for work in works if all(failure["lasting"] for failure in work.report.failures)]
     after = fleet_state(warehouse, [work.vessel for work in sure]) if sure else {}

@@ -29,7 +29,7 @@ FLOW = "rerun"
 FAILED = "failed"
 VERDICTS = ("bit-identical", "equal within tolerance", "different", FAILED)
 #: Differences of one set that are written down; the rest is counted.
-_TOLD = 20
+_FIELDS_SHOWN = 20
 
 
 @dataclass(frozen=True)
@@ -47,7 +47,7 @@ class Verdict:
         Whether an earlier call had reached the verdict.
     differences : int
         Fields that differ.
-    told : tuple of dict
+    fields : tuple of dict
         The first of these fields, as JSON content.
     packages_changed : dict
         Versions then and now, of those that differ.
@@ -61,7 +61,7 @@ class Verdict:
     code_changed: bool
     known_before: bool = False
     differences: int = 0
-    told: tuple[dict[str, Any], ...] = ()
+    fields: tuple[dict[str, Any], ...] = ()
     packages_changed: dict[str, list[str | None]] | None = None
     error: KempfError | None = None
 
@@ -74,7 +74,7 @@ class Verdict:
             "code_changed": self.code_changed,
             "packages_changed": self.packages_changed or {},
             "differing_fields": self.differences,
-            "differences": list(self.told),
+            "differences": list(self.fields),
             **(self.error.to_json() if self.error else {}),
         }
 
@@ -192,7 +192,7 @@ def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: floa
 
 
 def _verdict(one: ParameterSet, result: Rerun) -> Verdict:
-    told = tuple(difference.as_json() for difference in result.differences[:_TOLD])
+    fields = tuple(difference.as_json() for difference in result.differences[:_FIELDS_SHOWN])
     count = len(result.differences)
     return Verdict(
         vessel=one.vessel,
@@ -200,7 +200,7 @@ def _verdict(one: ParameterSet, result: Rerun) -> Verdict:
         verdict=result.verdict,
         code_changed=result.code_changed,
         differences=count,
-        told=told,
+        fields=fields,
         packages_changed=result.packages_changed,
     )
 
@@ -220,7 +220,7 @@ def _as_run(one: Verdict, tolerance: float) -> runs.Run:
         "parameter_set_id": one.parameter_set_id,
         "code_changed": one.code_changed,
         "packages_changed": one.packages_changed or {},
-        "differences": list(one.told),
+        "differences": list(one.fields),
     }
     name = _run_id(one.parameter_set_id, tolerance)
     return runs.Run(name, FLOW, one.vessel, one.verdict, {"differences": one.differences}, message)
@@ -234,6 +234,6 @@ def _remembered(run: runs.Run) -> Verdict:
         code_changed=bool(run.message["code_changed"]),
         known_before=True,
         differences=run.counts["differences"],
-        told=tuple(run.message["differences"]),
+        fields=tuple(run.message["differences"]),
         packages_changed=dict(run.message["packages_changed"]),
     )

@@ -138,15 +138,15 @@ def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profil
     KempfError
         It can no longer be identified; the reason says why.
     """
-    inputs, told = inputs_of(stored), dict(stored.provenance)
+    inputs, origin = inputs_of(stored), dict(stored.provenance)
     if inputs.estimator not in (*NAMES, POOLED, ESTIMATOR):
         raise _no_estimator(stored)
     if inputs.estimator == POOLED:
-        return build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, told)
+        return build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, origin)
     if inputs.estimator == ESTIMATOR:
-        return build_model(instruments, profile, inputs, stored.vessel, told, stored.parent)
+        return build_model(instruments, profile, inputs, stored.vessel, origin, stored.parent)
     one = instruments[inputs.bounds[0].log_id]
-    return build(one, profile, inputs, stored.vessel, stored.segment_ids, told, instruments)
+    return build(one, profile, inputs, stored.vessel, stored.segment_ids, origin, instruments)
 
 
 def _no_estimator(stored: ParameterSet) -> NotFound:
@@ -179,14 +179,14 @@ def code_changed(inputs: Inputs) -> bool:
 
 def inputs_of(stored: ParameterSet) -> Inputs:
     """Return all that a stored parameter set is a function of."""
-    told = stored.provenance["inputs"]
+    inputs = stored.provenance["inputs"]
     return Inputs(
-        log_ids=tuple(told["log_ids"]),
-        profile_sha256=told["profile_sha256"],
-        bounds=tuple(Bounds(**bounds) for bounds in told["segments"]),
-        model_spec=told["model"],
-        estimator=told["estimator"],
-        settings=told["settings"],
-        code_version=told["code_version"],
-        companions=tuple(Bounds(**bounds) for bounds in told.get("companions", ())),
+        log_ids=tuple(inputs["log_ids"]),
+        profile_sha256=inputs["profile_sha256"],
+        bounds=tuple(Bounds(**bounds) for bounds in inputs["segments"]),
+        model_spec=inputs["model"],
+        estimator=inputs["estimator"],
+        settings=inputs["settings"],
+        code_version=inputs["code_version"],
+        companions=tuple(Bounds(**bounds) for bounds in inputs.get("companions", ())),
     )

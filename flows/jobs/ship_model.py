@@ -28,7 +28,7 @@ _LEVELS = {
     "yaw_rate_rad_s": "sigma_r",
     "heading_rad": "sigma_psi",
 }
-#: below this part of the usual level an estimated one stands for zero, and an estimator would trust it blindly; as its
+#: below this part of the usual level an estimated one means zero, and an estimator would trust it blindly; as its
 #: gain is a settled one, it has to find force and stream from nothing, however little they change once they are known
 _LEAST = {"wind_m_s2": 1.0, "current_m_s": 1.0}
 _LEAST_OF_A_MEASUREMENT = 0.02
@@ -101,8 +101,8 @@ def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None
     """
     one = named_set(warehouse, set_id)
     spec = ModelSpec.model_validate(dict(one.model_spec))
-    told = speed_m_s if speed_m_s is not None else one.convergence.get("speed_m_s")
-    if told is None:
+    speed = speed_m_s if speed_m_s is not None else one.convergence.get("speed_m_s")
+    if speed is None:
         raise UsageError(
             "speed_unknown",
             f"{one.parameter_set_id} does not say at which speed it was identified.",
@@ -110,17 +110,17 @@ def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None
         )
     by_name = {p.name: p.value for p in one.parameters if p.value is not None}
     hull = Hull(*(float(by_name.get(name, np.nan)) for name in HULL_PARAMETERS))
-    require_numbers(hull, float(told))
+    require_numbers(hull, float(speed))
     profile = vessels.get(warehouse, str(one.provenance["inputs"]["profile_sha256"]))
     arm = spec.wind_arm_per_m if spec.wind_arm_per_m is not None else profile.wind_arm_per_m
     effects = _effects(one, profile)
-    remarks = sentences(carried(hull, effects, float(told), arm or 0.0))
+    remarks = sentences(carried(hull, effects, float(speed), arm or 0.0))
     noise, assumed = _noise(one, spec)
     warnings = [*one.warnings, *assumed, *remarks]
     if not one.convergence.get("converged"):
         warnings.insert(0, f"the set did not converge: {one.convergence.get('reason')}")
     covariance = _covariance(one, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
-    numbers = (float(told), arm or 0.0, profile.length_m)
+    numbers = (float(speed), arm or 0.0, profile.length_m)
     return KnownShip(one, hull, effects, covariance, spec, *numbers, noise, remarks, tuple(warnings))
 
 

@@ -1,4 +1,4 @@
-"""The model with effects that a vessel stands at, read and pointed to: aliases, parents, a person's own effects.
+"""The current model with effects of a vessel, read and pointed to: aliases, parents, a person's own effects.
 
 What is stored is read here; nothing is fitted, so that to show a model costs no more than to read it.
 """

@@ -1,6 +1,6 @@
 """The simulated ship as `kempf.pipeline.steering.track` steers her: the one place where the law and the plant meet.
 
-They lie in two rooms of the pipeline that must not know each other, or an error of one would hide in the other.
+They are in two rooms of the pipeline that must not know each other, or an error of one would hide in the other.
 """
 
 from __future__ import annotations
@@ -82,13 +82,13 @@ class SteeredShip:
         v, r, psi, _, _, V = self._state[self._row]
         _, current_north, current_east, V_T = self._forcing[self._row]
         noise = self._random.standard_normal(5)
-        told = self._noise
-        heading = psi + told.heading_rad * noise[3]
-        north = V * np.cos(psi) - (v + V_T) * np.sin(psi) + current_north + told.velocity_m_s * noise[0]
-        east = V * np.sin(psi) + (v + V_T) * np.cos(psi) + current_east + told.velocity_m_s * noise[1]
+        spread = self._noise
+        heading = psi + spread.heading_rad * noise[3]
+        north = V * np.cos(psi) - (v + V_T) * np.sin(psi) + current_north + spread.velocity_m_s * noise[0]
+        east = V * np.sin(psi) + (v + V_T) * np.cos(psi) + current_east + spread.velocity_m_s * noise[1]
         lateral = east * np.cos(heading) - north * np.sin(heading)
-        shown = np.array([lateral, r + told.yaw_rate_rad_s * noise[2], heading])
-        return shown, float(self._rudder[self._row] + told.rudder_rad * noise[4])
+        shown = np.array([lateral, r + spread.yaw_rate_rad_s * noise[2], heading])
+        return shown, float(self._rudder[self._row] + spread.rudder_rad * noise[4])
 
     def hold(self, order_rad: float, duration_s: float) -> None:
         """Order a rudder angle and sail on.

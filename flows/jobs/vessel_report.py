@@ -1,4 +1,4 @@
-"""What reprocessing did for one vessel, as it is told and as it is remembered for the next time."""
+"""What reprocessing did for one vessel, as it is reported and as it is remembered for the next time."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class VesselReport:
         Parameter set that ``current`` pointed to, where it no longer stands and nothing took its place.
     failures : list of dict
         What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
-        refused, so that the same data are refused again; ``known`` that the run before told of it already.
+        refused, so that the same data are refused again; ``known`` that the run before reported it already.
     """
 
     vessel: str
@@ -103,18 +103,18 @@ def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, Run]]
         run_id_of(report.vessel, changed_only=changed_only) for report, _ in found for changed_only in (True, False)
     ]
     stored = {run.run_id: run for run in runs.some(warehouse, [*every, *(run.run_id for _, run in found)])}
-    told = []
+    entries = []
     for report, run in found:
         before = {_what(f) for f in stored[run.run_id].message["failures"]} if run.run_id in stored else set()
         for failure in report.failures:
             failure["known"] = _what(failure) in before
-        told.append(replace(run, message={**run.message, "failures": report.failures}))
-        told += _forgotten(run, stored)
-    runs.record_all(warehouse, told)
+        entries.append(replace(run, message={**run.message, "failures": report.failures}))
+        entries += _forgotten(run, stored)
+    runs.record_all(warehouse, entries)
 
 
 def _forgotten(run: Run, stored: Mapping[str, Run]) -> list[Run]:
-    """Return the runs of the same vessel whose state no longer tells that nothing is left to do."""
+    """Return the runs of the same vessel whose state no longer says that nothing is left to do."""
     if "state" in run.message:
         return []
     names = [run_id_of(str(run.vessel), changed_only=changed_only) for changed_only in (True, False)]
@@ -134,12 +134,12 @@ def from_run(run: Run) -> VesselReport:
     run : Run
         Its failures are all lasting.
     """
-    told = run.counts
+    counts = run.counts
     return VesselReport(
         str(run.vessel),
-        logs=told["logs"],
-        segments=told["segments"],
-        kept_sets=told["new_sets"] + told["kept_sets"],
+        logs=counts["logs"],
+        segments=counts["segments"],
+        kept_sets=counts["new_sets"] + counts["kept_sets"],
         failures=[{**failure, "known": True} for failure in run.message["failures"]],
     )
 

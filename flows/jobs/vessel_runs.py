@@ -24,7 +24,7 @@ from kempf.warehouse import vessels
 from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.store import Warehouse
 
-#: where the profile does not tell a length; only the scale of non-dimensional coefficients hangs on it
+#: where the profile has no length; only the scale of non-dimensional coefficients depends on it
 LENGTH_M = 100.0
 
 

@@ -28,7 +28,7 @@ def together_or_each(items: Mapping[str, T], store: Callable[[Sequence[T]], obje
     """
     try:
         store(list(items.values()))
-    except Exception as error:  # noqa: BLE001 - told of those that it concerns
+    except Exception as error:  # noqa: BLE001 - reported to those that it concerns
         if len(items) == 1:
             return dict.fromkeys(items, wrapped(error))
         failed: dict[str, KempfError] = {}

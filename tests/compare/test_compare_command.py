@@ -111,7 +111,7 @@ def test_a_set_from_elsewhere_is_put_to_a_held_out_run(own: Path) -> None:
     assert list(inside) == CHANNELS
     assert all(one["share"] == one["inside"] / one["of"] for one in inside.values())
     assert all(0.8 < one["share"] <= 1.0 for one in inside.values()), inside
-    assert document["runs"][0]["noise_levels"].startswith("fitted to this run")
+    assert document["runs"][0]["noise_levels"].startswith("fitted to this manoeuvre")
 
 
 def test_runs_that_a_model_held_out_stay_held_out(own: Path, document: dict) -> None:
@@ -134,7 +134,7 @@ def test_where_it_fails_is_told_by_sample(place: Path) -> None:
     told = kempf("compare", "--vessel", "mariner", "--where", "--horizon", "1", "--warehouse", place)
     assert told.code == 0
     assert "horizon: one step" in told.out
-    assert "fitted: 1 run" in told.out and "held out: no run" in told.out
+    assert "fitted: 1 manoeuvre" in told.out and "held out: no manoeuvre" in told.out
     assert "where it fails, fitted runs" in told.out and "worst stretches" in told.out
 
 

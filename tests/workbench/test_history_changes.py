@@ -76,7 +76,7 @@ def test_a_new_rudder_is_told_to_a_person_and_to_a_program(place: Path, tmp_path
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
     told = asked(place)
     assert told.code == 0
-    assert "step between " in told.out and "are not one within their standard errors" in told.out
+    assert "step between " in told.out and "do not agree within their standard errors" in told.out
     assert "seen with 90 % probability" in told.out
 
 

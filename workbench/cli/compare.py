@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
 
 _CHANNELS = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
-#: probability below which a band or a correlation is told
+#: probability below which a band or a correlation is shown
 _LEVEL = 0.01
 _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
 
@@ -46,7 +46,7 @@ _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
     "--fail-above",
     type=float,
     metavar="PERCENT",
-    help="Exit code 5 where the mean free-run error (100 - fit %) of held-out runs, else of fitted ones, is larger.",
+    help="Exit code 5 where the mean free-run error (100 - fit %) of held-out, else fitted, manoeuvres is larger.",
 )
 @verbose_option
 @warehouse_option
@@ -64,8 +64,8 @@ def command(
 ) -> None:
     """Put what was measured beside what a parameter set predicts, on fitted and on held-out manoeuvres apart.
 
-    A run that the set was identified from is fitted, every other held out. A free run takes no measurement in: its
-    initial state and a constant wind force and current are fitted to the run itself.
+    A manoeuvre that the set was identified from is fitted, every other held out. A free run takes no measurement
+    in: its initial state and a constant wind force and current are fitted to the manoeuvre itself.
     """
     from kempf.flows.jobs.compare_vessel import compare_vessel
     from kempf.flows.jobs.out_of_date import said_of_vessel
@@ -103,7 +103,7 @@ def command(
     for document in above:
         judged = document["judged"]
         click.echo(
-            f"{document['parameter_set_id']}: the free-run error of {_SAMPLES[judged['sample']]} runs is "
+            f"{document['parameter_set_id']}: the free-run error of {_SAMPLES[judged['sample']]} manoeuvres is "
             f"{judged['free_run_error_percent']:.2f} %, above {fail_above:g} %",
             err=True,
         )
@@ -124,7 +124,7 @@ def _draw(found: Comparison, figure: Path) -> None:
 
 
 def _tell_skipped(skipped: dict[str, str], *, verbose: bool) -> None:
-    """Say which runs are left out, those of one reason together."""
+    """Say which manoeuvres are left out, those of one reason together."""
     by_reason: dict[str, list[str]] = {}
     for name, why in skipped.items():
         by_reason.setdefault(why, []).append(name)
@@ -157,10 +157,10 @@ def _tell(document: dict[str, Any], *, verbose: bool) -> None:
 
 def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | None) -> None:
     if mean is None:
-        click.echo(click.style(f"{title}: no run", bold=True))
+        click.echo(click.style(f"{title}: no manoeuvre", bold=True))
         return
     there = [name for name in _CHANNELS if name in mean["fit_percent"]]
-    head = ["run", "zigzag", "start UTC"]
+    head = ["manoeuvre", "zigzag", "start UTC"]
     for name in there:
         head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_told'][name]['unit']}"]
     head += ["overshoot errors deg (free run)"]
@@ -170,7 +170,7 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
         for name in there:
             row += [_percent(run["fit_percent"].get(name)), number(run["rms_told"].get(name, {}).get("value"), 3)]
         rows.append([*row, " ".join(_signed(e) for e in run["overshoot_error_deg"]) or "-"])
-    print_table(head, rows, f"{title}: {len(runs)} run{'s' if len(runs) > 1 else ''}")
+    print_table(head, rows, f"{title}: {len(runs)} manoeuvre{'s' if len(runs) > 1 else ''}")
     parts = [f"{_CHANNELS[name]} {_with_error(mean['fit_percent'][name])} %" for name in there]
     click.echo(f"  mean fit: {', '.join(parts)}")
     turns = mean["overshoot_error_deg"]
@@ -188,9 +188,9 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
 
 
 def _tell_where(title: str, where: dict[str, Any]) -> None:
-    click.echo(click.style(f"where it fails, {title} runs (whitened rms: 1 where the model is right)", bold=True))
+    click.echo(click.style(f"where it fails, {title} manoeuvres (whitened rms: 1 where the model is right)", bold=True))
     if not where["stands_out"]:
-        click.echo("  no phase, side, bin or run stands out from what a right model leaves")
+        click.echo("  no phase, side, bin or manoeuvre stands out from what a right model leaves")
     rows = [
         [
             _CHANNELS[one["channel"]],
@@ -212,27 +212,27 @@ def _tell_where(title: str, where: dict[str, Any]) -> None:
                 f"  {_CHANNELS[channel]}: {most['ratio']:.1f} times the power of white noise between "
                 f"{most['low_hz']:g} and {most['high_hz']:g} Hz, most at {most['peak_hz']:.3g} Hz"
             )
-    for channel, told in where["correlations"].items():
-        _tell_correlation(_CHANNELS[channel], told)
+    for channel, correlations in where["correlations"].items():
+        _tell_correlation(_CHANNELS[channel], correlations)
     short = short_ids(w["run"] for w in where["worst"])
     rows = [
         [w["start"][:19], w["end"][11:19], short[w["run"]], _CHANNELS[w["channel"]], w["measure"], _size(w)]
         for w in where["worst"]
     ]
-    print_table(["start UTC", "end", "run", "channel", "horizon", "error"], rows, "  worst stretches")
+    print_table(["start UTC", "end", "manoeuvre", "channel", "horizon", "error"], rows, "  worst stretches")
 
 
-def _tell_correlation(channel: str, told: dict[str, Any]) -> None:
-    """Say that a channel's innovations go with themselves or with what the ship was given, where they do."""
-    p_value = told["auto"]["p_value"]
+def _tell_correlation(channel: str, correlations: dict[str, Any]) -> None:
+    """Say that a channel's innovations are correlated with themselves or with the inputs, where they do."""
+    p_value = correlations["auto"]["p_value"]
     if p_value is not None and p_value < _LEVEL:
-        click.echo(f"  {channel}: errors one step ahead hang together (Ljung-Box p = {p_value:.1g})")
-    found = [(name, one) for name, one in told["cross"].items() if one["largest"] is not None]
+        click.echo(f"  {channel}: errors one step ahead are correlated in time (Ljung-Box p = {p_value:.1g})")
+    found = [(name, one) for name, one in correlations["cross"].items() if one["largest"] is not None]
     found = [(name, one) for name, one in found if one["p_adjusted"] < _LEVEL]
     if found:
         name, one = min(found, key=lambda pair: float(pair[1]["p_adjusted"]))
         click.echo(
-            f"  {channel}: errors go with {name.replace('_', ' ')} {one['largest_lag_s']:g} s before, correlation "
+            f"  {channel}: errors are correlated with {name.replace('_', ' ')} {one['largest_lag_s']:g} s before: "
             f"{one['largest']:+.2f} (99 % band ±{one['band']:.2f})"
         )
 
@@ -251,6 +251,6 @@ def _signed(value: float | None) -> str:
     return "-" if value is None else f"{value:+.2f}"
 
 
-def _with_error(told: dict[str, Any]) -> str:
-    error = told["std_error"]
-    return f"{told['mean']:.2f}" + ("" if error is None else f" ± {error:.2f} (1 s.e.)")
+def _with_error(mean: dict[str, Any]) -> str:
+    error = mean["std_error"]
+    return f"{mean['mean']:.2f}" + ("" if error is None else f" ± {error:.2f} (1 s.e.)")

@@ -28,8 +28,8 @@ if TYPE_CHECKING:
 def command(folder: Path, as_json: bool) -> None:
     """Simulate three trial days of one ship, run the main job on the raw logs, compare with the truth.
 
-    The logs are NMEA 0183, delimited text and MCAP with noise, wind, current and damaged lines; the pipeline is told
-    nothing but the vessel's profile.
+    The logs are NMEA 0183, delimited text and MCAP with noise, wind, current and damaged lines; the pipeline gets
+    nothing but the logs and the vessel's profile.
     """
     from kempf.flows.jobs.demonstrate import demonstrate
 

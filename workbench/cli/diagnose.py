@@ -38,8 +38,8 @@ def command(
     """Find which physical effect a vessel's model lacks, and say how sure that is.
 
     About three in ten manoeuvres are held out before anything is looked at. Every effect of the catalogue is screened,
-    what looks present is refitted and must predict manoeuvres that it was not fitted to; what these data cannot tell
-    apart is named together.
+    what looks present is refitted and must predict manoeuvres that it was not fitted to; what these data cannot
+    distinguish is named together.
     """
     if fleet == (vessel is not None):
         raise click.UsageError("Say whose model: --vessel NAME, or --fleet for all.")
@@ -92,10 +92,10 @@ def _percent(share: float | None) -> str:
     return "-" if share is None else number(100 * share, 3)
 
 
-def _tell(told: Mapping[str, Any], *, everything: bool) -> None:
-    title = f"{told['vessel']}: {told['verdict'].replace('_', ' ')}"
-    click.echo(click.style(title, bold=True) + f"  ({told['diagnosis_id']})")
-    for sentence in told["sentences"]:
+def _tell(document: Mapping[str, Any], *, everything: bool) -> None:
+    title = f"{document['vessel']}: {document['verdict'].replace('_', ' ')}"
+    click.echo(click.style(title, bold=True) + f"  ({document['diagnosis_id']})")
+    for sentence in document["sentences"]:
         click.echo(f"  {sentence}")
     ladder = [
         [
@@ -105,7 +105,7 @@ def _tell(told: Mapping[str, Any], *, everything: bool) -> None:
             "-" if one["held_out_error"] is None else number(100 * one["held_out_error"], 3),
             number(one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"], 2),
         ]
-        for one in told["ladder"]
+        for one in document["ladder"]
     ]
     print_table(["step", "added", "fitted, %", "held out, %", "wind, m/s^2/s^0.5"], ladder, "Free-run error")
     rows = [
@@ -118,21 +118,23 @@ def _tell(told: Mapping[str, Any], *, everything: bool) -> None:
             one["verdict"].replace("_", " "),
             one["why"],
         ]
-        for one in told["candidates"]
+        for one in document["candidates"]
         if everything or one["verdict"] in ("present", "negligible") or one["score"] is not None
     ]
     head = ["effect", "set", "score", "expected change, ± 1 s.e.", "absorbed", "verdict", "why"]
     print_table(head, rows if everything else rows[:_SHOWN], "Screened beside the plain model")
-    if not everything and len(told["candidates"]) > _SHOWN:
-        click.echo(f"  of {len(told['candidates'])} effects; --all shows every one, also what cannot be tested")
-    first = next((name for one in told["sets"] for name in one["effects"]), None)
+    if not everything and len(document["candidates"]) > _SHOWN:
+        click.echo(f"  of {len(document['candidates'])} effects; --all shows every one, also what cannot be tested")
+    first = next((name for one in document["sets"] for name in one["effects"]), None)
     if first:
-        click.echo(f"next: kempf effects add {first} --vessel {told['vessel']}, kempf ladder --vessel {told['vessel']}")
+        click.echo(
+            f"next: kempf effects add {first} --vessel {document['vessel']}, kempf ladder --vessel {document['vessel']}"
+        )
 
 
 def _change(change: Mapping[str, Mapping[str, Any]]) -> str:
-    told = [
+    sizes = [
         f"{n} {number(c['value'], 3)} ± {number(c['std'], 2)} {c['unit'].removesuffix('1')}".rstrip()
         for n, c in change.items()
     ]
-    return ", ".join(told)
+    return ", ".join(sizes)

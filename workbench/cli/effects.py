@@ -46,10 +46,10 @@ def list_effects(group: str | None, markdown: bool, as_json: bool) -> None:
 
 @command.command("show")
 @click.argument("name", required=False)
-@click.option("--symbols", is_flag=True, help="List what may stand in a formula of your own.")
+@click.option("--symbols", is_flag=True, help="List what a formula of your own may contain.")
 @json_option
 def show(name: str | None, symbols: bool, as_json: bool) -> None:
-    """Show an effect whole, or what may stand in a formula."""
+    """Show an effect whole, or what a formula may contain."""
     from kempf.schemas.effects import get
 
     if name is None and not symbols:

@@ -25,7 +25,7 @@ from kempf.workbench.terminal import number, print_json, print_note, print_table
 def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -> None:
     """Try a formula of your own, such as 'yaw: r*abs(r)': what it would explain, and whether it holds.
 
-    Beside the model that the vessel stands at; nothing is stored.
+    Beside the vessel's current model; nothing is stored.
     """
     from kempf.flows.jobs.chosen_manoeuvres import choose
     from kempf.flows.jobs.diagnose_vessel import examine
@@ -37,7 +37,7 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     from kempf.warehouse.store import Warehouse
 
     mine = Own(formulas={name: (formula,)})
-    mine.effects()  # a slip of the pen is told before anything is read
+    mine.effects()  # a slip of the pen is reported before anything is read
     warehouse = Warehouse(uri)
     spec, own = standing_model(warehouse, vessel)
     own = own.beside(mine)
@@ -46,18 +46,18 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
         settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
         found = examine(warehouse, chosen, spec, own, settings, tell, only=(name,))
     print_note(said_of_vessel(warehouse, vessel))
-    told = told_as_json(found.diagnosis)
-    told = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **told})
+    document = told_as_json(found.diagnosis)
+    document = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **document})
     if as_json:
-        print_json(told)
+        print_json(document)
         return
-    _tell_try(told)
+    _tell_try(document)
 
 
-def _tell_try(told: Mapping[str, Any]) -> None:
-    (candidate,) = told["candidates"]
-    refits = [r for one in told["sets"] for r in one["refits"]] + told["refused"]
-    click.echo(click.style(f"{told['formula']} on {told['vessel']}", bold=True))
+def _tell_try(document: Mapping[str, Any]) -> None:
+    (candidate,) = document["candidates"]
+    refits = [r for one in document["sets"] for r in one["refits"]] + document["refused"]
+    click.echo(click.style(f"{document['formula']} on {document['vessel']}", bold=True))
     click.echo(f"  score {number(candidate['score'])}, p = {number(candidate['p_adjusted'], 2)}")
     click.echo(f"  absorbed by the model as it is: {number(candidate['absorption'])}")
     for one in refits:
@@ -67,12 +67,12 @@ def _tell_try(told: Mapping[str, Any]) -> None:
         gains = [*one["gains_left_out"], *one["gains_held_out"]]
         better = sum(g > 0 for g in gains)
         click.echo(f"  refitted: BIC {number(one['bic_change'], 3)}, {better} of {len(gains)} manoeuvres better")
-    kept = bool(told["sets"])
-    click.echo("  it holds" if kept else f"  it does not hold: {_why(told, candidate)}")
+    kept = bool(document["sets"])
+    click.echo("  it holds" if kept else f"  it does not hold: {_why(document, candidate)}")
 
 
-def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
-    return str(told["refused"][-1]["why"] if told["refused"] else candidate["why"])
+def _why(document: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
+    return str(document["refused"][-1]["why"] if document["refused"] else candidate["why"])
 
 
 @click.command("add", cls=GivenOnce)
@@ -84,7 +84,7 @@ def _why(told: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
 @warehouse_option
 @json_option
 def add(name: str, vessel: str, formula: str | None, path: Path | None, verbose: bool, uri: str, as_json: bool) -> None:
-    """Add an effect to the model that a vessel stands at, refit, and show the error before and after."""
+    """Add an effect to a vessel's current model, refit, and show the error before and after."""
     from kempf.flows.jobs.add_effect import add_effect
     from kempf.flows.jobs.standing_model import Own, rungs_to
     from kempf.warehouse.store import Warehouse
@@ -148,4 +148,4 @@ def undo(vessel: str, uri: str, as_json: bool) -> None:
     if as_json:
         print_json(now.show())
     else:
-        click.echo(f"{vessel} stands at {now.model_name} again, {now.parameter_set_id}")
+        click.echo(f"{vessel}: the current model is {now.model_name} again, {now.parameter_set_id}")

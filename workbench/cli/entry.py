@@ -23,20 +23,20 @@ from kempf.workbench.terminal import one_line
 INTERRUPTED = 130
 
 COMMANDS = {
-    "ingest": "Take raw logs in: read, check, keep, find the zigzags.",
+    "ingest": "Take raw logs in: read, check, keep, find the manoeuvres.",
     "doctor": "Find channels that contradict each other, and the profile line that corrects them.",
-    "segments": "List the zigzags found.",
-    "identify": "Identify a model from every zigzag of a vessel.",
+    "segments": "List the manoeuvres found.",
+    "identify": "Identify a model from every manoeuvre of a vessel.",
     "params": "List, show, compare and export parameter sets; what they say of her steering.",
     "history": "Show a vessel's parameters over time, as known now or at an earlier time.",
-    "report": "Write one HTML file that tells what a vessel's model lacks, to be sent.",
-    "export": "Write a parameter set, or runs with their predictions, as a file for other programs.",
+    "report": "Write one HTML file to send that says what a vessel's model lacks.",
+    "export": "Write a parameter set, or manoeuvres with their predictions, as a file for other programs.",
     "steer": "Make a course-keeping law from a parameter set and try it on the simulated ship.",
     "compare": "Put what was measured beside what a parameter set predicts; say where it fails.",
     "effects": "List and show the physical effects that a model can be given.",
     "diagnose": "Find which physical effect a vessel's model lacks.",
     "ladder": "Show how the error fell from model to model.",
-    "rerun": "Build parameter sets again from the raw bytes: are they the same, what would this code move?",
+    "rerun": "Build parameter sets again from the raw bytes: are they the same, what would this code change?",
     "reprocess": "Bring the whole fleet up to date with its profiles and the code.",
     "compact": "Put the many small files of the tables into few; delete what nothing refers to.",
     "vessels": "List vessels, show and set their profiles.",
@@ -89,7 +89,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             raise
         # click has put something else in its place: the reader of our output has seen enough
         code = 0
-    except Exception as error:  # noqa: BLE001 - the last place where it can be told
+    except Exception as error:  # noqa: BLE001 - the last place where it can be reported
         code = _tell(wrapped(error), as_json)
     sys.exit(code if isinstance(code, int) else 0)
 

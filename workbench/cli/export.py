@@ -23,7 +23,7 @@ F = TypeVar("F", bound=Callable[..., Any])
 
 @click.group("export", cls=GivenOnceGroup)
 def command() -> None:
-    """Write a parameter set, or runs with their predictions, as a file that other programs read.
+    """Write a parameter set, or manoeuvres with their predictions, as a file that other programs read.
 
     A unique beginning of its id is enough. Without --out it goes to stdout. Nothing is overwritten.
     """
@@ -99,7 +99,7 @@ def mat_file(
 @warehouse_option
 @json_option
 def mcap_file(vessel: str, set_id: str | None, out: Path, segments: tuple[str, ...], uri: str, as_json: bool) -> None:
-    """Measured and predicted channels of a vessel's runs side by side, for Foxglove and PlotJuggler.
+    """Measured and predicted channels of a vessel's manoeuvres side by side, for Foxglove and PlotJuggler.
 
     One step ahead with 95 % intervals, and the free run, with what each leaves, and the position; UTC nanoseconds, JSON
     messages with a schema, zstd.
@@ -122,8 +122,14 @@ def mcap_file(vessel: str, set_id: str | None, out: Path, segments: tuple[str, .
     write_new(out, data, "--output")
     name = found.parameter_set.parameter_set_id
     if as_json:
-        told = {"vessel": vessel, "parameter_set_id": name, "format": "mcap", "out": str(out), "runs": len(found.runs)}
-        print_json({**told, "skipped": found.skipped})
+        content = {
+            "vessel": vessel,
+            "parameter_set_id": name,
+            "format": "mcap",
+            "out": str(out),
+            "runs": len(found.runs),
+        }
+        print_json({**content, "skipped": found.skipped})
     else:
         click.echo(f"{vessel}, {name}: {len(found.runs)} runs written to {out}", err=True)
 

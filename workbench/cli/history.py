@@ -76,8 +76,8 @@ def command(
     documents: list[dict[str, Any]] = []
     for name, found in histories.items():
         kinds = history.comparable(warehouse, name, instant)
-        told = [_examine(kind, occasion_h, _beside(figure, next(figures)), name) for kind in kinds]
-        documents.append({"vessel": name, "history": _rows(name, found), "changes": told})
+        examined = [_examine(kind, occasion_h, _beside(figure, next(figures)), name) for kind in kinds]
+        documents.append({"vessel": name, "history": _rows(name, found), "changes": examined})
     if as_json:
         print_json(documents if len(documents) > 1 else documents[0])
         return
@@ -180,7 +180,7 @@ def _tell(one: dict[str, Any]) -> None:
     pooled = one["pooled"]
     if pooled is not None and pooled["poolable"] is not None:
         p_value = number(pooled["p_value"], 2) if pooled["p_value"] > 1e-16 else "0 to 16 digits"
-        may = "may be pooled" if pooled["poolable"] else "are not one within their standard errors"
+        may = "may be pooled" if pooled["poolable"] else "do not agree within their standard errors"
         click.echo(
             f"  the sets {may}: Q = {number(pooled['q'])} on {pooled['degrees_of_freedom']} degrees of freedom, "
             f"p = {p_value}; with standard errors {number(pooled['scale'], 3)} times as large "
@@ -213,7 +213,7 @@ def _tell_change(change: dict[str, Any]) -> None:
         head = f"step between {one} and {other} ({sure} interval {low} to {high})"
     else:
         head = f"drift from {one} to {other}, per year"
-    doubt = "; step or drift, the data hardly tell" if change["bic_ahead_of_other_form"] < 2 else ""
+    doubt = "; step or drift, the data hardly decide" if change["bic_ahead_of_other_form"] < 2 else ""
     rows = [
         [
             name,

@@ -40,10 +40,10 @@ def command(
     uri: str,
     as_json: bool,
 ) -> None:
-    """Identify a model from every zigzag of a vessel and store it as a parameter set.
+    """Identify a model from every manoeuvre of a vessel and store it as a parameter set.
 
     Maximum likelihood also identifies one hull from all of them together. A model file may name effects; they are
-    estimated with the hull, from each zigzag and from all of them.
+    estimated with the hull, from each manoeuvre and from all of them.
 
     What was identified before from the same inputs, with the same code and settings, is not computed again.
     """
@@ -82,7 +82,7 @@ def command(
 def _pooled(
     warehouse: Warehouse, vessel: str, request: Request, outcomes: list[IdentifyOutcome], tell: Progress
 ) -> ParameterSet | None:
-    """Return the set that all zigzags share; where they share none the reason goes to stderr."""
+    """Return the set that all manoeuvres share; where they share none the reason goes to stderr."""
     from kempf.flows.jobs.pool_vessel import pool_vessel
 
     try:

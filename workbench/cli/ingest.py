@@ -31,7 +31,7 @@ def command(
 ) -> None:
     """Take raw logs in: MCAP, NMEA 0183 or delimited text, also compressed.
 
-    Each log is read, checked, kept byte for byte and searched for zigzags. A log that is in already changes nothing.
+    Each log is read, checked, kept byte for byte and searched for manoeuvres. A log that is in already changes nothing.
     One that cannot be read stops none of the others, and leaves nothing behind.
     """
     from kempf.flows.jobs.files import read_profiles

@@ -81,9 +81,9 @@ def show(set_id: str, verbose: bool, uri: str, as_json: bool) -> None:
         f"Discrete, eq. (17), at {number(one.convergence.get('speed_m_s'))} m/s and a step of "
         f"{number(one.convergence.get('step_s'))} s",
     )
-    told = one.provenance
+    origin = one.provenance
     click.echo(f"  log {', '.join(one.log_ids)}")
-    click.echo(f"  profile {told['profile_sha256']}, code {told['code_version']}, commit {told['git_commit']}")
+    click.echo(f"  profile {origin['profile_sha256']}, code {origin['code_version']}, commit {origin['git_commit']}")
 
 
 @command.command("diff")
@@ -146,7 +146,7 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
 @warehouse_option
 @json_option
 def alias(name: str, set_id: str, uri: str, as_json: bool) -> None:
-    """Let NAME point to a parameter set of its vessel; `current` is what every command takes unless told otherwise.
+    """Let NAME point to a parameter set of its vessel; `current` is what every command takes unless another is named.
 
     Every command that takes the id of a set takes the name as well. Names move, sets never change.
     """

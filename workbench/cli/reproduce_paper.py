@@ -95,8 +95,8 @@ def _tell_one(made: Reproduction, one: Experiment) -> None:
     for name, unit, key in (("force", "m/s^2", "force_m_s2"), ("current", "m/s", "current_m_s")):
         found = shown["disturbances_at_the_end"][key]
         first, end, true = (number(found[which], 3) for which in ("first", "last", "true"))
-        told = f"{first} after the first approximation, {end} after iteration {last}"
-        click.echo(f"  {name} at the end: {told}; true {true} {unit}")
+        estimates = f"{first} after the first approximation, {end} after iteration {last}"
+        click.echo(f"  {name} at the end: {estimates}; true {true} {unit}")
     likely = one.maximum_likelihood
     click.echo(f"  procedure: {one.course.reason}")
     click.echo(f"  maximum likelihood: {'converged' if likely.converged else 'NOT CONVERGED'}")

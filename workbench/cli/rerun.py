@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     "--verify/--preview",
     default=True,
     show_default=True,
-    help="With --all: hold every set against itself, built again; or say which sets the present code would move.",
+    help="With --all: compare every set with itself, built again; or say which sets the present code would change.",
 )
 @vessel_option(multiple=True)
 @click.option("--tolerance", type=float, default=1e-9, show_default=True, help="Relative; what still counts as equal.")
@@ -122,6 +122,6 @@ def _tell_all(found: Verification) -> None:
         if one.error is not None:
             click.echo(f"{one.vessel}, {one.parameter_set_id}: {one.error.message} {one.error.next_step}", err=True)
         elif one.verdict == "different":
-            fields = ", ".join(str(d["field"]) for d in one.told[:3])
+            fields = ", ".join(str(d["field"]) for d in one.fields[:3])
             more = f" and {one.differences - 3} more" if one.differences > 3 else ""
             click.echo(f"{one.vessel}, {one.parameter_set_id}: different in {fields}{more}")

@@ -14,7 +14,7 @@ from kempf.workbench.terminal import number, one_line, print_json, print_note, p
 @warehouse_option
 @json_option
 def command(vessel: str | None, uri: str, as_json: bool) -> None:
-    """List the zigzags found, with their executes, overshoots and IMO criteria."""
+    """List the manoeuvres found, with their executes, overshoots and IMO criteria."""
     from kempf.flows.jobs.out_of_date import said_of_logs
     from kempf.warehouse import examinations, logs, segments
     from kempf.warehouse.instant import iso_utc
@@ -26,11 +26,13 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     # another process may read a log anew between the two questions
     found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in names]
     said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
-    lies = {name: list(one.findings) for name, one in said.items() if one.findings}
+    contradictions = {name: list(one.findings) for name, one in said.items() if one.findings}
     print_note(said_of_logs(warehouse, vessel))
     if as_json:
         shown = [segment.show(names[segment.ingest_id]) for segment in found]
-        print_json([{**one, "channels": lies.get(s.ingest_id, [])} for one, s in zip(shown, found, strict=True)])
+        print_json(
+            [{**one, "channels": contradictions.get(s.ingest_id, [])} for one, s in zip(shown, found, strict=True)]
+        )
         return
     if not found:
         click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
@@ -51,7 +53,7 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     ]
     head = ["segment", "vessel", "zigzag", "first side", "K0 deg", "start UTC"]
     print_table([*head, "overshoots deg", "IMO"], rows)
-    for ingest, findings in lies.items():
+    for ingest, findings in contradictions.items():
         for words in findings:
             click.echo(f"warning: {one_line(names[ingest])}: {one_line(words)}")
 

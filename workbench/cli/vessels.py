@@ -20,7 +20,7 @@ def command() -> None:
 @warehouse_option
 @json_option
 def list_vessels(uri: str, as_json: bool) -> None:
-    """List the vessels with their logs, zigzags and parameter sets."""
+    """List the vessels with their logs, manoeuvres and parameter sets."""
     from kempf.warehouse.store import Warehouse
     from kempf.warehouse.vessel_counts import vessel_counts
 
@@ -58,7 +58,7 @@ def show(name: str, uri: str, as_json: bool) -> None:
 @warehouse_option
 @json_option
 def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) -> None:
-    """Put a profile in place of the vessel's current one; `kempf reprocess` then applies it to her logs."""
+    """Replace the vessel's current profile by another; `kempf reprocess` then applies it to her logs."""
     from kempf.flows.jobs.register_vessel import set_vessel
     from kempf.warehouse.store import Warehouse
 
