@@ -135,7 +135,7 @@ def test_where_it_fails_is_told_by_sample(place: Path) -> None:
     assert told.code == 0
     assert "horizon: one step" in told.out
     assert "fitted: 1 manoeuvre" in told.out and "held out: no manoeuvre" in told.out
-    assert "where it fails, fitted runs" in told.out and "worst stretches" in told.out
+    assert "where it fails, fitted manoeuvres" in told.out and "worst stretches" in told.out
 
 
 def test_a_threshold_that_is_exceeded_is_an_exit_code(place: Path, document: dict) -> None:
@@ -145,7 +145,7 @@ def test_a_threshold_that_is_exceeded_is_an_exit_code(place: Path, document: dic
         assert done.code == code, done
         assert done.json["fail_above"]["exceeded"] is (code == 5)
         assert done.json["fail_above"]["limit_percent"] == limit
-        assert ("fitted runs" in done.err) is (code == 5)
+        assert ("fitted manoeuvres" in done.err) is (code == 5)
 
 
 def test_several_sets_are_all_compared(own: Path, document: dict) -> None:
