@@ -10,8 +10,9 @@ import json
 import re
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, ConfigDict, Field, StringConstraints, ValidationInfo, field_validator, model_validator
+from pydantic import Field, StringConstraints, ValidationInfo, field_validator, model_validator
 
+from kempf.schemas.frozen import Frozen
 from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS, OWN_STATES, TARGETS
 
 Group = Literal["hull", "rudder", "propulsion", "environment", "sensor", "other", "own"]
@@ -25,11 +26,7 @@ _PARAMETER = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,19}")
 _WORD = re.compile(r"[A-Za-z_]\w*")
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class Parameter(_Frozen):
+class Parameter(Frozen):
     """One number of an effect.
 
     Either it makes the effect, which is absent with 0, or it shapes what others make, such as a frequency: then 0 lies
@@ -74,7 +71,7 @@ class Parameter(_Frozen):
         return self.steps[0] if self.shapes else 0.0
 
 
-class ExtraState(_Frozen):
+class ExtraState(Frozen):
     """A state that an effect brings along, such as a memory of the sway: all three are formulas.
 
     Attributes
@@ -95,7 +92,7 @@ class ExtraState(_Frozen):
     initial_std: _Formula = "0"
 
 
-class Effect(_Frozen):
+class Effect(Frozen):
     """One physical effect that eq. (16) lacks.
 
     Attributes

@@ -12,18 +12,15 @@ from datetime import datetime
 from fnmatch import fnmatch
 from typing import Any, Literal
 
-from pydantic import AwareDatetime, BaseModel, ConfigDict, Field, ValidationError, field_validator, model_validator
+from pydantic import AwareDatetime, Field, ValidationError, field_validator, model_validator
 
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import UsageError
+from kempf.schemas.frozen import Frozen
 from kempf.schemas.units import factor_to_si
 
 
-class _Frozen(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
-
-
-class ChannelMap(_Frozen):
+class ChannelMap(Frozen):
     """How one column or topic field becomes a canonical channel."""
 
     channel: str
@@ -60,7 +57,7 @@ class ChannelMap(_Frozen):
         return self.offset * factor_to_si(self.unit, CHANNELS[self.channel].unit, self.channel)
 
 
-class TimeColumn(_Frozen):
+class TimeColumn(Frozen):
     """Where the time of a delimited log stands: UTC text, or elapsed time since a stated start."""
 
     column: str
@@ -77,7 +74,7 @@ class TimeColumn(_Frozen):
         return value
 
 
-class Source(_Frozen):
+class Source(Frozen):
     """How the files of one kind are read; the first source whose pattern matches the file name is used."""
 
     match: str
@@ -100,7 +97,7 @@ class Source(_Frozen):
         return value
 
 
-class Antenna(_Frozen):
+class Antenna(Frozen):
     """Position of the GNSS antenna from midships on the centre line at the keel, m."""
 
     forward_m: float = 0.0
@@ -108,7 +105,7 @@ class Antenna(_Frozen):
     up_m: float = 0.0
 
 
-class VesselProfile(_Frozen):
+class VesselProfile(Frozen):
     """A ship's particulars and the sources of her logs."""
 
     vessel: str | None = None

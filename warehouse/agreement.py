@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from typing import Any, Literal
 
 from kempf.warehouse.canonical import canonical_json, sha256
-from kempf.warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 
 Verdict = Literal["bit-identical", "equal within tolerance", "different"]
 
@@ -105,7 +105,7 @@ _ABSENT = object()
 
 
 def _content(s: ParameterSet) -> dict[str, Any]:
-    def by_name(estimates: tuple[Estimate, ...]) -> dict[str, Any]:
+    def by_name(estimates: tuple[StoredValue, ...]) -> dict[str, Any]:
         return {e.name: {"value": e.value, "std": e.std, "unit": e.unit} for e in estimates}
 
     return {

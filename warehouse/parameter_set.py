@@ -14,7 +14,7 @@ _CONTENTS = ("model_spec", "settings", "fit", "iterations", "convergence", "prov
 
 
 @dataclass(frozen=True)
-class Estimate:
+class StoredValue:
     """One parameter or noise level: value and standard error (None where there is none) in ``unit``."""
 
     name: str
@@ -109,7 +109,7 @@ class ParameterSet:
         What it was identified from.
     start_utc_ns : int
         Start of the first segment, UTC nanoseconds.
-    parameters, discrete, noise : tuple of Estimate
+    parameters, discrete, noise : tuple of StoredValue
         In continuous time; of the discrete model, eq. (17); noise levels.
     covariance_names : tuple of str
         What the rows and columns of the covariance are.
@@ -136,9 +136,9 @@ class ParameterSet:
     segment_ids: tuple[str, ...]
     log_ids: tuple[str, ...]
     start_utc_ns: int
-    parameters: tuple[Estimate, ...]
-    discrete: tuple[Estimate, ...] = ()
-    noise: tuple[Estimate, ...] = ()
+    parameters: tuple[StoredValue, ...]
+    discrete: tuple[StoredValue, ...] = ()
+    noise: tuple[StoredValue, ...] = ()
     covariance_names: tuple[str, ...] = ()
     covariance: tuple[tuple[float, ...], ...] = ()
     fit: Mapping[str, Any] = field(default_factory=dict)
@@ -189,7 +189,7 @@ class ParameterSet:
         return shown
 
 
-def _by_name(estimates: Sequence[Estimate]) -> dict[str, dict[str, Any]]:
+def _by_name(estimates: Sequence[StoredValue]) -> dict[str, dict[str, Any]]:
     return {e.name: {"value": e.value, "std": e.std, "unit": e.unit} for e in estimates}
 
 

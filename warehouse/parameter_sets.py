@@ -11,7 +11,7 @@ from kempf.warehouse import delta
 from kempf.warehouse.agreement import content_digest, differences
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.keys import one_of, vessel_key
-from kempf.warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
@@ -187,6 +187,6 @@ def _as_columns(one: ParameterSet) -> dict[str, Any]:
 def _set(row: dict[str, Any]) -> ParameterSet:
     contents = {name: loads(row.pop(f"{name}_json")) for name in _TEXTS}
     contents["model_spec"] = loads(row.pop("model_json"))
-    contents |= {name: tuple(Estimate(**item) for item in row.pop(name)) for name in _ESTIMATES}
+    contents |= {name: tuple(StoredValue(**item) for item in row.pop(name)) for name in _ESTIMATES}
     del row["vessel_key"]
     return ParameterSet(**row, **contents)

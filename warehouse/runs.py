@@ -23,7 +23,7 @@ def run_id(flow: str, inputs: Any) -> str:
 
 
 @dataclass(frozen=True)
-class Run:
+class FlowRun:
     """One run; `counts` and `message` are JSON content."""
 
     run_id: str
@@ -38,14 +38,14 @@ class Run:
         object.__setattr__(self, "message", plain(self.message))
 
 
-def record_all(warehouse: Warehouse, runs: Sequence[Run]) -> tuple[str, ...]:
+def record_all(warehouse: Warehouse, runs: Sequence[FlowRun]) -> tuple[str, ...]:
     """Store how runs stand, in place of how they stood, in at most one commit.
 
     Parameters
     ----------
     warehouse : Warehouse
         Made where there is none.
-    runs : sequence of Run
+    runs : sequence of FlowRun
         Of one id the last counts.
 
     Returns
@@ -80,18 +80,18 @@ def record_all(warehouse: Warehouse, runs: Sequence[Run]) -> tuple[str, ...]:
     return with_retry(attempt)
 
 
-def some(warehouse: Warehouse, run_ids: Sequence[str]) -> list[Run]:
+def some(warehouse: Warehouse, run_ids: Sequence[str]) -> list[FlowRun]:
     """Return those of some runs that are stored, sorted by flow then id."""
     return _runs(delta.read(warehouse, "runs", {"run_id": sorted(set(run_ids))}))
 
 
-def all_runs(warehouse: Warehouse, flow: str | None = None) -> list[Run]:
+def all_runs(warehouse: Warehouse, flow: str | None = None) -> list[FlowRun]:
     """Return every run, of one flow or of all, sorted by flow then id."""
     return _runs(delta.read(warehouse, "runs", {} if flow is None else {"flow": flow}))
 
 
-def _runs(frame: pl.DataFrame) -> list[Run]:
+def _runs(frame: pl.DataFrame) -> list[FlowRun]:
     return [
-        Run(r["run_id"], r["flow"], r["vessel"], r["status"], loads(r["counts_json"]), loads(r["message_json"]))
+        FlowRun(r["run_id"], r["flow"], r["vessel"], r["status"], loads(r["counts_json"]), loads(r["message_json"]))
         for r in frame.sort("flow", "run_id").rows(named=True)
     ]

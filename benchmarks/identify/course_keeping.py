@@ -35,7 +35,7 @@ from kempf.pipeline.steering.course_keeping import LawSettings, course_law
 from kempf.pipeline.steering.robustness import ClosedLoop, closed_loop
 from kempf.pipeline.steering.state_space import NoiseLevels, usual_levels
 from kempf.pipeline.steering.track import (
-    CourseChange,
+    CourseChangeResponse,
     Performance,
     Track,
     course_change,
@@ -72,7 +72,7 @@ class Steered:
     law: str
     track: Track | None = None
     performance: Performance | None = None
-    change: CourseChange | None = None
+    change: CourseChangeResponse | None = None
     loop: ClosedLoop | None = None
     failure: str = ""
 

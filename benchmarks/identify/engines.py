@@ -117,10 +117,12 @@ def extended(one: Zigzag) -> Outcome:
     run = grid(one)
     with ThreadPoolExecutor(max_workers=1) as workers:
 
-        def fit() -> pooled_fit.Fit:
+        def fit() -> pooled_fit.PooledFit:
             start = start_of([one.record], [run], one.spec, [0], workers)
             nothing = np.zeros(0)
-            return pooled_fit.fit(effect_model.Augmented(), [run], one.spec, start.hull, start.levels, nothing, workers)
+            return pooled_fit.fit(
+                effect_model.EffectModel(), [run], one.spec, start.hull, start.levels, nothing, workers
+            )
 
         fit()
         found, fit_ms = _timed(fit)
@@ -129,10 +131,10 @@ def extended(one: Zigzag) -> Outcome:
     return Outcome(found.hull, found.std[:_HULL], run.measured.shape[0], evaluation_ms, fit_ms, found.converged)
 
 
-def grid(one: Zigzag) -> grid_run.Run:
+def grid(one: Zigzag) -> grid_run.GridRun:
     """Lay a zigzag on the grid of the extended filter."""
     length, arm = one.profile.length_m or 100.0, arm_of(one.spec, one.profile) or 0.0
-    ship = grid_run.Ship(length, one.profile.draught_m or 1.0, arm)
+    ship = grid_run.ShipConstants(length, one.profile.draught_m or 1.0, arm)
     step = grid_run.step_of([one.record], length)
     return grid_run.make_run(one.name, one.record, one.instruments, one.spec, ship, step)
 

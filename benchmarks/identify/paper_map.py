@@ -21,7 +21,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.paper import ship
 from kempf.pipeline.estimate.paper.least_squares import regress
-from kempf.pipeline.estimate.paper.procedure import Course, ProcedureSettings, iterate
+from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedureSettings, iterate
 from kempf.pipeline.estimate.record.record import Record, make_record
 from kempf.pipeline.estimate.record.sampled import Sampled, sample
 from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discretise
@@ -113,7 +113,7 @@ def vehicle(sailed: Sailed, variability: float) -> LinearVehicle:
     return ship.ship(sailed.sampled.step_s, *acting)
 
 
-def run(sailed: Sailed, variability: float, settings: ProcedureSettings) -> tuple[Course, Float]:
+def run(sailed: Sailed, variability: float, settings: ProcedureSettings) -> tuple[ProcedureCourse, Float]:
     """The course of the procedure and the errors of its last pass in percent, shape (6,)."""
     s = sailed.sampled
     R = ship.noise_covariance(sailed.record, s.step_s)

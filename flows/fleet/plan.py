@@ -15,7 +15,7 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import runs, vessels
-from kempf.warehouse.runs import Run
+from kempf.warehouse.runs import FlowRun
 from kempf.warehouse.store import Warehouse
 
 #: With so many logs a batch is full: a minute or two of work, beside which what an engine asks for a task and the
@@ -109,7 +109,7 @@ def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_on
     return Plan(tuple((name, logs) for logs, name in reversed(due)), tuple(report.show() for report in reports))
 
 
-def _settled(warehouse: Warehouse, states: Mapping[str, VesselState]) -> dict[str, Run]:
+def _settled(warehouse: Warehouse, states: Mapping[str, VesselState]) -> dict[str, FlowRun]:
     """Return the run that left each vessel in the state that she is in."""
     found = {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
     settled = {}

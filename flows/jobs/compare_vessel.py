@@ -18,13 +18,13 @@ from kempf.pipeline.compare.compared_run import compare_run
 from kempf.pipeline.compare.comparison import ComparedRun, judged, summary
 from kempf.pipeline.compare.misfit import where
 from kempf.pipeline.compare.overshoot import Turn, turns_of
-from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.grid_gating import left_out
 from kempf.pipeline.estimate.levels import fit_levels
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.pooled_start import Start
 from kempf.pipeline.estimate.sensitivity import Point
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
 from kempf.pipeline.predict.run_residuals import phases_s
 from kempf.schemas.errors import DataRejected
@@ -136,7 +136,7 @@ def compare_vessel(
     seen = _seen(warehouse, vessel, chosen)
     held = [not _is_seen(segment, seen) for segment in ordered]
     gross: Mapping[str, Any] = chosen.convergence.get("gross_error_instants_s") or {}
-    filtered = [Filtered(left_out(run, gross.get(run.name, {})), model, data.spec) for run in data.runs]
+    filtered = [RunFilter(left_out(run, gross.get(run.name, {})), model, data.spec) for run in data.runs]
     progress(0, len(filtered), "predicting")
     levels = _levels(filtered, held, hull, values, chosen, data.start)
     runs, found, skipped = [], [], dict(data.skipped)
@@ -168,10 +168,10 @@ def compare_vessel(
     return Comparison(vessel, chosen, alias, asked, tuple(runs), tuple(found), skipped)
 
 
-def _parameters(chosen: ParameterSet) -> tuple[Float, Float, Augmented]:
+def _parameters(chosen: ParameterSet) -> tuple[Float, Float, EffectModel]:
     """Return hull, parameters of the effects, and the model that they belong to."""
     known = known_effects(Own.from_json(chosen.settings.get("own") or {}))
-    model = Augmented(named(chosen.model_spec.get("effects", ()), known))
+    model = EffectModel(named(chosen.model_spec.get("effects", ()), known))
     found = {p.name: p.value for p in chosen.parameters}
     names = (*HULL_PARAMETERS, *model.names)
     lacking = [name for name in names if not np.isfinite(found.get(name, np.nan))]
@@ -230,7 +230,7 @@ class _Levels:
 
 
 def _levels(
-    filtered: list[Filtered], held: list[bool], hull: Float, values: Float, chosen: ParameterSet, start: Start
+    filtered: list[RunFilter], held: list[bool], hull: Float, values: Float, chosen: ParameterSet, start: Start
 ) -> list[_Levels]:
     """Return the noise levels of each run; a held-out run is predicted with the mean of the fitted ones' logarithms."""
     kept: Mapping[str, Any] = chosen.convergence.get("levels") or {}
@@ -257,7 +257,7 @@ def _levels(
     ]
 
 
-def _turns(segment: Segment, run: Run) -> tuple[Turn, ...]:
+def _turns(segment: Segment, run: GridRun) -> tuple[Turn, ...]:
     def seconds(ns: int) -> float:
         return (ns - run.start_utc_ns) / SECOND_NS
 

@@ -27,7 +27,7 @@ from kempf.warehouse.store import Warehouse
 
 
 @dataclass(frozen=True, eq=False)
-class Examined:
+class FullDiagnosis:
     """A diagnosis just made, with what it was made of."""
 
     chosen: Chosen
@@ -94,7 +94,7 @@ def diagnose_again(
 
 
 def _kept(
-    warehouse: Warehouse, examined: Examined, spec: ModelSpec, own: Own, inputs: dict[str, Any]
+    warehouse: Warehouse, examined: FullDiagnosis, spec: ModelSpec, own: Own, inputs: dict[str, Any]
 ) -> StoredDiagnosis:
     """Store a diagnosis, what its report shows, and the model that was diagnosed."""
     chosen, found = examined.chosen, examined.diagnosis
@@ -131,7 +131,7 @@ def examine(
     settings: DiagnosisSettings = STANDARD,
     progress: Progress = silent,
     only: tuple[str, ...] = (),
-) -> Examined:
+) -> FullDiagnosis:
     """Make a diagnosis with everything in it; nothing is stored.
 
     ``only`` names the effects to screen instead of all.
@@ -154,10 +154,10 @@ def examine(
             told=step,
         )
     progress(count, count, "done")
-    return Examined(chosen, runs, made)
+    return FullDiagnosis(chosen, runs, made)
 
 
-def _phases(examined: Examined) -> dict[str, tuple[PhaseInterval, ...]]:
+def _phases(examined: FullDiagnosis) -> dict[str, tuple[PhaseInterval, ...]]:
     detail = {segment.segment_id: segment.detail for segment in examined.chosen.segments}
     return {run.name: phases_s(detail[run.name].get("phases", ()), run.start_utc_ns) for run in examined.runs.runs}
 

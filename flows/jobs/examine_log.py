@@ -20,7 +20,7 @@ from kempf.warehouse.store import Warehouse
 
 
 @dataclass(frozen=True, eq=False)
-class Examined:
+class ExaminedLog:
     """One log and what the doctor found.
 
     Attributes
@@ -40,7 +40,9 @@ class Examined:
     content: dict[str, Any]
 
 
-def examine_instruments(instruments: Instruments, profile: VesselProfile, file_name: str, log_format: str) -> Examined:
+def examine_instruments(
+    instruments: Instruments, profile: VesselProfile, file_name: str, log_format: str
+) -> ExaminedLog:
     """Examine the channels of one log; nothing is stored.
 
     Parameters
@@ -55,10 +57,10 @@ def examine_instruments(instruments: Instruments, profile: VesselProfile, file_n
     units = {channel: mapped.unit for channel, (_, mapped) in known.items()}
     log = Log.of(instruments, profile.length_m, units)
     found = examine(log)
-    return Examined(file_name, log_format, log, found, as_content(found, known, log_format))
+    return ExaminedLog(file_name, log_format, log, found, as_content(found, known, log_format))
 
 
-def examine_file(path: Path, profile: VesselProfile) -> Examined:
+def examine_file(path: Path, profile: VesselProfile) -> ExaminedLog:
     """Read and examine a raw log that no warehouse knows.
 
     Raises
@@ -70,7 +72,7 @@ def examine_file(path: Path, profile: VesselProfile) -> Examined:
         return examine_instruments(from_readings(read.lazy()), profile, path.name, read.format)
 
 
-def examine_held(warehouse: Warehouse, name: str) -> Examined:
+def examine_held(warehouse: Warehouse, name: str) -> ExaminedLog:
     """Examine a log of the warehouse, by a beginning of its id or by its file name.
 
     Raises

@@ -161,7 +161,7 @@ def identify_segments(
                 outcomes += [IdentifyOutcome(segment, None, error=refreshed.failed[ingest]) for segment in hers]
             else:
                 beside = {s.segment_id: companions_of(s, readable, by_ingest) for s in hers if without_log(s)}
-                job = _Job(warehouse, request, pool, flow_run, table_versions, by_ingest)
+                job = _Identification(warehouse, request, pool, flow_run, table_versions, by_ingest)
                 outcomes += _identify_log(job, by_ingest[ingest], hers, beside)
                 new.keep([o.parameter_set for o in outcomes[-len(hers) :] if o.new and o.parameter_set])
     progress(len(ingests), len(ingests), "done")
@@ -171,7 +171,7 @@ def identify_segments(
 
 
 @dataclass(frozen=True)
-class _Job:
+class _Identification:
     """What is the same for every log of one call."""
 
     warehouse: Warehouse
@@ -183,7 +183,7 @@ class _Job:
 
 
 def _identify_log(
-    job: _Job, row: logs.LogRow, found: Sequence[Segment], beside: Mapping[str, tuple[Segment, ...]]
+    job: _Identification, row: logs.LogRow, found: Sequence[Segment], beside: Mapping[str, tuple[Segment, ...]]
 ) -> list[IdentifyOutcome]:
     """Identify the segments of one log, one a thread; the new sets are stored by the caller.
 

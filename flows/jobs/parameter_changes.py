@@ -10,7 +10,7 @@ from typing import Any
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.agreement import content_digest
 from kempf.warehouse.instant import iso_utc
-from kempf.warehouse.parameter_set import Bounds, Estimate, ParameterSet
+from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue
 
 
 @dataclass(frozen=True)
@@ -165,7 +165,7 @@ def _moves(one: ParameterSet, becomes: ParameterSet) -> Iterator[Move]:
             yield _move(one, becomes, before, now)
 
 
-def _move(one: ParameterSet, becomes: ParameterSet, before: Estimate, now: Estimate) -> Move:
+def _move(one: ParameterSet, becomes: ParameterSet, before: StoredValue, now: StoredValue) -> Move:
     std = before.std if before.std is not None and before.std > 0 and isfinite(before.std) else None
     return Move(
         vessel=one.vessel,

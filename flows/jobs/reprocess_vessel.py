@@ -77,7 +77,7 @@ def reprocess_vessels(
     list of VesselReport
         One a vessel, in the order given. Failures are in them: one bad log stops nothing, one bad vessel no other.
     """
-    job = _Job(warehouse, request, flow_run, progress)
+    job = _Reprocessing(warehouse, request, flow_run, progress)
     works = {vessel: _Work(VesselReport(vessel), Waiting(warehouse, vessel)) for vessel in vessels}
     all_of_them = list(works.values())
 
@@ -165,7 +165,7 @@ def _together(works: Sequence[_Work], step: Callable[[], None]) -> None:
 
 
 @dataclass(frozen=True)
-class _Job:
+class _Reprocessing:
     """What is the same for every vessel."""
 
     warehouse: Warehouse

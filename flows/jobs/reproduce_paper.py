@@ -18,7 +18,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.paper import ship as paper
-from kempf.pipeline.estimate.paper.procedure import Course
+from kempf.pipeline.estimate.paper.procedure import ProcedureCourse
 from kempf.pipeline.estimate.paper.ship import (
     REPORTED_PERCENT,
     PaperSettings,
@@ -64,7 +64,7 @@ class Experiment:
         parameters.
     measured : ndarray, shape (n, 2)
         y_v and y_r.
-    course : Course
+    course : ProcedureCourse
         Every iteration.
     procedure : Estimate
         After the last one.
@@ -82,7 +82,7 @@ class Experiment:
     first: Float
     last: Float
     measured: Float
-    course: Course
+    course: ProcedureCourse
     procedure: Estimate
     first_error: dict[str, float]
     last_error: dict[str, float]
@@ -264,7 +264,7 @@ def _experiment(factor: float) -> Experiment:
     )
 
 
-def _states(course: Course, sampled: Sampled) -> tuple[Float, Float]:
+def _states(course: ProcedureCourse, sampled: Sampled) -> tuple[Float, Float]:
     """States and disturbances with the parameters of the first approximation and of the last iteration."""
     nothing = np.full((sampled.measured.shape[0], 4), np.nan)
     after = course.passes[1].filtered if len(course.passes) > 1 else None

@@ -33,7 +33,7 @@ _FIELDS_SHOWN = 20
 
 
 @dataclass(frozen=True)
-class Verdict:
+class RerunVerdict:
     """What became of one parameter set.
 
     Attributes
@@ -83,7 +83,7 @@ class Verdict:
 class Verification:
     """Every verdict, sorted by vessel, start and id."""
 
-    verdicts: tuple[Verdict, ...]
+    verdicts: tuple[RerunVerdict, ...]
 
     def counts(self, *, code_changed: bool | None = None) -> dict[str, int]:
         """Return how many sets there are of each verdict, of all or of those whose code is, or is not, another now."""
@@ -137,7 +137,7 @@ def verify_all(
     listed = parameter_sets.summaries(warehouse).select("vessel", "parameter_set_id").rows()
     asked = [(vessel, name) for vessel, name in listed if not vessels or vessel in vessels]
     known = {} if afresh else {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
-    found: dict[str, Verdict] = {}
+    found: dict[str, RerunVerdict] = {}
     for _, name in asked:
         before = known.get(_run_id(name, tolerance))
         if before is not None:
@@ -169,14 +169,14 @@ def _groups(sets: Sequence[ParameterSet]) -> Iterator[list[ParameterSet]]:
             yield together[first : first + batch]
 
 
-def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: float) -> list[Verdict]:
+def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: float) -> list[RerunVerdict]:
     """Build sets of the same logs again, one a thread: the likelihood runs outside the interpreter's lock."""
     try:
         instruments, profile = raw_inputs(warehouse, group[0])
     except Exception as error:  # noqa: BLE001 - whatever it is, the other logs must not pay for it
         return [_failed(one, wrapped(error)) for one in group]
 
-    def verdict_on(one: ParameterSet) -> Verdict:
+    def verdict_on(one: ParameterSet) -> RerunVerdict:
         try:
             return _verdict(one, judged(one, rebuilt(one, instruments, profile), tolerance))
         except Exception as error:  # noqa: BLE001 - whatever it is, the other sets must not pay for it
@@ -191,10 +191,10 @@ def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: floa
         workers.shutdown(cancel_futures=True)
 
 
-def _verdict(one: ParameterSet, result: Rerun) -> Verdict:
+def _verdict(one: ParameterSet, result: Rerun) -> RerunVerdict:
     fields = tuple(difference.as_json() for difference in result.differences[:_FIELDS_SHOWN])
     count = len(result.differences)
-    return Verdict(
+    return RerunVerdict(
         vessel=one.vessel,
         parameter_set_id=one.parameter_set_id,
         verdict=result.verdict,
@@ -205,8 +205,8 @@ def _verdict(one: ParameterSet, result: Rerun) -> Verdict:
     )
 
 
-def _failed(one: ParameterSet, error: KempfError) -> Verdict:
-    return Verdict(one.vessel, one.parameter_set_id, FAILED, code_changed(inputs_of(one)), error=error)
+def _failed(one: ParameterSet, error: KempfError) -> RerunVerdict:
+    return RerunVerdict(one.vessel, one.parameter_set_id, FAILED, code_changed(inputs_of(one)), error=error)
 
 
 def _run_id(parameter_set_id: str, tolerance: float) -> str:
@@ -215,7 +215,7 @@ def _run_id(parameter_set_id: str, tolerance: float) -> str:
     return runs.run_id(FLOW, {**what, "code": code_of_sets(), "packages": code_version.packages()})
 
 
-def _as_run(one: Verdict, tolerance: float) -> runs.Run:
+def _as_run(one: RerunVerdict, tolerance: float) -> runs.FlowRun:
     message = {
         "parameter_set_id": one.parameter_set_id,
         "code_changed": one.code_changed,
@@ -223,11 +223,11 @@ def _as_run(one: Verdict, tolerance: float) -> runs.Run:
         "differences": list(one.fields),
     }
     name = _run_id(one.parameter_set_id, tolerance)
-    return runs.Run(name, FLOW, one.vessel, one.verdict, {"differences": one.differences}, message)
+    return runs.FlowRun(name, FLOW, one.vessel, one.verdict, {"differences": one.differences}, message)
 
 
-def _remembered(run: runs.Run) -> Verdict:
-    return Verdict(
+def _remembered(run: runs.FlowRun) -> RerunVerdict:
+    return RerunVerdict(
         vessel=str(run.vessel),
         parameter_set_id=str(run.message["parameter_set_id"]),
         verdict=run.status,

@@ -17,7 +17,7 @@ from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import vessels
-from kempf.warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 from kempf.warehouse.store import Warehouse
 
 #: noise level of a set by the field of `NoiseLevels` that it is
@@ -73,7 +73,7 @@ class KnownShip:
     warnings: tuple[str, ...]
 
     @property
-    def effect_parameters(self) -> tuple[Estimate, ...]:
+    def effect_parameters(self) -> tuple[StoredValue, ...]:
         """The parameters of the effects, in their order."""
         held = {p.name: p for p in self.parameter_set.parameters}
         return tuple(held[name] for name in (self.effects.model.names if self.effects is not None else ()))
@@ -131,10 +131,10 @@ def _effects(one: ParameterSet, profile: VesselProfile) -> ShipEffects | None:
     # compiled code, which a set without effects does without
     from kempf.flows.jobs.standing_model import known_effects, model_of, named
     from kempf.flows.jobs.vessel_runs import LENGTH_M
-    from kempf.pipeline.model.effect_model import Augmented
+    from kempf.pipeline.model.effect_model import EffectModel
 
     spec, own = model_of(one)
-    model = Augmented(named(spec.effects, known_effects(own)))
+    model = EffectModel(named(spec.effects, known_effects(own)))
     values = {p.name: p.value for p in one.parameters}
     return ShipEffects(
         model,

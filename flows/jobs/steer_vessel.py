@@ -13,16 +13,15 @@ from kempf.flows.jobs.ship_model import KnownShip, known_ship
 from kempf.flows.jobs.steered_ship import SteeredShip
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.simulate.disturbances import Environment
-from kempf.pipeline.simulate.hulls import Hull as SimulatedHull
-from kempf.pipeline.simulate.hulls import HullParameters
-from kempf.pipeline.simulate.steering_gear import DeadTime, Lag, Part, Play, RateLimit, SteeringGear
+from kempf.pipeline.simulate.hulls import HullParameters, SimulatedHull
+from kempf.pipeline.simulate.steering_gear import DeadTime, GearPart, Lag, Play, RateLimit, SteeringGear
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT
 from kempf.pipeline.steering.carried import Carried, carried
 from kempf.pipeline.steering.course_keeping import Law, LawSettings, course_law
 from kempf.pipeline.steering.motion import ShipEffects, equivalent_hull, linear_motion
 from kempf.pipeline.steering.robustness import ClosedLoop, closed_loop, share_held
 from kempf.pipeline.steering.track import (
-    CourseChange,
+    CourseChangeResponse,
     Performance,
     Track,
     course_change,
@@ -81,7 +80,7 @@ class Tried:
     track : Track
     performance : Performance
         On the first leg, without its beginning.
-    change : CourseChange
+    change : CourseChangeResponse
     loop : ClosedLoop
         On the ship of the parameter set, without rudder rate and limit.
     held : float
@@ -93,7 +92,7 @@ class Tried:
     law: Law
     track: Track
     performance: Performance
-    change: CourseChange
+    change: CourseChangeResponse
     loop: ClosedLoop
     held: float
 
@@ -244,7 +243,7 @@ def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: KnownShip,
 
 
 #: parts of the simulated steering gear by what an effect makes of the rudder's course, made from its size
-_PARTS: dict[str, Callable[[float], Part]] = {
+_PARTS: dict[str, Callable[[float], GearPart]] = {
     "rudder_lag": Lag,
     "dead_time": DeadTime,
     "backlash": Play,

@@ -12,7 +12,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.simulate.disturbances import Environment
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.plant import ORDERS, follow, hull_constants, steer
 from kempf.pipeline.simulate.programme import GRID_S
 from kempf.pipeline.simulate.random_streams import stream
@@ -21,7 +21,7 @@ from kempf.schemas.errors import DataRejected, UsageError
 
 
 @dataclass(frozen=True)
-class Instruments:
+class ShipInstruments:
     """Noise of what the law is shown, standard deviations of one reading.
 
     Attributes
@@ -42,7 +42,7 @@ class SteeredShip:
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
     environment : Environment
         Wind and stream.
     longest_s : float
@@ -51,26 +51,26 @@ class SteeredShip:
         Heading at the start.
     seed : int
         Of wind, stream and noise; equal seeds give equal weather and noise whatever the law does.
-    instruments : Instruments, optional
+    instruments : ShipInstruments, optional
     gear : SteeringGear, optional
         Between the rudder's reading and the hull, fresh; None lets the hull feel what is read.
     """
 
     def __init__(
         self,
-        hull: Hull,
+        hull: SimulatedHull,
         environment: Environment,
         longest_s: float,
         *,
         course_rad: float = 0.0,
         seed: int = 0,
-        instruments: Instruments | None = None,
+        instruments: ShipInstruments | None = None,
         gear: SteeringGear | None = None,
     ) -> None:
         # a law's steps are cut to the grid one by one
         n = round(longest_s / GRID_S) + 2
         self._hull, self._constants = hull, hull_constants(hull)
-        self._noise, self._row = instruments or Instruments(), 0
+        self._noise, self._row = instruments or ShipInstruments(), 0
         self._state, self._rudder, self._order = np.zeros((n, 6)), np.zeros(n), np.zeros(n)
         self._state[0, 2], self._state[0, 5] = course_rad, hull.trial_speed_m_s
         self._forcing = environment.forcing(n, GRID_S, seed)

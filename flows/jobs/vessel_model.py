@@ -26,14 +26,14 @@ from kempf.pipeline.diagnose.verdict import rung
 from kempf.pipeline.estimate.grid_gating import instants_left_out
 from kempf.pipeline.estimate.one_step_fit import one_step_fit
 from kempf.pipeline.estimate.plausibility import doubts
-from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.result import discrete_values
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import parameter_sets, provenance, vessels
-from kempf.warehouse.parameter_set import Estimate as Stored
 from kempf.warehouse.parameter_set import Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse.parameter_set import StoredValue as Stored
 from kempf.warehouse.store import Warehouse
 
 _STEP_S = 1.0
@@ -46,14 +46,14 @@ class Fitted:
     Attributes
     ----------
     runs : VesselRuns
-    fits : tuple of Fit
+    fits : tuple of PooledFit
         With one effect more each.
     gross_errors : int
         Measurements left out before the first.
     """
 
     runs: VesselRuns
-    fits: tuple[Fit, ...]
+    fits: tuple[PooledFit, ...]
     gross_errors: int
 
 
@@ -181,7 +181,7 @@ def build_single(
     return replace(made, noise=_noise(fit, runs.spec), fit=one_step, warnings=said, parent=spec.parent)
 
 
-def _noise(fit: Fit, spec: ModelSpec) -> tuple[Stored, ...]:
+def _noise(fit: PooledFit, spec: ModelSpec) -> tuple[Stored, ...]:
     """Return the noise levels of a fit of one run by name; those of the disturbances in the long run."""
     rates = (
         *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
@@ -196,7 +196,7 @@ def _noise(fit: Fit, spec: ModelSpec) -> tuple[Stored, ...]:
 
 
 def _model_set(
-    fit: Fit,
+    fit: PooledFit,
     fitted: Fitted,
     profile: VesselProfile,
     inputs: Inputs,
@@ -223,7 +223,7 @@ def _model_set(
 
 
 def _as_parameter_set(
-    fit: Fit,
+    fit: PooledFit,
     fitted: Fitted,
     profile: VesselProfile,
     inputs: Inputs,
@@ -275,14 +275,14 @@ def _as_parameter_set(
     )
 
 
-def _gross_errors(fit: Fit, runs: VesselRuns) -> dict[str, dict[str, list[float]]]:
+def _gross_errors(fit: PooledFit, runs: VesselRuns) -> dict[str, dict[str, list[float]]]:
     """Return which measurements the fit left out, by run and measurement, so that a comparison leaves them out too."""
     whole = {run.name: run for run in runs.runs}
     found = {one.run.name: instants_left_out(whole[one.run.name], one.run) for one in fit.runs}
     return {name: instants for name, instants in found.items() if instants}
 
 
-def _parameters(fit: Fit) -> tuple[Stored, ...]:
+def _parameters(fit: PooledFit) -> tuple[Stored, ...]:
     values, std = np.concatenate([fit.hull, fit.values]), fit.std
     units = [*HULL_PARAMETERS.values(), *(p.unit for _, p in fit.model.parameters)]
     names = [*HULL_PARAMETERS, *fit.model.names]

@@ -8,7 +8,7 @@ from typing import Any
 
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.warehouse import runs
-from kempf.warehouse.runs import Run
+from kempf.warehouse.runs import FlowRun
 from kempf.warehouse.store import Warehouse
 
 #: Codes of errors that come of the storage and may be gone at the next attempt.
@@ -62,7 +62,7 @@ class VesselReport:
         lasting = isinstance(error, DataRejected)
         self.failures.append({"what": what, "lasting": lasting, "known": False, **error.to_json()})
 
-    def as_run(self, state: str | None, *, changed_only: bool, estimator: str | None) -> Run:
+    def as_run(self, state: str | None, *, changed_only: bool, estimator: str | None) -> FlowRun:
         """Return the line of the table ``runs``.
 
         Parameters
@@ -75,7 +75,7 @@ class VesselReport:
         """
         counts = {k: v for k, v in vars(self).items() if isinstance(v, int)}
         message = {"failures": self.failures, **({"state": state} if state else {})}
-        return Run(
+        return FlowRun(
             run_id_of(self.vessel, changed_only=changed_only, estimator=estimator),
             FLOW,
             self.vessel,
@@ -90,13 +90,13 @@ def run_id_of(vessel: str, *, changed_only: bool, estimator: str | None = None) 
     return runs.run_id(FLOW, {"vessel": vessel, "changed_only": changed_only, "estimator": estimator})
 
 
-def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, Run]]) -> None:
+def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, FlowRun]]) -> None:
     """Store runs in one commit; failures that stood there before are marked as known in the reports and in the runs.
 
     Parameters
     ----------
     warehouse : Warehouse
-    found : sequence of (VesselReport, Run)
+    found : sequence of (VesselReport, FlowRun)
         Each with the run of its `VesselReport.as_run`.
     """
     every = [
@@ -113,7 +113,7 @@ def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, Run]]
     runs.record_all(warehouse, entries)
 
 
-def _forgotten(run: Run, stored: Mapping[str, Run]) -> list[Run]:
+def _forgotten(run: FlowRun, stored: Mapping[str, FlowRun]) -> list[FlowRun]:
     """Return the runs of the same vessel whose state no longer says that nothing is left to do."""
     if "state" in run.message:
         return []
@@ -126,12 +126,12 @@ def _forgotten(run: Run, stored: Mapping[str, Run]) -> list[Run]:
     ]
 
 
-def from_run(run: Run) -> VesselReport:
+def from_run(run: FlowRun) -> VesselReport:
     """Return the report of a vessel that has nothing to do, from what her last run left.
 
     Parameters
     ----------
-    run : Run
+    run : FlowRun
         Its failures are all lasting.
     """
     counts = run.counts

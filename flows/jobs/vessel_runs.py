@@ -14,7 +14,7 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.estimate.record.grid_run import Run, Ship, make_run, step_of
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run, step_of
 from kempf.pipeline.estimate.record.record import Record, make_record
 from kempf.pipeline.estimate.search.pooled_start import Start, start_of
 from kempf.schemas.errors import KempfError, NotFound
@@ -36,7 +36,7 @@ class VesselRuns:
     ----------
     spec : ModelSpec
         With the arm and the moment decided.
-    runs : tuple of Run
+    runs : tuple of GridRun
         In order of time; named by their segments.
     records : tuple of Record
         What the runs were made of.
@@ -45,7 +45,7 @@ class VesselRuns:
     """
 
     spec: ModelSpec
-    runs: tuple[Run, ...]
+    runs: tuple[GridRun, ...]
     records: tuple[Record, ...]
     skipped: dict[str, str]
 
@@ -107,7 +107,7 @@ def assemble(
         )
     arm = arm_of(spec, profile)
     ready = spec.with_arm(arm)
-    ship = Ship(profile.length_m or LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
+    ship = ShipConstants(profile.length_m or LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
     step = step_of([record for _, _, record in records], ship.length_m)
     days = {log_id: k for k, log_id in enumerate(dict.fromkeys(one.log_id for _, one, _ in records))}
     runs = tuple(

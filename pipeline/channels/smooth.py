@@ -34,7 +34,7 @@ _PASSED = 0.2652
 
 
 @dataclass(frozen=True, eq=False)
-class Smoothed:
+class SmoothedSpeed:
     """A series without its noise, and what of it is left.
 
     Attributes
@@ -52,7 +52,7 @@ class Smoothed:
     error_time_s: float
 
 
-def smoothed(series: Series, noise_std: float, shapes: Sequence[Float] = ()) -> Smoothed:
+def smoothed(series: Series, noise_std: float, shapes: Sequence[Float] = ()) -> SmoothedSpeed:
     """Take the noise out of a series.
 
     Parameters
@@ -66,7 +66,7 @@ def smoothed(series: Series, noise_std: float, shapes: Sequence[Float] = ()) -> 
 
     Returns
     -------
-    Smoothed
+    SmoothedSpeed
         With the same series where there is no noise to speak of, or fewer than 12 readings.
 
     References
@@ -79,8 +79,8 @@ def smoothed(series: Series, noise_std: float, shapes: Sequence[Float] = ()) -> 
     multiple is that of what is left of both when the spline is taken away.
     """
     if len(series) < _FEWEST:
-        return Smoothed(series, noise_std, 0.0)
-    as_it_is = Smoothed(series, noise_std, 0.5 * series.period_s)
+        return SmoothedSpeed(series, noise_std, 0.0)
+    as_it_is = SmoothedSpeed(series, noise_std, 0.5 * series.period_s)
     if not noise_std > 1e-6 * max(1e-12, float(np.max(np.abs(series.value)))):
         return as_it_is
     time_s = series.seconds_since(int(series.time_utc_ns[0]))
@@ -125,7 +125,7 @@ def smoothed(series: Series, noise_std: float, shapes: Sequence[Float] = ()) -> 
     left = min(noise_std * float(np.sqrt(_PASSED * series.period_s / over_s)), noise_std)
     # narrower than its readings lie apart no spline is: then it is the readings themselves
     slowness = max(0.5 / _PASSED * over_s, 0.5 * series.period_s)
-    return Smoothed(Series(series.time_utc_ns, value), float(np.hypot(left, np.sqrt(around))), slowness)
+    return SmoothedSpeed(Series(series.time_utc_ns, value), float(np.hypot(left, np.sqrt(around))), slowness)
 
 
 def without_spikes(series: Series) -> tuple[Series, int]:

@@ -8,7 +8,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.comparison import ComparedRun
 from kempf.pipeline.compare.overshoot import Turn, compare_overshoots
 from kempf.pipeline.estimate import sensitivity
-from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.free_run import free_run_of
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
@@ -19,7 +19,7 @@ _HEADING = 2
 
 
 def compare_run(
-    filtered: Filtered,
+    filtered: RunFilter,
     point: Point,
     horizon: Horizon,
     *,
@@ -33,7 +33,7 @@ def compare_run(
 
     Parameters
     ----------
-    filtered : Filtered
+    filtered : RunFilter
     point : Point
     horizon : Horizon
     held_out : bool

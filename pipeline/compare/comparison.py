@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.compare.group import UNITS
-from kempf.pipeline.compare.overshoot import Overshoot
+from kempf.pipeline.compare.overshoot import OvershootError
 from kempf.pipeline.predict.prediction import Predicted
 from kempf.pipeline.predict.run_residuals import Looked
 
@@ -36,7 +36,7 @@ class ComparedRun:
         The free run, for overshoots and for the threshold.
     free_run_error_percent : float
         The error of the model on this run, `kempf.pipeline.predict.free_run.FreeRun.relative_error` in percent.
-    overshoots : tuple of Overshoot
+    overshoots : tuple of OvershootError
     looked : Looked
         For `kempf.pipeline.compare.misfit.where`.
     levels_from : str
@@ -48,7 +48,7 @@ class ComparedRun:
     predicted: Predicted
     free: Predicted
     free_run_error_percent: float
-    overshoots: tuple[Overshoot, ...]
+    overshoots: tuple[OvershootError, ...]
     looked: Looked
     levels_from: str
 

@@ -14,7 +14,7 @@ from scipy.stats import chi2, norm
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.group import BAND
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import Looked
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
@@ -65,7 +65,7 @@ def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
     return found
 
 
-def _given(run: Run) -> dict[str, Float]:
+def _given(run: GridRun) -> dict[str, Float]:
     """Return what a run was given, without its mean, shape (n,) each; what does not change is left out."""
     given = {
         "rudder": run.rudder_rad,

@@ -37,7 +37,7 @@ class Turn:
 
 
 @dataclass(frozen=True)
-class Overshoot:
+class OvershootError:
     """One overshoot, measured and predicted, deg.
 
     Attributes
@@ -57,7 +57,7 @@ class Overshoot:
 
 def compare_overshoots(
     time_s: Float, measured: Float, predicted: Float, turns: Sequence[Turn]
-) -> tuple[Overshoot, ...]:
+) -> tuple[OvershootError, ...]:
     """Compare the overshoots of a run.
 
     Parameters
@@ -79,7 +79,7 @@ def compare_overshoots(
         if len(gained) == 2 and gained[0] is not None and gained[1] is not None:
             error = float(np.rad2deg(gained[1] - gained[0]))
         told = None if error is None else turn.overshoot_deg + error
-        found.append(Overshoot(turn.number, turn.side, turn.overshoot_deg, told, error))
+        found.append(OvershootError(turn.number, turn.side, turn.overshoot_deg, told, error))
     return tuple(found)
 
 

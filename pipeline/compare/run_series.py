@@ -7,19 +7,19 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import SECOND_NS, Float
 from kempf.pipeline.compare.comparison import ORDER, ComparedRun
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import CHANNELS
 
 _UNITS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
 
 
-def instants_utc_ns(run: Run) -> NDArray[np.int64]:
+def instants_utc_ns(run: GridRun) -> NDArray[np.int64]:
     """Return the instants of a run's grid, UTC nanoseconds, shape (n,)."""
     instants: NDArray[np.int64] = run.start_utc_ns + np.round(run.time_s * SECOND_NS).astype(np.int64)
     return instants
 
 
-def first_heading(run: Run) -> float:
+def first_heading(run: GridRun) -> float:
     """Return the true heading, rad, that the measured one is counted from."""
     known = np.isfinite(run.measured[:, CHANNELS.index("heading")])
     from_first = run.measured[known, CHANNELS.index("heading")]

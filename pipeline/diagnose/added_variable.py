@@ -13,7 +13,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.screen import Candidate, nuisance
-from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.diagnosis_evidence import AddedVariable
 
@@ -34,7 +34,7 @@ def added_variables(diagnosis: Diagnosis) -> tuple[AddedVariable, ...]:
     return tuple(_added_variable(fit, candidate) for fit, candidate in pairs)
 
 
-def _added_variable(fit: Fit, candidate: Candidate) -> AddedVariable:
+def _added_variable(fit: PooledFit, candidate: Candidate) -> AddedVariable:
     known = nuisance(fit.linearised, N_HULL + len(fit.model.names))
     cleaned = known.clean(known.u[:, None])[:, 0]
     # the second half of each run's part is about the spread of the innovations, not about themselves

@@ -12,8 +12,8 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.forward_selection import added
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate import sensitivity
-from kempf.pipeline.estimate.pooled_fit import Fit
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import N_HULL, Point
 from kempf.pipeline.predict.free_run import predictive
 
@@ -37,13 +37,13 @@ class Unseen:
     held: Float
 
 
-def unseen(fit: Fit, held: Sequence[Run], workers: Executor) -> Unseen:
+def unseen(fit: PooledFit, held: Sequence[GridRun], workers: Executor) -> Unseen:
     """Return the log-likelihoods of runs that the parameters did not see.
 
     Parameters
     ----------
-    fit : Fit
-    held : sequence of Run
+    fit : PooledFit
+    held : sequence of GridRun
         Held out.
     workers : Executor
     """
@@ -56,7 +56,7 @@ class Confirmation:
 
     Attributes
     ----------
-    fit : Fit
+    fit : PooledFit
     likelihood_ratio : float
         Twice the log-likelihood gained.
     bic_change : float
@@ -74,7 +74,7 @@ class Confirmation:
         ``before``: none.
     """
 
-    fit: Fit
+    fit: PooledFit
     likelihood_ratio: float
     bic_change: float
     fold_gains: Float
@@ -97,10 +97,10 @@ class Confirmation:
 
 
 def confirm(
-    base: Fit,
+    base: PooledFit,
     before: Unseen,
     candidate: Candidate,
-    held: Sequence[Run],
+    held: Sequence[GridRun],
     workers: Executor,
     most_bic: float = np.inf,
 ) -> Confirmation:
@@ -108,12 +108,12 @@ def confirm(
 
     Parameters
     ----------
-    base : Fit
+    base : PooledFit
     before : Unseen
         Of ``base``, the same for all its candidates.
     candidate : Candidate
         Of the screen beside ``base``.
-    held : sequence of Run
+    held : sequence of GridRun
         Held out.
     workers : Executor
     most_bic : float, optional
@@ -143,7 +143,7 @@ def confirm(
     )
 
 
-def _left_out(fit: Fit, workers: Executor) -> Float:
+def _left_out(fit: PooledFit, workers: Executor) -> Float:
     """Log-likelihood of each run under what the other runs say of the shared parameters, one step from the fit."""
     shared = N_HULL + len(fit.model.names)
     informations, scores = [], []

@@ -20,8 +20,8 @@ from kempf.pipeline.diagnose.ridge_reference import Flexible, flexible
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.estimate.pooled_fit import Fit
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.pooled_start import Start
 from kempf.pipeline.predict.free_run import FreeRun, free_run
 from kempf.schemas.effect import Effect
@@ -40,7 +40,7 @@ class Step:
 
     Attributes
     ----------
-    fit : Fit
+    fit : PooledFit
     added : Effect or None
         None on the first.
     chosen_from : tuple of (Candidate, Confirmation)
@@ -53,7 +53,7 @@ class Step:
         Free runs of the fitted and of the held-out manoeuvres.
     """
 
-    fit: Fit
+    fit: PooledFit
     added: Effect | None
     chosen_from: tuple[tuple[Candidate, Confirmation], ...]
     refused: tuple[tuple[Candidate, Confirmation], ...]
@@ -84,23 +84,23 @@ class Diagnosis:
 
     Attributes
     ----------
-    way : tuple of Fit
+    way : tuple of PooledFit
         The plain model, then with one given effect more after the other; the last one is diagnosed.
     steps : tuple of Step
         The diagnosed model first.
     before, after : Flexible or None
         The flexible reference beside the plain model and beside the last; None with a single run.
-    fitted, held : tuple of Run
+    fitted, held : tuple of GridRun
     gross_errors : int
     settings : DiagnosisSettings
     """
 
-    way: tuple[Fit, ...]
+    way: tuple[PooledFit, ...]
     steps: tuple[Step, ...]
     before: Flexible | None
     after: Flexible | None
-    fitted: tuple[Run, ...]
-    held: tuple[Run, ...]
+    fitted: tuple[GridRun, ...]
+    held: tuple[GridRun, ...]
     gross_errors: int
     settings: DiagnosisSettings
 
@@ -110,7 +110,7 @@ def _silent(_: str) -> None:
 
 
 def diagnose(
-    runs: Sequence[Run],
+    runs: Sequence[GridRun],
     spec: ModelSpec,
     start: Start,
     effects: Mapping[str, Effect],
@@ -123,7 +123,7 @@ def diagnose(
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of GridRun
         All usable manoeuvres in order of time.
     spec : ModelSpec
         Disturbances.
@@ -183,7 +183,7 @@ def diagnose(
     return Diagnosis(tuple(fits), tuple(steps), before, after, fitted, tuple(held), gross, settings)
 
 
-def _unseen(step: Step, held: Sequence[Run], workers: Executor) -> Unseen:
+def _unseen(step: Step, held: Sequence[GridRun], workers: Executor) -> Unseen:
     """Return how a rung predicts what it did not see; its confirmation has asked that already."""
     return step.chosen_from[0][1].unseen if step.chosen_from else unseen(step.fit, held, workers)
 
@@ -202,7 +202,7 @@ def _idle(steps: Sequence[Step]) -> Effect | None:
 
 
 def _without(
-    idle: Effect, steps: list[Step], held: Sequence[Run], effects: Mapping[str, Effect], workers: Executor
+    idle: Effect, steps: list[Step], held: Sequence[GridRun], effects: Mapping[str, Effect], workers: Executor
 ) -> list[Step]:
     """Climb the ladder again without an effect; what was refused on the way stays told."""
     made = [steps[0]]
@@ -219,17 +219,17 @@ def _without(
     return made
 
 
-def step_of(fit: Fit, held: Sequence[Run]) -> Step:
+def step_of(fit: PooledFit, held: Sequence[GridRun]) -> Step:
     """Return a fitted model as a rung by itself, with its free runs and nothing screened."""
     return _step(fit, fit.model.effects[-1] if fit.model.effects else None, (), (), held, ())
 
 
 def _step(
-    fit: Fit,
+    fit: PooledFit,
     added: Effect | None,
     chosen_from: tuple[tuple[Candidate, Confirmation], ...],
     refused: tuple[tuple[Candidate, Confirmation], ...],
-    held: Sequence[Run],
+    held: Sequence[GridRun],
     screened: Sequence[Candidate],
     workers: Executor | None = None,
 ) -> Step:

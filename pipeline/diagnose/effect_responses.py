@@ -14,14 +14,14 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
-from kempf.pipeline.estimate.filtered import Filtered
-from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.batch import MOST
 from kempf.schemas.effect import Effect
 
 
 @dataclass(frozen=True)
-class Trial:
+class EffectTrial:
     """An effect with the values of its parameters at which it is tried."""
 
     effect: Effect
@@ -33,14 +33,14 @@ class Trial:
         return tuple(k for k, p in enumerate(self.effect.parameters) if not p.shapes)
 
 
-def responses(base: Fit, trials: Sequence[Trial], workers: Executor) -> list[Float | None]:
+def responses(base: PooledFit, trials: Sequence[EffectTrial], workers: Executor) -> list[Float | None]:
     """Return what each trial does to the whitened innovations of all runs.
 
     Parameters
     ----------
-    base : Fit
+    base : PooledFit
         The fitted model; it has none of the effects.
-    trials : sequence of Trial
+    trials : sequence of EffectTrial
     workers : Executor
         Share the passes; nothing depends on it.
 
@@ -62,7 +62,7 @@ def responses(base: Fit, trials: Sequence[Trial], workers: Executor) -> list[Flo
     return found
 
 
-def _bundles(trials: Sequence[Trial]) -> list[list[int]]:
+def _bundles(trials: Sequence[EffectTrial]) -> list[list[int]]:
     """Put trials together that fit into the lanes of one filter.
 
     States of their own would be carried by all, and courses of the rudder be computed for all: effects with these share
@@ -84,7 +84,7 @@ def _alone(effect: Effect) -> str:
     return effect.name if effect.states or effect.rudder_course is not None else ""
 
 
-def _passed(base: Fit, trials: Sequence[Trial]) -> list[Float | None]:
+def _passed(base: PooledFit, trials: Sequence[EffectTrial]) -> list[Float | None]:
     """Return the columns of trials that go through the filter together, None for one that runs away."""
     model, effects = base.model, {trial.effect.name: trial.effect for trial in trials}
     first, at = {}, base.values.size
@@ -102,7 +102,7 @@ def _passed(base: Fit, trials: Sequence[Trial]) -> list[Float | None]:
     hulls = np.repeat(base.hull[:, None], len(lanes), axis=1)
     for number, (filtered, line) in enumerate(zip(base.runs, base.linearised, strict=True)):
         levels = np.repeat(np.exp(base.levels[number])[:, None], len(lanes), axis=1)
-        others = Filtered(filtered.run, model, filtered.spec).run_filters(hulls, levels, values)
+        others = RunFilter(filtered.run, model, filtered.spec).run_filters(hulls, levels, values)
         for lane, ((trial, k), other) in enumerate(zip(lanes, others, strict=True)):
             if np.isfinite(other.log_likelihood):
                 parts[lane].append(sensitivity.difference(line.passed, other, trial.steps[k]))

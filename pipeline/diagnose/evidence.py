@@ -15,7 +15,7 @@ from kempf.pipeline.diagnose.judged_run import JudgedRun, judged_fitted, judged_
 from kempf.pipeline.diagnose.manoeuvre_evidence import SailedZigzag, manoeuvre_evidence
 from kempf.pipeline.diagnose.misfit import misfit_of
 from kempf.pipeline.diagnose.unmodelled_acceleration import unmodelled_acceleration
-from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.predict.run_residuals import PhaseInterval
 from kempf.pipeline.predict.smoothed_states import smoothed_states
 from kempf.schemas.diagnosis_evidence import (
@@ -107,12 +107,12 @@ class _Judged:
         )
 
 
-def fitted_parameters(fit: Fit) -> tuple[FittedParameter, ...]:
+def fitted_parameters(fit: PooledFit) -> tuple[FittedParameter, ...]:
     """Return the parameters of hull and effects with their standard errors.
 
     Parameters
     ----------
-    fit : Fit
+    fit : PooledFit
     """
     names = [*HULL_PARAMETERS, *fit.model.names]
     units = [*HULL_PARAMETERS.values(), *(parameter.unit for _, parameter in fit.model.parameters)]

@@ -16,10 +16,10 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screen import Candidate, score
 from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.grid_gating import without_gross_errors
-from kempf.pipeline.estimate.pooled_fit import Fit
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.pooled_start import INTENSITIES, Start
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import DataRejected
@@ -33,22 +33,22 @@ _LONGER = (1.0, 10.0, 30.0)
 _RUNS_OF_RACE = 3
 
 
-def plain(runs: Sequence[Run], spec: ModelSpec, start: Start, workers: Executor) -> tuple[Fit, int]:
+def plain(runs: Sequence[GridRun], spec: ModelSpec, start: Start, workers: Executor) -> tuple[PooledFit, int]:
     """Fit eq. (16), take gross errors out, fit again.
 
     Returns
     -------
-    fit : Fit
+    fit : PooledFit
     gross_errors : int
     """
-    found = pooled_fit.fit(Augmented(), runs, spec, start.hull, start.levels, np.zeros(0), workers)
+    found = pooled_fit.fit(EffectModel(), runs, spec, start.hull, start.levels, np.zeros(0), workers)
     cleaned, gross = without_gross_errors(found)
     if gross:
-        found = pooled_fit.fit(Augmented(), cleaned, spec, found.hull, found.levels, np.zeros(0), workers)
+        found = pooled_fit.fit(EffectModel(), cleaned, spec, found.hull, found.levels, np.zeros(0), workers)
     return found, gross
 
 
-def added(base: Fit, candidate: Candidate, workers: Executor, wanted: float = -np.inf) -> Fit:
+def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: float = -np.inf) -> PooledFit:
     """Fit a model with one effect more.
 
     A hull fitted without a lag of the rudder has bent itself to stand in for it, and from there the way to the true
@@ -57,7 +57,7 @@ def added(base: Fit, candidate: Candidate, workers: Executor, wanted: float = -n
 
     Parameters
     ----------
-    base : Fit
+    base : PooledFit
     candidate : Candidate
         Of the screen beside ``base``.
     workers : Executor
@@ -118,15 +118,15 @@ def is_ship(hull: Float) -> bool:
 
 
 def _climbed(
-    base: Fit,
-    model: Augmented,
+    base: PooledFit,
+    model: EffectModel,
     hull: Float,
     begin: Float,
     workers: Executor,
     iterations: int,
     chosen: slice = slice(None),
     wanted: float = -np.inf,
-) -> Fit:
+) -> PooledFit:
     filtered = tuple(replace(one, model=model) for one in base.runs[chosen])
     values = np.concatenate([base.values, begin])
     return pooled_fit.climb(filtered, hull, base.levels[chosen], values, workers, iterations, wanted)
@@ -143,13 +143,13 @@ def _begin(candidate: Candidate) -> Float:
 
 
 def staged(
-    runs: Sequence[Run], spec: ModelSpec, start: Start, effects: Sequence[Effect], workers: Executor
-) -> tuple[list[Fit], int]:
+    runs: Sequence[GridRun], spec: ModelSpec, start: Start, effects: Sequence[Effect], workers: Executor
+) -> tuple[list[PooledFit], int]:
     """Fit the plain ship, then with one effect more after the other.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of GridRun
     spec : ModelSpec
     start : Start
     effects : sequence of Effect
@@ -158,7 +158,7 @@ def staged(
 
     Returns
     -------
-    fits : list of Fit
+    fits : list of PooledFit
         The last one is the model.
     gross_errors : int
 

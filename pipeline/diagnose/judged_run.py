@@ -9,9 +9,9 @@ import numpy as np
 
 from kempf.pipeline.diagnose.diagnosis import Step
 from kempf.pipeline.estimate import sensitivity
-from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.levels import fit_levels
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
 
@@ -58,14 +58,14 @@ def judged_fitted(step: Step, phases: Mapping[str, Sequence[PhaseInterval]]) -> 
 
 
 def judged_held_out(
-    step: Step, held: Sequence[Run], phases: Mapping[str, Sequence[PhaseInterval]]
+    step: Step, held: Sequence[GridRun], phases: Mapping[str, Sequence[PhaseInterval]]
 ) -> tuple[JudgedRun, ...]:
     """Return the held-out manoeuvres under the model of a step.
 
     Parameters
     ----------
     step : Step
-    held : sequence of Run
+    held : sequence of GridRun
         In the order of ``step.held``.
     phases : mapping of str to sequence of PhaseInterval
         By run; a run without has none.
@@ -73,7 +73,7 @@ def judged_held_out(
     fit, made = step.fit, []
     usual = np.mean(fit.levels, axis=0)
     for run, free in zip(held, step.held, strict=True):
-        filtered = Filtered(run, fit.model, fit.runs[0].spec)
+        filtered = RunFilter(run, fit.model, fit.runs[0].spec)
         levels = fit_levels(filtered, fit.hull, fit.values, usual).levels
         point = Point(fit.hull, fit.values, levels)
         passed = sensitivity.passed(filtered, point)

@@ -11,7 +11,7 @@ import numpy as np
 from kempf.pipeline.channels.series import SECOND_NS, Float
 from kempf.pipeline.compare.overshoot import Turn, compare_overshoots, turns_of
 from kempf.pipeline.diagnose.judged_run import JudgedRun
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.pipeline.predict.prediction import of_free_run, predict
 from kempf.schemas.diagnosis_evidence import (
@@ -105,7 +105,7 @@ def manoeuvre_evidence(
     )
 
 
-def _seconds(run: Run, utc_ns: int) -> float:
+def _seconds(run: GridRun, utc_ns: int) -> float:
     return (utc_ns - run.start_utc_ns) / SECOND_NS
 
 
@@ -117,7 +117,7 @@ class _BaseCourse:
     zero: float
 
     @classmethod
-    def of(cls, run: Run, until_s: float, base_heading_deg: float) -> _BaseCourse:
+    def of(cls, run: GridRun, until_s: float, base_heading_deg: float) -> _BaseCourse:
         first = run.time_s <= max(until_s, float(run.time_s[1]))
         known = np.isfinite(run.measured[first, 2]).any()
         # without a measured heading, the one that the wind's direction is turned by

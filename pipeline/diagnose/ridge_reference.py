@@ -15,10 +15,10 @@ from itertools import pairwise
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.effect_responses import Trial, responses
+from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
 from kempf.pipeline.diagnose.formula_search import Term, search
 from kempf.pipeline.diagnose.screen import Nuisance, nuisance
-from kempf.pipeline.estimate.pooled_fit import Fit
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect, Parameter
 
@@ -110,16 +110,16 @@ class Flexible:
         return bool(np.mean(self.gains > 0.0) > 0.5)
 
 
-def flexible(base: Fit, workers: Executor) -> Flexible:
+def flexible(base: PooledFit, workers: Executor) -> Flexible:
     """Measure what a smooth force could still explain.
 
     Parameters
     ----------
-    base : Fit
+    base : PooledFit
         At least two runs.
     workers : Executor
     """
-    found = responses(base, [Trial(effect, (_SIZE,)) for effect in TERMS], workers)
+    found = responses(base, [EffectTrial(effect, (_SIZE,)) for effect in TERMS], workers)
     X = np.column_stack([c if c is not None else np.zeros((2 * base.count, 1)) for c in found])
     known = nuisance(base.linearised, N_HULL + len(base.model.names))
     return _cross_validated(known, X, [line.u.size for line in base.linearised])

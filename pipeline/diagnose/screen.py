@@ -19,8 +19,8 @@ import numpy as np
 from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.effect_responses import Trial, responses
-from kempf.pipeline.estimate.pooled_fit import Fit, Linearised
+from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
+from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect
 
@@ -118,12 +118,12 @@ def _orthonormal(columns: Float) -> Float:
     return basis
 
 
-def screen(base: Fit, effects: Mapping[str, Effect], workers: Executor) -> list[Candidate]:
+def screen(base: PooledFit, effects: Mapping[str, Effect], workers: Executor) -> list[Candidate]:
     """Score every effect that the model does not have yet, the highest first.
 
     Parameters
     ----------
-    base : Fit
+    base : PooledFit
         The fitted model.
     effects : mapping
         Catalogue.
@@ -143,33 +143,33 @@ def screen(base: Fit, effects: Mapping[str, Effect], workers: Executor) -> list[
     return sorted(found, key=lambda one: (-np.nan_to_num(one.score, nan=-1.0), one.effect.name))
 
 
-def missing_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
+def missing_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
     """Return the channels that an effect needs and some of the runs lack."""
     return tuple(c for c in effect.needs if any(c not in one.run.channels for one in base.runs))
 
 
-def telling_channels(base: Fit, effect: Effect) -> tuple[str, ...]:
+def telling_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
     """Return the channels that show an effect already in every run."""
     return tuple(c for c in effect.measured_by if all(c in one.run.channels for one in base.runs))
 
 
-def score(base: Fit, effect: Effect, workers: Executor) -> Candidate:
+def score(base: PooledFit, effect: Effect, workers: Executor) -> Candidate:
     """Score one effect beside a fitted model; its p-value is adjusted for its own grid alone."""
     (one,) = _scored(base, nuisance(base.linearised, N_HULL + len(base.model.names)), [effect], workers)
     return replace(one, p_adjusted=one.p_value)
 
 
-def _scored(base: Fit, known: Nuisance, effects: Sequence[Effect], workers: Executor) -> list[Candidate]:
+def _scored(base: PooledFit, known: Nuisance, effects: Sequence[Effect], workers: Executor) -> list[Candidate]:
     nothing = [_untested(base, effect) for effect in effects]
     # what a channel shows already is in the inputs: scored beside them it would stand in for something else
     tried = [one.effect for one in nothing if not (one.missing or one.told_by)]
-    trials = [Trial(effect, steps) for effect in tried for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in tried for steps in _grid(effect)]
     columns = responses(base, trials, workers)
     moved = {(trial.effect.name, trial.steps): one for trial, one in zip(trials, columns, strict=True)}
     return list(workers.map(lambda one: _best(known, one, moved), nothing))
 
 
-def _untested(base: Fit, effect: Effect) -> Candidate:
+def _untested(base: PooledFit, effect: Effect) -> Candidate:
     unknown = np.full(len(effect.parameters), np.nan)
     missing, told_by = missing_channels(base, effect), telling_channels(base, effect)
     return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, np.nan, missing, np.zeros(0), (), told_by)

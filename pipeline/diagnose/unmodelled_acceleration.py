@@ -7,18 +7,18 @@ from collections.abc import Sequence
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.schemas.diagnosis_evidence import Quartiles, UnmodelledAcceleration, UnmodelledPart
 
 _BINS, _FEWEST = 12, 5
 
 
-def unmodelled_acceleration(runs: Sequence[Run], states: Sequence[Float]) -> UnmodelledAcceleration:
+def unmodelled_acceleration(runs: Sequence[GridRun], states: Sequence[Float]) -> UnmodelledAcceleration:
     """Return what acts beside a model at the instants of all manoeuvres.
 
     Parameters
     ----------
-    runs : sequence of Run
+    runs : sequence of GridRun
     states : sequence of ndarray, shape (n, 4)
         v, r, F and M of each, given all its measurements (`kempf.pipeline.predict.smoothed_states`); a manoeuvre
         with NaN is left out.

@@ -35,7 +35,7 @@ NEGLIGIBLE = 5e-4
 
 
 @dataclass(frozen=True)
-class Finding:
+class EffectFinding:
     """One effect's verdict, and why."""
 
     verdict: Literal["present", "negligible", "not_testable", "absent"]
@@ -89,7 +89,7 @@ def _unseen_by_reference(diagnosis: Diagnosis) -> bool:
     return foreseen - diagnosis.before.gain > max(UNSEEN, UNSEEN_SHARE * foreseen)
 
 
-def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
+def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
     """Return the verdict on one candidate of the first screen.
 
     Parameters
@@ -102,19 +102,21 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
     for number, step in enumerate(diagnosis.steps[1:], start=1):
         members = {c.effect.name: k for c, k in step.chosen_from}
         if effect.name in members and something_left(diagnosis):
-            return Finding("absent", f"{NOT_EXPLAINED}: {sized(effect, members[effect.name])}")
+            return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized(effect, members[effect.name])}")
         if effect.name in members:
             others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
             alike = f"; these data would fit {_listed(others)} as well" if others else ""
-            return Finding("present", f"step {number}: {sized(effect, members[effect.name])}{alike}")
+            return EffectFinding("present", f"step {number}: {sized(effect, members[effect.name])}{alike}")
     untestable = _untestable(candidate)
     if untestable:
-        return Finding("not_testable", untestable)
+        return EffectFinding("not_testable", untestable)
     if candidate.p_adjusted >= diagnosis.settings.level:
-        return Finding("absent", _absent(candidate))
+        return EffectFinding("absent", _absent(candidate))
     measured = sum(line.u.size // 2 for line in diagnosis.steps[0].fit.linearised)
     if candidate.score / measured < NEGLIGIBLE:
-        return Finding("negligible", f"it explains {_percent(candidate.score / measured)} of the innovations' variance")
+        return EffectFinding(
+            "negligible", f"it explains {_percent(candidate.score / measured)} of the innovations' variance"
+        )
     return _explained_away(diagnosis, candidate)
 
 
@@ -131,17 +133,17 @@ def _untestable(candidate: Candidate) -> str:
     return f"{weak} {candidate.effect.separated_by}" if weak else ""
 
 
-def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> Finding:
+def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
     """Say why an effect that looked present by itself is not claimed."""
     name = candidate.effect.name
     added = [step.added.title for step in diagnosis.steps[1:] if step.added is not None]
     last = {c.effect.name: c for c in diagnosis.steps[-1].screened}.get(name)
     refits = [k for step in diagnosis.steps for c, k in step.refused if c.effect.name == name]
     if added and (last is None or np.isnan(last.score) or last.p_adjusted >= diagnosis.settings.level):
-        return Finding("absent", f"no longer significant once {_listed(added)} is included")
+        return EffectFinding("absent", f"no longer significant once {_listed(added)} is included")
     if refits:
-        return Finding("absent", f"significant by itself; refused after the refit: {refusal(refits[-1])}")
-    return Finding("absent", "significant by itself; not refitted, as others explain more")
+        return EffectFinding("absent", f"significant by itself; refused after the refit: {refusal(refits[-1])}")
+    return EffectFinding("absent", "significant by itself; not refitted, as others explain more")
 
 
 def refusal(one: Confirmation) -> str:

@@ -8,11 +8,11 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.ekf import extended
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.model.batch import LANES, MOST, ONE
 from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.model_spec import ModelSpec
 
 #: so few sets of parameters go through one by one: a group of lanes costs as much as these
@@ -44,19 +44,19 @@ class Passed:
 
 
 @dataclass(frozen=True, eq=False)
-class Filtered:
+class RunFilter:
     """A run, a model and a disturbance model, ready for parameters.
 
     Attributes
     ----------
-    run : Run
-    model : Augmented
+    run : GridRun
+    model : EffectModel
     spec : ModelSpec
         Which disturbances there are.
     """
 
-    run: Run
-    model: Augmented
+    run: GridRun
+    model: EffectModel
     spec: ModelSpec
 
     def present(self) -> Float:

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from kempf.pipeline.estimate.pooled_fit import Fit
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.record.record import MEASUREMENTS
 
 #: robust standard deviations beyond which a measurement is gross, and within which its neighbours must lie
@@ -17,12 +17,12 @@ _GROSS, _SOUND = 6.0, 4.0
 _MOST = 0.02
 
 
-def left_out(run: Run, instants_s: Mapping[str, Sequence[float]]) -> Run:
+def left_out(run: GridRun, instants_s: Mapping[str, Sequence[float]]) -> GridRun:
     """Return a run without the measurements that a fit left out, as `instants_left_out` told them.
 
     Parameters
     ----------
-    run : Run
+    run : GridRun
     instants_s : mapping of str to sequence of float
         Seconds from the beginning of the run, by measurement.
     """
@@ -33,19 +33,19 @@ def left_out(run: Run, instants_s: Mapping[str, Sequence[float]]) -> Run:
     return replace(run, measured=measured)
 
 
-def instants_left_out(before: Run, after: Run) -> dict[str, list[float]]:
+def instants_left_out(before: GridRun, after: GridRun) -> dict[str, list[float]]:
     """Return the instants, s from the beginning, at which a run lost measurements, by measurement.
 
     Parameters
     ----------
-    before, after : Run
+    before, after : GridRun
         The same run with and without them.
     """
     gone = np.isfinite(before.measured) & ~np.isfinite(after.measured)
     return {name: before.time_s[gone[:, i]].tolist() for i, name in enumerate(MEASUREMENTS) if gone[:, i].any()}
 
 
-def without_gross_errors(fit: Fit) -> tuple[list[Run], int]:
+def without_gross_errors(fit: PooledFit) -> tuple[list[GridRun], int]:
     """Return the runs of a fit without single gross errors, and how many measurements went.
 
     A misfit of the model comes in stretches; an error of a reading stands alone. Only the second kind is taken out.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import HIGHEST, LOWEST, CommonLikelihood
 from kempf.pipeline.estimate.search.climb import climb
 
@@ -22,7 +22,7 @@ class Levels:
     Attributes
     ----------
     levels : ndarray, shape (6,)
-        Logarithms, see `kempf.pipeline.estimate.pooled_fit.Fit`.
+        Logarithms, see `kempf.pipeline.estimate.pooled_fit.PooledFit`.
     log_likelihood : float
     converged : bool
     """
@@ -32,12 +32,12 @@ class Levels:
     converged: bool
 
 
-def fit_levels(filtered: Filtered, hull: Float, values: Float, start: Float) -> Levels:
+def fit_levels(filtered: RunFilter, hull: Float, values: Float, start: Float) -> Levels:
     """Climb the likelihood in the noise levels, hull and effects held.
 
     Parameters
     ----------
-    filtered : Filtered
+    filtered : RunFilter
     hull, values : ndarray, shapes (6,) and (p,)
     start : ndarray, shape (6,)
         Logarithms of the levels.

@@ -10,13 +10,13 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
-from kempf.pipeline.estimate.filtered import Filtered, Passed
-from kempf.pipeline.estimate.record.grid_run import Run
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search import climb as search
 from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.estimate.sensitivity import N_HULL, N_LEVELS, Point
 from kempf.pipeline.model.batch import MOST
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.model_spec import ModelSpec
 
@@ -50,13 +50,13 @@ class Linearised:
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class PooledFit:
     """A model fitted to several runs.
 
     Attributes
     ----------
-    model : Augmented
-    runs : tuple of Filtered
+    model : EffectModel
+    runs : tuple of RunFilter
     hull, values : ndarray
         Shared parameters.
     levels : ndarray, shape (runs, 6)
@@ -72,8 +72,8 @@ class Fit:
     iterations : int
     """
 
-    model: Augmented
-    runs: tuple[Filtered, ...]
+    model: EffectModel
+    runs: tuple[RunFilter, ...]
     hull: Float
     values: Float
     levels: Float
@@ -101,8 +101,8 @@ class Fit:
 
 
 def fit(
-    model: Augmented,
-    runs: Sequence[Run],
+    model: EffectModel,
+    runs: Sequence[GridRun],
     spec: ModelSpec,
     hull: Float,
     levels: Float,
@@ -110,13 +110,13 @@ def fit(
     workers: Executor,
     *,
     max_iterations: int = _MAX_ITERATIONS,
-) -> Fit:
+) -> PooledFit:
     """Fit a model to several runs from a start.
 
     Parameters
     ----------
-    model : Augmented
-    runs : sequence of Run
+    model : EffectModel
+    runs : sequence of GridRun
     spec : ModelSpec
         Disturbances.
     hull, levels, values : ndarray
@@ -125,19 +125,19 @@ def fit(
         Runs share it; sums are in the order of the runs.
     max_iterations : int, optional
     """
-    filtered = tuple(Filtered(run, model, spec) for run in runs)
+    filtered = tuple(RunFilter(run, model, spec) for run in runs)
     return climb(filtered, hull, np.clip(levels, LOWEST, HIGHEST), values, workers, max_iterations)
 
 
 def climb(
-    filtered: tuple[Filtered, ...],
+    filtered: tuple[RunFilter, ...],
     hull: Float,
     levels: Float,
     values: Float,
     workers: Executor,
     max_iterations: int,
     wanted: float = -np.inf,
-) -> Fit:
+) -> PooledFit:
     """Climb to the maximum by damped Fisher scoring; given up where the log-likelihood ``wanted`` is out of reach."""
     model = filtered[0].model
     layout = CommonLikelihood(filtered, workers)
@@ -158,7 +158,7 @@ def climb(
     first = np.flatnonzero(index < shared)
     back = layout.scale[index[first]]
     covariance[np.ix_(index[first], index[first])] = inverse[np.ix_(first, first)] * np.outer(back, back)
-    return Fit(
+    return PooledFit(
         model=model,
         runs=filtered,
         hull=theta[:N_HULL],
@@ -176,7 +176,7 @@ def climb(
 class CommonLikelihood:
     """The log-likelihood of several runs over one vector: hull, effects in units of their steps, six levels a run."""
 
-    def __init__(self, filtered: Sequence[Filtered], workers: Executor) -> None:
+    def __init__(self, filtered: Sequence[RunFilter], workers: Executor) -> None:
         self.filtered, self.workers, self.model = filtered, workers, filtered[0].model
         self.shared = N_HULL + len(self.model.names)
         runs = len(filtered)
@@ -238,7 +238,7 @@ class CommonLikelihood:
 
 
 def linearise(
-    filtered: Sequence[Filtered], points: Sequence[Point], bases: Sequence[Passed], workers: Executor
+    filtered: Sequence[RunFilter], points: Sequence[Point], bases: Sequence[Passed], workers: Executor
 ) -> tuple[Linearised, ...]:
     """Return u and J of every run at its point, ``bases`` being the passes there."""
     # a group of lanes of one run is the smallest piece of work: so three runs keep two cores busy

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.filtered import Filtered, Passed
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
 
 _ROOT_2 = float(np.sqrt(2.0))
 N_HULL, N_LEVELS = 6, 6
@@ -52,12 +52,12 @@ class Point:
         return Point(vector[:N_HULL], vector[N_HULL : N_HULL + p], vector[N_HULL + p :])
 
 
-def passed(filtered: Filtered, point: Point) -> Passed:
+def passed(filtered: RunFilter, point: Point) -> Passed:
     """Run the filter at a point."""
     return filtered.run_filter(point.hull, np.exp(point.levels), point.values)
 
 
-def passes(filtered: Filtered, points: Sequence[Point]) -> list[Passed]:
+def passes(filtered: RunFilter, points: Sequence[Point]) -> list[Passed]:
     """Run the filter at several points at once."""
     hulls, levels = (np.stack(part, axis=-1) for part in ([p.hull for p in points], [p.levels for p in points]))
     return filtered.run_filters(hulls, np.exp(levels), np.stack([p.values for p in points], axis=-1))
@@ -78,13 +78,13 @@ def difference(base: Passed, other: Passed, step: float) -> Float:
     return np.concatenate([first, np.log(other.variance[made] / S) / _ROOT_2]) / step
 
 
-def active(filtered: Filtered) -> list[int]:
+def active(filtered: RunFilter) -> list[int]:
     """Return which numbers of `Point.vector` this run has."""
     shared = N_HULL + len(filtered.model.names)
     return [*range(shared), *(shared + i for i, used in enumerate(filtered.levels_used()) if used)]
 
 
-def steps(filtered: Filtered, point: Point) -> Float:
+def steps(filtered: RunFilter, point: Point) -> Float:
     """Return the step of every number of `Point.vector`; away from a bound where one is near."""
     hull = _HULL_STEP * _typical(filtered, point)
     effects = []
@@ -94,19 +94,19 @@ def steps(filtered: Filtered, point: Point) -> Float:
     return np.concatenate([hull, np.array(effects), np.full(N_LEVELS, _LEVEL_STEP)])
 
 
-def _typical(filtered: Filtered, point: Point) -> Float:
+def _typical(filtered: RunFilter, point: Point) -> Float:
     """Size of the hull parameters, also of one that happens to be near 0."""
     L = filtered.run.ship.length_m
     typical: Float = np.maximum(np.abs(point.hull), 0.02 * np.array([1 / L, 1.0, 1 / L**2, 1 / L, 1 / L, 1 / L**2]))
     return typical
 
 
-def columns(filtered: Filtered, point: Point, base: Passed, wanted: Sequence[int]) -> list[Float]:
+def columns(filtered: RunFilter, point: Point, base: Passed, wanted: Sequence[int]) -> list[Float]:
     """Return columns of J, each of shape (2 m,), by a pass of the filter for each, several passes at once.
 
     Parameters
     ----------
-    filtered : Filtered
+    filtered : RunFilter
     point : Point
     base : Passed
         The pass there.

@@ -31,7 +31,7 @@ Table = tuple[NDArray[np.int64], NDArray[np.int64], Float]
 
 
 @dataclass(frozen=True, eq=False)
-class Augmented:
+class EffectModel:
     """A model: eq. (16) and effects in order.
 
     Parameters
@@ -79,9 +79,9 @@ class Augmented:
         """Upper bounds, shape (p,)."""
         return np.array([p.high for _, p in self.parameters])
 
-    def with_effect(self, effect: Effect) -> Augmented:
+    def with_effect(self, effect: Effect) -> EffectModel:
         """Return the model with one more effect at its end."""
-        return Augmented((*self.effects, effect))
+        return EffectModel((*self.effects, effect))
 
     @cached_property
     def table(self) -> Table:

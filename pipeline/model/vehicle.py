@@ -43,7 +43,7 @@ class SlowDisturbance:
 
 
 @dataclass(frozen=True, eq=False)
-class Augmented:
+class AugmentedVehicle:
     """Vehicle and disturbances as one system for the filter (3)-(5).
 
     Attributes
@@ -147,7 +147,7 @@ class LinearVehicle:
         result: Float = 0.5 * self.step_s * (direction + A @ direction)
         return result
 
-    def augmented(self, A: Float, B: Float) -> Augmented:
+    def augmented(self, A: Float, B: Float) -> AugmentedVehicle:
         """Join states and disturbances.
 
         Parameters
@@ -161,7 +161,9 @@ class LinearVehicle:
         whole[:n, :n], whole[:n, n:], whole[n:, n:] = A, self.entering(A), np.diag(decay)
         G = np.zeros((n + m, m))
         G[n:] = np.diag([d.std for d in self.disturbances] * np.sqrt(1.0 - decay**2))
-        return Augmented(whole, np.vstack([B, np.zeros((m, B.shape[1]))]), G, np.hstack([np.eye(n), self.carried]))
+        return AugmentedVehicle(
+            whole, np.vstack([B, np.zeros((m, B.shape[1]))]), G, np.hstack([np.eye(n), self.carried])
+        )
 
     def hidden(self, A: Float) -> tuple[str, ...]:
         """Name the states and disturbances that the measurements leave undetermined; empty where (A, H) is observable.

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.filtered import Filtered
-from kempf.pipeline.estimate.pooled_fit import Fit
-from kempf.pipeline.estimate.record.grid_run import Run, spread
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 
 #: how far the constants may lie from nothing, SI: v, r, psi, F, M, c_1, c_2, b
 _PRIOR = np.array([2.0, 0.1, 0.1, 0.05, 1e-3, 1.0, 1.0, 1e-3])
@@ -65,20 +65,20 @@ class FreeRun:
         return float(np.nanmean(self.relative))
 
 
-def free_run(fit: Fit, run: Run) -> FreeRun:
+def free_run(fit: PooledFit, run: GridRun) -> FreeRun:
     """Let the fitted ship run freely through a manoeuvre.
 
     Parameters
     ----------
-    fit : Fit
-    run : Run
+    fit : PooledFit
+    run : GridRun
         Fitted or held out.
     """
-    filtered = Filtered(run, fit.model, fit.runs[0].spec)
+    filtered = RunFilter(run, fit.model, fit.runs[0].spec)
     return free_run_of(filtered, fit.hull, fit.values)
 
 
-def free_run_of(filtered: Filtered, hull: Float, values: Float) -> FreeRun:
+def free_run_of(filtered: RunFilter, hull: Float, values: Float) -> FreeRun:
     """As `free_run`, for a model and parameters that stand by themselves."""
     run = filtered.run
     used = np.flatnonzero(filtered.present()).tolist()
@@ -122,8 +122,8 @@ def free_run_of(filtered: Filtered, hull: Float, values: Float) -> FreeRun:
     return FreeRun(run.name, predicted, run.measured - predicted, constants)
 
 
-def predictive(fit: Fit, run: Run) -> float:
+def predictive(fit: PooledFit, run: GridRun) -> float:
     """Return the log-likelihood of a manoeuvre that was not fitted, its noise levels the mean of the fitted ones."""
-    filtered = Filtered(run, fit.model, fit.runs[0].spec)
+    filtered = RunFilter(run, fit.model, fit.runs[0].spec)
     levels = np.exp(np.mean(fit.levels, axis=0))
     return filtered.run_filter(fit.hull, levels, fit.values).log_likelihood

@@ -8,7 +8,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
-from kempf.pipeline.estimate.filtered import Filtered, Passed
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.one_step_fit import fit_percent
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.free_run import CHANNELS, FreeRun, free_run_of
@@ -83,12 +83,12 @@ class Predicted:
         return found
 
 
-def predict(filtered: Filtered, point: Point, horizon: Horizon) -> Predicted:
+def predict(filtered: RunFilter, point: Point, horizon: Horizon) -> Predicted:
     """Predict a run.
 
     Parameters
     ----------
-    filtered : Filtered
+    filtered : RunFilter
     point : Point
         Parameters and noise levels; a free run asks for no levels.
     horizon : Horizon
@@ -110,12 +110,12 @@ def predict(filtered: Filtered, point: Point, horizon: Horizon) -> Predicted:
     return Predicted(horizon, filtered.run.time_s, passed.predicted, error, std, settling)
 
 
-def of_free_run(filtered: Filtered, found: FreeRun, horizon: Horizon) -> Predicted:
+def of_free_run(filtered: RunFilter, found: FreeRun, horizon: Horizon) -> Predicted:
     """Return a free run that was made already as a prediction.
 
     Parameters
     ----------
-    filtered : Filtered
+    filtered : RunFilter
     found : FreeRun
         Of it.
     horizon : Horizon
@@ -143,7 +143,7 @@ def settled(passed: Passed) -> tuple[Float, Float]:
     return np.where(good, passed.innovation, np.nan), np.where(good, np.sqrt(variance), np.nan)
 
 
-def _ahead(filtered: Filtered, point: Point, horizon: Horizon, seconds: float) -> Predicted:
+def _ahead(filtered: RunFilter, point: Point, horizon: Horizon, seconds: float) -> Predicted:
     """Go without measurements for one horizon in four, from as many beginnings as predict every instant once."""
     run = filtered.run
     n = run.measured.shape[0]
@@ -175,12 +175,12 @@ def _ahead(filtered: Filtered, point: Point, horizon: Horizon, seconds: float) -
     return Predicted(horizon, run.time_s, predicted, error, std, left_out)
 
 
-def _require_finite(passed: Passed, filtered: Filtered) -> None:
+def _require_finite(passed: Passed, filtered: RunFilter) -> None:
     if not np.isfinite(passed.log_likelihood):
         raise _diverges(filtered)
 
 
-def _diverges(filtered: Filtered) -> DataRejected:
+def _diverges(filtered: RunFilter) -> DataRejected:
     return DataRejected(
         "prediction_diverges",
         f"The model runs away under the rudder of {filtered.run.name}: its state leaves all bounds.",

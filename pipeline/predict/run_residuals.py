@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import SECOND_NS, Float
-from kempf.pipeline.estimate.filtered import Filtered, Passed
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.pipeline.predict.prediction import settled
 
@@ -30,7 +30,7 @@ class Looked:
 
     Attributes
     ----------
-    filtered : Filtered
+    filtered : RunFilter
     passed : Passed
         Of the fitted model, with the run's noise levels.
     free : FreeRun
@@ -38,7 +38,7 @@ class Looked:
         None where they are not known.
     """
 
-    filtered: Filtered
+    filtered: RunFilter
     passed: Passed
     free: FreeRun
     phases: tuple[PhaseInterval, ...] = ()

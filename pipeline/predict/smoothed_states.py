@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import expm
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.filtered import INITIAL_STD, Filtered
+from kempf.pipeline.estimate.filtered import INITIAL_STD, RunFilter
 from kempf.pipeline.estimate.filters.smoother import LinearSystem, smooth
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.free_run import FreeRun
@@ -19,12 +19,12 @@ from kempf.pipeline.predict.free_run import FreeRun
 _V, _R, _PSI, _F, _M, _C1, _C2, _B = range(8)
 
 
-def smoothed_states(filtered: Filtered, point: Point, free: FreeRun) -> Float:
+def smoothed_states(filtered: RunFilter, point: Point, free: FreeRun) -> Float:
     """Return v, r, F and M at every instant given all measurements, shape (n, 4), SI; NaN where the free run diverges.
 
     Parameters
     ----------
-    filtered : Filtered
+    filtered : RunFilter
     point : Point
         Its parameters and noise levels.
     free : FreeRun
@@ -42,7 +42,7 @@ def smoothed_states(filtered: Filtered, point: Point, free: FreeRun) -> Float:
     return np.column_stack([drift + found[:, _V], turn + found[:, _R], force + found[:, _F], moment + found[:, _M]])
 
 
-def _departures(filtered: Filtered, point: Point, error: Float) -> LinearSystem:
+def _departures(filtered: RunFilter, point: Point, error: Float) -> LinearSystem:
     """Return the linear system of v, r, psi, F, M, c_1, c_2, b about a free run."""
     run, spec = filtered.run, filtered.spec
     n, V = error.shape[0], run.speed_m_s

@@ -44,7 +44,7 @@ class HullParameters:
 
 
 @dataclass(frozen=True)
-class Hull:
+class SimulatedHull:
     """A ship as the simulator knows her.
 
     Parameters
@@ -129,10 +129,10 @@ def _mariner() -> HullParameters:
 _PLAUSIBLE = "plausible, not a real ship"
 
 #: The catalogue, by name.
-HULLS: dict[str, Hull] = {
+HULLS: dict[str, SimulatedHull] = {
     hull.name: hull
     for hull in (
-        Hull(
+        SimulatedHull(
             "mariner",
             "linear derivatives of Chislett and Stroem-Tejsen (1965), Hy-5, as in the MSS toolbox; the speed loss, "
             "the wind arm and the roll are plausible",
@@ -145,7 +145,7 @@ HULLS: dict[str, Hull] = {
             wind_arm_per_m=1.0 / 160.93,
             rudder_rate_rad_s=radians(5.0),
         ),
-        Hull(
+        SimulatedHull(
             "container",
             _PLAUSIBLE,
             from_prime(220.0, ((-0.80, -0.36), (-3.6, -2.4)), (-0.17, 1.5)),
@@ -157,7 +157,7 @@ HULLS: dict[str, Hull] = {
             wind_arm_per_m=1.1 / 220.0,
             shaft_speed_per_s=1.6,
         ),
-        Hull(
+        SimulatedHull(
             "tanker",
             _PLAUSIBLE + "; barely stable on a straight course",
             from_prime(320.0, ((-0.60, -0.30), (-3.0, -1.7)), (-0.12, 1.05)),
@@ -170,7 +170,7 @@ HULLS: dict[str, Hull] = {
             shaft_speed_per_s=1.2,
             heel_per_g=0.8,
         ),
-        Hull(
+        SimulatedHull(
             "ferry",
             _PLAUSIBLE,
             from_prime(140.0, ((-0.85, -0.33), (-3.6, -2.6)), (-0.20, 1.9)),
@@ -182,7 +182,7 @@ HULLS: dict[str, Hull] = {
             wind_arm_per_m=1.0 / 140.0,
             rudder_rate_rad_s=radians(5.0),
         ),
-        Hull(
+        SimulatedHull(
             "usv",
             _PLAUSIBLE,
             from_prime(3.0, ((-1.0, -0.30), (-3.0, -3.2)), (-0.25, 1.8)),

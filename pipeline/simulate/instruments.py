@@ -9,7 +9,7 @@ from math import pi
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.pipeline.simulate.sensors import SENSORS, Setting
 from kempf.pipeline.simulate.trajectory import Trajectory
@@ -94,7 +94,7 @@ class InstrumentRecord:
 def measure(
     instrument: Instrument,
     trajectory: Trajectory,
-    hull: Hull,
+    hull: SimulatedHull,
     setting: Setting,
     *,
     start_utc_ns: int,
@@ -109,7 +109,7 @@ def measure(
         The instrument.
     trajectory : Trajectory
         The truth.
-    hull : Hull
+    hull : SimulatedHull
         The ship.
     setting : Setting
         Origin, antenna and what else a sensor needs to know.

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.plant import AUTOPILOT, FIXED, ORDERS, ZIGZAG
 
 Float = NDArray[np.float64]
@@ -29,7 +29,7 @@ class Steering:
     longest_s: float
 
 
-def _autopilot(heading_rad: float, hull: Hull, longest_s: float) -> Steering:
+def _autopilot(heading_rad: float, hull: SimulatedHull, longest_s: float) -> Steering:
     # gains in the ship's own time L/V: well damped for every hull of the catalogue, a fraction of a degree in calm sea
     time = hull.length_m / hull.trial_speed_m_s
     return Steering(AUTOPILOT, np.array([heading_rad, 1.0, 1.5 * time, 0.15 / time]), np.empty(0), longest_s)
@@ -51,7 +51,7 @@ class SteadyCourse:
     heading_deg: float | None = None
     kind: ClassVar[str] = "steady_course"
 
-    def steering(self, hull: Hull, heading_rad: float, random: np.random.Generator) -> Steering:
+    def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
         """Return the step for the kernel; ``heading_rad`` is the heading at its beginning, not wrapped."""
         turn = 0.0
         if self.heading_deg is not None:
@@ -67,7 +67,7 @@ class CourseChange:
     duration_s: float = 300.0
     kind: ClassVar[str] = "course_change"
 
-    def steering(self, hull: Hull, heading_rad: float, random: np.random.Generator) -> Steering:
+    def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
         """Return the step for the kernel; ``heading_rad`` is the heading at its beginning, not wrapped."""
         return _autopilot(heading_rad + radians(self.change_deg), hull, self.duration_s)
 
@@ -96,7 +96,7 @@ class ZigzagTest:
     duration_s: float = 1200.0
     kind: ClassVar[str] = "zigzag"
 
-    def steering(self, hull: Hull, heading_rad: float, random: np.random.Generator) -> Steering:
+    def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
         """Return the step for the kernel; ``heading_rad`` is the heading at its beginning, not wrapped."""
         side = 1.0 if self.first_side == "starboard" else -1.0
         legs = inf if self.legs is None else float(self.legs)
@@ -113,7 +113,7 @@ class TurningCircle:
     duration_s: float = 1800.0
     kind: ClassVar[str] = "turning_circle"
 
-    def steering(self, hull: Hull, heading_rad: float, random: np.random.Generator) -> Steering:
+    def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
         """Return the step for the kernel; ``heading_rad`` is the heading at its beginning, not wrapped."""
         settings = np.array([radians(self.rudder_deg), radians(self.change_deg)])
         return Steering(FIXED, settings, np.empty(0), self.duration_s)
@@ -139,7 +139,7 @@ class HandSteering:
     longest_period_s: float = 150.0
     kind: ClassVar[str] = "hand_steering"
 
-    def steering(self, hull: Hull, heading_rad: float, random: np.random.Generator) -> Steering:
+    def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
         """Return the step for the kernel; the orders are drawn from ``random``."""
         n_waves = 16
         time = np.arange(int(self.duration_s / TICK_S) + 1) * TICK_S

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.simulate.compiled import compiled
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 
 Float = NDArray[np.float64]
 
@@ -30,7 +30,7 @@ AUTOPILOT, ZIGZAG, FIXED, ORDERS = 0, 1, 2, 3
 _HALVINGS = 60
 
 
-def hull_constants(hull: Hull) -> Float:
+def hull_constants(hull: SimulatedHull) -> Float:
     """Return what the kernels read of a hull: a11, a12, a21, a22, b1, b2, l, V0, T, c, L; shape (11,)."""
     p = hull.parameters
     own = [hull.wind_arm_per_m, hull.trial_speed_m_s, hull.surge_time_s, hull.speed_loss, hull.length_m]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.simulate.disturbances import Environment
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.manoeuvre import (
     TICK_S,
     HandSteering,
@@ -54,7 +54,7 @@ class _Tables:
 
 
 def sail(
-    hull: Hull,
+    hull: SimulatedHull,
     programme: tuple[Step, ...],
     environment: Environment,
     *,
@@ -66,7 +66,7 @@ def sail(
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
         The ship.
     programme : tuple of Step
         What she does, in order; at least one step.
@@ -193,7 +193,7 @@ def _check(programme: tuple[Step, ...]) -> None:
             )
 
 
-def _check_range(hull: Hull, state: Float) -> None:
+def _check_range(hull: SimulatedHull, state: Float) -> None:
     speed = state[:, STATE.index("V")]
     turn = np.abs(state[:, STATE.index("r")]) * hull.length_m / hull.trial_speed_m_s
     if bool(np.all(np.isfinite(state))) and bool(np.all(speed > 0.0)) and bool(np.all(turn < 5.0)):

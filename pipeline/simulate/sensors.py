@@ -9,7 +9,7 @@ from math import cos, pi, radians, sin, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.plant import STATE
 from kempf.pipeline.simulate.trajectory import Sample
 
@@ -49,7 +49,7 @@ class Setting:
 
 
 Noise = dict[str, float]
-Read = Callable[[Sample, Hull, Setting, Noise, np.random.Generator], dict[str, Float]]
+Read = Callable[[Sample, SimulatedHull, Setting, Noise, np.random.Generator], dict[str, Float]]
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,9 @@ def radii_of_curvature(latitude_rad: float) -> tuple[float, float]:
     return a * (1.0 - e2) / (w * sqrt(w)), a / sqrt(w)
 
 
-def _gnss(sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator) -> dict[str, Float]:
+def _gnss(
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
+) -> dict[str, Float]:
     n = sample.time_s.size
     forward, starboard = setting.antenna_forward_m, setting.antenna_starboard_m
     v_north, v_east = sample.ground_velocity(forward, starboard)
@@ -101,36 +103,40 @@ def _gnss(sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np
 
 
 def _heading(
-    sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
 ) -> dict[str, Float]:
     return {"heading_rad": (_state(sample, "psi") + _draw(random, noise, "heading", sample.time_s.size)) % (2 * pi)}
 
 
 def _yaw_rate(
-    sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
 ) -> dict[str, Float]:
     return {"yaw_rate_rad_s": _state(sample, "r") + _draw(random, noise, "yaw_rate", sample.time_s.size)}
 
 
 def _rudder(
-    sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
 ) -> dict[str, Float]:
     return {"rudder_angle_rad": sample.rudder + _draw(random, noise, "rudder_angle", sample.time_s.size)}
 
 
 def _rudder_order(
-    sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
 ) -> dict[str, Float]:
     return {"rudder_order_rad": sample.order.copy()}
 
 
-def _log(sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator) -> dict[str, Float]:
+def _log(
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
+) -> dict[str, Float]:
     return {
         "speed_through_water_m_s": _state(sample, "V") + _draw(random, noise, "speed_through_water", sample.time_s.size)
     }
 
 
-def _wind(sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator) -> dict[str, Float]:
+def _wind(
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
+) -> dict[str, Float]:
     n = sample.time_s.size
     true = np.interp(
         sample.time_s, np.arange(setting.wind_speed_path.size) * setting.wind_step_s, setting.wind_speed_path
@@ -144,15 +150,21 @@ def _wind(sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np
     return {"wind_speed_m_s": np.abs(speed), "wind_angle_rad": angle % (2 * pi)}
 
 
-def _shaft(sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator) -> dict[str, Float]:
+def _shaft(
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
+) -> dict[str, Float]:
     return {"shaft_speed_per_s": hull.shaft_speed_per_s + _draw(random, noise, "shaft_speed", sample.time_s.size)}
 
 
-def _depth(sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator) -> dict[str, Float]:
+def _depth(
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
+) -> dict[str, Float]:
     return {"water_depth_m": setting.water_depth_m + _draw(random, noise, "water_depth", sample.time_s.size)}
 
 
-def _roll(sample: Sample, hull: Hull, setting: Setting, noise: Noise, random: np.random.Generator) -> dict[str, Float]:
+def _roll(
+    sample: Sample, hull: SimulatedHull, setting: Setting, noise: Noise, random: np.random.Generator
+) -> dict[str, Float]:
     # outward heel: a turn to starboard heels her to port, which is negative
     lateral_g = _state(sample, "V") * _state(sample, "r") / _GRAVITY_M_S2
     return {"roll_rad": -hull.heel_per_g * lateral_g + _draw(random, noise, "roll", sample.time_s.size)}

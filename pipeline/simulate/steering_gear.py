@@ -16,7 +16,7 @@ import numpy as np
 from kempf.pipeline.simulate.plant import Float
 
 
-class Part(Protocol):
+class GearPart(Protocol):
     """One part of the gear."""
 
     def __call__(self, begin_rad: float, end_rad: float, cell_s: float) -> float:
@@ -85,11 +85,11 @@ class SteeringGear:
 
     Parameters
     ----------
-    parts : sequence of Part
+    parts : sequence of GearPart
     zero_rad : float, optional
     """
 
-    def __init__(self, parts: Sequence[Part] = (), zero_rad: float = 0.0) -> None:
+    def __init__(self, parts: Sequence[GearPart] = (), zero_rad: float = 0.0) -> None:
         self._parts, self._zero_rad = tuple(parts), zero_rad
         self._ends = [0.0] * len(self._parts)
 

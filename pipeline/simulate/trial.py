@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
-from kempf.pipeline.simulate.hulls import HULLS, Hull, HullParameters
+from kempf.pipeline.simulate.hulls import HULLS, HullParameters, SimulatedHull
 from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument, InstrumentRecord, measure
 from kempf.pipeline.simulate.manoeuvre import ManoeuvreRecord, Side, SteadyCourse, Step, ZigzagTest
 from kempf.pipeline.simulate.programme import GRID_S, sail
@@ -31,7 +31,7 @@ class TrialSettings:
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
         The ship, such as one of `kempf.pipeline.simulate.hulls.HULLS`.
     programme : tuple of Step
         What she does; see `kempf.pipeline.simulate.manoeuvre`.
@@ -55,7 +55,7 @@ class TrialSettings:
         Integrator steps in a cell of 0.02 s.
     """
 
-    hull: Hull
+    hull: SimulatedHull
     programme: tuple[Step, ...]
     environment: Environment = CALM
     instruments: tuple[Instrument, ...] = DEFAULT_INSTRUMENTS

@@ -15,7 +15,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
 
 if TYPE_CHECKING:
-    from kempf.pipeline.model.effect_model import Augmented
+    from kempf.pipeline.model.effect_model import EffectModel
 
 #: v, r, psi, F and M come before the states of effects, in the filter's order
 V, R, PSI, F, M = 0, 1, 2, 3, 4
@@ -29,7 +29,7 @@ class ShipEffects:
 
     Attributes
     ----------
-    model : Augmented
+    model : EffectModel
     values : ndarray, shape (p,)
         Their parameters.
     length_m, draught_m : float
@@ -38,7 +38,7 @@ class ShipEffects:
         Which log the ship is as in, 0 for the first: what a change of the load goes by.
     """
 
-    model: Augmented
+    model: EffectModel
     values: Float
     length_m: float = 100.0
     draught_m: float = 1.0

@@ -1,7 +1,7 @@
 """A ship on her course under a law: the loop, what it recorded, and the numbers that are compared.
 
-The ship is any `Ship`: the loop knows what her instruments show and what rudder it orders. It shares no dynamics with
-her. `kempf.flows.jobs.steered_ship` is the simulator as one.
+The ship is any `SteerableShip`: the loop knows what her instruments show and what rudder it orders, and shares no
+dynamics with her. `kempf.flows.jobs.steered_ship` is the simulator as one.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from kempf.pipeline.steering.course_keeping import Law
 from kempf.schemas.errors import UsageError
 
 
-class Ship(Protocol):
+class SteerableShip(Protocol):
     """What is steered."""
 
     def measure(self) -> tuple[Float, float]:
@@ -43,7 +43,7 @@ class Track:
     course_rad : ndarray, shape (n,)
         Heading that was ordered.
     truth : ndarray, shape (n, 8)
-        See `Ship.truth`.
+        See `SteerableShip.truth`.
     estimate : ndarray, shape (n, n_state)
         v, r, psi (from the course at the start), F, V_T as the law sees them, then the states of effects.
     order_rad : ndarray, shape (n,)
@@ -101,13 +101,13 @@ class Performance:
 
 
 def keep_course(
-    ship: Ship, law: Law, duration_s: float, course_rad: float, changes: tuple[tuple[float, float], ...] = ()
+    ship: SteerableShip, law: Law, duration_s: float, course_rad: float, changes: tuple[tuple[float, float], ...] = ()
 ) -> Track:
     """Steer a ship by a law.
 
     Parameters
     ----------
-    ship : Ship
+    ship : SteerableShip
     law : Law
     duration_s : float
     course_rad : float
@@ -151,7 +151,7 @@ def keep_course(
 
 
 @dataclass(frozen=True)
-class CourseChange:
+class CourseChangeResponse:
     """How the last change of course went.
 
     Attributes
@@ -169,7 +169,7 @@ class CourseChange:
     settled_s: float | None
 
 
-def course_change(track: Track) -> CourseChange | None:
+def course_change(track: Track) -> CourseChangeResponse | None:
     """Measure the last change of course of a track; None where there is none."""
     steps = np.flatnonzero(np.diff(track.course_rad))
     if not steps.size:
@@ -180,7 +180,7 @@ def course_change(track: Track) -> CourseChange | None:
     outside = np.flatnonzero(np.abs(error) > 0.1 * abs(change))
     last = int(outside[-1]) if outside.size else -1
     settled = float(time[last + 1]) if last + 1 < time.size else None
-    return CourseChange(change, float(max(np.max(error), 0.0)), settled)
+    return CourseChangeResponse(change, float(max(np.max(error), 0.0)), settled)
 
 
 def performance(track: Track, settle_s: float, until_s: float = inf) -> Performance:

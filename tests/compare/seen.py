@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 
 from kempf.pipeline.estimate import sensitivity
-from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.filters.ekf import ROWS
-from kempf.pipeline.estimate.record.grid_run import Run, Ship, make_run, step_of
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run, step_of
 from kempf.pipeline.estimate.sensitivity import Point
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.predict.free_run import free_run_of
 from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
 from kempf.pipeline.simulate.trial import Trial
@@ -26,14 +26,14 @@ NOISE = np.array([0.03, 5e-4, 2e-3])
 LENGTH_M = 160.0
 
 
-def run_of(trial: Trial, spec: ModelSpec = SPEC, name: str = "seg-1") -> Run:
+def run_of(trial: Trial, spec: ModelSpec = SPEC, name: str = "seg-1") -> GridRun:
     record = record_of(trial)
-    ship = Ship(LENGTH_M, 8.0, trial.truth.wind_arm_per_m)
+    ship = ShipConstants(LENGTH_M, 8.0, trial.truth.wind_arm_per_m)
     return make_run(name, record, instruments_of(trial), spec, ship, step_of([record], LENGTH_M))
 
 
-def filtered_of(trial: Trial, spec: ModelSpec = SPEC, name: str = "seg-1") -> Filtered:
-    return Filtered(run_of(trial, spec, name), Augmented(), spec)
+def filtered_of(trial: Trial, spec: ModelSpec = SPEC, name: str = "seg-1") -> RunFilter:
+    return RunFilter(run_of(trial, spec, name), EffectModel(), spec)
 
 
 def levels_of(noise: np.ndarray = NOISE) -> np.ndarray:
@@ -41,7 +41,9 @@ def levels_of(noise: np.ndarray = NOISE) -> np.ndarray:
     return np.log(np.array([1e-7, 1e-9, 1e-5, *noise]))
 
 
-def sailed_by_model(run: Run, hull: np.ndarray, *, seed: int = 1, late_s: float = 0.0, scale: float = 1.0) -> Filtered:
+def sailed_by_model(
+    run: GridRun, hull: np.ndarray, *, seed: int = 1, late_s: float = 0.0, scale: float = 1.0
+) -> RunFilter:
     """The run with measurements that the model in still water makes, every instant and channel, with white noise.
 
     ``late_s``: by how much the rudder reaches the hull later than it is logged.
@@ -52,12 +54,12 @@ def sailed_by_model(run: Run, hull: np.ndarray, *, seed: int = 1, late_s: float 
         inputs[:, 1] = np.concatenate([np.full(shift, inputs[0, 1]), inputs[:-shift, 1]])
     n = run.measured.shape[0]
     exact = replace(run, rudder_noise=np.zeros(n), offset_s=np.zeros((n, 3)), measured=np.zeros((n, 3)))
-    clean = Filtered(replace(exact, inputs=inputs), Augmented(), QUIET).free(hull, np.zeros(0), np.zeros(8))
+    clean = RunFilter(replace(exact, inputs=inputs), EffectModel(), QUIET).free(hull, np.zeros(0), np.zeros(8))
     noise = scale * NOISE * np.random.default_rng(seed).standard_normal((n, 3))
-    return Filtered(replace(exact, measured=clean + noise), Augmented(), QUIET)
+    return RunFilter(replace(exact, measured=clean + noise), EffectModel(), QUIET)
 
 
-def looked_at(filtered: Filtered, hull: np.ndarray, phases: tuple[PhaseInterval, ...] = ()) -> Looked:
+def looked_at(filtered: RunFilter, hull: np.ndarray, phases: tuple[PhaseInterval, ...] = ()) -> Looked:
     point = Point(hull, np.zeros(0), levels_of())
     free = free_run_of(filtered, hull, np.zeros(0))
     return Looked(filtered, sensitivity.passed(filtered, point), free, phases)

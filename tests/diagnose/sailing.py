@@ -17,7 +17,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.estimate.record.grid_run import Run, Ship, make_run
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
 from kempf.pipeline.estimate.record.record import make_record
 from kempf.pipeline.estimate.search.pooled_start import Start, start_of
 from kempf.pipeline.simulate.trial import Trial, TrialSettings
@@ -36,7 +36,7 @@ _STEP_S, _LEAD_S, _LEGS = 2.0, 20.0, 4
 class Sailed:
     """Four zigzags of one ship, ready to be diagnosed; ``c`` is the size of her effect."""
 
-    runs: tuple[Run, ...]
+    runs: tuple[GridRun, ...]
     start: Start
     spec: ModelSpec
     c: float
@@ -60,7 +60,7 @@ def sailed(effect: str = "none", *, strength: int = 2, seed: int = 3, noise: flo
     trial = readings.read(hull, voyage, weather.wind_from_rad, settings, sensor)
     instruments = instruments_of(trial)
     spec = ModelSpec(rate_bias=False, wind_arm_per_m=hull.wind_arm_per_m)
-    ship = Ship(hull.length_m, hull.draught_m, hull.wind_arm_per_m)
+    ship = ShipConstants(hull.length_m, hull.draught_m, hull.wind_arm_per_m)
     records = [
         make_record(instruments, *(settings.start_utc_ns + round(t * SECOND_NS) for t in (e[0] - _LEAD_S, e[_LEGS])))
         for e in voyage.executes_s

@@ -13,10 +13,10 @@ from kempf.pipeline.diagnose.confirm import confirm, unseen
 from kempf.pipeline.diagnose.diagnosis import step_of
 from kempf.pipeline.diagnose.screen import score
 from kempf.pipeline.estimate import pooled_fit, sensitivity
-from kempf.pipeline.estimate.filtered import Filtered, Passed
-from kempf.pipeline.estimate.pooled_fit import Fit, Linearised, linearise
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit, linearise
 from kempf.pipeline.estimate.sensitivity import Point
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import get
 from tests.diagnose.sailing import WORKERS, Sailed, sailed
 
@@ -27,11 +27,11 @@ class Counted:
     def __init__(self) -> None:
         self.passes, self.ask, self.ask_at_once = 0, sensitivity.passed, sensitivity.passes
 
-    def one(self, filtered: Filtered, point: Point) -> Passed:
+    def one(self, filtered: RunFilter, point: Point) -> Passed:
         self.passes += 1
         return self.ask(filtered, point)
 
-    def several(self, filtered: Filtered, points: Sequence[Point]) -> list[Passed]:
+    def several(self, filtered: RunFilter, points: Sequence[Point]) -> list[Passed]:
         self.passes += len(points)
         return self.ask_at_once(filtered, points)
 
@@ -44,10 +44,10 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counted:
     return found
 
 
-def plain_of(ship: Sailed, iterations: int) -> Fit:
+def plain_of(ship: Sailed, iterations: int) -> PooledFit:
     runs, start = ship.runs[:2], ship.start.of([0, 1])
     return pooled_fit.fit(
-        *(Augmented(), runs, ship.spec, start.hull, start.levels, np.zeros(0), WORKERS), max_iterations=iterations
+        *(EffectModel(), runs, ship.spec, start.hull, start.levels, np.zeros(0), WORKERS), max_iterations=iterations
     )
 
 

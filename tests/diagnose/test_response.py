@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.diagnose import effect_responses
-from kempf.pipeline.diagnose.effect_responses import Trial, responses
+from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
 from kempf.pipeline.diagnose.ridge_reference import TERMS
 from kempf.pipeline.diagnose.screen import _grid
-from kempf.pipeline.estimate.filtered import Filtered
-from kempf.pipeline.estimate.pooled_fit import Fit, linearise
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise
 from kempf.pipeline.estimate.sensitivity import Point, passed
 from kempf.pipeline.model.batch import MOST
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect, Parameter
 from kempf.schemas.effects import catalogue
@@ -24,25 +24,25 @@ LEVELS = np.log(np.array([2e-3, 1e-5, 2e-2, 0.05, 6e-4, 2e-3]))
 
 
 @pytest.fixture(scope="module")
-def base() -> Fit:
+def base() -> PooledFit:
     """A model with one effect already, at parameters near the truth, beside a short run."""
-    model, spec = Augmented((catalogue()["sway_quadratic"],)), ModelSpec()
-    runs = tuple(Filtered(run, model, spec) for run in sailed("none").runs[:2])
+    model, spec = EffectModel((catalogue()["sway_quadratic"],)), ModelSpec()
+    runs = tuple(RunFilter(run, model, spec) for run in sailed("none").runs[:2])
     hull, values = mariner_like(runs[0].run.ship.length_m).array(), np.array([-0.01])
     points = [Point(hull, values, LEVELS) for _ in runs]
     lines = linearise(runs, points, [passed(run, point) for run, point in zip(runs, points, strict=True)], WORKERS)
     levels = np.stack([LEVELS, LEVELS])
     told = (0.0, np.full((7, 7), np.nan), tuple(lines), True, 0)
-    return Fit(model, runs, hull, values, levels, *told)
+    return PooledFit(model, runs, hull, values, levels, *told)
 
 
-def alone(base: Fit, trial: Trial) -> np.ndarray | None:
+def alone(base: PooledFit, trial: EffectTrial) -> np.ndarray | None:
     return effect_responses._passed(base, [trial])[0]
 
 
-def test_together_is_as_alone(base: Fit) -> None:
+def test_together_is_as_alone(base: PooledFit) -> None:
     chosen = [effect for effect in catalogue().values() if effect.name != "sway_quadratic"]
-    trials = [Trial(effect, steps) for effect in [*chosen[::3], *TERMS[:9]] for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in [*chosen[::3], *TERMS[:9]] for steps in _grid(effect)]
     found = responses(base, trials, WORKERS)
     assert max(map(len, effect_responses._bundles(trials))) > 5
     for trial, together in zip(trials, found, strict=True):
@@ -57,17 +57,17 @@ def test_together_is_as_alone(base: Fit) -> None:
 
 
 def test_no_bundle_is_wider_than_the_lanes_and_none_is_lost() -> None:
-    trials = [Trial(effect, steps) for effect in catalogue().values() for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in catalogue().values() for steps in _grid(effect)]
     bundles = effect_responses._bundles(trials)
     assert sorted(i for bundle in bundles for i in bundle) == list(range(len(trials)))
     for bundle in bundles:
         assert sum(len(trials[i].making) for i in bundle) <= MOST or len(bundle) == 1
 
 
-def test_one_that_is_no_number_takes_no_other_with_it(base: Fit) -> None:
+def test_one_that_is_no_number_takes_no_other_with_it(base: PooledFit) -> None:
     size = Parameter(name="c", unit="1", low=-1.0, high=1.0, steps=(0.01,), meaning="size")
     wild = Effect(name="wild", plain="wild", reference="none", parameters=(size,), terms={"yaw": "c/(r-r)"})
     tame = catalogue()["yaw_quadratic"]
-    trials = [Trial(effect, steps) for effect in (wild, tame) for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in (wild, tame) for steps in _grid(effect)]
     first, *others = responses(base, trials, WORKERS)
     assert first is None and all(one is not None for one in others)

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import get_args
 
 from kempf.pipeline.diagnose.ridge_reference import TERMS
-from kempf.pipeline.diagnose.verdict import Finding, Verdict
+from kempf.pipeline.diagnose.verdict import EffectFinding, Verdict
 from tests.docs.console import Command, follow, steps
 
 ROOT = Path(__file__).parents[2]
@@ -34,7 +34,7 @@ def test_every_verdict_is_told() -> None:
     section = TEXT.partition("## The verdicts")[2].partition("\n## ")[0]
     whole, _, single = section.partition("Each effect has a verdict")
     told = [set(re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)) for part in (whole, single)]
-    of_an_effect = get_args(import_module("typing").get_type_hints(Finding)["verdict"])
+    of_an_effect = get_args(import_module("typing").get_type_hints(EffectFinding)["verdict"])
     assert told == [set(get_args(Verdict)), set(of_an_effect)]
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from kempf.flows.jobs.examine_log import Examined, examine_instruments
+from kempf.flows.jobs.examine_log import ExaminedLog, examine_instruments
 from kempf.pipeline.channels.doctor.corrections import Correction, put_into
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.ingest.read import read_log
@@ -15,7 +15,7 @@ from kempf.schemas.profile import ChannelMap, VesselProfile
 from tests.doctor import closed_form_ship
 
 
-def look(data: bytes, profile: VesselProfile) -> Examined:
+def look(data: bytes, profile: VesselProfile) -> ExaminedLog:
     read = read_log("made.csv", data, profile)
     return examine_instruments(from_readings(read.frame), profile, "made.csv", read.format)
 

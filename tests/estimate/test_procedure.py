@@ -9,7 +9,7 @@ import pytest
 from scipy.linalg import expm
 
 from kempf.pipeline.estimate.paper.least_squares import Regression, regress
-from kempf.pipeline.estimate.paper.procedure import Course, Pass, ProcedureSettings, iterate, judge
+from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedurePass, ProcedureSettings, iterate, judge
 from kempf.pipeline.model.vehicle import LinearVehicle, SlowDisturbance
 from kempf.schemas.errors import DataRejected, UsageError
 from tests.estimate.depth_channel import DEPTH_STATE, DepthChannel, DepthRecord, sail_depth
@@ -25,7 +25,7 @@ def diver(step_s: float) -> LinearVehicle:
     return LinearVehicle(DEPTH_STATE, ("planes",), (0.5, 0.2, 0.3, 5.0), step_s, (FORCE, MOMENT, GYRO))
 
 
-def dive(share: float) -> tuple[DepthChannel, DepthRecord, Course]:
+def dive(share: float) -> tuple[DepthChannel, DepthRecord, ProcedureCourse]:
     settings = DepthChannel(noise=tuple(share * NOISE))
     sailed = sail_depth(settings)
     R = np.diag(np.square(max(share, 1e-3) * NOISE))
@@ -187,12 +187,12 @@ def test_a_filter_that_overflows_is_a_divergence_with_its_reason() -> None:
     assert course.last is None and len(course.passes) == 1
 
 
-def passes(values: list[float]) -> list[Pass]:
+def passes(values: list[float]) -> list[ProcedurePass]:
     def one(value: float) -> Regression:
         matrix = np.array([[value]])
         return Regression(matrix, np.zeros((1, 1)), matrix, matrix, 2)
 
-    return [Pass(one(value), np.nan, np.eye(1), None) for value in values]
+    return [ProcedurePass(one(value), np.nan, np.eye(1), None) for value in values]
 
 
 @pytest.mark.parametrize("period", [2, 3, 5])

@@ -23,7 +23,7 @@ from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, compaction, delta, logs, parameter_sets, runs
-from kempf.warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh, seen
 from tests.warehouse.samples import parameter_set
@@ -130,7 +130,7 @@ def test_an_old_set_is_built_again_after_compaction_and_vacuum(own: Warehouse, m
 
     names = [s.parameter_set_id for s in parameter_sets.get_all(own, "mariner")]
     for i in range(3):
-        runs.record_all(own, [runs.Run("run-0", "other", None, str(i))])
+        runs.record_all(own, [runs.FlowRun("run-0", "other", None, str(i))])
     assert own.folder is not None
     compaction.compact(own, more_files_than=1)
     for path in own.folder.rglob("*"):
@@ -228,7 +228,7 @@ def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeyp
 
 @pytest.mark.parametrize(("after", "std"), [(nan, 0.1), (nan, None), (2.0, None), (inf, 0.1)])
 def test_a_value_that_is_none_has_moved_beyond_any_limit(after: float, std: float | None):
-    estimates = [Estimate("a11", value, std, "1/m") for value in (1.0, after)]
+    estimates = [StoredValue("a11", value, std, "1/m") for value in (1.0, after)]
     sets = [parameter_set(parameters=(e,), parameter_set_id=f"ps-{k}") for k, e in enumerate(estimates)]
     (move,) = paired(sets[:1], sets[1:]).moves
     assert move.size == inf

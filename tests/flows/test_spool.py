@@ -81,7 +81,7 @@ def test_a_log_that_proves_unreadable_late_leaves_nothing(
     def refuse(*arguments: object) -> None:
         raise DataRejected("late", "Found at the end.", "Nothing.")
 
-    monkeypatch.setattr(decode._Job, "require_something", refuse)
+    monkeypatch.setattr(decode._DecodeJob, "require_something", refuse)
     ferry.write(tmp_path)
     warehouse = Warehouse(str(tmp_path / "w"))
     (outcome,) = ingest(warehouse, [tmp_path / "ferry.mcap"], given=VesselProfile.model_validate(ferry.profile))

@@ -14,7 +14,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.effects import RUDDER_COURSES
 from kempf.pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
 from kempf.pipeline.model.terms.ordinary import answer, require_ordinary, run
@@ -69,7 +69,7 @@ def test_the_catalogue_holds_what_was_asked_for() -> None:
 @each
 def test_it_can_be_computed_at_ordinary_states_and_is_absent_without_parameters(effect: Effect) -> None:
     require_ordinary(effect)
-    programs, code, _ = Augmented((effect,)).table
+    programs, code, _ = EffectModel((effect,)).table
     assert len(programs) == len(effect.terms) + 3 * len(effect.states)
     assert code.shape[1] == 2
 

@@ -7,11 +7,11 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from kempf.pipeline.estimate.filtered import Filtered
+from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.filters.ekf import ROWS
-from kempf.pipeline.estimate.record.grid_run import Run, Ship
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants
 from kempf.pipeline.model.dynamics import N_INPUT
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect
 from kempf.schemas.effects import catalogue
@@ -25,7 +25,7 @@ ALL = catalogue()
 
 
 @lru_cache(maxsize=1)
-def run() -> Run:
+def run() -> GridRun:
     """Three minutes of a turn to both sides, every channel logged; what is measured is made up."""
     n, step = 180, 1.0
     fine = step / ROWS * np.arange(ROWS * (n - 1) + 1)
@@ -40,7 +40,7 @@ def run() -> Run:
     measured = np.column_stack(
         [0.3 * np.cos(0.03 * fine[::ROWS]), 0.018 * np.cos(0.03 * fine[::ROWS]), coarse - coarse[0]]
     )
-    return Run(
+    return GridRun(
         name="made",
         start_utc_ns=0,
         step_s=step,
@@ -53,13 +53,13 @@ def run() -> Run:
         approach_m_s=7.0,
         approach_per_s=1.8,
         channels=frozenset(CHANNEL_SYMBOLS.values()),
-        ship=Ship(100.0, 6.0, 0.0),
+        ship=ShipConstants(100.0, 6.0, 0.0),
         day=1,
     )
 
 
 def innovations(effects: tuple[Effect, ...], values: list[float]) -> np.ndarray:
-    passed = Filtered(run(), Augmented(effects), SPEC).run_filter(HULL, LEVELS, np.array(values))
+    passed = RunFilter(run(), EffectModel(effects), SPEC).run_filter(HULL, LEVELS, np.array(values))
     assert np.isfinite(passed.log_likelihood)
     return np.asarray(passed.innovation / np.sqrt(passed.variance))
 
@@ -79,6 +79,6 @@ def test_absent_it_changes_no_bit_and_present_it_is_felt(effect: Effect) -> None
 def test_at_its_bounds_the_filter_gives_a_number_or_a_plain_no(effect: Effect) -> None:
     for end in ("low", "high"):
         values = [getattr(p, end) for p in effect.parameters]
-        passed = Filtered(run(), Augmented((effect,)), SPEC).run_filter(HULL, LEVELS, np.array(values))
+        passed = RunFilter(run(), EffectModel((effect,)), SPEC).run_filter(HULL, LEVELS, np.array(values))
         # a model far from the ship fits badly, but what it says is a number, or a plain no
         assert np.isfinite(passed.log_likelihood) or passed.log_likelihood == -np.inf

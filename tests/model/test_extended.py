@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kempf.pipeline.estimate.filtered import INITIAL_STD, Filtered
+from kempf.pipeline.estimate.filtered import INITIAL_STD, RunFilter
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.filters.linear_kernel import N_STATE, likelihood, no_trace
-from kempf.pipeline.estimate.record.grid_run import Run, Ship
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants
 from kempf.pipeline.model.discretise import LONGEST
 from kempf.pipeline.model.dynamics import N_INPUT
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.terms.own import from_expression
 from kempf.schemas.effect import Effect, ExtraState, Parameter
 from kempf.schemas.errors import UsageError
@@ -26,7 +26,7 @@ SPEC = ModelSpec(moment="gauss-markov")
 STEP, N = 1.0, 240
 
 
-def run_of(step: float = STEP, n: int = N, *, seed: int = 0) -> Run:
+def run_of(step: float = STEP, n: int = N, *, seed: int = 0) -> GridRun:
     """A zigzag of rudder, a speed that varies, a heading that swings, measurements that are only noise around it."""
     random = np.random.default_rng(seed)
     fine = step / ROWS * np.arange(ROWS * (n - 1) + 1)
@@ -38,7 +38,7 @@ def run_of(step: float = STEP, n: int = N, *, seed: int = 0) -> Run:
     heading = 0.3 + 0.3 * np.sin(coarse / 40.0)
     inputs[:, -3] = np.interp(fine, coarse, heading)
     inputs[:, -2] = fine
-    run = Run(
+    run = GridRun(
         name="made",
         start_utc_ns=0,
         step_s=step,
@@ -51,11 +51,11 @@ def run_of(step: float = STEP, n: int = N, *, seed: int = 0) -> Run:
         approach_m_s=9.0,
         approach_per_s=2.0,
         channels=frozenset(),
-        ship=Ship(150.0, 6.0, 0.0067),
+        ship=ShipConstants(150.0, 6.0, 0.0067),
         day=0,
     )
     start = np.array([0.2, 0.003, 0.1, 2e-3, 0.0, 0.2, 0.1, 1e-4])
-    measured = Filtered(run, Augmented(), SPEC).free(HULL, np.zeros(0), start)
+    measured = RunFilter(run, EffectModel(), SPEC).free(HULL, np.zeros(0), start)
     measured = measured + random.normal(0.0, LEVELS[3:], (n, 3))
     measured[random.random((n, 3)) < 0.3] = np.nan
     return replace(run, measured=measured)
@@ -63,7 +63,7 @@ def run_of(step: float = STEP, n: int = N, *, seed: int = 0) -> Run:
 
 def test_without_effects_it_is_the_kernel():
     run = run_of()
-    passed = Filtered(run, Augmented(), SPEC).run_filter(HULL, LEVELS, np.zeros(0))
+    passed = RunFilter(run, EffectModel(), SPEC).run_filter(HULL, LEVELS, np.zeros(0))
     rates = SPEC.wind_correlation_rate_per_s, SPEC.moment_correlation_rate_per_s, SPEC.current_correlation_rate_per_s
     stationary = LEVELS[:3] / np.sqrt(2.0 * np.array(rates))
     theta = np.concatenate([HULL, np.log(stationary), np.log(LEVELS[3:])])
@@ -106,14 +106,14 @@ def test_a_free_run_with_drag_is_that_of_another_integrator():
     run = run_of()
     effect = from_expression(["sway: -c*v*abs(v)/L; yaw: -c*r*abs(r)"])
     start = np.array([0.2, 0.003, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
-    found = Filtered(run, Augmented((effect,)), SPEC).free(HULL, np.array([1.7]), start)
+    found = RunFilter(run, EffectModel((effect,)), SPEC).free(HULL, np.array([1.7]), start)
 
     def slope(t: float, x: np.ndarray) -> list[float]:
         return drag(x, np.interp(t, run.time_s, run.speed_m_s), np.interp(t, run.time_s, run.rudder_rad), 1.7)
 
     told = solve_ivp(slope, (0.0, run.time_s[-1]), start[:3], t_eval=run.time_s, rtol=1e-10, atol=1e-12, max_step=0.25)
     assert found == pytest.approx(told.y.T, abs=2e-5)
-    plain = Filtered(run, Augmented(), SPEC).free(HULL, np.zeros(0), start)
+    plain = RunFilter(run, EffectModel(), SPEC).free(HULL, np.zeros(0), start)
     assert np.max(np.abs(plain - found)) > 0.05  # the term is no rounding
 
 
@@ -121,7 +121,7 @@ def test_a_measurement_off_the_grid_is_predicted_at_its_own_instant():
     run = run_of()
     late = replace(run, offset_s=np.full((N, 3), 0.25))
     start = np.array([0.2, 0.003, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
-    on, off = (Filtered(one, Augmented(), SPEC).free(HULL, np.zeros(0), start) for one in (run, late))
+    on, off = (RunFilter(one, EffectModel(), SPEC).free(HULL, np.zeros(0), start) for one in (run, late))
     fine = solve_ivp(
         lambda t, x: drag(x, np.interp(t, run.time_s, run.speed_m_s), np.interp(t, run.time_s, run.rudder_rad), 0.0),
         *((0.0, run.time_s[-1]), start[:3]),
@@ -148,7 +148,7 @@ def test_an_effect_with_a_state_of_its_own_remembers():
         states=(ExtraState(name="m1", derivative="(v - m1)/20"),),
     )
     start = np.array([0.2, 0.003, 0.1, 0.0, 0.0, 0.0, 0.0, 0.0])
-    found = Filtered(run, Augmented((memory,)), SPEC).free(HULL, np.array([0.02]), start)
+    found = RunFilter(run, EffectModel((memory,)), SPEC).free(HULL, np.array([0.02]), start)
 
     def slope(t: float, x: np.ndarray) -> list[float]:
         speed, rudder = np.interp(t, run.time_s, run.speed_m_s), np.interp(t, run.time_s, run.rudder_rad)
@@ -164,8 +164,8 @@ def test_an_effect_with_a_state_of_its_own_remembers():
 def test_effects_are_absent_at_nothing_and_named_once():
     run = run_of()
     one, other = from_expression(["yaw: r*abs(r)"], "one"), from_expression(["sway: v**3"], "other")
-    plain = Filtered(run, Augmented(), SPEC).run_filter(HULL, LEVELS, np.zeros(0))
-    both = Filtered(run, Augmented((one, other)), SPEC).run_filter(HULL, LEVELS, np.zeros(2))
+    plain = RunFilter(run, EffectModel(), SPEC).run_filter(HULL, LEVELS, np.zeros(0))
+    both = RunFilter(run, EffectModel((one, other)), SPEC).run_filter(HULL, LEVELS, np.zeros(2))
     assert both.log_likelihood == pytest.approx(plain.log_likelihood, rel=1e-13)
     with pytest.raises(UsageError, match="holds 'one' twice"):
-        Augmented((one, one))
+        EffectModel((one, one))

@@ -77,8 +77,8 @@ def test_several_writers_lose_nothing(bucket: Bucket) -> None:
     def write(k: int) -> None:
         mine = Warehouse(warehouse.uri, bucket.settings)
         vessels.register(mine, f"ship{k}", VesselProfile(vessel=f"ship{k}", length_m=50.0 + k))
-        runs.record_all(mine, [runs.Run(runs.run_id("test", k), "test", f"ship{k}", "done")])
-        runs.record_all(mine, [runs.Run(runs.run_id("test", "all"), "test", None, f"last was {k}")])
+        runs.record_all(mine, [runs.FlowRun(runs.run_id("test", k), "test", f"ship{k}", "done")])
+        runs.record_all(mine, [runs.FlowRun(runs.run_id("test", "all"), "test", None, f"last was {k}")])
 
     with ThreadPoolExecutor(3) as pool:
         list(pool.map(write, range(6)))
@@ -126,14 +126,14 @@ def test_compaction_and_vacuum_keep_in_a_bucket_what_they_keep_in_a_folder(bucke
         asked = inputs(start_utc_ns=START_NS + i)
         told = {"table_versions": delta.versions(warehouse) if i else {}}
         parameter_sets.insert(warehouse, [parameter_set("aurora", asked, provenance=told)])
-        runs.record_all(warehouse, [runs.Run("run-1", "test", None, str(i))])
+        runs.record_all(warehouse, [runs.FlowRun("run-1", "test", None, str(i))])
         moments.append(datetime.now(UTC))
     pins = compaction.pinned(warehouse)["runs"]
     then = [delta.read(warehouse, "runs", version=v).rows() for v in pins]
     assert len(then) == 2 and "runs" in delta.versions(warehouse)
     assert compaction.compact(warehouse, more_files_than=1) == ("parameter_sets",)
     for i in range(2):
-        runs.record_all(warehouse, [runs.Run("run-1", "test", None, f"later {i}")])
+        runs.record_all(warehouse, [runs.FlowRun("run-1", "test", None, f"later {i}")])
     time.sleep(1.1)  # a bucket tells the age of an object in whole seconds
     said = {one.table: one.files for one in compaction.vacuum(warehouse, 0.0, dry_run=True)}
     done = {one.table: one.files for one in compaction.vacuum(warehouse, 0.0)}

@@ -13,7 +13,7 @@ from scipy.integrate import solve_ivp
 
 import kempf.pipeline.simulate
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
-from kempf.pipeline.simulate.hulls import HULLS, Hull
+from kempf.pipeline.simulate.hulls import HULLS, SimulatedHull
 from kempf.pipeline.simulate.manoeuvre import HandSteering, SteadyCourse, TurningCircle, ZigzagTest
 from kempf.pipeline.simulate.programme import sail
 
@@ -38,7 +38,7 @@ def test_constant_rudder_ends_in_the_steady_turn_of_the_linear_equations(rudder_
     np.testing.assert_array_equal(path.column("V"), V)
 
 
-def reference_rate(hull: Hull, environment: Environment, t: float, y: np.ndarray, delta: float) -> list[float]:
+def reference_rate(hull: SimulatedHull, environment: Environment, t: float, y: np.ndarray, delta: float) -> list[float]:
     p = hull.parameters
     F, cn, ce, vt = (
         d.mean

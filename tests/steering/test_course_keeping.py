@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.linalg import solve_discrete_are
 
-from kempf.flows.jobs.steered_ship import Instruments, SteeredShip
+from kempf.flows.jobs.steered_ship import ShipInstruments, SteeredShip
 from kempf.pipeline.estimate.filters.kalman_filter import run_filter
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
@@ -24,7 +24,7 @@ from kempf.schemas.model_spec import ModelSpec
 from tests.steering.ships import covariance_of, hull_of
 
 STEADY = Environment(Disturbance(5e-3), Disturbance(0.15), Disturbance(0.26))
-QUIET = Instruments(0.0, 0.0, 0.0, 0.0)
+QUIET = ShipInstruments(0.0, 0.0, 0.0, 0.0)
 
 
 def law_of(name: str, factor: float = 1.0, **changes):

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from kempf.flows.jobs.steered_ship import SteeredShip
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.effects import RUDDER_COURSES
 from kempf.pipeline.model.terms.own import from_expression
 from kempf.pipeline.simulate.disturbances import CALM
@@ -32,17 +32,17 @@ STILL = ModelSpec(wind="none", current="none")
 
 def having(**values: float | tuple[float, ...]) -> ShipEffects:
     """Effects of the catalogue by name with their parameters."""
-    model = Augmented(tuple(catalogue.get(name) for name in values))
+    model = EffectModel(tuple(catalogue.get(name) for name in values))
     return ShipEffects(model, np.hstack([np.atleast_1d(v) for v in values.values()]), LENGTH, 7.5, 1.0)
 
 
 def own(text: str, *values: float) -> ShipEffects:
-    return ShipEffects(Augmented((from_expression(text),)), np.array(values), LENGTH, 7.5)
+    return ShipEffects(EffectModel((from_expression(text),)), np.array(values), LENGTH, 7.5)
 
 
 def test_without_effects_the_compiled_model_is_eq_16_to_the_last_bit() -> None:
     plain = linear_motion(HULL, None, V, arm_per_m=ARM)
-    same = linear_motion(HULL, ShipEffects(Augmented(), np.zeros(0)), V, arm_per_m=ARM)
+    same = linear_motion(HULL, ShipEffects(EffectModel(), np.zeros(0)), V, arm_per_m=ARM)
     for name in ("A", "B", "C", "D", "offsets"):
         assert np.array_equal(getattr(plain, name), getattr(same, name)), name
 

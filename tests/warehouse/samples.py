@@ -11,7 +11,7 @@ from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Read
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.deposit import Delivery
 from kempf.warehouse.examinations import StoredExamination
-from kempf.warehouse.parameter_set import Bounds, Estimate, Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, StoredValue, parameter_set_id
 from kempf.warehouse.segments import Segment, segment_id
 
 START_NS = 1_746_258_421_147_000_001
@@ -110,9 +110,9 @@ def parameter_set(vessel: str = "aurora", made_of: Inputs | None = None, **chang
         "segment_ids": ("seg-1",),
         "log_ids": made_of.log_ids,
         "start_utc_ns": made_of.bounds[0].start_utc_ns,
-        "parameters": (Estimate("a11", -0.1, 0.01, "1/m"), Estimate("b2", 1 / 3, None, "1/m^2")),
-        "discrete": (Estimate("phi11", 0.9, 0.1, "1"),),
-        "noise": (Estimate("sigma_r", 5e-4, 1e-5, "rad/s"),),
+        "parameters": (StoredValue("a11", -0.1, 0.01, "1/m"), StoredValue("b2", 1 / 3, None, "1/m^2")),
+        "discrete": (StoredValue("phi11", 0.9, 0.1, "1"),),
+        "noise": (StoredValue("sigma_r", 5e-4, 1e-5, "rad/s"),),
         "covariance_names": ("a11", "b2"),
         "covariance": ((1e-4, -0.0), (-0.0, float("nan"))),
         "fit": {"yaw_rate": {"fit_percent": 91.25, "lag": float("nan")}},

@@ -53,7 +53,7 @@ def lived_in(warehouse: Warehouse) -> list[dict[str, int]]:
         made = parameter_set("aurora", asked, provenance=told)
         parameter_sets.insert(warehouse, [made])
         aliases.point(warehouse, "aurora", made.parameter_set_id)
-        runs.record_all(warehouse, [runs.Run("run-1", "reprocess", "aurora", f"round {i}")])
+        runs.record_all(warehouse, [runs.FlowRun("run-1", "reprocess", "aurora", f"round {i}")])
         pins.append(told["table_versions"])
     return pins
 

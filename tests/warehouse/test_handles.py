@@ -19,7 +19,7 @@ ROOT = Path(__file__).parents[2]
 
 
 def put(warehouse: Warehouse, status: str, name: str = "run-1") -> None:
-    runs.record_all(warehouse, [runs.Run(name, "ingest", None, status)])
+    runs.record_all(warehouse, [runs.FlowRun(name, "ingest", None, status)])
 
 
 def stands(warehouse: Warehouse) -> dict[str, str]:

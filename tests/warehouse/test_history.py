@@ -10,7 +10,7 @@ from deltalake import DeltaTable
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import compaction, delta, history, parameter_sets, vessels
-from kempf.warehouse.parameter_set import Estimate
+from kempf.warehouse.parameter_set import StoredValue
 from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import START_NS, inputs, parameter_set
 
@@ -114,7 +114,7 @@ def test_clocks_that_disagree_do_not_reorder_versions(warehouse: Warehouse, monk
 
 
 def test_a_hundred_thousand_rows_are_quick(warehouse: Warehouse) -> None:
-    estimates = tuple(Estimate(f"p{i}", float(i), 0.1, "1") for i in range(50))
+    estimates = tuple(StoredValue(f"p{i}", float(i), 0.1, "1") for i in range(50))
     sets = [
         parameter_set(f"v{i % 4}", inputs(settings={"i": i}), parameters=estimates, parameter_set_id=f"ps-{i:016x}")
         for i in range(2000)

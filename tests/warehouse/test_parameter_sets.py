@@ -11,7 +11,7 @@ from kempf.warehouse import aliases, delta, parameter_sets, provenance
 from kempf.warehouse.agreement import content_digest, differences, verdict
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.parameter_set import Bounds, Estimate, ParameterSet, parameter_set_id
+from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue, parameter_set_id
 from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import START_NS, inputs, parameter_set
 
@@ -102,7 +102,7 @@ def test_it_shows_itself_as_json(warehouse: Warehouse) -> None:
 
 def test_malformed_ones_cannot_be_made() -> None:
     with pytest.raises(ValueError, match="share a name"):
-        parameter_set(parameters=(Estimate("a", 1.0, None, "1"), Estimate("a", 2.0, None, "1")))
+        parameter_set(parameters=(StoredValue("a", 1.0, None, "1"), StoredValue("a", 2.0, None, "1")))
     with pytest.raises(ValueError, match="covariance of 2"):
         parameter_set(covariance=((1.0,), (2.0,)))
     with pytest.raises(TypeError, match="set"):
@@ -125,8 +125,8 @@ def test_sizes_are_those_of_the_errors() -> None:
     one = parameter_set(covariance=((1e-4, 1e-20), (1e-20, 1e-4)))
     noisy = replace(one, covariance=((1e-4, 5e-20), (5e-20, 1e-4)))
     assert verdict(one, noisy, 1e-9)[0] == "equal within tolerance"  # against 1e-4, not against 1e-20
-    zero = parameter_set(parameters=(Estimate("a11", 0.0, 0.01, "1/m"),))
-    tiny = replace(zero, parameters=(Estimate("a11", 1e-14, 0.01, "1/m"),))
+    zero = parameter_set(parameters=(StoredValue("a11", 0.0, 0.01, "1/m"),))
+    tiny = replace(zero, parameters=(StoredValue("a11", 1e-14, 0.01, "1/m"),))
     assert verdict(zero, tiny, 1e-9)[0] == "equal within tolerance"
 
 
@@ -143,8 +143,8 @@ def test_numbers_on_the_path_count_for_bits_only() -> None:
     [
         {"warnings": ()},
         {"covariance": ((1e-4, 0.0), (-0.0, float("nan")))},
-        {"noise": (Estimate("sigma_r", 5e-4, 1e-5, "deg/s"),)},
-        {"parameters": (Estimate("b2", 1 / 3, None, "1/m^2"), Estimate("a11", -0.1, 0.01, "1/m"))},
+        {"noise": (StoredValue("sigma_r", 5e-4, 1e-5, "deg/s"),)},
+        {"parameters": (StoredValue("b2", 1 / 3, None, "1/m^2"), StoredValue("a11", -0.1, 0.01, "1/m"))},
         {"fit": {"yaw_rate": {"fit_percent": 91}}},
         {"segment_ids": ("seg-1", "seg-2")},
         {"start_utc_ns": START_NS + 1},

@@ -8,8 +8,8 @@ def test_a_run_is_stored_as_it_stands(warehouse: Warehouse) -> None:
     name = runs.run_id("ingest", {"logs": ["a"]})
     assert name == runs.run_id("ingest", {"logs": ("a",)})
     assert name != runs.run_id("identify", {"logs": ["a"]})
-    assert runs.record_all(warehouse, [runs.Run(name, "ingest", None, "running")])
-    done = runs.Run(name, "ingest", None, "completed", {"logs": 3}, {"slowest": "day'1", "ratio": float("nan")})
+    assert runs.record_all(warehouse, [runs.FlowRun(name, "ingest", None, "running")])
+    done = runs.FlowRun(name, "ingest", None, "completed", {"logs": 3}, {"slowest": "day'1", "ratio": float("nan")})
     assert runs.record_all(warehouse, [done])
     version = delta.versions(warehouse)
     assert not runs.record_all(warehouse, [done])
@@ -21,7 +21,7 @@ def test_a_run_is_stored_as_it_stands(warehouse: Warehouse) -> None:
 def test_runs_are_listed_by_flow(warehouse: Warehouse) -> None:
     for flow in ("identify", "ingest"):
         for vessel in ("x' OR '1'='1", None):
-            runs.record_all(warehouse, [runs.Run(runs.run_id(flow, vessel), flow, vessel, "completed")])
+            runs.record_all(warehouse, [runs.FlowRun(runs.run_id(flow, vessel), flow, vessel, "completed")])
     assert len(runs.all_runs(warehouse)) == 4
     assert {run.flow for run in runs.all_runs(warehouse, "ingest")} == {"ingest"}
     assert {run.vessel for run in runs.all_runs(warehouse, "ingest")} == {None, "x' OR '1'='1"}

@@ -18,7 +18,7 @@ ODD = (
 
 
 def test_every_text_is_found_by_itself(warehouse: Warehouse) -> None:
-    every = [runs.Run(f"run-{i}", text, None if i % 2 else text, "done") for i, text in enumerate(ODD)]
+    every = [runs.FlowRun(f"run-{i}", text, None if i % 2 else text, "done") for i, text in enumerate(ODD)]
     runs.record_all(warehouse, every[::3])  # some share a file, some have one alone
     for one in (*every[1::3], *every[2::3]):
         runs.record_all(warehouse, [one])
@@ -39,11 +39,11 @@ def test_which_files_answer_is_asked_once_a_version(warehouse: Warehouse, monkey
         return real(table, *given, **named)
 
     monkeypatch.setattr(DeltaTable, "file_uris", counted)
-    runs.record_all(warehouse, [runs.Run("run-1", "ingest", None, "done")])
+    runs.record_all(warehouse, [runs.FlowRun("run-1", "ingest", None, "done")])
     for _ in range(3):
         assert [run.run_id for run in runs.all_runs(warehouse, "ingest")] == ["run-1"]
     once = len(asked)
     assert once == len(set(asked))
-    runs.record_all(warehouse, [runs.Run("run-2", "ingest", None, "done")])
+    runs.record_all(warehouse, [runs.FlowRun("run-2", "ingest", None, "done")])
     assert [run.run_id for run in runs.all_runs(warehouse, "ingest")] == ["run-1", "run-2"]
     assert len(asked) > once

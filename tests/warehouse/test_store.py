@@ -137,7 +137,7 @@ def test_credentials_are_not_shown() -> None:
 
 
 def test_a_version_that_is_not_there_is_named(warehouse: Warehouse) -> None:
-    runs.record_all(warehouse, [runs.Run("run-1", "ingest", None, "completed")])
+    runs.record_all(warehouse, [runs.FlowRun("run-1", "ingest", None, "completed")])
     newest = delta.versions(warehouse)["runs"]
     assert delta.read(warehouse, "runs", version=newest).height == 1
     assert delta.read(warehouse, "runs", version=0).height == 0
@@ -149,7 +149,7 @@ def test_a_version_that_is_not_there_is_named(warehouse: Warehouse) -> None:
 
 
 def test_a_damaged_table_log_is_one_clear_error(warehouse: Warehouse) -> None:
-    runs.record_all(warehouse, [runs.Run("run-1", "ingest", None, "completed")])
+    runs.record_all(warehouse, [runs.FlowRun("run-1", "ingest", None, "completed")])
     assert warehouse.folder is not None
     for commit in (warehouse.folder / "runs" / "_delta_log").glob("*.json"):
         commit.write_bytes(b"{garbage")
@@ -167,7 +167,7 @@ def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
 
 
 def test_a_missing_table_file_is_one_clear_error(warehouse: Warehouse) -> None:
-    runs.record_all(warehouse, [runs.Run("run-1", "ingest", None, "completed")])
+    runs.record_all(warehouse, [runs.FlowRun("run-1", "ingest", None, "completed")])
     assert warehouse.folder is not None
     for path in (warehouse.folder / "runs").glob("*.parquet"):
         path.unlink()
@@ -191,7 +191,7 @@ def test_a_full_disk_is_told(warehouse: Warehouse, monkeypatch: pytest.MonkeyPat
 
     monkeypatch.setattr("deltalake.write_deltalake", full)
     with pytest.raises(KempfError) as caught:
-        runs.record_all(warehouse, [runs.Run("run-1", "ingest", None, "completed")])
+        runs.record_all(warehouse, [runs.FlowRun("run-1", "ingest", None, "completed")])
     assert caught.value.code == "disk_full"
 
 

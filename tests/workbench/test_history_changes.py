@@ -11,7 +11,7 @@ import pytest
 
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import parameter_sets, segments, vessels
-from kempf.warehouse.parameter_set import Estimate, ParameterSet
+from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 from kempf.warehouse.store import Warehouse
 from tests.history.made import NAMES, UNITS, history, step
 from tests.warehouse.samples import inputs, parameter_set, segment
@@ -26,7 +26,8 @@ def made_sets(n: int, shift: np.ndarray | None = None, **changes: object) -> lis
     for i in range(n):
         std = np.sqrt(np.diag(h.covariance[i]))
         estimates = tuple(
-            Estimate(name, float(v), float(s), u) for name, v, s, u in zip(NAMES, h.value[i], std, UNITS, strict=True)
+            StoredValue(name, float(v), float(s), u)
+            for name, v, s, u in zip(NAMES, h.value[i], std, UNITS, strict=True)
         )
         values: dict[str, object] = {
             "parameters": estimates,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kempf.flows.jobs.examine_log import Examined
+from kempf.flows.jobs.examine_log import ExaminedLog
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.outcome import Figure
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
@@ -26,12 +26,12 @@ _TURNS = {
 _POINTS = 2000
 
 
-def draw(found: Examined, path: Path) -> None:
+def draw(found: ExaminedLog, path: Path) -> None:
     """Draw an examination.
 
     Parameters
     ----------
-    found : Examined
+    found : ExaminedLog
     path : Path
         Ending ``.png``, ``.svg`` or ``.pdf``.
     """

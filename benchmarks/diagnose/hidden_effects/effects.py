@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.diagnose.hidden_effects import plant
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 
 Float = NDArray[np.float64]
 Kind = Literal["catalogue", "outsider", "none"]
@@ -77,7 +77,7 @@ class HiddenEffect:
         return {self.parameter: c} | {name: factor * c for name, factor in self.also}
 
 
-def scales(hull: Hull) -> dict[str, float]:
+def scales(hull: SimulatedHull) -> dict[str, float]:
     """Return what sizes and slots may be multiplied by for a hull, by the text that stands for it."""
     L, V, n = hull.length_m, hull.trial_speed_m_s, hull.shaft_speed_per_s
     found = {"1": 1.0, "L": L, "1/L": 1.0 / L, "1/L^2": 1.0 / L**2, "V": V, "L/V": L / V, "V/L": V / L}
@@ -88,7 +88,7 @@ def scales(hull: Hull) -> dict[str, float]:
     }
 
 
-def theta(effect: HiddenEffect | None, c: float, hull: Hull) -> Float:
+def theta(effect: HiddenEffect | None, c: float, hull: SimulatedHull) -> Float:
     """Return the strengths that the kernels of `benchmarks.diagnose.hidden_effects.plant` take, shape (47,).
 
     Parameters
@@ -97,7 +97,7 @@ def theta(effect: HiddenEffect | None, c: float, hull: Hull) -> Float:
         None: all zero, eq. (16).
     c : float
         Its parameter.
-    hull : Hull
+    hull : SimulatedHull
     """
     found = np.zeros(plant.N_THETA)
     if effect is None:

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from benchmarks.diagnose.hidden_effects import plant
 from kempf.pipeline.simulate.disturbances import Disturbance
-from kempf.pipeline.simulate.hulls import HULLS, Hull, HullParameters
+from kempf.pipeline.simulate.hulls import HULLS, HullParameters, SimulatedHull
 from kempf.pipeline.simulate.random_streams import stream
 
 Float = NDArray[np.float64]
@@ -43,7 +43,7 @@ _WEATHER = {
 DISTURBANCES = tuple(_WEATHER)
 
 
-def ship(name: str, seed: int) -> Hull:
+def ship(name: str, seed: int) -> SimulatedHull:
     """Return a sister of a hull of the catalogue: every parameter up to 5 % off, another loss of speed in turns.
 
     Parameters
@@ -63,12 +63,12 @@ def ship(name: str, seed: int) -> Hull:
     return replace(hull, parameters=own, speed_loss=float(random.uniform(0.4, 1.2)))
 
 
-def grid_s(hull: Hull) -> float:
+def grid_s(hull: SimulatedHull) -> float:
     """Return the step of the plant, s: well below what the ship, her rudder and her instruments resolve."""
     return 0.05 if hull.length_m / hull.trial_speed_m_s > 10.0 else 0.02
 
 
-def orders(hull: Hull, seed: int, day: int) -> Float:
+def orders(hull: SimulatedHull, seed: int, day: int) -> Float:
     """Return the programme of a day as `benchmarks.diagnose.hidden_effects.plant.voyage` takes it, shape (n, 9).
 
     Three or four times a steady course on a new heading, then a zigzag of five to seven legs, twice as many
@@ -76,7 +76,7 @@ def orders(hull: Hull, seed: int, day: int) -> Float:
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
     seed : int
     day : int
         0 or 1.
@@ -123,12 +123,12 @@ class Weather:
         )
 
 
-def weather(hull: Hull, level: str, seed: int, day: int) -> Weather:
+def weather(hull: SimulatedHull, level: str, seed: int, day: int) -> Weather:
     """Draw the weather of a day.
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
         Wind force goes with her rudder's force, the stream with her speed where she is slow.
     level : str
         One of `DISTURBANCES`.

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from benchmarks.diagnose.hidden_effects import plant
 from benchmarks.diagnose.hidden_effects.programme import QUICK_SHIP_S
 from benchmarks.diagnose.hidden_effects.sail import Voyage
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.instruments import (
     DEFAULT_INSTRUMENTS,
     SECOND_NS,
@@ -52,7 +52,7 @@ class _Late(Trajectory):
         return replace(super().at(np.maximum(time_s - self.latency_s, 0.0)), time_s=time_s)
 
 
-def instruments(hull: Hull) -> tuple[Instrument, ...]:
+def instruments(hull: SimulatedHull) -> tuple[Instrument, ...]:
     """Return what she carries."""
     time_s = hull.length_m / hull.trial_speed_m_s
     quick = time_s < QUICK_SHIP_S
@@ -70,13 +70,13 @@ def instruments(hull: Hull) -> tuple[Instrument, ...]:
 
 
 def read(
-    hull: Hull, voyage: Voyage, wind_from_rad: float, settings: TrialSettings, sensor: tuple[str, float] | None
+    hull: SimulatedHull, voyage: Voyage, wind_from_rad: float, settings: TrialSettings, sensor: tuple[str, float] | None
 ) -> Trial:
     """Let the instruments measure a voyage.
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
     voyage : Voyage
     wind_from_rad : float
         Where the true wind comes from.
@@ -108,7 +108,9 @@ def read(
     return Trial(settings, truth, tuple(records))
 
 
-def _own(record: InstrumentRecord, voyage: Voyage, hull: Hull, start: int, name: str, c: float) -> InstrumentRecord:
+def _own(
+    record: InstrumentRecord, voyage: Voyage, hull: SimulatedHull, start: int, name: str, c: float
+) -> InstrumentRecord:
     """Put in what the instruments of the other simulator do not know: shaft, bottom, roll; and a faulty instrument."""
     time_s = (record.measured_utc_ns - start) / SECOND_NS
     values = dict(record.values)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from benchmarks.diagnose.hidden_effects import plant, programme
 from benchmarks.diagnose.hidden_effects.effects import SHARES, HiddenEffect, scales, theta
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.pipeline.simulate.trajectory import Trajectory
 from kempf.schemas.errors import KempfError
@@ -66,7 +66,7 @@ class Voyage:
         return Trajectory(self.step_s, state, slope, self.logged, self.logged, forcing)
 
 
-def constants(hull: Hull, wave_from_rad: float) -> Float:
+def constants(hull: SimulatedHull, wave_from_rad: float) -> Float:
     """Return what the kernels read of a hull, slots `benchmarks.diagnose.hidden_effects.plant.CONSTANTS`."""
     p, L, V0 = hull.parameters, hull.length_m, hull.trial_speed_m_s
     own = [hull.wind_arm_per_m, V0, hull.surge_time_s, hull.speed_loss, L, hull.shaft_speed_per_s, hull.draught_m]
@@ -77,13 +77,13 @@ def constants(hull: Hull, wave_from_rad: float) -> Float:
 
 
 def voyage(
-    hull: Hull, weather: programme.Weather, effect: HiddenEffect | None, c: float, seed: int, day: int
+    hull: SimulatedHull, weather: programme.Weather, effect: HiddenEffect | None, c: float, seed: int, day: int
 ) -> Voyage:
     """Sail a day.
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
     weather : Weather
     effect : HiddenEffect or None
         None: eq. (16).
@@ -127,7 +127,7 @@ def voyage(
     )
 
 
-def _check(hull: Hull, orders: Float, states: Float, executes: Float) -> None:
+def _check(hull: SimulatedHull, orders: Float, states: Float, executes: Float) -> None:
     V, r = states[:, plant.STATE.index("V")], states[:, plant.STATE.index("r")]
     turn = np.abs(r) * hull.length_m / hull.trial_speed_m_s
     sane = bool(np.all(np.isfinite(states))) and float(V.min()) > 0.2 * hull.trial_speed_m_s and float(turn.max()) < 3.0
@@ -142,7 +142,9 @@ def _check(hull: Hull, orders: Float, states: Float, executes: Float) -> None:
         )
 
 
-def added(days: tuple[Voyage, ...], hull: Hull, weathers: tuple[programme.Weather, ...], strengths: Float) -> float:
+def added(
+    days: tuple[Voyage, ...], hull: SimulatedHull, weathers: tuple[programme.Weather, ...], strengths: Float
+) -> float:
     """Return what ``strengths`` would add along voyages that went on without, as a share of the rudder's work.
 
     Root mean square over the zigzags of what dv/dt gains over that of b1 V^2 d, and of dr/dt over b2 V^2 d; the greater
@@ -163,13 +165,13 @@ def added(days: tuple[Voyage, ...], hull: Hull, weathers: tuple[programme.Weathe
 
 
 def strength_of(
-    hull: Hull, weathers: tuple[programme.Weather, ...], effect: HiddenEffect, strength: int, seed: int
+    hull: SimulatedHull, weathers: tuple[programme.Weather, ...], effect: HiddenEffect, strength: int, seed: int
 ) -> float:
     """Return the parameter c of an effect that makes it small (0), medium (1) or large (2) in this case.
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
     weathers : tuple of Weather
         One a day.
     effect : HiddenEffect
@@ -186,13 +188,13 @@ def strength_of(
 
 
 def voyages(
-    hull: Hull, weathers: tuple[programme.Weather, ...], effect: HiddenEffect | None, strength: int, seed: int
+    hull: SimulatedHull, weathers: tuple[programme.Weather, ...], effect: HiddenEffect | None, strength: int, seed: int
 ) -> tuple[float, tuple[Voyage, ...]]:
     """Return the parameter of the effect and the voyages, one a day; an effect she cannot sail with is weakened.
 
     Parameters
     ----------
-    hull : Hull
+    hull : SimulatedHull
     weathers : tuple of Weather
         One a day.
     effect : HiddenEffect or None

@@ -25,7 +25,7 @@ from benchmarks.diagnose.hidden_effects.cases import Case, design
 from benchmarks.diagnose.hidden_effects.effects import theta
 from benchmarks.diagnose.hidden_effects.seal import seal
 from kempf.pipeline.simulate.csv_log import to_csv
-from kempf.pipeline.simulate.hulls import Hull
+from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.mcap_log import to_mcap
 from kempf.pipeline.simulate.nmea_log import to_nmea
@@ -78,7 +78,7 @@ def logs_of(case: Case) -> tuple[dict[str, bytes], dict[str, Any]]:
     return files, _answer(case, hull, c, voyages, weathers)
 
 
-def _settings(case: Case, hull: Hull, day: int) -> TrialSettings:
+def _settings(case: Case, hull: SimulatedHull, day: int) -> TrialSettings:
     random = stream(case.seed, "place and date")
     latitude, longitude, days, apart = (random.uniform(*b) for b in ((35, 62), (-30, 30), (0, 300), (20, 120)))
     begin = datetime(2025, 1, 5, 6, tzinfo=UTC) + timedelta(days=int(days) + day * int(apart))
@@ -97,7 +97,7 @@ def _settings(case: Case, hull: Hull, day: int) -> TrialSettings:
 
 def _answer(
     case: Case,
-    hull: Hull,
+    hull: SimulatedHull,
     c: float,
     voyages: tuple[sail.Voyage, ...],
     weathers: tuple[programme.Weather, ...],
@@ -125,7 +125,7 @@ def _answer(
     }
 
 
-def _zigzags(hull: Hull, seed: int, day: int) -> np.ndarray:
+def _zigzags(hull: SimulatedHull, seed: int, day: int) -> np.ndarray:
     orders = programme.orders(hull, seed, day)
     return orders[orders[:, plant.KIND_] == 1.0]
 

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.channels.doctor.robust_regression import Fit, fit
+from kempf.pipeline.channels.doctor.robust_regression import RobustLine, fit
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
@@ -215,7 +215,7 @@ def _refined(
     long = np.diff(edges) / SECOND_NS
     middle = edges[:-1] + np.diff(edges) // 2
     along = (middle - middle[middle.size // 2]) / SECOND_NS
-    found: Fit | None = None
+    found: RobustLine | None = None
     for _ in range(rounds):
         last = (lag, rate)
         at = _read_later(edges, lag, rate)

@@ -51,7 +51,7 @@ _FEW = 400
 
 
 @dataclass(frozen=True)
-class Finding:
+class ChannelFinding:
     """One contradiction: the faults that could cause it, and what shows it.
 
     Attributes
@@ -79,14 +79,14 @@ class Examination:
 
     Attributes
     ----------
-    findings : tuple of Finding
+    findings : tuple of ChannelFinding
     outcomes : tuple of Outcome
         Of every check on the log as it came.
     untested : tuple of str
         Channels that no check could test, by name.
     """
 
-    findings: tuple[Finding, ...]
+    findings: tuple[ChannelFinding, ...]
     outcomes: tuple[Outcome, ...]
     untested: tuple[str, ...]
 
@@ -145,18 +145,18 @@ def examine(log: Log) -> Examination:
     """
     first = answers = ask(log)
     original = log
-    findings: list[Finding] = []
+    findings: list[ChannelFinding] = []
     for _ in range(_MOST_FAULTS):
         explained = _explained(log, answers)
         if explained is None:
             break
         faults, corrected, answers_then = explained
         before = _by_name(answers)
-        findings.append(Finding(faults, tuple(before[name] for name in corrected)))
+        findings.append(ChannelFinding(faults, tuple(before[name] for name in corrected)))
         log, answers = faults[0].corrected(log), answers_then
     left = tuple(_wrong(answers).values())
     if left:
-        findings.append(Finding((), left))
+        findings.append(ChannelFinding((), left))
     outcomes = tuple(_by_name(first).values())
     return Examination(tuple(findings), outcomes, _untested(original, outcomes))
 

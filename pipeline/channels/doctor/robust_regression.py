@@ -18,7 +18,7 @@ _LAGS = 30
 
 
 @dataclass(frozen=True, eq=False)
-class Fit:
+class RobustLine:
     """Coefficients of a linear fit.
 
     Attributes
@@ -47,7 +47,7 @@ def swing(values: Float) -> float:
     return float(ordered[high] - ordered[low])
 
 
-def fit(columns: Float, observed: Float) -> Fit | None:
+def fit(columns: Float, observed: Float) -> RobustLine | None:
     """Fit observations by columns, Huber's way.
 
     Parameters
@@ -58,7 +58,7 @@ def fit(columns: Float, observed: Float) -> Fit | None:
 
     Returns
     -------
-    Fit or None
+    RobustLine or None
         None for fewer rows than four a column.
 
     References
@@ -90,7 +90,7 @@ def fit(columns: Float, observed: Float) -> Fit | None:
     least = np.diag(inverse) * scale**2
     spread = float(np.sqrt(np.mean(y**2)))
     left = float(np.sqrt(np.average(residual**2, weights=weight))) / spread if spread > 0.0 else 1.0
-    return Fit(value / unit, np.sqrt(np.maximum(np.diag(covariance), least)) / unit, left)
+    return RobustLine(value / unit, np.sqrt(np.maximum(np.diag(covariance), least)) / unit, left)
 
 
 def _spread(residual: Float) -> float:
@@ -108,7 +108,7 @@ def _summed_products(score: Float, lags: int) -> Float:
     return summed
 
 
-def posterior(columns: Float, observed: Float, noise_std: Float, prior_std: Float) -> Fit:
+def posterior(columns: Float, observed: Float, noise_std: Float, prior_std: Float) -> RobustLine:
     """Fit few observations whose error is known, with what is known of the coefficients beforehand.
 
     Parameters
@@ -137,4 +137,4 @@ def posterior(columns: Float, observed: Float, noise_std: Float, prior_std: Floa
     covariance = np.linalg.pinv(precision, hermitian=True)
     spread = float(np.sqrt(np.mean(observed**2)))
     left = float(np.sqrt(np.average((observed - columns @ value) ** 2, weights=weight))) / max(spread, 1e-300)
-    return Fit(value, np.sqrt(np.maximum(np.diag(covariance), 0.0)), left)
+    return RobustLine(value, np.sqrt(np.maximum(np.diag(covariance), 0.0)), left)

@@ -12,7 +12,7 @@ from kempf.pipeline.channels.doctor.align import edges_of
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log, integral, turning
 from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable, worst
-from kempf.pipeline.channels.doctor.robust_regression import Fit, fit, quantile, swing
+from kempf.pipeline.channels.doctor.robust_regression import RobustLine, fit, quantile, swing
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
@@ -141,7 +141,7 @@ def _averaged(series: Series, over_s: float) -> Series:
 
 def _best(
     edges: Nanoseconds, rudder: Series, angle: Series, rate: Series, way: NDArray[np.bool_], shifts: Float
-) -> tuple[Fit, float, float] | None:
+) -> tuple[RobustLine, float, float] | None:
     """Return the fit at the shift of the rudder that explains most, that shift (s) and what the rudder explains."""
     turn, jump, total = _table(edges, rudder, angle, rate)
     jump = np.where(way, jump, np.nan)
@@ -182,7 +182,7 @@ def _mean_squares(put: Float, turn: Float, long: Float, observed: Float) -> Floa
     return np.where(count < _FEWEST, np.inf, left)
 
 
-def _clock(name: str, channels: tuple[str, ...], found: Fit, shift: float, explains: float) -> Outcome:
+def _clock(name: str, channels: tuple[str, ...], found: RobustLine, shift: float, explains: float) -> Outcome:
     """Judge the shift of the rudder at which she answers best."""
     if explains < _CLOCKED or abs(found.value[0]) < SURE * found.std[0]:
         return untestable(name, channels, "her answer to the rudder is too faint to tell when it was put over")
@@ -198,7 +198,7 @@ def _clock(name: str, channels: tuple[str, ...], found: Fit, shift: float, expla
     return Outcome(name, channels, figure.state, words, (figure,), min(1.0 - explains, 1.0), suspects)
 
 
-def _judged(name: str, channels: tuple[str, ...], found: Fit, explains: float) -> Outcome:
+def _judged(name: str, channels: tuple[str, ...], found: RobustLine, explains: float) -> Outcome:
     answer, std = float(found.value[0]), float(found.std[0])
     if explains < _EXPLAINS or abs(answer) < SURE * std:
         return untestable(name, channels, "her answer to the rudder is lost in what else turns her")

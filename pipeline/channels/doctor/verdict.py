@@ -7,7 +7,7 @@ from math import pi
 from typing import Any
 
 from kempf.pipeline.channels.doctor.corrections import propose
-from kempf.pipeline.channels.doctor.examine import Examination, Finding
+from kempf.pipeline.channels.doctor.examine import ChannelFinding, Examination
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome
 from kempf.schemas.channels import CHANNELS
@@ -41,7 +41,7 @@ def as_content(
     }
 
 
-def _finding(finding: Finding, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> dict[str, Any]:
+def _finding(finding: ChannelFinding, known: Mapping[str, tuple[str, ChannelMap]], log_format: str) -> dict[str, Any]:
     faults = []
     for fault in finding.faults:
         corrections = propose(fault, known, log_format)
@@ -85,7 +85,7 @@ def _figure(figure: Figure) -> dict[str, Any]:
     }
 
 
-def sentence(finding: Finding) -> str:
+def sentence(finding: ChannelFinding) -> str:
     """Return a finding as one sentence."""
     if not finding.faults:
         which = "one" if len(finding.channels) == 2 else "at least one"

@@ -101,7 +101,7 @@ class Priors:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class MotionRun:
     """One run on the instants of its record.
 
     Attributes
@@ -143,7 +143,7 @@ def coarsened(record: Record) -> Record:
     return replace(record, **rows)
 
 
-def run_of(record: Record) -> Run:
+def run_of(record: Record) -> MotionRun:
     """Place the GNSS speed along the bow on the instants of the record; the turning is not known yet and is 0."""
     along = np.full(record.time_s.size, np.nan)
     since = (record.lateral.time_utc_ns - record.start_utc_ns).astype(np.float64) * 1e-9
@@ -152,15 +152,15 @@ def run_of(record: Record) -> Run:
     # what was taken out of y_v as a gross error is one in the other component of the same reading
     here &= np.isfinite(record.measured[row, Y_V])
     along[row[here]] = record.lateral.forward_m_s[here]
-    return Run(record, along, np.zeros(record.time_s.size))
+    return MotionRun(record, along, np.zeros(record.time_s.size))
 
 
-def join(runs: tuple[Run, ...], fits: tuple[LateralFit, ...], priors: Priors, current: str) -> LinearSystem:
+def join(runs: tuple[MotionRun, ...], fits: tuple[LateralFit, ...], priors: Priors, current: str) -> LinearSystem:
     """Join runs, in the order of time, to one system; `set_surge` then gives it its longitudinal half.
 
     Parameters
     ----------
-    runs : tuple of Run
+    runs : tuple of MotionRun
         Their ``record.speed_m_s`` is the speed that the lateral model takes.
     fits : tuple of LateralFit
         One a run.
@@ -183,20 +183,22 @@ def join(runs: tuple[Run, ...], fits: tuple[LateralFit, ...], priors: Priors, cu
     return LinearSystem(Phi, g, Q, Y, H, R, x0, P0)
 
 
-def spans(runs: tuple[Run, ...]) -> tuple[slice, ...]:
+def spans(runs: tuple[MotionRun, ...]) -> tuple[slice, ...]:
     """Return the rows of each run in the joint system."""
     edges = np.cumsum([0, *(run.record.time_s.size for run in runs)])
     return tuple(slice(int(a), int(b)) for a, b in pairwise(edges))
 
 
-def set_surge(system: LinearSystem, runs: tuple[Run, ...], surge: Surge, along_noise_m_s: float, averaged: int) -> None:
+def set_surge(
+    system: LinearSystem, runs: tuple[MotionRun, ...], surge: Surge, along_noise_m_s: float, averaged: int
+) -> None:
     """Write the longitudinal half into a joint system, in place: it is what a search changes again and again.
 
     Parameters
     ----------
     system : LinearSystem
         Of `join`.
-    runs : tuple of Run
+    runs : tuple of MotionRun
     surge : Surge
     along_noise_m_s : float
         Standard deviation of y_u.
@@ -214,7 +216,7 @@ def set_surge(system: LinearSystem, runs: tuple[Run, ...], surge: Surge, along_n
     system.R[:, Y_U] = along_noise_m_s**2
 
 
-def _lateral_half(run: Run, fit: LateralFit, current: str) -> tuple[Float, ...]:
+def _lateral_half(run: MotionRun, fit: LateralFit, current: str) -> tuple[Float, ...]:
     """Return Phi, g, Q, Y, H, R of one run; its first step and its longitudinal half are left as the identity."""
     record, n = run.record, run.record.time_s.size
     step_s = np.diff(record.time_s)
@@ -249,7 +251,7 @@ def _current_rows(record: Record, current: str) -> tuple[Float, Float]:
     return np.tile([here, 0.0], (record.time_s.size, 1)), np.tile([0.0, here], (record.time_s.size, 1))
 
 
-def _initial(run: Run, priors: Priors, current: str) -> tuple[Float, Float]:
+def _initial(run: MotionRun, priors: Priors, current: str) -> tuple[Float, Float]:
     """Return mean, shape (n_state,), and covariance, shape (n_state, n_state), before the first measurement."""
     x0, std = np.zeros(N_STATE), np.zeros(N_STATE)
     std[:N_CHAIN] = priors.sway_m_s, priors.yaw_rad_s, priors.force_m_s2, priors.moment_rad_s2, priors.heading_rad
@@ -261,11 +263,11 @@ def _initial(run: Run, priors: Priors, current: str) -> tuple[Float, Float]:
     return x0, np.diag(std**2)
 
 
-def _first_speed(run: Run) -> float:
+def _first_speed(run: MotionRun) -> float:
     return float(run.along_m_s[np.flatnonzero(np.isfinite(run.along_m_s))[0]])
 
 
-def _bridge(part: tuple[Float, ...], run: Run, gap_s: float, priors: Priors, current: str) -> None:
+def _bridge(part: tuple[Float, ...], run: MotionRun, gap_s: float, priors: Priors, current: str) -> None:
     """Write the step from the run before to this one: motion and forces begin anew, current, V_0, k and bias stay.
 
     m begins anew too: what a linear hull lacks depends on how far and how fast she is swung.

@@ -21,8 +21,8 @@ from kempf.pipeline.estimate.no_log.joint_motion import (
     V0,
     Y_U,
     LateralFit,
+    MotionRun,
     Priors,
-    Run,
     V,
     join,
     set_surge,
@@ -51,7 +51,7 @@ class Speed:
     ----------
     speed_m_s, std_m_s : tuple of ndarray, shape (n,)
         V and its standard error at the instants of the run, for the lateral parameters given.
-    runs : tuple of Run
+    runs : tuple of MotionRun
         With the turning that was found, and without gross errors.
     surge : Surge
     along_noise_m_s : float
@@ -69,7 +69,7 @@ class Speed:
 
     speed_m_s: tuple[Float, ...]
     std_m_s: tuple[Float, ...]
-    runs: tuple[Run, ...]
+    runs: tuple[MotionRun, ...]
     surge: Surge
     along_noise_m_s: float
     settled_m_s: tuple[float, float]
@@ -87,7 +87,7 @@ class Motion:
 
     Parameters
     ----------
-    runs : tuple of Run
+    runs : tuple of MotionRun
         In the order of time.
     fits : tuple of LateralFit
     priors : Priors
@@ -95,7 +95,7 @@ class Motion:
         See `kempf.pipeline.estimate.no_log.joint_motion.join`.
     """
 
-    def __init__(self, runs: tuple[Run, ...], fits: tuple[LateralFit, ...], priors: Priors, current: str) -> None:
+    def __init__(self, runs: tuple[MotionRun, ...], fits: tuple[LateralFit, ...], priors: Priors, current: str) -> None:
         self.runs, self.fits, self.priors, self.current = runs, fits, priors, current
         self._system = join(runs, fits, priors, current)
         mean = float(np.mean([np.nanmean(run.along_m_s) for run in runs]))
@@ -110,7 +110,7 @@ class Motion:
         set_surge(self._system, self.runs, Surge(T, wander), noise, averaged)
         return self._system
 
-    def with_runs(self, runs: tuple[Run, ...]) -> Motion:
+    def with_runs(self, runs: tuple[MotionRun, ...]) -> Motion:
         """Return the same with other y_u or turning."""
         return Motion(runs, self.fits, self.priors, self.current)
 
@@ -232,7 +232,7 @@ def _root(variance: Float) -> Float:
     return np.sqrt(np.where(variance >= 0.0, variance, np.nan))
 
 
-def _gated(runs: tuple[Run, ...], white: Float, rows: tuple[slice, ...]) -> tuple[Run, ...]:
+def _gated(runs: tuple[MotionRun, ...], white: Float, rows: tuple[slice, ...]) -> tuple[MotionRun, ...]:
     """Leave out y_u whose innovation lies beyond the gate, in robust standard deviations."""
     width = _GATE * 1.4826 * float(np.nanmedian(np.abs(white)))
     kept = []

@@ -57,7 +57,7 @@ class ProcedureSettings:
 
 
 @dataclass(frozen=True, eq=False)
-class Pass:
+class ProcedurePass:
     """One pass.
 
     Attributes
@@ -79,12 +79,12 @@ class Pass:
 
 
 @dataclass(frozen=True, eq=False)
-class Course:
+class ProcedureCourse:
     """How the procedure went.
 
     Attributes
     ----------
-    passes : tuple of Pass
+    passes : tuple of ProcedurePass
         The first approximation, then one an iteration.
     end : {"converged", "cycling", "diverged", "still moving"}
     reason : str
@@ -97,7 +97,7 @@ class Course:
         States and disturbances with the [A B] of the last pass; None where the filter does not exist.
     """
 
-    passes: tuple[Pass, ...]
+    passes: tuple[ProcedurePass, ...]
     end: End
     reason: str
     period: int | None
@@ -105,7 +105,9 @@ class Course:
     last: Filtered | None
 
 
-def iterate(vehicle: LinearVehicle, measured: Float, inputs: Float, R: Float, settings: ProcedureSettings) -> Course:
+def iterate(
+    vehicle: LinearVehicle, measured: Float, inputs: Float, R: Float, settings: ProcedureSettings
+) -> ProcedureCourse:
     """Run the procedure on one record.
 
     Parameters
@@ -121,7 +123,7 @@ def iterate(vehicle: LinearVehicle, measured: Float, inputs: Float, R: Float, se
 
     Returns
     -------
-    Course
+    ProcedureCourse
 
     Raises
     ------
@@ -131,7 +133,7 @@ def iterate(vehicle: LinearVehicle, measured: Float, inputs: Float, R: Float, se
     now = _whole_steps(vehicle, measured, settings.skip)
     found = regress(measured[now], inputs[now], measured[now + 1])
     scale = _scale(measured, inputs, now)
-    passes = [Pass(found, np.nan, np.full_like(R, np.nan), None)]
+    passes = [ProcedurePass(found, np.nan, np.full_like(R, np.nan), None)]
     states, targets = measured[now], measured[now + 1]
     end: tuple[End, str, int | None] | None = None
     converged = ""
@@ -151,7 +153,7 @@ def iterate(vehicle: LinearVehicle, measured: Float, inputs: Float, R: Float, se
         states, targets = corrected[now], corrected[now + 1] - W[now] @ entering.T
         previous, found = found, regress(states, inputs[now], targets)
         change = _distance(found, previous, scale)
-        passes.append(Pass(found, change, bounded, filtered))
+        passes.append(ProcedurePass(found, change, bounded, filtered))
         if change < settings.tolerance and not converged:
             converged = f"converged in iteration {count}: it changed [A B] by {change:.1e}"
             if not settings.run_on:
@@ -160,15 +162,15 @@ def iterate(vehicle: LinearVehicle, measured: Float, inputs: Float, R: Float, se
         end = ("converged", converged, None) if converged else judge(passes, scale)
     bounded = _bounded(R, found, states, inputs[now], targets) if settings.floor else R
     last = _filtered(vehicle, found, measured, inputs, bounded)
-    return Course(tuple(passes), end[0], end[1], end[2], vehicle.hidden(passes[0].regression.A), last)
+    return ProcedureCourse(tuple(passes), end[0], end[1], end[2], vehicle.hidden(passes[0].regression.A), last)
 
 
-def judge(passes: list[Pass], scale: Float) -> tuple[End, str, int | None]:
+def judge(passes: list[ProcedurePass], scale: Float) -> tuple[End, str, int | None]:
     """Say of passes that did not converge whether they repeat themselves, or go ever further.
 
     Parameters
     ----------
-    passes : list of Pass
+    passes : list of ProcedurePass
     scale : ndarray, shape (n_state, n_state + n_input)
         Part of one unit of each element in the increments.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.paper.least_squares import estimate_from_discrete
-from kempf.pipeline.estimate.paper.procedure import Course, Pass, ProcedureSettings, iterate
+from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedurePass, ProcedureSettings, iterate
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.sampled import Sampled, sample
 from kempf.pipeline.estimate.result import Estimate
@@ -92,7 +92,7 @@ def noise_covariance(record: Record, step_s: float) -> Float:
     return np.diag([max(lateral, 1e-6) ** 2, max(turning, 1e-8) ** 2])
 
 
-def run(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettings) -> tuple[Sampled, Course]:
+def run(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettings) -> tuple[Sampled, ProcedureCourse]:
     """Run the procedure and return it whole, states and disturbances of every pass included.
 
     Parameters
@@ -108,7 +108,7 @@ def run(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettin
     -------
     sampled : Sampled
         The record on the grid of eq. (17).
-    course : Course
+    course : ProcedureCourse
     """
     sampled = sample(record, settings.step_s)
     wind_rate, current_rate = (0.0, 0.0) if settings.constant else settings.rates(spec)
@@ -133,7 +133,7 @@ def percent_std(found: Estimate, truth: Hull) -> dict[str, float]:
     return {p.name: 100.0 * p.std / abs(float(t)) for p, t in zip(found.parameters, truth.array(), strict=True)}
 
 
-def hull_of(one: Pass, sampled: Sampled) -> Hull:
+def hull_of(one: ProcedurePass, sampled: Sampled) -> Hull:
     """Return the continuous parameters of a pass; NaN where its matrices belong to no continuous ship."""
     found = one.regression
     hull = continuous_from_discrete(found.A, found.B, sampled.speed_m_s, sampled.step_s)
@@ -161,14 +161,14 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperS
     return estimate_of(record, *run(record, spec, arm_per_m, settings))
 
 
-def estimate_of(record: Record, sampled: Sampled, course: Course) -> Estimate:
+def estimate_of(record: Record, sampled: Sampled, course: ProcedureCourse) -> Estimate:
     """Turn what `run` returned into the estimate of its last pass.
 
     Parameters
     ----------
     record : Record
     sampled : Sampled
-    course : Course
+    course : ProcedureCourse
     """
     warnings = list(record.warnings)
     if course.hidden:
@@ -184,7 +184,7 @@ def estimate_of(record: Record, sampled: Sampled, course: Course) -> Estimate:
     )
 
 
-def _entry(count: int, one: Pass, sampled: Sampled) -> dict[str, object]:
+def _entry(count: int, one: ProcedurePass, sampled: Sampled) -> dict[str, object]:
     found = one.regression
     values = [float(x) if np.isfinite(x) else None for x in hull_of(one, sampled).array()]
     means = [None, None] if one.filtered is None else [float(x) for x in np.mean(one.filtered.updated[:, 2:4], axis=0)]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.doctor.corrections import setting
-from kempf.pipeline.channels.doctor.examine import Finding, examine_window
+from kempf.pipeline.channels.doctor.examine import ChannelFinding, examine_window
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
 from kempf.pipeline.channels.doctor.outcome import Outcome
@@ -75,7 +75,7 @@ def _doubt(outcome: Outcome) -> str:
     return f"{listed(outcome.channels)} may disagree: {outcome.words}"
 
 
-def _refuse(finding: Finding) -> None:
+def _refuse(finding: ChannelFinding) -> None:
     for fault in finding.faults:
         code = _code(fault)
         if code is None:

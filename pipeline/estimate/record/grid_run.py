@@ -21,7 +21,7 @@ _APPROACH_S = 5.0
 
 
 @dataclass(frozen=True)
-class Ship:
+class ShipConstants:
     """What the terms may ask of a ship.
 
     Attributes
@@ -37,7 +37,7 @@ class Ship:
 
 
 @dataclass(frozen=True, eq=False)
-class Run:
+class GridRun:
     """One manoeuvre.
 
     Attributes
@@ -57,7 +57,7 @@ class Run:
         Speed and shaft speed of the approach.
     channels : frozenset of str
         Canonical channels that the run has beyond those it must have.
-    ship : Ship
+    ship : ShipConstants
     day : int
     """
 
@@ -73,7 +73,7 @@ class Run:
     approach_m_s: float
     approach_per_s: float
     channels: frozenset[str]
-    ship: Ship
+    ship: ShipConstants
     day: int
 
     @property
@@ -125,8 +125,14 @@ def _period(record: Record) -> float:
 
 
 def make_run(
-    name: str, record: Record, instruments: Instruments, spec: ModelSpec, ship: Ship, step_s: float, day: int = 0
-) -> Run:
+    name: str,
+    record: Record,
+    instruments: Instruments,
+    spec: ModelSpec,
+    ship: ShipConstants,
+    step_s: float,
+    day: int = 0,
+) -> GridRun:
     """Lay a record on the grid.
 
     Readings of one kind around an instant are averaged, value and time; what is a moment off the grid is told to the
@@ -140,13 +146,13 @@ def make_run(
         For the channels that effects ask for.
     spec : ModelSpec
         For the frame of the current.
-    ship : Ship
+    ship : ShipConstants
     step_s : float
     day : int, optional
 
     Returns
     -------
-    Run
+    GridRun
     """
     n = int(np.floor(record.time_s[-1] / step_s)) + 1
     time = step_s * np.arange(n)
@@ -174,7 +180,7 @@ def make_run(
     coarse = heading[::ROWS]
     shaft = 2 + list(CHANNEL_SYMBOLS).index("n")
     first = fine <= _APPROACH_S
-    return Run(
+    return GridRun(
         name=name,
         start_utc_ns=record.start_utc_ns,
         step_s=step_s,

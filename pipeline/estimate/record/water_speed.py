@@ -12,14 +12,14 @@ from scipy.signal import lfilter
 
 from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.series import Float, Series
-from kempf.pipeline.channels.smooth import Smoothed, smoothed
+from kempf.pipeline.channels.smooth import SmoothedSpeed, smoothed
 from kempf.pipeline.estimate.record.checks import moves
 
 #: times in which a ship wins her speed back that are tried, in legs of the manoeuvre
 _LEGS = (0.3, 1.0, 3.0)
 
 
-def water_speed(log: Series, heading: Series, rudder: Series) -> Smoothed:
+def water_speed(log: Series, heading: Series, rudder: Series) -> SmoothedSpeed:
     """Return the speed at the log's instants, and how large and how slow its error is.
 
     Parameters
@@ -31,7 +31,7 @@ def water_speed(log: Series, heading: Series, rudder: Series) -> Smoothed:
 
     Returns
     -------
-    Smoothed
+    SmoothedSpeed
 
     References
     ----------

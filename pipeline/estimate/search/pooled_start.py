@@ -11,11 +11,11 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import maximum_likelihood, pooled_fit
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
-from kempf.pipeline.estimate.pooled_fit import Fit
-from kempf.pipeline.estimate.record.grid_run import Run, spread
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.search.starts import thinned
-from kempf.pipeline.model.effect_model import Augmented
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.model_spec import ModelSpec
@@ -40,7 +40,7 @@ class Start:
 
 
 def start_of(
-    records: Sequence[Record], runs: Sequence[Run], spec: ModelSpec, chosen: Sequence[int], workers: Executor
+    records: Sequence[Record], runs: Sequence[GridRun], spec: ModelSpec, chosen: Sequence[int], workers: Executor
 ) -> Start:
     """Race the ships that single runs give over several; the most likely one after a few steps wins.
 
@@ -48,7 +48,7 @@ def start_of(
     ----------
     records : sequence of Record
         One a run.
-    runs : sequence of Run
+    runs : sequence of GridRun
     spec : ModelSpec
     chosen : sequence of int
         The runs that race; the others get noise levels of their own and no part in the hull.
@@ -66,10 +66,10 @@ def start_of(
     alone = [one for one in found if one is not None]
     hulls = [np.median(alone, axis=0), *alone] if alone else []
     hulls = [*hulls[: _ENTRIES - 1], mariner_like(runs[0].ship.length_m).array()]
-    raced: list[Fit] = []
+    raced: list[PooledFit] = []
     for hull in hulls:
         one = pooled_fit.fit(
-            *(Augmented(), [runs[i] for i in few], spec, hull, levels[few], np.zeros(0), workers),
+            *(EffectModel(), [runs[i] for i in few], spec, hull, levels[few], np.zeros(0), workers),
             max_iterations=_SHORT_CLIMB,
         )
         if np.isfinite(one.log_likelihood):
@@ -95,7 +95,7 @@ def _alone(record: Record, spec: ModelSpec, arm_per_m: float) -> Float | None:
     return found.hull.array() if np.all(np.isfinite(found.hull.array())) else None
 
 
-def _levels(record: Record, run: Run) -> Float:
+def _levels(record: Record, run: GridRun) -> Float:
     """Noise levels to start from: those of the readings, smaller where several were averaged, and a little more."""
     noise = np.nan_to_num(record.noise_start, nan=1e-3)
     readings = np.isfinite(record.measured).sum(axis=0) / np.maximum(np.isfinite(run.measured).sum(axis=0), 1)

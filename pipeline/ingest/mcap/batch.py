@@ -169,7 +169,7 @@ def _indexed(log: LogFile, at: int) -> tuple[NDArray[np.int64], NDArray[np.int64
 
 
 @dataclass(frozen=True, eq=False)
-class _Block:
+class _ChunkBlock:
     """Payloads of one batch: where its bytes come from, and where in them the payloads lie."""
 
     pieces: tuple[Piece, ...]
@@ -181,11 +181,11 @@ class PayloadsBuilder:
     """Takes note of where the payloads of batches stand."""
 
     def __init__(self) -> None:
-        self._blocks: list[_Block] = []
+        self._blocks: list[_ChunkBlock] = []
 
     def add(self, batch: Batch) -> None:
         """Take note of one batch."""
-        self._blocks.append(_Block(batch.pieces, batch.first.astype(np.uint32), batch.end.astype(np.uint32)))
+        self._blocks.append(_ChunkBlock(batch.pieces, batch.first.astype(np.uint32), batch.end.astype(np.uint32)))
 
     def build(self, log: LogFile, is_text: NDArray[np.bool_]) -> Payloads:
         """Return all payloads; ``is_text`` tells of each whether it is shown as it stands."""
@@ -206,7 +206,7 @@ class Payloads:
     """
 
     def __init__(
-        self, log: LogFile, blocks: list[_Block], is_text: NDArray[np.bool_], chosen: Index | None = None
+        self, log: LogFile, blocks: list[_ChunkBlock], is_text: NDArray[np.bool_], chosen: Index | None = None
     ) -> None:
         self._log, self._blocks, self._is_text = log, blocks, is_text
         self._begins = np.cumsum([0] + [block.first.size for block in blocks])

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Reason, Values
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.mcap.batch import Batch, PayloadsBuilder, joined
-from kempf.pipeline.ingest.mcap.records import Channel
+from kempf.pipeline.ingest.mcap.records import McapChannel
 from kempf.pipeline.ingest.mcap.stream import McapStream
 from kempf.pipeline.ingest.mcap.topics import Route
 from kempf.pipeline.ingest.messages.columns import NoReaderError
@@ -110,7 +110,7 @@ def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
     UsageError, DataRejected
         See `decode`, but for what can be told only at the end of the file.
     """
-    return _Job(name, log, source).parts()
+    return _DecodeJob(name, log, source).parts()
 
 
 def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) -> Iterator[Decoded]:
@@ -143,7 +143,7 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
         A topic that the profile maps is not in the file (``topics_missing``), or it unpacks to far more than a log of
         its size holds.
     """
-    yield from _Job(name, log, source).run(patterns)
+    yield from _DecodeJob(name, log, source).run(patterns)
 
 
 def _topics(name: str, log: LogFile, source: Source | None, known: McapStream) -> set[str]:
@@ -161,7 +161,7 @@ def _topics(name: str, log: LogFile, source: Source | None, known: McapStream) -
     return {channel.topic for channel in channels.values()}
 
 
-class _Job:
+class _DecodeJob:
     """One pass over the file."""
 
     def __init__(self, name: str, log: LogFile, source: Source | None) -> None:
@@ -174,7 +174,7 @@ class _Job:
         self.clock = time.column if time and time.column in _TIMES else _TIMES[0]
         self.time_field = time if time and time.column not in _TIMES else None
         self.routes: dict[int, Route | None] = {}
-        self.made: dict[Channel, Route | None] = {}
+        self.made: dict[McapChannel, Route | None] = {}
         self.refused: dict[str, str] = {}
         self.seen: dict[str, set[str]] = {}
         self.timed, self.untimed = False, set[str]()
@@ -247,7 +247,7 @@ class _Job:
                 found = record[present], value[present] * mapped.factor + mapped.offset_si
                 part.values.setdefault(mapped.channel, []).append(found)
 
-    def _route(self, number: int, channel: Channel) -> Route | None:
+    def _route(self, number: int, channel: McapChannel) -> Route | None:
         """Return the reader of a channel, None where nothing is asked of it or it cannot be read."""
         if number not in self.routes:
             # channels that say the same have one reader, however many there are
@@ -256,7 +256,7 @@ class _Job:
             self.routes[number] = self.made[channel]
         return self.routes[number]
 
-    def _new_route(self, channel: Channel) -> Route | None:
+    def _new_route(self, channel: McapChannel) -> Route | None:
         schema = self.stream.schemas.get(channel.schema)
         if channel.topic not in self.topics:
             before = self.owners

@@ -42,7 +42,7 @@ class Schema:
 
 
 @dataclass(frozen=True)
-class Channel:
+class McapChannel:
     """One stream of messages; ``schema`` 0 is none."""
 
     topic: str
@@ -71,7 +71,7 @@ def parse_schema(content: bytes) -> tuple[int, Schema] | None:
         return None
 
 
-def parse_channel(content: bytes) -> tuple[int, Channel] | None:
+def parse_channel(content: bytes) -> tuple[int, McapChannel] | None:
     """Return the id of a channel and what it says; its metadata are not looked at."""
     try:
         number, schema = struct.unpack_from("<HH", content, 0)
@@ -79,7 +79,7 @@ def parse_channel(content: bytes) -> tuple[int, Channel] | None:
         encoding, _ = _text(content, at)
     except struct.error:
         return None
-    return number, Channel(topic, encoding, schema)
+    return number, McapChannel(topic, encoding, schema)
 
 
 def parse_footer(content: bytes) -> Footer | None:

@@ -30,8 +30,8 @@ from kempf.pipeline.ingest.mcap.records import (
     FOOTER,
     MESSAGE,
     SCHEMA,
-    Channel,
     DamagedChunkError,
+    McapChannel,
     Schema,
     head_of,
     parse_channel,
@@ -81,7 +81,7 @@ class McapStream:
     def __init__(self, name: str, log: LogFile) -> None:
         self._name, self._log = name, log
         self._summary = read_summary(log)
-        self.channels: dict[int, Channel] = dict(self._summary.channels)
+        self.channels: dict[int, McapChannel] = dict(self._summary.channels)
         self.schemas: dict[int, Schema] = dict(self._summary.schemas)
         self.lost: list[LostStretch] = []
         self.notes: list[str] = list(self._summary.notes)

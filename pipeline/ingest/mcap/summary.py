@@ -21,7 +21,7 @@ from kempf.pipeline.ingest.mcap.records import (
     FOOTER_SIZE,
     SCHEMA,
     STATISTICS,
-    Channel,
+    McapChannel,
     Schema,
     parse_channel,
     parse_chunk_place,
@@ -59,7 +59,7 @@ class Summary:
 
     ended: bool
     stop: int
-    channels: dict[int, Channel] = field(default_factory=dict)
+    channels: dict[int, McapChannel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
     chunks: list[tuple[int, int]] = field(default_factory=list)
     messages: int | None = None

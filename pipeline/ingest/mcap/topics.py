@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.mapping import check_once
-from kempf.pipeline.ingest.mcap.records import Channel, Schema
+from kempf.pipeline.ingest.mcap.records import McapChannel, Schema
 from kempf.pipeline.ingest.messages.columns import Columns, MessageReader, NoReaderError
 from kempf.pipeline.ingest.spans import Spans
 from kempf.schemas.known_messages import VOID_WHERE_NEGATIVE, plain_name
@@ -27,7 +27,7 @@ _LAST = float(np.iinfo(np.int64).max)
 
 
 @dataclass(frozen=True, eq=False)
-class Decoded:
+class DecodedTopics:
     """Messages of one channel.
 
     Attributes
@@ -49,7 +49,7 @@ class Route:
 
     Parameters
     ----------
-    channel : Channel
+    channel : McapChannel
     schema : Schema or None
     mapped : dict of str to ChannelMap
         By field; none where nothing is asked of the channel.
@@ -65,7 +65,7 @@ class Route:
     """
 
     def __init__(
-        self, channel: Channel, schema: Schema | None, mapped: dict[str, ChannelMap], time: TimeColumn | None
+        self, channel: McapChannel, schema: Schema | None, mapped: dict[str, ChannelMap], time: TimeColumn | None
     ) -> None:
         check_once(channel.topic, mapped)
         self.mapped = mapped
@@ -84,7 +84,7 @@ class Route:
         #: mapped fields that no message can have, each with why
         self.absent = {k: lacks[k] for k in mapped if k in lacks and (not _parts(k) or set(_parts(k)) & set(lacks))}
 
-    def read(self, payloads: Spans) -> Decoded:
+    def read(self, payloads: Spans) -> DecodedTopics:
         """Decode messages, shape (m,)."""
         columns = self._reader.read(payloads)
         found = {}
@@ -95,7 +95,7 @@ class Route:
                     sign, told = self._of(columns, test)
                     present = present & ~(told & (sign < 0))
             found[key] = value, present
-        return Decoded(columns.good, found, None if self._time is None else self._instants(columns))
+        return DecodedTopics(columns.good, found, None if self._time is None else self._instants(columns))
 
     def _of(self, columns: Columns, key: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         at = self._wanted.index(key)
@@ -155,7 +155,7 @@ def _angle(
     return np.arctan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
 
 
-def _reader(channel: Channel, schema: Schema | None, wanted: list[str]) -> MessageReader:
+def _reader(channel: McapChannel, schema: Schema | None, wanted: list[str]) -> MessageReader:
     """Return a reader of a channel's encoding; each is imported where it is used, for what it compiles."""
     told = schema.encoding if schema else ""
     if channel.encoding == "json":

@@ -70,7 +70,7 @@ class CdrReader:
 
 
 @dataclass
-class Program:
+class CdrProgram:
     """How to walk through one message.
 
     Attributes
@@ -104,7 +104,7 @@ class _StopError(Exception):
     """From here on the message cannot be walked through; says why."""
 
 
-def program_for(types: Types, name: str, wanted: list[str]) -> Program:
+def program_for(types: Types, name: str, wanted: list[str]) -> CdrProgram:
     """Compile the walk through a message.
 
     Parameters
@@ -118,7 +118,7 @@ def program_for(types: Types, name: str, wanted: list[str]) -> Program:
 
     Returns
     -------
-    Program
+    CdrProgram
         One slot a wanted field; those that the definition lacks stay empty.
 
     Raises
@@ -126,7 +126,7 @@ def program_for(types: Types, name: str, wanted: list[str]) -> Program:
     NoReaderError
         A wanted field lies behind something that cannot be stepped over.
     """
-    program = Program(kinds=[""] * len(wanted))
+    program = CdrProgram(kinds=[""] * len(wanted))
     slots = {tuple(key.split(".")): slot for slot, key in enumerate(wanted)}
     told = {path: _no_number(types, full_name(name, ""), path) for path in slots}
     program.missing = {".".join(path): why for path, why in told.items() if why}
@@ -170,7 +170,7 @@ def _no_number(types: Types, name: str, path: tuple[str, ...]) -> str:
 Slots = dict[tuple[str, ...], int]
 
 
-def _message(program: Program, types: Types, name: str, slots: Slots, depth: int) -> None:
+def _message(program: CdrProgram, types: Types, name: str, slots: Slots, depth: int) -> None:
     if depth > DEEPEST:
         raise _StopError(f"{name} is nested in itself")
     fields = types[name] or (Field("structure_needs_at_least_one_member", "uint8", None),)
@@ -184,7 +184,7 @@ def _message(program: Program, types: Types, name: str, slots: Slots, depth: int
             _array(program, types, own, within, depth)
 
 
-def _value(program: Program, types: Types, own: Field, within: Slots, depth: int) -> None:
+def _value(program: CdrProgram, types: Types, own: Field, within: Slots, depth: int) -> None:
     if own.kind in PRIMITIVES:
         size = np.dtype(PRIMITIVES[own.kind]).itemsize
         if not within:
@@ -201,7 +201,7 @@ def _value(program: Program, types: Types, own: Field, within: Slots, depth: int
         _message(program, types, own.kind, within, depth + 1)
 
 
-def _array(program: Program, types: Types, own: Field, within: Slots, depth: int) -> None:
+def _array(program: CdrProgram, types: Types, own: Field, within: Slots, depth: int) -> None:
     count = own.count or 0
     if own.kind in PRIMITIVES:
         size = np.dtype(PRIMITIVES[own.kind]).itemsize
@@ -223,7 +223,7 @@ def _array(program: Program, types: Types, own: Field, within: Slots, depth: int
         _loop(program, types, element, count - last - 1, depth)
 
 
-def _sequence(program: Program, types: Types, own: Field, within: Slots, depth: int) -> None:
+def _sequence(program: CdrProgram, types: Types, own: Field, within: Slots, depth: int) -> None:
     if own.kind in PRIMITIVES:
         size = np.dtype(PRIMITIVES[own.kind]).itemsize
         for path, slot in within.items():
@@ -234,7 +234,7 @@ def _sequence(program: Program, types: Types, own: Field, within: Slots, depth: 
     _loop(program, types, Field(own.name, own.kind, None), -1, depth)
 
 
-def _loop(program: Program, types: Types, element: Field, count: int, depth: int) -> None:
+def _loop(program: CdrProgram, types: Types, element: Field, count: int, depth: int) -> None:
     place = len(program.steps)
     _add(program, LOOP, count, 0)
     _value(program, types, element, {}, depth + 1)
@@ -242,7 +242,7 @@ def _loop(program: Program, types: Types, element: Field, count: int, depth: int
     program.steps[place] = (LOOP, count, len(program.steps))
 
 
-def _skip(program: Program, align: int, size: int) -> None:
+def _skip(program: CdrProgram, align: int, size: int) -> None:
     """Add a skip; one that is aligned like the last one is made one with it."""
     last = program.steps[-1] if program.steps else (END,)
     if last[0] == SKIP and last[1] == align:
@@ -251,7 +251,7 @@ def _skip(program: Program, align: int, size: int) -> None:
         _add(program, SKIP, align, size)
 
 
-def _add(program: Program, *step: int) -> None:
+def _add(program: CdrProgram, *step: int) -> None:
     if len(program.steps) >= _LONGEST:
         raise _StopError("its definition is too long")
     program.steps.append(step)

@@ -33,7 +33,7 @@ _PAUSE = 3
 
 
 @dataclass(frozen=True, eq=False)
-class Clock:
+class NmeaClock:
     """Times of the sentences.
 
     Attributes
@@ -69,7 +69,7 @@ class _Told:
         return told
 
 
-def clock_of(frames: Frames, said: dict[str, Said]) -> Clock:
+def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
     """Give each sentence its time.
 
     Parameters
@@ -80,7 +80,7 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> Clock:
 
     Returns
     -------
-    Clock
+    NmeaClock
     """
     told, late = _told(frames, said)
     notes = []
@@ -97,7 +97,7 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> Clock:
             ahead = "ahead of" if lead > 0 else "behind"
             seconds = abs(float(lead)) / SECOND_NS
             notes.append(f"The logger's stamps are {seconds:.3f} s {ahead} the receiver's UTC (median).")
-        return Clock(np.where(own != NO_TIME, own, frames.stamp_ns), notes)
+        return NmeaClock(np.where(own != NO_TIME, own, frames.stamp_ns), notes)
     speaks = _of_a_dated_talker(frames, told.dated) & told.timed
     own = _nearest_day(told, _by_counting_days(told, speaks), notes)
     follows = _follows(said)
@@ -107,7 +107,7 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> Clock:
     n = own.size
     carrier = _next(fix) if follows else _latest(fix)
     carried = np.where((carrier >= 0) & (carrier < n), own[np.clip(carrier, 0, max(n - 1, 0))], NO_TIME)
-    return Clock(
+    return NmeaClock(
         np.where(own != NO_TIME, own, carried + _delays(frames, said, own, fix, carried, follows, notes)), notes
     )
 
