@@ -109,15 +109,15 @@ def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile
         ``no_vessel_named``, ``vessel_name``: the name is blank, or ``profiles_disagree``: the option and the profile
         name different vessels.
     """
-    told = given.vessel if given else None
-    if vessel is not None and told is not None and vessel != told:
+    named = given.vessel if given else None
+    if vessel is not None and named is not None and vessel != named:
         raise UsageError(
             "profiles_disagree",
-            f"--vessel says {vessel!r}, the profile says {told!r}.",
+            f"--vessel says {vessel!r}, the profile says {named!r}.",
             "Make them agree, or leave one of them out.",
-            {"option": vessel, "profile": told},
+            {"option": vessel, "profile": named},
         )
-    name = vessel if vessel is not None else told
+    name = vessel if vessel is not None else named
     if name is None:
         raise UsageError(
             "no_vessel_named",
