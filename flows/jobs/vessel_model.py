@@ -214,7 +214,7 @@ def _model_set(
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     return replace(
         made,
-        model_name=" + ".join(("plain", *effects)),
+        model_name=" + ".join((inputs.model_spec["name"], *effects)),
         fit={"horizon": "free run", "rung": rung(0, step)},
         convergence={**made.convergence, "held_out": [run.name for run in step.held], "left_out": runs.skipped},
         warnings=(*(f"left out: {name} ({why})" for name, why in sorted(runs.skipped.items())), *alone, *made.warnings),

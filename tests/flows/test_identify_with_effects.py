@@ -26,7 +26,7 @@ def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     late_rudder.write(folder)
     warehouse = fresh(folder / "w")
     ingest(warehouse, [folder / "day.mcap"], given=read_profiles([folder / "late.yaml"]))
-    (folder / "lag.yaml").write_text("name: plain\neffects: [rudder_lag]\nrate_bias: false\n", encoding="utf-8")
+    (folder / "lag.yaml").write_text("name: as_built\neffects: [rudder_lag]\nrate_bias: false\n", encoding="utf-8")
     return folder
 
 
@@ -46,7 +46,7 @@ def test_each_zigzag_and_all_of_them_know_the_lag(place: Path, identified: list[
     for one in identified:
         lag = one["parameters"]["rudder_lag.tau"]
         assert lag["unit"] == "s" and abs(lag["value"] - late_rudder.LAG_S) < 4.0 * lag["std"], one["parameter_set_id"]
-        assert one["fit"]
+        assert one["fit"] and one["model"]["name"] == "as_built + rudder_lag"
     single = identified[0]
     assert set(single["noise"]) >= {"sigma_F", "sigma_v", "sigma_r", "sigma_psi"}
     assert single["fit"]["channels"]["yaw_rate"]["fit_percent"] > 90.0
@@ -60,7 +60,7 @@ def test_each_zigzag_and_all_of_them_know_the_lag(place: Path, identified: list[
 
 def test_the_history_follows_a_ship_whose_model_has_effects(place: Path, identified: list[dict[str, Any]]) -> None:
     changes = run(place, "history", "--vessel", VESSEL, "--changes")["changes"]
-    followed = {(one["model"], one["estimator"]): one for one in changes}["plain + rudder_lag", "ml"]
+    followed = {(one["model"], one["estimator"]): one for one in changes}["as_built + rudder_lag", "ml"]
     assert followed["parameter_set_ids"] == [one["parameter_set_id"] for one in identified[:-1]]
 
 
@@ -70,6 +70,8 @@ def test_a_set_names_its_model_and_plain_identification_leaves_current_where_it_
     pooled = identified[-1]["parameter_set_id"]
     again = run(place, "identify", "--vessel", VESSEL, "--model", pooled[:12])
     assert [one["parameter_set_id"] for one in again] == [one["parameter_set_id"] for one in identified]
+    told = kempf("identify", "--vessel", VESSEL, "--model", pooled[:12], "--warehouse", place / "w")
+    assert f"2 zigzags pooled, 1 held out: {pooled}" in told.out
     run(place, "identify", "--vessel", VESSEL)
     warehouse = Warehouse(str(place / "w"))
     assert aliases.of_vessel(warehouse, VESSEL) == {"current": pooled}

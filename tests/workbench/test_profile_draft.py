@@ -43,7 +43,12 @@ def test_units_behind_a_name_and_columns_of_no_known_name() -> None:
     assert channels["x: 1"] == {"channel": "?", "unit": "?"}
 
 
-def test_what_describes_itself_needs_no_draft(logs: Path) -> None:
+def test_what_describes_itself_needs_no_draft(logs: Path, tmp_path: Path) -> None:
     refused(kempf("profile", "draft", logs / "mariner.nmea.gz", "--json"), 2, "no_draft")
     refused(kempf("profile", "draft", logs / "none.csv", "--json"), 4, "no_such_file")
+    bad = (("empty.csv", b"", 3, "empty_log"), ("noise.csv", bytes(range(256)), 2, "no_draft"))
+    for name, content, code, error in bad:
+        (tmp_path / name).write_bytes(content)
+        told = refused(kempf("profile", "draft", tmp_path / name, "--json"), code, error)
+        assert "Ingest it as it is" not in told["next_step"]
     assert "sources:" in kempf("profile", "draft", logs / "mariner.csv.gz", "--json").json["profile"]

@@ -13,7 +13,7 @@ import click
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import print_json, print_note, progress
+from kempf.workbench.terminal import counted, print_json, print_note, progress
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -131,7 +131,7 @@ def mcap_file(vessel: str, set_id: str | None, out: Path, segments: tuple[str, .
         }
         print_json({**content, "skipped": found.skipped})
     else:
-        click.echo(f"{vessel}, {name}: {len(found.runs)} runs written to {out}", err=True)
+        click.echo(f"{vessel}, {name}: {counted(len(found.runs), 'run')} written to {out}", err=True)
 
 
 def _only(found: Comparison, wanted: Sequence[str]) -> Comparison:

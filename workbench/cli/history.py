@@ -13,7 +13,7 @@ import click
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
+from kempf.workbench.terminal import counted, number, print_json, print_note, print_table, short_ids
 
 if TYPE_CHECKING:
     from kempf.pipeline.history.changes import Changes
@@ -174,7 +174,8 @@ def _tell(one: dict[str, Any]) -> None:
     """Print what was found of one model and estimator, for a person."""
     left = ", ".join(f"{n} {reason}" for reason, n in one["left_out"].items())
     title = (
-        f"model {one['model']}, estimator {one['estimator']}: {one['sets']} sets on {len(one['occasions'])} occasions"
+        f"model {one['model']}, estimator {one['estimator']}: {counted(one['sets'], 'set')} on "
+        f"{counted(len(one['occasions']), 'occasion')}"
     )
     click.echo(click.style(title, bold=True) + (f"; left out: {left}" if left else ""))
     pooled = one["pooled"]

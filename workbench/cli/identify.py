@@ -14,7 +14,7 @@ from kempf.schemas.errors import KempfError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.parameter_set_table import tell_set
-from kempf.workbench.terminal import print_json, progress
+from kempf.workbench.terminal import counted, print_json, progress
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
@@ -66,13 +66,13 @@ def command(
         for outcome in outcomes:
             _tell(outcome, verbose=verbose)
         if pooled is not None:
-            title = f"{len(pooled.segment_ids)} zigzags pooled: {pooled.parameter_set_id}"
+            held = len(pooled.convergence.get("held_out", ()))
+            title = f"{counted(len(pooled.segment_ids) - held, 'zigzag')} pooled"
+            title += f", {held} held out: {pooled.parameter_set_id}" if held else f": {pooled.parameter_set_id}"
             tell_set(pooled, title, verbose=verbose)
             out = len(outcomes) - len(pooled.segment_ids)
             if out:
-                click.echo(
-                    f"  {out} zigzags are not in it: broken off, not converged, or the same manoeuvre in another log"
-                )
+                click.echo(f"  not in it: {counted(out, 'zigzag')} broken off, not converged, or in another log, too")
         click.echo(f"next: kempf history --vessel {vessel}, kempf params show ID, kempf rerun ID")
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if failed and len(failed) == len(outcomes):

@@ -12,7 +12,7 @@ import click
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, profile_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.ranked_warnings import of_several, show_warnings
-from kempf.workbench.terminal import one_line, print_json, progress
+from kempf.workbench.terminal import counted, one_line, print_json, progress
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.ingest_logs import IngestOutcome
@@ -116,4 +116,4 @@ def _zigzags(outcome: IngestOutcome) -> str:
         f"{s.psi0_deg:g}/{s.delta0_deg:g} to {s.first_side}{' (broken off)' if s.kind != 'zigzag' else ''}"
         for s in outcome.segments
     ]
-    return f"{len(found)} zigzags: {', '.join(found)}" if found else "no zigzag"
+    return f"{counted(len(found), 'zigzag')}: {', '.join(found)}" if found else "no zigzag"
