@@ -39,6 +39,8 @@ def test_a_set_prints_three_warnings_and_all_of_them_where_asked(own: Path) -> N
     assert "  2 more warnings: --verbose" in short
     assert kempf(*asked, "--verbose").out.count("  warning: ") == len(WARNINGS)
     assert kempf(*asked, "--json").json["warnings"] == list(WARNINGS)
+    steered = kempf("steer", "--vessel", "mariner", "--set", "ps-0", "--minutes", "8", "--warehouse", own).out
+    assert steered.count("  warning: ") == 3 and "more warnings: --verbose" in steered
 
 
 def test_one_note_of_many_logs_is_said_once() -> None:

@@ -13,7 +13,8 @@ SHORT = ("--minutes", "8")
 
 def steered(filled: Path, *options: object):
     chosen = () if "--set" in options else ("--set", one_of(filled, "ml"))
-    return kempf("steer", "--vessel", "mariner", *chosen, *SHORT, *options, "--warehouse", filled)
+    short = () if "--minutes" in options else SHORT
+    return kempf("steer", "--vessel", "mariner", *chosen, *short, *options, "--warehouse", filled)
 
 
 def test_a_law_and_one_from_wrong_parameters(filled: Path):

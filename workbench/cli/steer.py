@@ -10,7 +10,7 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ _FIGURES = (".png", ".svg", ".pdf")
 @click.option("--minutes", type=float, default=20.0, show_default=True, help="Of each of the two legs of the track.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of weather and noise.")
 @click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help="Draw the tracks: .png, .svg or .pdf.")
+@verbose_option
 @warehouse_option
 @json_option
 def command(
@@ -45,6 +46,7 @@ def command(
     minutes: float,
     seed: int,
     figure: Path | None,
+    verbose: bool,
     uri: str,
     as_json: bool,
 ) -> None:
@@ -67,7 +69,7 @@ def command(
     if as_json:
         print_json(_show(done, figure))
     else:
-        _tell(done, figure)
+        _tell(done, figure, verbose=verbose)
 
 
 def _check_figure(figure: Path) -> None:
@@ -152,7 +154,9 @@ def _law(one: Tried) -> dict[str, Any]:
     }
 
 
-def _tell(done: Steered, figure: Path | None) -> None:
+def _tell(done: Steered, figure: Path | None, *, verbose: bool) -> None:
+    from kempf.workbench.ranked_warnings import show_warnings
+
     shown = [_law(one) for one in done.laws]
     rows = [
         (
@@ -175,8 +179,7 @@ def _tell(done: Steered, figure: Path | None) -> None:
         click.echo(f"  effect: {p.name} {number(p.value)} ± {number(p.std, 2)} {p.unit} (1 s.e.)")
     if figure is not None:
         click.echo(f"  drawn: {figure}")
-    for warning in done.warnings:
-        click.echo(f"  warning: {warning}")
+    show_warnings(done.warnings, verbose=verbose)
 
 
 _ROWS = {
