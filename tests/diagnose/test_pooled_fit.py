@@ -58,7 +58,7 @@ def test_derivatives_are_asked_for_only_where_the_search_goes_on(counted: Counte
     beginning = plain_of(ship, 0)
     # the start and its derivatives, and none of it again for the linearisation that a fit keeps
     assert counted.passes == two + each
-    layout = pooled_fit._Layout(beginning.runs, WORKERS)
+    layout = pooled_fit.CommonLikelihood(beginning.runs, WORKERS)
     theta = np.concatenate([beginning.hull, beginning.values, beginning.levels.ravel()])
     value, gradient, _ = layout.full(theta)
     lower = theta + 0.1 * np.concatenate([np.zeros(6), np.sign(-gradient[6:])])
@@ -78,7 +78,7 @@ def test_a_point_beside_which_the_filter_runs_away_is_no_place_to_go_on_from(mon
         J[3, 1] = 1e200
         return (replace(first, J=J), *others)
 
-    layout = pooled_fit._Layout(beginning.runs, WORKERS)
+    layout = pooled_fit.CommonLikelihood(beginning.runs, WORKERS)
     theta = np.concatenate([beginning.hull, beginning.values, beginning.levels.ravel()])
     with monkeypatch.context() as patched:
         patched.setattr(pooled_fit, "linearise", away)

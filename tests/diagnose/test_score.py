@@ -43,7 +43,7 @@ def scored(run: GridRun, truth: np.ndarray, seed: int, name: str) -> Candidate:
     (line,) = linearise((filtered,), (point,), (passed(filtered, point),), WORKERS)
     base = PooledFit(
         *(EffectModel(), (filtered,), hull, np.zeros(0), LEVELS[None, :], line.passed.log_likelihood),
-        *(np.full((6, 6), np.nan), (line,), True, 0),
+        *(np.full((6, 6), np.nan), (line,), True, "", 0),
     )
     return score(base, catalogue()[name], WORKERS)
 

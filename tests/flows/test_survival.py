@@ -116,7 +116,7 @@ def test_a_signal_at_any_moment_leaves_what_the_next_run_completes(
     code = (
         "import os, sys\n"
         "import deltalake, polars, pyarrow.fs, kempf.flows.jobs.ingest_logs, kempf.workbench.cli.ingest\n"
-        "from warehouse import delta\n"
+        "from kempf.warehouse import delta\n"
         "from kempf.warehouse.store import Warehouse\n"
         "from kempf.workbench.cli import main\n"
         "left = [0]\n"

@@ -43,8 +43,8 @@ def test_what_another_process_wrote_is_seen(warehouse: Warehouse) -> None:
     put(warehouse, "one")
     assert stands(warehouse) == {"run-1": "one"}
     code = (
-        "from warehouse import runs; from kempf.warehouse.store import Warehouse\n"
-        f"runs.record_all(Warehouse({warehouse.uri!r}), [runs.Run('run-1', 'ingest', None, 'two')])"
+        "from kempf.warehouse import runs; from kempf.warehouse.store import Warehouse\n"
+        f"runs.record_all(Warehouse({warehouse.uri!r}), [runs.FlowRun('run-1', 'ingest', None, 'two')])"
     )
     subprocess.run([sys.executable, "-c", code], check=True, cwd=ROOT, timeout=60)
     assert stands(warehouse) == {"run-1": "two"}
