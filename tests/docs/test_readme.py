@@ -9,7 +9,7 @@ from tests.docs.console import Names, blocks, difference, follow, same_line
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(("page", "commands"), [("README", 7), ("docs/first_logs", 14), ("docs/tables", 3)])
+@pytest.mark.parametrize(("page", "commands"), [("README", 7), ("docs/first_logs", 16), ("docs/tables", 3)])
 def test_pages_show_what_their_commands_print(page: str, commands: int, tmp_path: Path) -> None:
     text = (ROOT / f"{page}.md").read_text(encoding="utf-8")
     assert follow(text, tmp_path, f"export PYTHONPATH='{ROOT}'", "unset KEMPF_WAREHOUSE") == commands

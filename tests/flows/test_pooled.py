@@ -69,3 +69,9 @@ def test_reprocessing_keeps_the_pool_and_the_command_lists_it_last(days: Warehou
     told = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri))
     assert "2 zigzags pooled" in told.out and "not in it: 1 zigzag broken off" in told.out
     assert len(parameter_sets.summaries(days, "mariner")) == 4
+
+
+def test_zigzags_that_are_not_pooled_are_said_to_be_so(days: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("kempf.flows.jobs.pool_vessel.pool_vessel", lambda *_, **__: None)
+    said = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri))
+    assert said.code == 0 and "not pooled: that takes two whole zigzags" in said.err

@@ -108,6 +108,12 @@ def _tell(document: Mapping[str, Any], *, everything: bool) -> None:
         for one in document["ladder"]
     ]
     print_table(["step", "added", "fitted, %", "held out, %", "wind, m/s^2/s^0.5"], ladder, "Free-run error")
+    shown = [
+        one
+        for one in document["candidates"]
+        if everything or one["verdict"] in ("present", "negligible") or one["score"] is not None
+    ]
+    shown = shown if everything else shown[:_SHOWN]
     rows = [
         [
             one["effect"],
@@ -116,13 +122,16 @@ def _tell(document: Mapping[str, Any], *, everything: bool) -> None:
             _change(one["expected_change"]),
             number(one["absorption"], 3),
             one["verdict"].replace("_", " "),
-            one["why"],
         ]
-        for one in document["candidates"]
-        if everything or one["verdict"] in ("present", "negligible") or one["score"] is not None
+        for one in shown
     ]
-    head = ["effect", "set", "score", "expected change, ± 1 s.e.", "absorbed", "verdict", "why"]
-    print_table(head, rows if everything else rows[:_SHOWN], "Screened beside the plain model")
+    head = ["effect", "set", "score", "expected change, ± 1 s.e.", "absorbed", "verdict"]
+    print_table(head, rows, "Screened beside the plain model")
+    reasons: dict[str, list[str]] = {}
+    for one in shown:
+        reasons.setdefault(one["why"], []).append(one["effect"])
+    for why, effects in reasons.items():
+        click.echo(f"  {', '.join(effects)}: {why}")
     if not everything and len(document["candidates"]) > _SHOWN:
         click.echo(f"  of {len(document['candidates'])} effects; --all shows every one, also what cannot be tested")
     first = next((name for one in document["sets"] for name in one["effects"]), None)

@@ -90,6 +90,12 @@ def _pooled(
     except KempfError as error:
         click.echo(f"not pooled [{error.code}] {error}", err=True)
         return None
+    if found is None and request.estimator == "ml" and len(outcomes) > 1:
+        click.echo(
+            "not pooled: that takes two whole zigzags that converged, each with a speed log, at different times and read "
+            "with one profile",
+            err=True,
+        )
     return found[0] if found else None
 
 

@@ -9,7 +9,7 @@ import click
 from kempf.schemas.errors import NotFound
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_note, print_table
+from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
 
 
 @click.command("ladder", cls=GivenOnce)
@@ -41,30 +41,22 @@ def command(vessel: str, uri: str, as_json: bool) -> None:
 
 def tell_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
     """Print rungs of a ladder as a table."""
+    ids = short_ids([one["parameter_set_id"] for one in rungs])
     rows = []
     for one in rungs:
         held, wind = one["held_out_error"], one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"]
-        change = [f"{name} {number(v['value'])} ± {number(v['std'], 2)}" for name, v in one["effects"].items()]
+        own = {n.partition(".")[2]: v for n, v in one["effects"].items() if n.partition(".")[0] == one["added"]}
+        sizes = [f"{name} {number(v['value'])} ± {number(v['std'], 2)}" for name, v in own.items()]
         rows.append(
             [
                 str(one["step"]),
                 one["added"] or "plain model",
+                ", ".join(sizes) or "-",
                 number(100 * one["in_sample_error"], 3),
                 "-" if held is None else number(100 * held, 3),
                 number(wind, 2),
-                number(one["log_likelihood"], 7),
-                ", ".join(change) or "-",
-                one["parameter_set_id"],
+                ids[one["parameter_set_id"]],
             ]
         )
-    head = [
-        "step",
-        "added",
-        "fitted, %",
-        "held out, %",
-        "wind, m/s^2/s^0.5",
-        "log-likelihood",
-        "effects, ± 1 s.e.",
-        "set",
-    ]
-    print_table(head, rows, f"{vessel}: free-run error as a share of the motion")
+    head = ["step", "added", "size, ± 1 s.e.", "fitted", "held out", "wind, m/s^2/s^0.5", "set"]
+    print_table(head, rows, f"{vessel}: free-run error, % of the motion")
