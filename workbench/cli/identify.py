@@ -92,7 +92,7 @@ def _pooled(
         return None
     if found is None and request.estimator == "ml" and len(outcomes) > 1:
         click.echo(
-            "not pooled: that takes two whole zigzags that converged, each with a speed log, at different times and read "
+            "not pooled: that takes two whole zigzags that converged, each with a speed log, at different times, read "
             "with one profile",
             err=True,
         )
