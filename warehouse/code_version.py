@@ -57,6 +57,7 @@ STAGES: dict[Stage, Entry] = {
     "estimate": Entry(
         (
             *("channels.instruments", "estimate.estimators", "estimate.pooling", "estimate.no_log.companions"),
+            "estimate.record.cut",
             *("diagnose.forward_selection", "diagnose.diagnosis", "diagnose.verdict"),
         ),
         ("ingest",),

@@ -24,7 +24,7 @@ from benchmarks.result_page import RESULTS, table, write
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
-from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.history.changes import find_changes
 from kempf.pipeline.history.scan import judge, stretch
 from kempf.pipeline.history.sets import ParameterHistory, occasions

@@ -18,7 +18,7 @@ import numpy as np
 
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
-from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.pipeline.simulate.logger_profile import logger_profile

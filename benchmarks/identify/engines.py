@@ -29,7 +29,8 @@ from kempf.pipeline.estimate import maximum_likelihood, pooled_fit
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.pooled_fit import CommonLikelihood
 from kempf.pipeline.estimate.record import grid_run
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.search.pooled_start import start_of
 from kempf.pipeline.estimate.uncertainty import from_information

@@ -32,7 +32,8 @@ from kempf.pipeline.estimate import pooling
 from kempf.pipeline.estimate.likelihood import Likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.pooling import Member
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.search.starts import starting_points
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, simulate_trial, zigzag_settings
 from kempf.schemas.channels import CHANNELS

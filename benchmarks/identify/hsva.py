@@ -21,7 +21,7 @@ from kempf.flows.jobs.files import read_model
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_vessel
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.pipeline.estimate.filters.linear_kernel import FASTEST_PER_S
-from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment

@@ -24,7 +24,8 @@ from kempf.flows.jobs.log_channels import channels_of
 from kempf.pipeline.estimate import pooling
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.pooling import Member
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.result import Estimate
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec

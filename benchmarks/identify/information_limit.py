@@ -30,7 +30,8 @@ from benchmarks.identify.information_result import Case, Run
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.instruments import Instrument

@@ -16,7 +16,8 @@ from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
 from kempf.pipeline.estimate.no_log.companions import Passage, companions_of, shaft_speed
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings, identify_without_log
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.schemas.model_spec import ModelSpec

@@ -22,7 +22,8 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.paper import ship
 from kempf.pipeline.estimate.paper.least_squares import regress
 from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedureSettings, iterate
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.sampled import Sampled, sample
 from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discretise
 from kempf.pipeline.model.vehicle import LinearVehicle

@@ -24,7 +24,8 @@ from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, search
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment

@@ -19,7 +19,7 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.estimators import default_settings, estimate
-from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile

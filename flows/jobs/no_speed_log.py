@@ -14,7 +14,8 @@ from kempf.pipeline.estimate.estimators import estimate_without_log
 from kempf.pipeline.estimate.no_log import companions
 from kempf.pipeline.estimate.no_log.companions import Passage
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec

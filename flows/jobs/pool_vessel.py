@@ -19,7 +19,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate import pooling
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.pooling import Member
-from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile

@@ -26,7 +26,7 @@ from kempf.pipeline.estimate.paper.ship import (
     percent_off,
     percent_std,
 )
-from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.sampled import Sampled
 from kempf.pipeline.estimate.result import Estimate, Value
 from kempf.pipeline.model.ship import Hull, discretise

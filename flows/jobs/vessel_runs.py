@@ -14,8 +14,9 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run, step_of
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.search.pooled_start import Start, start_of
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec

@@ -17,8 +17,8 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
-from kempf.pipeline.estimate.record.record import make_record
 from kempf.pipeline.estimate.search.pooled_start import Start, start_of
 from kempf.pipeline.simulate.trial import Trial, TrialSettings
 from kempf.schemas.channels import CHANNELS

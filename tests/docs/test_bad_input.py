@@ -7,7 +7,7 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor import outcome
 from kempf.pipeline.channels.doctor.faults import UNITS
-from kempf.pipeline.estimate.record import channel_faults, checks, jumps, record
+from kempf.pipeline.estimate.record import channel_faults, checks, cut, jumps
 from tests.estimate.test_checks import REFUSED
 
 ROOT = Path(__file__).parents[2]
@@ -15,7 +15,7 @@ TEXT = (ROOT / "docs" / "bad_input.md").read_text(encoding="utf-8")
 SOURCES = [
     (ROOT / "pipeline" / f"{name}.py").read_text(encoding="utf-8")
     for name in (
-        "estimate/record/record",
+        "estimate/record/cut",
         "estimate/record/checks",
         "estimate/record/channel_faults",
         "estimate/maximum_likelihood",
@@ -49,10 +49,10 @@ def test_every_flag_is_in_the_code() -> None:
 
 
 def test_thresholds_are_the_codes() -> None:
-    assert f"fewer than {record._MIN_INSTANTS // 2} readings" in TEXT
-    assert f"fewer than {record._MIN_INSTANTS} instants" in TEXT
-    assert f"less than {np.rad2deg(record._MIN_RUDDER_STD_RAD):.1f} deg rms" in TEXT
-    assert f"more than {record._MAX_SPEED_GAP_S:.0f} s" in TEXT
+    assert f"fewer than {cut._MIN_INSTANTS // 2} readings" in TEXT
+    assert f"fewer than {cut._MIN_INSTANTS} instants" in TEXT
+    assert f"less than {np.rad2deg(cut._MIN_RUDDER_STD_RAD):.1f} deg rms" in TEXT
+    assert f"more than {cut._MAX_SPEED_GAP_S:.0f} s" in TEXT
     assert f"beyond {np.rad2deg(checks._FARTHEST_RUDDER_RAD):.0f} deg" in TEXT
     assert f"within {np.rad2deg(checks._FAINT_RUDDER_RAD):.0f} deg" in TEXT
     assert (checks._SWING_PER_RUDDER, checks._EXECUTES) == (10.0, 2)

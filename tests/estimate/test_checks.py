@@ -9,8 +9,9 @@ import pytest
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.pipeline.estimate.record.checks import moves, swing
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.moves import moves, swing
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.schemas.errors import DataRejected
 from tests.estimate.simulated import bounds, changed, instruments_of, record_of, sailed, without

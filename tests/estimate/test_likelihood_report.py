@@ -10,7 +10,7 @@ import pytest
 from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.likelihood_report import slowest_s
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
-from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.trial import Trial
 from kempf.schemas.model_spec import ModelSpec

@@ -18,7 +18,8 @@ from kempf.pipeline.estimate.filters.smoother import LinearSystem, last_state, s
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.no_log.companions import Passage, companions_of, has_log
 from kempf.pipeline.estimate.no_log.identify import SPEED_POWER, NoLogSettings, identify_without_log
-from kempf.pipeline.estimate.record.record import Record, make_record
+from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.result import Estimate
 from kempf.pipeline.estimate.search.starts import thinned

@@ -9,7 +9,7 @@ import pytest
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.pipeline.estimate.record.record import make_record
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.sampled import sample
 from kempf.pipeline.estimate.search.starts import thinned
 from kempf.schemas.errors import DataRejected

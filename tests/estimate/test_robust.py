@@ -13,8 +13,8 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Series
 from kempf.pipeline.estimate.likelihood import Likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify, search
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.jumps import find_jumps
-from kempf.pipeline.estimate.record.record import make_record
 from kempf.pipeline.estimate.result import Estimate
 from kempf.pipeline.estimate.search.climb import Search, climb
 from kempf.pipeline.estimate.search.starts import starting_points, thinned

@@ -53,7 +53,7 @@ class Passage:
 
 
 def has_log(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> bool:
-    """Return whether `kempf.pipeline.estimate.record.record.make_record` takes the speed of a segment from a log.
+    """Return whether `kempf.pipeline.estimate.record.cut.make_record` takes the speed of a segment from a log.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
-from kempf.pipeline.estimate.record.checks import moves
+from kempf.pipeline.estimate.record.moves import moves
 
 #: the yaw rate is the heading's change over this share of a leg
 _SHARE = 0.1

@@ -13,7 +13,7 @@ from scipy.signal import lfilter
 from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.smooth import SmoothedSpeed, smoothed
-from kempf.pipeline.estimate.record.checks import moves
+from kempf.pipeline.estimate.record.moves import moves
 
 #: times in which a ship wins her speed back that are tried, in legs of the manoeuvre
 _LEGS = (0.3, 1.0, 3.0)
