@@ -14,7 +14,8 @@ from kempf.pipeline.steering.motion import LinearMotion, ShipEffects, linear_mot
 How = Literal["carried", "shifts the course", "no part of a straight course", "left out"]
 #: what is taken of a channel that a steady course does not have
 _TAKEN = {"wind_speed": "calm air", "wind_angle": "calm air", "water_depth": "deep water", "roll": "no heel"}
-_NEGLIGIBLE = 1e-12
+#: differences by rounding: as a share of the largest number of a row, and of what is taken for nothing there
+_NEGLIGIBLE, _NOTHING = 1e-9, 1e-6
 
 
 @dataclass(frozen=True)
@@ -95,7 +96,9 @@ def _compared(name: str, whole: LinearMotion, bare: LinearMotion, taken: set[str
     rest = [[m.rudder_rad, m.sway_m_s, *m.offsets] for m in (whole, bare)]
     if _differ(*map(np.array, rest)):
         moved = whole.rudder_rad - bare.rudder_rad
-        how = f": rudder at {degrees(whole.rudder_rad):.2g} deg" if abs(moved) > _NEGLIGIBLE else " as it is measured"
+        how = " as it is measured"
+        if abs(moved) > _NEGLIGIBLE * _NOTHING:
+            how = f": rudder at {degrees(whole.rudder_rad):.2g} deg"
         return Carried(name, "shifts the course", f"{name} only shifts the straight course{how}")
     if taken:
         return Carried(
@@ -107,4 +110,8 @@ def _compared(name: str, whole: LinearMotion, bare: LinearMotion, taken: set[str
 
 
 def _differ(here: np.ndarray, there: np.ndarray) -> bool:
-    return bool(np.any(np.abs(here - there) > _NEGLIGIBLE * np.maximum(np.abs(here), np.abs(there))))
+    size = np.maximum(np.abs(here), np.abs(there))
+    if size.ndim > 1 and size.size:
+        # an element that is nothing but for rounding is small beside its row, not beside itself
+        size = np.broadcast_to(np.max(size, axis=-1, keepdims=True), size.shape)
+    return bool(np.any(np.abs(here - there) > _NEGLIGIBLE * np.maximum(size, _NOTHING)))
