@@ -5,6 +5,8 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 
+import polars as pl
+
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import delta, parameter_sets
 from kempf.warehouse.keys import one_of, quoted, vessel_key
@@ -91,18 +93,21 @@ def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tu
 
 def of_vessel(warehouse: Warehouse, vessel: str) -> dict[str, str]:
     """Return the parameter set id of every alias of a vessel, sorted by alias."""
-    frame = delta.read(warehouse, "aliases", {"vessel_key": vessel_key(vessel)})
-    stored = dict(zip(frame["alias"].to_list(), frame["parameter_set_id"].to_list(), strict=True))
-    dated = [stored.pop(alias) for alias in EARLIER if alias in stored]
-    return dict(sorted((stored | ({CURRENT: dated[0]} if dated else {})).items()))
+    return _pointed(delta.read(warehouse, "aliases", {"vessel_key": vessel_key(vessel)}))
 
 
 def holders(warehouse: Warehouse, alias: str) -> dict[str, str]:
     """Return the parameter set id that an alias points to, by vessel, sorted."""
     frame = delta.read(warehouse, "aliases", {})
-    names = frame["vessel"].unique().sort().to_list()
-    found = {vessel: of_vessel(warehouse, vessel).get(alias) for vessel in names}
-    return {vessel: name for vessel, name in found.items() if name is not None}
+    pointed = {str(one["vessel"][0]): _pointed(one) for one in frame.sort("vessel").partition_by("vessel")}
+    return {vessel: names[alias] for vessel, names in pointed.items() if alias in names}
+
+
+def _pointed(rows: pl.DataFrame) -> dict[str, str]:
+    """Return the parameter set id of every alias in the rows of one vessel, sorted by alias."""
+    stored = dict(zip(rows["alias"].to_list(), rows["parameter_set_id"].to_list(), strict=True))
+    dated = [stored.pop(alias) for alias in EARLIER if alias in stored]
+    return dict(sorted((stored | ({CURRENT: dated[0]} if dated else {})).items()))
 
 
 def _require_name(alias: str) -> None:

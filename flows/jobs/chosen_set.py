@@ -56,7 +56,7 @@ def named_set(warehouse: Warehouse, name: str) -> ParameterSet:
     NotFound
         ``no_parameter_set``.
     UsageError
-        ``alias_ambiguous``: several vessels have this alias. ``id_ambiguous``.
+        ``alias_ambiguous``: several vessels have this alias. ``ambiguous_parameter_set``: several ids begin so.
     """
     if name.startswith("ps-"):
         return parameter_sets.get(warehouse, name)

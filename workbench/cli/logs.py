@@ -65,7 +65,7 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
 
 
 def _facts(row: LogRow) -> dict[str, Any]:
-    """Return what is told of every log."""
+    """Return what is shown of every log."""
     from kempf.warehouse.instant import iso_utc
 
     return {
