@@ -41,7 +41,7 @@ class ModelSpec(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
-    name: str = "linear"
+    name: str = "plain"
     base: str = "sway-yaw-16"
     effects: tuple[str, ...] = ()
     #: ``force``: the normalised lateral force F of eq. (16) with its moment l F; ``none``: no wind, as in a tank
@@ -55,8 +55,9 @@ class ModelSpec(BaseModel):
     #: the rudder's force goes with V to this power, in eq. (16) with 2; with a propeller that keeps turning the rudder
     #: stands in a race that slows less than the ship: 1 is V times the speed of the approach, at which b1 and b2 hold
     rudder_speed_exponent: float = Field(default=2.0, ge=0.0, le=2.0)
-    #: whether the rate gyro may have a constant bias; it takes a heading beside the yaw rate to tell
-    rate_bias: bool = True
+    #: whether every manoeuvre has a bias of the rate gyro of its own among its states; the effect ``gyro_bias``, one
+    #: constant of the ship's gyro, is what a diagnosis finds and names
+    rate_bias: bool = False
     #: mu_F, that of M, and mu_V of eq. (16), 1/s. By default force and current hardly forget within a trial: random
     #: walks, which may stand off nothing for as long as they like
     wind_correlation_rate_per_s: float = Field(default=1e-5, gt=0)

@@ -19,6 +19,7 @@ STATE_SYMBOLS: dict[str, str] = {
     "psi": "heading from its first value, rad",
     "F": "lateral wind acceleration, m/s^2",
     "M": "yaw acceleration beside the wind's, rad/s^2",
+    "dV": "error of the speed as it was logged, m/s",
     "m1": "state of an effect",
     "m2": "state of an effect",
     "m3": "state of an effect",

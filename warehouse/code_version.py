@@ -56,8 +56,8 @@ STAGES: dict[Stage, Entry] = {
     ),
     "estimate": Entry(
         (
-            *("channels.instruments", "estimate.estimators", "estimate.pooling", "estimate.no_log.companions"),
-            "estimate.record.cut",
+            *("channels.instruments", "estimate.estimators", "estimate.pooled_uncertainty"),
+            *("estimate.no_log.companions", "estimate.record.cut", "estimate.record.left_out"),
             *("diagnose.forward_selection", "diagnose.diagnosis", "diagnose.verdict"),
         ),
         ("ingest",),

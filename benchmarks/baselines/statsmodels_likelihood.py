@@ -20,7 +20,7 @@ from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 #: positions in our theta of what this model has: the hull, sigma_F, sigma_V, sigma_v, sigma_r
 TAKEN = np.array([0, 1, 2, 3, 4, 5, 6, 8, 9, 10])
 _NAMES = (*HULL_PARAMETERS, "log_sigma_F", "log_sigma_V", "log_sigma_v", "log_sigma_r")
-_STATES = np.array([0, 1, 2, 5, 6])
+_STATES = np.array([0, 1, 3, 5, 6])
 _ORDER = 24
 _NODES, _WEIGHTS = (np.array(x) for x in np.polynomial.legendre.leggauss(4))
 

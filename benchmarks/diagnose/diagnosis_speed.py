@@ -17,8 +17,8 @@ from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import assembled
-from kempf.pipeline.diagnose.forward_selection import plain
 from kempf.pipeline.diagnose.screen import screen
+from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.schemas.effects import catalogue
 from kempf.warehouse.store import Warehouse
 
@@ -43,7 +43,7 @@ def main() -> None:
             ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
             runs = assembled(warehouse, choose(warehouse, "speed"), PLAIN)
             with ThreadPoolExecutor(max_workers=_CORES) as workers:
-                fit, _ = plain(runs.runs, runs.spec, runs.start, workers)
+                fit = fit_plain(runs.runs, runs.spec, workers).fit
                 chosen = dict(list(catalogue().items())[:_CANDIDATES])
                 screen(fit, chosen, workers)
                 taken = []

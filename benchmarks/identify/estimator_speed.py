@@ -28,11 +28,11 @@ from benchmarks.baselines import vessel_models
 from benchmarks.identify.draw_estimator_speed import draw
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.pipeline.estimate import pooling
 from kempf.pipeline.estimate.likelihood import Likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings, identify
-from kempf.pipeline.estimate.pooling import Member
+from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.grid_run import plain_run
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.search.starts import starting_points
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, simulate_trial, zigzag_settings
@@ -252,7 +252,7 @@ def by_samples() -> tuple[list[float], list[float]]:
 def by_segments() -> tuple[list[float], list[float], list[str]]:
     """Seconds of separate fits and of the pooled one over `SEGMENTS`; and lines on threads."""
     sailed = [sail("mariner", 100 + number, SEGMENT_SAMPLES) for number in range(SEGMENTS[-1])]
-    members = [Member(str(i), s.record, s.arm_per_m) for i, s in enumerate(sailed)]
+    runs = [plain_run(str(i), s.record, s.spec, s.arm_per_m, None) for i, s in enumerate(sailed)]
     separate, pooled = [], []
     for count in SEGMENTS:
         few, spec = sailed[:count], sailed[0].spec
@@ -265,7 +265,7 @@ def by_segments() -> tuple[list[float], list[float], list[str]]:
             for _ in range(1 + 8 // count):
                 # the work is done in the worker's thread
                 begin = time.process_time()
-                pooling.identify(members[:count], spec, SETTINGS, workers)
+                fit_plain(runs[:count], spec, workers)
                 best = min(best, time.process_time() - begin)
         pooled.append(best)
         print(count, separate[-1], pooled[-1], file=sys.stderr)

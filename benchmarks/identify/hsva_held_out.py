@@ -21,13 +21,12 @@ from benchmarks.identify.linear_free_run import LinearFreeRun, free_run
 from benchmarks.measured_ships import ordered
 from kempf.flows.jobs.files import read_model
 from kempf.flows.jobs.log_channels import channels_of
-from kempf.pipeline.estimate import pooling
-from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
-from kempf.pipeline.estimate.pooling import Member
+from kempf.pipeline.estimate.plain_fit import fit_plain
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.grid_run import plain_run
 from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
-from kempf.pipeline.estimate.result import Estimate
+from kempf.pipeline.model.ship import Hull
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.warehouse.store import Warehouse
 
@@ -45,7 +44,7 @@ class Trained:
     """One way of training: how it is told, the estimate, and the free runs by name of the run."""
 
     title: str
-    estimate: Estimate
+    fit: PooledFit
     runs: dict[str, LinearFreeRun]
 
     def mean_rms(self, *, held_out: bool) -> tuple[float, float]:
@@ -69,10 +68,10 @@ def records(data: Path) -> dict[str, Record]:
 
 def train(title: str, spec: ModelSpec, runs: dict[str, Record]) -> Trained:
     """Identify from the training runs and let the ship run free on all."""
-    members = [Member(name, with_rudder_inflow(runs[name], spec), spec.wind_arm_per_m or 0.0) for name in TRAINING]
+    chosen = [plain_run(name, runs[name], spec, spec.wind_arm_per_m or 0.0, LENGTH_M) for name in TRAINING]
     with ThreadPoolExecutor() as workers:
-        found = pooling.identify(members, spec, MaximumLikelihoodSettings(), workers)
-    return Trained(title, found, {name: free_run(record, found.hull, spec) for name, record in runs.items()})
+        found = fit_plain(chosen, spec, workers).fit
+    return Trained(title, found, {name: free_run(record, Hull(*found.hull), spec) for name, record in runs.items()})
 
 
 def at_one_speed(runs: dict[str, Record]) -> dict[str, Record]:
@@ -112,12 +111,12 @@ def page(ways: list[Trained], chosen: tuple[float, float], grid: list[list[str]]
     rows = []
     for way in ways:
         ours, theirs = way.mean_rms(held_out=False), way.mean_rms(held_out=True)
-        state = "yes" if way.estimate.converged else "**no**"
+        state = "yes" if way.fit.converged else "**no**"
         rows.append(
             [way.title, state, *(f"{a:.3f}" if i % 2 == 0 else f"{a:.4f}" for i, a in enumerate((*ours, *theirs)))]
         )
     scale = plausibility.scale(LENGTH_M)
-    cells = [f"{p.value * s:.2f} ± {p.std * s:.2f}" for p, s in zip(best.estimate.parameters, scale, strict=True)]
+    cells = [f"{p * s:.2f} ± {e * s:.2f}" for p, e, s in zip(best.fit.hull, best.fit.std, scale, strict=True)]
     told = ", ".join(f"{n} {c}" for n, c in zip(HULL_PARAMETERS, cells, strict=True))
     tank = read_model(_TANK)
     agrees = chosen == (tank.moment_correlation_rate_per_s, tank.rudder_speed_exponent)

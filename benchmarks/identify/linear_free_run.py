@@ -76,7 +76,7 @@ def free_run(record: Record, hull: Hull, spec: ModelSpec) -> LinearFreeRun:
     n = used.time_s.size
     first = used.time_s <= used.time_s[0] + _INITIAL_S
     x0, P0 = np.zeros(N_STATE), np.zeros((N_STATE, N_STATE))
-    for state, column in ((0, 0), (1, 1), (4, 2)):
+    for state, column in ((0, 0), (1, 1), (2, 2)):
         known = used.measured[first, column]
         x0[state] = float(np.mean(known[np.isfinite(known)])) if np.isfinite(known).any() else 0.0
         # a state without variance would be left out of the arithmetic
@@ -89,5 +89,5 @@ def free_run(record: Record, hull: Hull, spec: ModelSpec) -> LinearFreeRun:
         *(theta, False, used.time_s, used.speed_m_s, used.rudder_rad, np.zeros(n), np.zeros(n), nothing),
         *(np.zeros(n, dtype=np.bool_), np.zeros((n, 2)), 0.0, 1.0, 1.0, 1.0, 1.0, LONGEST, x0, P0, trace),
     )
-    predicted = states[:, [0, 1, 4]]
+    predicted = states[:, [0, 1, 2]]
     return LinearFreeRun(record.time_s, predicted, record.measured - predicted)

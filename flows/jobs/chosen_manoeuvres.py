@@ -13,6 +13,9 @@ from kempf.warehouse.deduplicate import once, same
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
+#: so many manoeuvres with a speed through the water do without those that have none
+_ENOUGH = 2
+
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
@@ -37,6 +40,11 @@ class Chosen:
     ingests: dict[str, str]
     file_names: dict[str, str]
     skipped: dict[str, str]
+
+
+def without_log(segment: Segment) -> bool:
+    """Return whether a segment has no speed through the water of its own."""
+    return segment.detail.get("has_log") is False
 
 
 def choose(warehouse: Warehouse, vessel: str, failed: Collection[str] = ()) -> Chosen:
@@ -69,6 +77,11 @@ def choose(warehouse: Warehouse, vessel: str, failed: Collection[str] = ()) -> C
     for segment in found:
         if rows[segment.ingest_id].profile_sha256 != profile_sha256:
             skipped[segment.segment_id] = "its log is read with an older profile"
+    logged = [s for s in kept if not without_log(s)]
+    if len(logged) >= _ENOUGH:
+        # over ground a stream along the course is taken for speed: beside zigzags with a log it only misleads
+        skipped |= {s.segment_id: "no speed through the water, unlike others" for s in kept if s not in logged}
+        kept = logged
     kept.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
     return Chosen(
         vessel,

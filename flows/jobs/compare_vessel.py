@@ -19,10 +19,9 @@ from kempf.pipeline.compare.comparison import ComparedRun, judged, summary
 from kempf.pipeline.compare.misfit import where
 from kempf.pipeline.compare.overshoot import Turn, turns_of
 from kempf.pipeline.estimate.filtered import RunFilter
-from kempf.pipeline.estimate.grid_gating import left_out
-from kempf.pipeline.estimate.levels import fit_levels
+from kempf.pipeline.estimate.levels import first_levels, fit_levels
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.estimate.search.pooled_start import Start
+from kempf.pipeline.estimate.record.left_out import left_out
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
@@ -138,7 +137,7 @@ def compare_vessel(
     gross: Mapping[str, Any] = chosen.convergence.get("gross_error_instants_s") or {}
     filtered = [RunFilter(left_out(run, gross.get(run.name, {})), model, data.spec) for run in data.runs]
     progress(0, len(filtered), "predicting")
-    levels = _levels(filtered, held, hull, values, chosen, data.start)
+    levels = _levels(filtered, held, hull, values, chosen)
     runs, found, skipped = [], [], dict(data.skipped)
     for k, (one, segment) in enumerate(zip(filtered, ordered, strict=True)):
         progress(k, len(filtered), f"predicting {segment.segment_id}")
@@ -230,7 +229,7 @@ class _Levels:
 
 
 def _levels(
-    filtered: list[RunFilter], held: list[bool], hull: Float, values: Float, chosen: ParameterSet, start: Start
+    filtered: list[RunFilter], held: list[bool], hull: Float, values: Float, chosen: ParameterSet
 ) -> list[_Levels]:
     """Return the noise levels of each run; a held-out run is predicted with the mean of the fitted ones' logarithms."""
     kept: Mapping[str, Any] = chosen.convergence.get("levels") or {}
@@ -240,7 +239,7 @@ def _levels(
             own.append(np.array(kept[one.run.name], dtype=np.float64))
             sources.append("fitted with the parameters")
         else:
-            found = fit_levels(one, hull, values, start.levels[k])
+            found = fit_levels(one, hull, values, first_levels(one))
             own.append(found.levels)
             sources.append("fitted to this manoeuvre, parameters held" + ("" if found.converged else "; not converged"))
     seen = [levels for levels, out in zip(own, held, strict=True) if not out]

@@ -98,7 +98,7 @@ def _kept(
 ) -> StoredDiagnosis:
     """Store a diagnosis, what its report shows, and the model that was diagnosed."""
     chosen, found = examined.chosen, examined.diagnosis
-    fitted = Fitted(examined.runs, found.way, found.gross_errors)
+    fitted = Fitted(examined.runs, found.plain, found.way)
     base, _ = store_model(warehouse, chosen, spec, own, fitted=fitted)
     phases = _phases(examined)
     content = {**as_json(found), "where": where_left(found, phases)}
@@ -149,7 +149,7 @@ def examine(
 
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         made = diagnose(
-            *(runs.runs, runs.spec, runs.start, screened, workers, settings),
+            *(runs.runs, runs.spec, screened, workers, settings),
             given=named(spec.effects, known),
             told=step,
         )

@@ -7,12 +7,13 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
+from kempf.flows.jobs.chosen_manoeuvres import without_log
 from kempf.flows.jobs.log_channels import channels_of
-from kempf.flows.jobs.no_speed_log import CAN, KEY, companions_of, estimate_of, no_log_settings, without_log
+from kempf.flows.jobs.no_speed_log import CAN, KEY, companions_of, estimate_of, no_log_settings
 from kempf.flows.jobs.parameter_set_of import arm_of, as_parameter_set, without_arm
 from kempf.flows.jobs.pending import Waiting, waiting
 from kempf.flows.jobs.refresh_logs import Refreshed, refresh_logs
-from kempf.flows.jobs.standing_model import EFFECTS_BY, NONE_OF_ONES_OWN, Own, effect_settings
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, SINGLE, Own, effect_settings
 from kempf.flows.jobs.vessel_model import build_single
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
@@ -46,11 +47,11 @@ class Request:
     own: Own = NONE_OF_ONES_OWN
 
     def __post_init__(self) -> None:
-        if self.spec.effects and self.estimator != EFFECTS_BY:
+        if self.spec.effects and self.estimator != SINGLE:
             raise UsageError(
                 "effects_need_ml",
                 f"The model has the effects {', '.join(self.spec.effects)}, which {self.estimator!r} cannot estimate.",
-                f"Take the estimator {EFFECTS_BY!r}, or a model without effects.",
+                f"Take the estimator {SINGLE!r}, or a model without effects.",
             )
 
     def all_settings(self) -> dict[str, Any]:
@@ -315,5 +316,6 @@ def build(
     if KEY in inputs.settings:
         result = estimate_of(record, spec.with_arm(arm), arm or 0.0, profile, inputs, others or {})
     else:
-        result = estimate(inputs.estimator, record, spec.with_arm(arm), arm or 0.0, dict(inputs.settings))
+        given = (spec.with_arm(arm), arm or 0.0, dict(inputs.settings), profile.length_m)
+        result = estimate(inputs.estimator, record, *given)
     return as_parameter_set(result, inputs, vessel, segment_ids, origin, without_arm(spec, arm))

@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
+from kempf.flows.jobs.chosen_manoeuvres import without_log
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.estimators import estimate_without_log
 from kempf.pipeline.estimate.no_log import companions
@@ -28,11 +29,6 @@ from kempf.warehouse.segments import Segment
 CAN = ("ml",)
 #: place of `NoLogSettings` among the settings of a set
 KEY = "no_log"
-
-
-def without_log(segment: Segment) -> bool:
-    """Return whether a segment has no speed through the water of its own."""
-    return segment.detail.get("has_log") is False
 
 
 def no_log_settings(wished: Mapping[str, Any]) -> dict[str, Any]:

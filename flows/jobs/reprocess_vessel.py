@@ -14,10 +14,10 @@ from kempf.flows.fleet.state import VesselState, fleet_state
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_segments
 from kempf.flows.jobs.pending import Waiting, store
-from kempf.flows.jobs.pool_vessel import POOLED, pool_segments
+from kempf.flows.jobs.pool_vessel import pool_segments
 from kempf.flows.jobs.refresh_logs import Refreshed, Stale, refresh_all, stale_logs
 from kempf.flows.jobs.rerun_set import rerun
-from kempf.flows.jobs.standing_model import Own, model_of, point, standing
+from kempf.flows.jobs.standing_model import POOLED, SINGLE, Own, model_of, point, standing
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all
 from kempf.flows.process.commit_batch import together_or_each
@@ -237,6 +237,9 @@ class _Reprocessing:
         if now is None:
             return
         spec, own = model_of(now)
+        if any(one.estimator == SINGLE and one.spec == spec for one in work.requests):
+            # identified and pooled just now
+            return
         try:
             chosen = choose(self.warehouse, work.vessel, work.refreshed.failed if work.refreshed else ())
             made, new = store_model(self.warehouse, chosen, spec, own, self.progress, self.flow_run)

@@ -8,9 +8,8 @@ from typing import Any
 
 from kempf.flows.jobs.chosen_set import named_set
 from kempf.flows.jobs.identify_vessel import build
-from kempf.flows.jobs.pool_vessel import POOLED, build_pooled
 from kempf.flows.jobs.spool import spooled
-from kempf.flows.jobs.standing_model import ESTIMATOR, Own, known_effects
+from kempf.flows.jobs.standing_model import POOLED, WITH_EFFECTS, Own, known_effects
 from kempf.flows.jobs.vessel_model import build_model
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.pipeline.estimate.names import NAMES
@@ -139,12 +138,10 @@ def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profil
         It can no longer be identified; the reason says why.
     """
     inputs, origin = inputs_of(stored), dict(stored.provenance)
-    if inputs.estimator not in (*NAMES, POOLED, ESTIMATOR):
+    if inputs.estimator not in (*NAMES, POOLED, WITH_EFFECTS):
         raise _no_estimator(stored)
-    if inputs.estimator == POOLED:
-        return build_pooled(instruments, profile, inputs, stored.vessel, stored.segment_ids, origin)
-    if inputs.estimator == ESTIMATOR:
-        return build_model(instruments, profile, inputs, stored.vessel, origin, stored.parent)
+    if inputs.estimator in (POOLED, WITH_EFFECTS):
+        return build_model(instruments, profile, inputs, stored.vessel, stored.segment_ids, origin, stored.parent)
     one = instruments[inputs.bounds[0].log_id]
     return build(one, profile, inputs, stored.vessel, stored.segment_ids, origin, instruments)
 

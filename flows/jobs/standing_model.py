@@ -19,10 +19,12 @@ from kempf.warehouse import aliases, code_version, parameter_sets
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
 
-#: the estimator of these sets, and of sets of a single manoeuvre whose model has effects
-ESTIMATOR, EFFECTS_BY = "ml-effects", "ml"
-#: eq. (16) with the bias of the rate gyro left to the catalogue, which names it where there is one
-PLAIN = ModelSpec(name="plain", rate_bias=False)
+#: the estimator of these sets, its name in earlier versions where the model has effects, and that of single manoeuvres
+POOLED, WITH_EFFECTS, SINGLE = "ml-pooled", "ml-effects", "ml"
+#: key of a pooled set's settings that holds those of its search, where they are not the defaults
+SEARCH = "search"
+#: eq. (16), the model of whoever names none
+PLAIN = ModelSpec()
 
 
 @dataclass(frozen=True)
@@ -87,7 +89,7 @@ def named(names: Sequence[str], known: Mapping[str, Effect]) -> tuple[Effect, ..
     return tuple(known[name] if name in known else effects.get(name) for name in names)
 
 
-def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
+def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own, search: Mapping[str, Any] | None = None) -> Inputs:
     """Return all that a model's parameter set is a function of.
 
     Parameters
@@ -97,21 +99,26 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own) -> Inputs:
         ``effects`` names them in order.
     own : Own
         Those that are not in the catalogue.
+    search : mapping, optional
+        Settings of the search that differ from the defaults.
     """
+    settings = {"segments": [s.segment_id for s in chosen.segments], **effect_settings(spec, own)}
     return Inputs(
         log_ids=tuple(s.log_id for s in chosen.segments),
         profile_sha256=chosen.profile_sha256,
         bounds=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in chosen.segments),
         model_spec=spec.model_dump(mode="json"),
-        estimator=ESTIMATOR,
-        settings={"segments": [s.segment_id for s in chosen.segments], **effect_settings(spec, own)},
+        estimator=POOLED,
+        settings={**settings, **({SEARCH: dict(search)} if search else {})},
         code_version=code_version.fingerprint("estimate"),
     )
 
 
-def stored_model(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, own: Own) -> ParameterSet | None:
+def stored_model(
+    warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, own: Own, search: Mapping[str, Any] | None = None
+) -> ParameterSet | None:
     """Return the parameter set of a model of these manoeuvres, None where it is not stored yet."""
-    name = parameter_set_id(inputs_of(chosen, spec, own))
+    name = parameter_set_id(inputs_of(chosen, spec, own, search))
     there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
     return parameter_sets.get(warehouse, name) if name in there else None
 
@@ -135,7 +142,7 @@ def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     """Return a vessel's current model, None where her current set is of no model of this kind."""
     pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
     current = parameter_sets.get(warehouse, pointed) if pointed else None
-    return current if current is not None and current.estimator == ESTIMATOR else None
+    return current if current is not None and current.estimator in (POOLED, WITH_EFFECTS) else None
 
 
 def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:

@@ -5,7 +5,7 @@ A model's parent is the model with one effect less, so a vessel's ladder is the 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -14,19 +14,23 @@ import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.parameter_set_of import arm_of, channel_warnings, stored, without_arm
-from kempf.flows.jobs.standing_model import Own, inputs_of, known_effects, named, stored_model
+from kempf.flows.jobs.standing_model import SEARCH, Own, inputs_of, known_effects, named, stored_model
 from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.diagnosis import step_of
 from kempf.pipeline.diagnose.forward_selection import staged
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import rung
-from kempf.pipeline.estimate.grid_gating import instants_left_out
-from kempf.pipeline.estimate.one_step_fit import one_step_fit
+from kempf.pipeline.estimate.level_bounds import to_intensities
+from kempf.pipeline.estimate.maximum_likelihood import settings_of
+from kempf.pipeline.estimate.plain_fit import LEVEL, PlainFit
 from kempf.pipeline.estimate.plausibility import doubts
 from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncertainty_of
+from kempf.pipeline.estimate.record.left_out import instants_left_out
 from kempf.pipeline.estimate.result import discrete_values
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
@@ -46,24 +50,32 @@ class Fitted:
     Attributes
     ----------
     runs : VesselRuns
+    plain : PlainFit
     fits : tuple of PooledFit
         With one effect more each.
-    gross_errors : int
-        Measurements left out before the first.
     """
 
     runs: VesselRuns
+    plain: PlainFit
     fits: tuple[PooledFit, ...]
-    gross_errors: int
 
 
-def fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own) -> Fitted:
-    """Fit a model and every model on the way to it."""
+def fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own, search: Mapping[str, Any] | None = None) -> Fitted:
+    """Fit a model and every model on the way to it.
+
+    Parameters
+    ----------
+    runs : VesselRuns
+    spec : ModelSpec
+    own : Own
+    search : mapping, optional
+        Settings of the search that differ from the defaults.
+    """
     used = named(spec.effects, known_effects(own))
     chosen, _ = split(runs.runs)
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        fits, gross = staged([runs.runs[i] for i in chosen], runs.spec, runs.start.of(chosen), used, workers)
-    return Fitted(runs, tuple(fits), gross)
+        plain, fits = staged([runs.runs[i] for i in chosen], runs.spec, used, workers, settings_of(search or {}))
+    return Fitted(runs, plain, tuple(fits))
 
 
 def store_model(
@@ -74,6 +86,8 @@ def store_model(
     progress: Progress = silent,
     flow_run: str | None = None,
     fitted: Fitted | None = None,
+    search: Mapping[str, Any] | None = None,
+    keep: Callable[[Sequence[ParameterSet]], None] | None = None,
 ) -> tuple[ParameterSet, bool]:
     """Store a model and every model on the way to it, each the parent of the next, in one commit.
 
@@ -88,30 +102,38 @@ def store_model(
     flow_run : str, optional
     fitted : Fitted, optional
         The model's fits, where the caller has them; else they are made here.
+    search : mapping, optional
+        Settings of the search that differ from the defaults.
+    keep : callable, optional
+        Takes what is new, where the caller stores it.
 
     Returns
     -------
     (ParameterSet, bool)
         The model, and whether it is new.
     """
-    found = stored_model(warehouse, chosen, spec, own)
+    found = stored_model(warehouse, chosen, spec, own, search)
     if found is not None:
         return found, False
     way = [spec.model_copy(update={"effects": spec.effects[:k]}) for k in range(len(spec.effects) + 1)]
-    wanted = [inputs_of(chosen, one, own) for one in way]
+    wanted = [inputs_of(chosen, one, own, search) for one in way]
     names = [parameter_set_id(inputs) for inputs in wanted]
     there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
     if fitted is None:
         runs = assembled(warehouse, chosen, spec, progress)
         progress(0, 1, f"fitting {spec.effects[-1] if spec.effects else 'the plain model'}")
-        fitted = fitted_model(runs, spec, own)
+        fitted = fitted_model(runs, spec, own, search)
     profile = vessels.get(warehouse, chosen.profile_sha256)
     made = []
     for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
         if name not in there:
             told = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
-            made.append(_model_set(fit, fitted, profile, inputs, chosen.vessel, told, parent))
-    parameter_sets.insert(warehouse, made)
+            ids = [segment.segment_id for segment in chosen.segments]
+            made.append(_model_set(fit, fitted, profile, inputs, chosen.vessel, ids, told, parent))
+    if keep is None:
+        parameter_sets.insert(warehouse, made)
+    else:
+        keep(made)
     return made[-1], True
 
 
@@ -120,6 +142,7 @@ def build_model(
     profile: VesselProfile,
     inputs: Inputs,
     vessel: str,
+    segment_ids: Sequence[str],
     told: dict[str, Any],
     parent: str | None,
 ) -> ParameterSet:
@@ -132,14 +155,17 @@ def build_model(
     profile : VesselProfile
     inputs : Inputs
     vessel : str
+    segment_ids : sequence of str
+        In the order of the inputs' bounds.
     told : dict
         Provenance.
     parent : str or None
     """
     spec = ModelSpec.model_validate(dict(inputs.model_spec))
-    runs = assemble(instruments, profile, list(zip(inputs.settings["segments"], inputs.bounds, strict=True)), spec)
-    fitted = fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
-    return _model_set(fitted.fits[-1], fitted, profile, inputs, vessel, told, parent)
+    runs = assemble(instruments, profile, list(zip(segment_ids, inputs.bounds, strict=True)), spec)
+    own = Own.from_json(inputs.settings.get("own") or {})
+    fitted = fitted_model(runs, spec, own, inputs.settings.get(SEARCH))
+    return _model_set(fitted.fits[-1], fitted, profile, inputs, vessel, segment_ids, told, parent)
 
 
 def build_single(
@@ -174,23 +200,24 @@ def build_single(
     runs = assemble({bounds.log_id: instruments}, profile, [(segment_ids[0], bounds)], spec)
     fitted = fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
     fit, (record,) = fitted.fits[-1], runs.records
-    passed = fit.linearised[0].passed
-    one_step = one_step_fit(fit.runs[0].run.measured, passed.innovation, passed.variance)
-    made = _as_parameter_set(fit, fitted, profile, inputs, vessel, segment_ids, told)
-    said = (*record.warnings, *made.warnings, *doubts(fit.hull, fit.std[:6], one_step))
-    return replace(made, noise=_noise(fit, runs.spec), fit=one_step, warnings=said, parent=spec.parent)
+    known = uncertainty_of(fit)
+    made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, segment_ids, told)
+    return replace(
+        made,
+        noise=_noise(fit, runs.spec),
+        fit=known.one_step[0],
+        warnings=(*record.warnings, *made.warnings),
+        parent=spec.parent,
+    )
 
 
 def _noise(fit: PooledFit, spec: ModelSpec) -> tuple[Stored, ...]:
     """Return the noise levels of a fit of one run by name; those of the disturbances in the long run."""
-    rates = (
-        *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
-        *(spec.current_correlation_rate_per_s, 0.5, 0.5, 0.5),
-    )
+    in_the_long_run = np.exp(fit.levels[0] - to_intensities(spec)).tolist()
     used = fit.runs[0].levels_used()
     return tuple(
-        Stored(name, float(np.exp(level) / np.sqrt(2.0 * rate)), None, unit)
-        for (name, unit), level, rate, there in zip(NOISE_PARAMETERS.items(), fit.levels[0], rates, used, strict=True)
+        Stored(name, level, None, unit)
+        for (name, unit), level, there in zip(NOISE_PARAMETERS.items(), in_the_long_run, used, strict=True)
         if there
     )
 
@@ -201,6 +228,7 @@ def _model_set(
     profile: VesselProfile,
     inputs: Inputs,
     vessel: str,
+    segment_ids: Sequence[str],
     told: dict[str, Any],
     parent: str | None,
 ) -> ParameterSet:
@@ -210,20 +238,66 @@ def _model_set(
         raise NotFound("no_parent", f"The model {effects} has no parent.", "Make it with `kempf effects add`.")
     _, left = split(runs.runs)
     step = step_of(fit, [runs.runs[i] for i in left])
-    made = _as_parameter_set(fit, fitted, profile, inputs, vessel, tuple(inputs.settings["segments"]), told)
+    known, plain = uncertainty_of(fit), fitted.plain
+    if not effects:
+        known = replace(known, covariance=known.covariance * plain.widened**2)
+    made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, tuple(segment_ids), told)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
+    # of the manoeuvres that the inputs name, so that a rerun says the same
+    skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in segment_ids}
     return replace(
         made,
         model_name=" + ".join((inputs.model_spec["name"], *effects)),
         fit={"horizon": "free run", "rung": rung(0, step)},
-        convergence={**made.convergence, "held_out": [run.name for run in step.held], "left_out": runs.skipped},
-        warnings=(*(f"left out: {name} ({why})" for name, why in sorted(runs.skipped.items())), *alone, *made.warnings),
+        convergence={
+            **made.convergence,
+            "held_out": [run.name for run in step.held],
+            "left_out": skipped,
+            **({} if effects or len(plain.alone) < 2 else {"pooling": _pooling(plain)}),
+        },
+        warnings=(
+            *(f"left out: {name} ({why})" for name, why in sorted(skipped.items())),
+            *alone,
+            *(() if effects else _disagreement(plain)),
+            *made.warnings,
+        ),
         parent=parent,
+    )
+
+
+def _pooling(plain: PlainFit) -> dict[str, Any]:
+    """Return what separate hulls say of a common one, JSON content."""
+    return {
+        "segments": len(plain.alone),
+        "statistic": plain.statistic,
+        "degrees_of_freedom": plain.degrees_of_freedom,
+        "p_value": plain.p_value,
+        "may_be_pooled": plain.p_value >= LEVEL,
+        "widened": plain.widened,
+        "members": [
+            {
+                "segment": one.run.name,
+                "gross_errors": one.gross_errors,
+                "off_in_std": dict(zip(HULL_PARAMETERS, plain.off_in_std(one).tolist(), strict=True)),
+            }
+            for one in plain.alone
+        ],
+    }
+
+
+def _disagreement(plain: PlainFit) -> tuple[str, ...]:
+    if plain.p_value >= LEVEL:
+        return ()
+    return (
+        f"the {len(plain.alone)} manoeuvres do not share one hull (p = {plain.p_value:.1g}): the ship, her load or "
+        "what acts on her changed, or the model lacks something; standard errors are widened "
+        f"{plain.widened:.1f} times",
     )
 
 
 def _as_parameter_set(
     fit: PooledFit,
+    known: PooledUncertainty,
     fitted: Fitted,
     profile: VesselProfile,
     inputs: Inputs,
@@ -232,8 +306,10 @@ def _as_parameter_set(
     told: dict[str, Any],
 ) -> ParameterSet:
     """Return what every set of a fit with effects holds."""
-    spec, covariance = ModelSpec.model_validate(dict(inputs.model_spec)), fit.covariance
+    spec, covariance = ModelSpec.model_validate(dict(inputs.model_spec)), known.covariance
     speed = float(np.mean([np.mean(one.run.speed_m_s) for one in fit.runs]))
+    with np.errstate(invalid="ignore"):
+        std = np.sqrt(np.diag(covariance))
     return ParameterSet(
         parameter_set_id=parameter_set_id(inputs),
         vessel=vessel,
@@ -245,7 +321,7 @@ def _as_parameter_set(
         segment_ids=segment_ids,
         log_ids=inputs.log_ids,
         start_utc_ns=min(bounds.start_utc_ns for bounds in inputs.bounds),
-        parameters=_parameters(fit),
+        parameters=_parameters(fit, std),
         discrete=stored(discrete_values(fit.hull, np.nan_to_num(covariance[:6, :6]), speed, _STEP_S)),
         noise=(),
         covariance_names=(*HULL_PARAMETERS, *fit.model.names),
@@ -261,12 +337,14 @@ def _as_parameter_set(
             "speed_m_s": speed,
             "step_s": _STEP_S,
             "grid_step_s": fit.runs[0].run.step_s,
-            "gross_errors": fitted.gross_errors,
+            "standard_errors": known.kind,
+            "gross_errors": fitted.plain.gross_errors,
             "gross_error_instants_s": _gross_errors(fit, fitted.runs),
             "levels": {one.run.name: list(levels) for one, levels in zip(fit.runs, fit.levels, strict=True)},
         },
         warnings=(
             *(() if fit.converged else (f"not converged: {fit.reason}",)),
+            *dict.fromkeys(sentence for one in known.one_step for sentence in doubts(fit.hull, std[:6], one)),
             *without_arm(spec, arm_of(spec, profile)),
             *channel_warnings(told),
         ),
@@ -282,8 +360,8 @@ def _gross_errors(fit: PooledFit, runs: VesselRuns) -> dict[str, dict[str, list[
     return {name: instants for name, instants in found.items() if instants}
 
 
-def _parameters(fit: PooledFit) -> tuple[Stored, ...]:
-    values, std = np.concatenate([fit.hull, fit.values]), fit.std
+def _parameters(fit: PooledFit, std: Float) -> tuple[Stored, ...]:
+    values = np.concatenate([fit.hull, fit.values])
     units = [*HULL_PARAMETERS.values(), *(p.unit for _, p in fit.model.parameters)]
     names = [*HULL_PARAMETERS, *fit.model.names]
     return tuple(

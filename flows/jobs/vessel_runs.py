@@ -3,21 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from functools import cached_property
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.parameter_set_of import arm_of
-from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.estimate.record.average import step_of
 from kempf.pipeline.estimate.record.cut import make_record
-from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run, step_of
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
 from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.estimate.search.pooled_start import Start, start_of
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
@@ -49,12 +45,6 @@ class VesselRuns:
     runs: tuple[GridRun, ...]
     records: tuple[Record, ...]
     skipped: dict[str, str]
-
-    @cached_property
-    def start(self) -> Start:
-        """Hull and noise levels to start a fit from; the held-out runs have no part in the hull."""
-        with ThreadPoolExecutor(max_workers=usable()) as workers:
-            return start_of(self.records, self.runs, self.spec, split(self.runs)[0], workers)
 
 
 def assembled(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:
@@ -109,7 +99,7 @@ def assemble(
     arm = arm_of(spec, profile)
     ready = spec.with_arm(arm)
     ship = ShipConstants(profile.length_m or LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
-    step = step_of([record for _, _, record in records], ship.length_m)
+    step = step_of([record for _, _, record in records], profile.length_m)
     days = {log_id: k for k, log_id in enumerate(dict.fromkeys(one.log_id for _, one, _ in records))}
     runs = tuple(
         make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id])

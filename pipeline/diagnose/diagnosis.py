@@ -20,9 +20,9 @@ from kempf.pipeline.diagnose.ridge_reference import Flexible, flexible
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.estimate.plain_fit import PlainFit
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.estimate.search.pooled_start import Start
 from kempf.pipeline.predict.free_run import FreeRun, free_run
 from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import ModelSpec
@@ -91,7 +91,7 @@ class Diagnosis:
     before, after : Flexible or None
         The flexible reference beside the plain model and beside the last; None with a single run.
     fitted, held : tuple of GridRun
-    gross_errors : int
+    plain : PlainFit
     settings : DiagnosisSettings
     """
 
@@ -101,7 +101,7 @@ class Diagnosis:
     after: Flexible | None
     fitted: tuple[GridRun, ...]
     held: tuple[GridRun, ...]
-    gross_errors: int
+    plain: PlainFit
     settings: DiagnosisSettings
 
 
@@ -112,7 +112,6 @@ def _silent(_: str) -> None:
 def diagnose(
     runs: Sequence[GridRun],
     spec: ModelSpec,
-    start: Start,
     effects: Mapping[str, Effect],
     workers: Executor,
     settings: DiagnosisSettings = STANDARD,
@@ -127,8 +126,6 @@ def diagnose(
         All usable manoeuvres in order of time.
     spec : ModelSpec
         Disturbances.
-    start : Start
-        One row of levels a run.
     effects : mapping
         Catalogue.
     workers : Executor
@@ -140,7 +137,7 @@ def diagnose(
     """
     chosen, left = split(runs)
     told(f"fitting the model to {len(chosen)} manoeuvres, {len(left)} held out")
-    fits, gross = staged([runs[i] for i in chosen], spec, start.of(chosen), given, workers)
+    plain, fits = staged([runs[i] for i in chosen], spec, given, workers)
     base = fits[-1]
     held = [runs[i] for i in left]
     told(f"screening {len(effects)} effects")
@@ -180,7 +177,7 @@ def diagnose(
     told("measuring what is left")
     after = flexible(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
     fitted = tuple(one.run for one in base.runs)
-    return Diagnosis(tuple(fits), tuple(steps), before, after, fitted, tuple(held), gross, settings)
+    return Diagnosis(tuple(fits), tuple(steps), before, after, fitted, tuple(held), plain, settings)
 
 
 def _unseen(step: Step, held: Sequence[GridRun], workers: Executor) -> Unseen:

@@ -15,10 +15,11 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screen import Candidate, score
 from kempf.pipeline.estimate import pooled_fit
-from kempf.pipeline.estimate.grid_gating import without_gross_errors
+from kempf.pipeline.estimate.level_bounds import level_bounds
+from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
+from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.estimate.search.pooled_start import INTENSITIES, Start
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect
@@ -31,21 +32,8 @@ _RACE, _TO_THE_END = 6, 60
 _LONGER = (1.0, 10.0, 30.0)
 #: runs that the race goes over
 _RUNS_OF_RACE = 3
-
-
-def plain(runs: Sequence[GridRun], spec: ModelSpec, start: Start, workers: Executor) -> tuple[PooledFit, int]:
-    """Fit eq. (16), take gross errors out, fit again.
-
-    Returns
-    -------
-    fit : PooledFit
-    gross_errors : int
-    """
-    found = pooled_fit.fit(EffectModel(), runs, spec, start.hull, start.levels, np.zeros(0), workers)
-    cleaned, gross = without_gross_errors(found)
-    if gross:
-        found = pooled_fit.fit(EffectModel(), cleaned, spec, found.hull, found.levels, np.zeros(0), workers)
-    return found, gross
+#: intensities of what drives force, moment and current where an ordinary hull begins, SI
+_CALM = (1e-4, 1e-6, 1e-3)
 
 
 def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: float = -np.inf) -> PooledFit:
@@ -84,8 +72,8 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
         return found
     # what the score foretells beside such a hull says little, and the disturbances beside it have eaten the effect
     levels = base.levels.copy()
-    levels[:, : len(INTENSITIES)] = np.log(INTENSITIES)
-    calm = replace(base, levels=np.clip(levels, pooled_fit.LOWEST, pooled_fit.HIGHEST))
+    levels[:, : len(_CALM)] = np.log(_CALM)
+    calm = replace(base, levels=np.clip(levels, *level_bounds(base.runs[0].spec)))
     for size in _sizes(candidate.effect):
         # a lower hill need not be climbed to its top
         least = max(wanted, found.log_likelihood)
@@ -129,7 +117,7 @@ def _climbed(
 ) -> PooledFit:
     filtered = tuple(replace(one, model=model) for one in base.runs[chosen])
     values = np.concatenate([base.values, begin])
-    return pooled_fit.climb(filtered, hull, base.levels[chosen], values, workers, iterations, wanted)
+    return pooled_fit.fit(filtered, hull, base.levels[chosen], values, workers, iterations, wanted)
 
 
 def _begin(candidate: Candidate) -> Float:
@@ -143,24 +131,29 @@ def _begin(candidate: Candidate) -> Float:
 
 
 def staged(
-    runs: Sequence[GridRun], spec: ModelSpec, start: Start, effects: Sequence[Effect], workers: Executor
-) -> tuple[list[PooledFit], int]:
+    runs: Sequence[GridRun],
+    spec: ModelSpec,
+    effects: Sequence[Effect],
+    workers: Executor,
+    settings: MaximumLikelihoodSettings = STANDARD,
+) -> tuple[PlainFit, list[PooledFit]]:
     """Fit the plain ship, then with one effect more after the other.
 
     Parameters
     ----------
     runs : sequence of GridRun
     spec : ModelSpec
-    start : Start
     effects : sequence of Effect
         In the order in which they were added.
     workers : Executor
+    settings : MaximumLikelihoodSettings, optional
+        Of the search of single runs.
 
     Returns
     -------
+    plain : PlainFit
     fits : list of PooledFit
-        The last one is the model.
-    gross_errors : int
+        The plain model's first; the last one is the model.
 
     Raises
     ------
@@ -168,8 +161,8 @@ def staged(
         ``effect_not_testable``: nothing can be told of an effect from these runs, or a channel tells it already; the
         message says which.
     """
-    first, gross = plain(runs, spec, start, workers)
-    fits = [first]
+    plain = fit_plain(runs, spec, workers, settings)
+    fits = [plain.fit]
     for effect in effects:
         candidate = score(fits[-1], effect, workers)
         if candidate.missing:
@@ -195,4 +188,4 @@ def staged(
                 {"effect": effect.name, "absorption": candidate.absorption},
             )
         fits.append(added(fits[-1], candidate, workers))
-    return fits, gross
+    return plain, fits

@@ -304,7 +304,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         },
         "fitted": [run.name for run in diagnosis.fitted],
         "held_out": [run.name for run in diagnosis.held],
-        "gross_errors": diagnosis.gross_errors,
+        "gross_errors": diagnosis.plain.gross_errors,
     }
 
 

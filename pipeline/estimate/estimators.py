@@ -74,7 +74,14 @@ def _with_tuples(settings: dict[str, Any]) -> dict[str, Any]:
     return {key: tuple(value) if isinstance(value, list) else value for key, value in settings.items()}
 
 
-def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, settings: dict[str, Any]) -> Estimate:
+def estimate(
+    name: str,
+    record: Record,
+    spec: ModelSpec,
+    arm_per_m: float,
+    settings: dict[str, Any],
+    length_m: float | None = None,
+) -> Estimate:
     """Run one estimator on one record.
 
     Parameters
@@ -87,6 +94,8 @@ def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, setti
         l of eq. (16), 1/m.
     settings : dict
         As `default_settings` gives them; JSON has no tuples, so lists stand for them.
+    length_m : float, optional
+        Of the ship, for the step over which ``ml`` averages readings.
 
     Returns
     -------
@@ -94,4 +103,7 @@ def estimate(name: str, record: Record, spec: ModelSpec, arm_per_m: float, setti
     """
     chosen = _ESTIMATORS[name]
     given = chosen.settings(**_with_tuples(settings))
-    return chosen.identify(with_rudder_inflow(record, spec), spec, arm_per_m, given)
+    ready = with_rudder_inflow(record, spec)
+    if name == "ml":
+        return maximum_likelihood.identify(ready, spec, arm_per_m, given, length_m)
+    return chosen.identify(ready, spec, arm_per_m, given)

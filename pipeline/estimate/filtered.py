@@ -8,7 +8,10 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.ekf import extended
+from kempf.pipeline.estimate.level_bounds import SIGMA_HIGH, SIGMA_LOW
+from kempf.pipeline.estimate.likelihood import INITIAL_STD, Likelihood
 from kempf.pipeline.estimate.record.grid_run import GridRun
+from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.model.batch import LANES, MOST, ONE
 from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
@@ -17,8 +20,8 @@ from kempf.schemas.model_spec import ModelSpec
 
 #: so few sets of parameters go through one by one: a group of lanes costs as much as these
 _ALONE = 4
-#: standard deviations of (v, r, psi, F, M, c_1, c_2, b) at the first instant, SI: wide, the data decide
-INITIAL_STD = np.array([2.0, 0.2, 0.2, 0.1, 0.01, 2.0, 2.0, 0.01])
+#: states of a run that every fit of it begins from: v, r, psi, F and M, before the error of the speed and effects
+_CHAIN = 5
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +34,7 @@ class Passed:
     innovation, variance : ndarray, shape (n, 3)
         Measured less predicted, NaN where not measured; and its variance.
     predicted : ndarray, shape (n, 3)
-    states, spread : ndarray, shape (n, 8 + k)
+    states, spread : ndarray, shape (n, 9 + k)
         Filtered states and their variances; 0 rows unless asked for.
     """
 
@@ -72,6 +75,12 @@ class RunFilter:
         """Which of the three measurements the run has."""
         return [bool(np.isfinite(column).any()) for column in self.run.measured.T]
 
+    def linear(self) -> Likelihood:
+        """Return the likelihood of the run without effects, by the linear filter on the same measurements."""
+        spec = self.spec
+        record = with_rudder_inflow(self.run.instants(), spec)
+        return Likelihood(record, spec, self.run.ship.arm_per_m, INITIAL_STD, SIGMA_LOW, SIGMA_HIGH)
+
     def levels_used(self) -> list[bool]:
         """Which of the six noise levels these data and this specification have."""
         has = self.present()
@@ -107,8 +116,8 @@ class RunFilter:
         self, hulls: Float, levels: Float, values: Float, *, states: bool, withheld: Mask | None
     ) -> list[Passed]:
         extra = self.model.extra
-        std = INITIAL_STD * self.present()
-        wide = np.concatenate([std[:N_BEFORE], np.zeros(extra), std[N_BEFORE:]])
+        std = np.array(INITIAL_STD) * self.present()
+        wide = np.concatenate([std[:_CHAIN], [self.run.speed_error_std_m_s], np.zeros(extra), std[_CHAIN:]])
         used = np.where(np.array(self.levels_used())[:, None], levels, np.array([[0.0, 0.0, 0.0, 1.0, 1.0, 1.0]]).T)
         x0 = np.zeros((wide.size, hulls.shape[1]))
         return self._passes(hulls, used, values, x0, np.diag(wide**2), states=states, withheld=withheld)
@@ -136,7 +145,8 @@ class RunFilter:
         ndarray, shape (n, 3, k)
         """
         k = starts.shape[1]
-        x0 = np.concatenate([starts[:N_BEFORE], np.zeros((self.model.extra, k)), starts[N_BEFORE:]])
+        between = np.zeros((N_BEFORE - _CHAIN + self.model.extra, k))
+        x0 = np.concatenate([starts[:_CHAIN], between, starts[_CHAIN:]])
         held = np.ones(self.run.measured.shape[0], dtype=np.bool_)
         quiet = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0])
         hulls, levels, same = (np.repeat(column[:, None], k, axis=1) for column in (hull, quiet, values))
@@ -185,7 +195,7 @@ class RunFilter:
         assert size == N_BEFORE + self.model.extra + N_AFTER
         rates = (
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
-            spec.current_correlation_rate_per_s,
+            *(spec.current_correlation_rate_per_s, run.speed_error_rate_per_s),
         )
         told = np.array(
             [
@@ -201,7 +211,7 @@ class RunFilter:
         found = extended(
             *(hulls, levels, values, run.step_s, run.inputs, self._rudders(values), run.rudder_noise, run.measured),
             *(run.offset_s, np.zeros(n, dtype=np.bool_) if withheld is None else withheld, run.current_row, told),
-            *(np.zeros(3) if still else np.array(rates), x0, P0, self.model.table, kept, lanes),
+            *(np.zeros(4) if still else np.array(rates), x0, P0, self.model.table, kept, lanes),
         )
         predicted, variance, filtered, spread = (np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in kept)
         return [
@@ -212,8 +222,9 @@ class RunFilter:
     def _rudders(self, values: Float) -> Float:
         """Return the rudder as the effects have it for every set of their parameters, shape (rows, k)."""
         measured = self.run.inputs[:, 1]
+        between = self.run.rudder_between[:, None]
         if all(effect.rudder_course is None for effect in self.model.effects):
-            return np.repeat(measured[:, None], values.shape[1], axis=1)
+            return np.repeat(measured[:, None] + between, values.shape[1], axis=1)
         own, of = np.unique(values, axis=1, return_inverse=True)
         courses = [self.model.rudder(self.run.fine_time_s, measured, one) for one in own.T]
-        return np.ascontiguousarray(np.stack(courses, axis=-1)[:, of])
+        return np.ascontiguousarray((np.stack(courses, axis=-1) + between)[:, of])

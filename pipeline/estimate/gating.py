@@ -1,7 +1,8 @@
 """Gross errors: measurements that no noise of the instrument explains, taken out before they bend the estimate.
 
 A gate on the whitened innovations of the fitted model, in robust units: their median absolute deviation, which the
-gross errors themselves do not move. See Huber & Ronchetti (2009), Robust Statistics, ch. 1.
+gross errors themselves do not move. See Huber & Ronchetti (2009), Robust Statistics, ch. 1. What a model lacks shows as
+long misfits, and these stay: a gross error has a sound neighbour.
 """
 
 from __future__ import annotations
@@ -11,7 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.record.record import MEASUREMENTS, Record
+from kempf.pipeline.estimate.record.record import MEASUREMENTS, Instants
+
+#: share of the gate's width within which one neighbour of a gross error must lie
+_SOUND = 0.7
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +24,7 @@ class Gated:
 
     Attributes
     ----------
-    record : Record
+    record : Instants
         With NaN where a measurement was taken out.
     taken_out : dict of str to int
         How many, by measurement; only where there are some.
@@ -28,17 +32,17 @@ class Gated:
         Measurements of which so many lie outside the gate that these are no gross errors; all of them were kept.
     """
 
-    record: Record
+    record: Instants
     taken_out: dict[str, int]
     heavy: tuple[str, ...]
 
 
-def gate(record: Record, innovation: Float, variance: Float, width: float, largest_share: float) -> Gated:
+def gate(record: Instants, innovation: Float, variance: Float, width: float, largest_share: float) -> Gated:
     """Take out the measurements whose innovation lies outside the gate.
 
     Parameters
     ----------
-    record : Record
+    record : Instants
         What the model was fitted to.
     innovation, variance : ndarray, shape (n, 3)
         One-step prediction errors and their variances, NaN where not measured.
@@ -60,7 +64,9 @@ def gate(record: Record, innovation: Float, variance: Float, width: float, large
             continue
         white = innovation[rows, i] / np.sqrt(variance[rows, i])
         spread = 1.4826 * float(np.median(np.abs(white)))
-        outside = rows[np.abs(white) > width * spread]
+        size = np.abs(white) / max(spread, 1.0)
+        sound = np.minimum(np.roll(size, 1), np.roll(size, -1)) < _SOUND * width
+        outside = rows[(size > width) & sound]
         if outside.size > largest_share * rows.size:
             heavy.append(name)
         elif outside.size > 0:

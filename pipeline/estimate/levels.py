@@ -9,8 +9,11 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import RunFilter
-from kempf.pipeline.estimate.pooled_fit import HIGHEST, LOWEST, CommonLikelihood
-from kempf.pipeline.estimate.search.climb import climb
+from kempf.pipeline.estimate.level_bounds import to_intensities
+from kempf.pipeline.estimate.pooled_fit import CommonLikelihood
+from kempf.pipeline.estimate.search.block_arrow import ArrowSteps
+from kempf.pipeline.estimate.search.climb import climb_by
+from kempf.pipeline.estimate.search.starts import noise_levels
 
 _DECREMENT, _MAX_ITERATIONS = 1e-2, 30
 
@@ -32,6 +35,11 @@ class Levels:
     converged: bool
 
 
+def first_levels(filtered: RunFilter) -> Float:
+    """Return logarithms of noise levels to start from, shape (6,)."""
+    return np.log(noise_levels(filtered.run.instants(), filtered.spec)) + to_intensities(filtered.spec)
+
+
 def fit_levels(filtered: RunFilter, hull: Float, values: Float, start: Float) -> Levels:
     """Climb the likelihood in the noise levels, hull and effects held.
 
@@ -50,6 +58,6 @@ def fit_levels(filtered: RunFilter, hull: Float, values: Float, start: Float) ->
     with ThreadPoolExecutor(max_workers=1) as workers:
         objective = CommonLikelihood([filtered], workers)
         objective.active[: objective.shared] = False
-        begin = np.concatenate([hull, values / objective.unit, np.clip(start, LOWEST, HIGHEST)])
-        found = climb(objective, begin, _MAX_ITERATIONS, _DECREMENT)
+        begin = np.concatenate([hull, values / objective.unit, start])
+        found = climb_by(ArrowSteps(), objective, begin, _MAX_ITERATIONS, _DECREMENT)
     return Levels(found.theta[objective.shared :], found.log_likelihood, found.converged)

@@ -8,21 +8,22 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.linear_kernel import (
+    ERROR,
     LOG_MEASUREMENT,
     N_STATE,
     N_THETA,
     likelihood,
     no_trace,
 )
-from kempf.pipeline.estimate.record.record import Record
+from kempf.pipeline.estimate.record.record import Instants
 from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.model.discretise import LONGEST
 from kempf.schemas.model_spec import ModelSpec
 
 #: logarithm of a noise level whose square is 0 to a double
 _NOTHING = -400.0
-#: standard deviations of (v, r, F, M, psi, c_1, c_2, b) at the first instant, SI: wide, the data decide
-INITIAL_STD = (2.0, 0.2, 0.1, 0.01, 0.2, 2.0, 2.0, 0.01)
+#: standard deviations of (v, r, psi, F, M, c_1, c_2, b) at the first instant, SI: wide, the data decide
+INITIAL_STD = (2.0, 0.2, 0.2, 0.1, 0.01, 2.0, 2.0, 0.01)
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,12 +52,12 @@ class Likelihood:
 
     Parameters
     ----------
-    record : Record
+    record : Instants
     spec : ModelSpec
     arm_per_m : float
         l of eq. (16), 1/m.
     initial_std : tuple of float
-        Standard deviations of the state (v, r, F, M, psi, c_1, c_2, b) at the first instant.
+        Standard deviations of the state (v, r, psi, F, M, c_1, c_2, b) at the first instant.
     sigma_low, sigma_high : tuple of float
         Bounds of the noise levels, order of `kempf.schemas.model_spec.NOISE_PARAMETERS`.
     longest : float
@@ -72,7 +73,7 @@ class Likelihood:
 
     def __init__(
         self,
-        record: Record,
+        record: Instants,
         spec: ModelSpec,
         arm_per_m: float,
         initial_std: tuple[float, ...],
@@ -84,14 +85,14 @@ class Likelihood:
         used = record.used
         wind, moment, current = spec.wind != "none", spec.moment == "gauss-markov", spec.current != "none"
         self.active: Mask = np.array([*[True] * 6, wind, moment, current, *used])
-        present = np.array([1, 1, wind, moment, used[2], current, current, spec.rate_bias and used[1] and used[2]])
+        present = np.array([1, 1, used[2], wind, moment, current, current, spec.rate_bias and used[1] and used[2]])
         if spec.current == "earth":
             row = np.column_stack([-np.sin(record.heading_rad), np.cos(record.heading_rad)])
         else:
             row = np.tile([1.0, 0.0], (record.time_s.size, 1))
             present[6] = 0
         error = record.speed_error
-        P0 = np.diag(np.append(np.array(initial_std) * present, error.std_m_s) ** 2)
+        P0 = np.diag(np.insert(np.array(initial_std) * present, ERROR, error.std_m_s) ** 2)
         rates = (
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
             *(spec.current_correlation_rate_per_s, error.rate_per_s),

@@ -20,6 +20,7 @@ from kempf.pipeline.estimate.filters.linear_kernel import (
 from kempf.pipeline.estimate.likelihood import Likelihood, Trace
 from kempf.pipeline.estimate.one_step_fit import one_step_fit
 from kempf.pipeline.estimate.plausibility import doubts, not_white
+from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate, Value, discrete_values, hull_values
 from kempf.pipeline.estimate.search.climb import Pass, Search, free
 from kempf.pipeline.estimate.uncertainty import from_information, sandwich
@@ -42,6 +43,7 @@ _NAMES = (*HULL_PARAMETERS, *NOISE_PARAMETERS)
 
 
 def report(
+    record: Record,
     objective: Likelihood,
     best: Search[Float],
     trace: Trace,
@@ -53,6 +55,8 @@ def report(
 
     Parameters
     ----------
+    record : Record
+        What the segment was cut to.
     objective : Likelihood
         What was climbed at last, gross errors taken out.
     best : Search
@@ -70,15 +74,15 @@ def report(
     Estimate
         Standard errors are the Cramer-Rao bound where the prediction errors are white, else those of the sandwich.
     """
-    record, theta = objective.record, best.theta
+    theta = best.theta
     movable = free(objective, theta, best.score)
     index = np.flatnonzero(movable)
     known = from_information(best.information, index)
-    fit = one_step_fit(record.measured, trace.innovation, trace.variance)
+    fit = one_step_fit(objective.record.measured, trace.innovation, trace.variance)
     covariance, kind, widened = known.covariance, "information", 1.0
     if not_white(fit):
         scores = objective.trace(theta, scores=True).scores.sum(axis=1)
-        robust = sandwich(known.covariance, scores, record.time_s)
+        robust = sandwich(known.covariance, scores, objective.record.time_s)
         ratio = np.sqrt(np.diag(robust)[:6] / np.diag(known.covariance)[:6])
         if np.nanmax(ratio, initial=0.0) > 1.0:
             covariance, kind, widened = robust, "sandwich", float(np.nanmax(ratio))
@@ -93,7 +97,7 @@ def report(
         if objective.active[6 + i]
     )
     ends = _at_the_end(objective, trace)
-    warnings = _warnings(objective, best, details["gross_errors"], heavy, bounds, ends)
+    warnings = _warnings(record, objective, best, details["gross_errors"], heavy, bounds, ends)
     names = [_NAMES[i] for i in index]
     # as shares of the hull parameters; those of the logarithms are shares already
     scale = np.concatenate([np.abs(theta[:_HULL]), np.ones(theta.size - _HULL)])
@@ -132,6 +136,7 @@ def report(
 
 
 def _warnings(
+    record: Record,
     objective: Likelihood,
     best: Search[Float],
     taken_out: dict[str, int],
@@ -139,7 +144,7 @@ def _warnings(
     bounds: list[str],
     ends: dict[str, dict[str, Any]],
 ) -> list[str]:
-    record, theta = objective.record, best.theta
+    theta = best.theta
     warnings = list(record.warnings)
     warnings += [f"{count} gross errors of {key} left out" for key, count in taken_out.items()]
     warnings += [

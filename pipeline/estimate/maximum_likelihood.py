@@ -7,6 +7,7 @@ Automatica 16; Astrom and Kallstrom (1976), "Identification of ship steering dyn
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +16,11 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.linear_kernel import LOG_F, LOG_M, LOG_V
 from kempf.pipeline.estimate.gating import gate
+from kempf.pipeline.estimate.level_bounds import SIGMA_HIGH, SIGMA_LOW
 from kempf.pipeline.estimate.likelihood import INITIAL_STD, Likelihood, Trace
 from kempf.pipeline.estimate.likelihood_report import report
-from kempf.pipeline.estimate.record.record import Record
+from kempf.pipeline.estimate.record.grid_run import averaged
+from kempf.pipeline.estimate.record.record import Instants, Record
 from kempf.pipeline.estimate.result import Estimate
 from kempf.pipeline.estimate.search.climb import Search, climb
 from kempf.pipeline.estimate.search.starts import starting_points, thinned
@@ -53,7 +56,7 @@ class MaximumLikelihoodSettings:
     sigma_low, sigma_high : tuple of float
         Bounds of the noise levels, order of `NOISE_PARAMETERS`.
     initial_std : tuple of float
-        Standard deviations of the state (v, r, F, M, psi, c_1, c_2, b) at the first instant, wide: the data decide.
+        Standard deviations of the state (v, r, psi, F, M, c_1, c_2, b) at the first instant, wide: the data decide.
     gate_width, gate_share, gate_rounds : float, float, int
         Measurements farther than ``gate_width`` robust standard deviations from their prediction are gross errors and
         are left out, unless they are more than ``gate_share`` of all; the fit and the gate take turns so many times.
@@ -67,26 +70,41 @@ class MaximumLikelihoodSettings:
     entries: int = 2
     coarse_instants: int = 300
     coarse_iterations: int = 25
-    sigma_low: tuple[float, ...] = (1e-6, 1e-9, 3e-3, 1e-5, 1e-7, 1e-6)
-    sigma_high: tuple[float, ...] = (10.0, 0.1, 100.0, 10.0, 0.5, 1.0)
+    sigma_low: tuple[float, ...] = SIGMA_LOW
+    sigma_high: tuple[float, ...] = SIGMA_HIGH
     initial_std: tuple[float, ...] = INITIAL_STD
     gate_width: float = 5.0
     gate_share: float = 0.1
     gate_rounds: int = 5
     discrete_step_s: float = 1.0
 
-    def bind(self, record: Record, spec: ModelSpec, arm_per_m: float) -> Likelihood:
+    def bind(self, record: Instants, spec: ModelSpec, arm_per_m: float) -> Likelihood:
         """Return the log-likelihood of a record under these settings."""
         return Likelihood(record, spec, arm_per_m, self.initial_std, self.sigma_low, self.sigma_high)
 
-    def coarse(self, record: Record, spec: ModelSpec, arm_per_m: float) -> Likelihood:
+    def coarse(self, record: Instants, spec: ModelSpec, arm_per_m: float) -> Likelihood:
         """Return the log-likelihood of the thinned record on which the starting points race, cheap instead of exact."""
         few = thinned(record, self.coarse_instants)
         bounds = (self.initial_std, self.sigma_low, self.sigma_high)
         return Likelihood(few, spec, arm_per_m, *bounds, longest=_RACE_LONGEST)
 
 
-def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: MaximumLikelihoodSettings) -> Estimate:
+STANDARD = MaximumLikelihoodSettings()
+
+
+def settings_of(given: Mapping[str, Any]) -> MaximumLikelihoodSettings:
+    """Return settings from JSON content, which has lists for tuples; what it lacks has its default."""
+    content: dict[str, Any] = {key: tuple(value) if isinstance(value, list) else value for key, value in given.items()}
+    return MaximumLikelihoodSettings(**content)
+
+
+def identify(
+    record: Record,
+    spec: ModelSpec,
+    arm_per_m: float,
+    settings: MaximumLikelihoodSettings,
+    length_m: float | None = None,
+) -> Estimate:
     """Estimate hull parameters and noise levels from one segment.
 
     Parameters
@@ -97,6 +115,8 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Maximu
     arm_per_m : float
         l of eq. (16), 1/m.
     settings : MaximumLikelihoodSettings
+    length_m : float, optional
+        Of the ship, for the step over which readings are averaged; see `kempf.pipeline.estimate.record.average`.
 
     Returns
     -------
@@ -108,12 +128,13 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Maximu
     DataRejected
         ``no_ship_explains_it``: no start has a likelihood.
     """
-    objective, best, trace, details, heavy = search(record, spec, arm_per_m, settings)
-    return report(objective, best, trace, settings.discrete_step_s, details, heavy)
+    means = averaged(record, spec, arm_per_m, length_m)
+    objective, best, trace, details, heavy = search(means, spec, arm_per_m, settings)
+    return report(record, objective, best, trace, settings.discrete_step_s, details, heavy)
 
 
 def search(
-    record: Record, spec: ModelSpec, arm_per_m: float, settings: MaximumLikelihoodSettings
+    record: Instants, spec: ModelSpec, arm_per_m: float, settings: MaximumLikelihoodSettings
 ) -> tuple[Likelihood, Search[Float], Trace, dict[str, Any], tuple[str, ...]]:
     """Find the maximum for one segment, gross errors taken out.
 

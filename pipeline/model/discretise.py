@@ -1,4 +1,4 @@
-"""One exact step of the chain (v, r, F, M, psi) of eq. (16), with its derivatives, compiled.
+"""One exact step of the chain (v, r, psi, F, M) of eq. (16), with its derivatives, compiled.
 
 M is a Gauss-Markov yaw acceleration beside l F, for ships on which more than the wind acts; it may be absent. For a
 speed held over the step and a rudder that moves linearly, the matrix exponential, the input and the process noise come
@@ -13,7 +13,7 @@ import numpy as np
 from kempf.pipeline.compiled import STEP, njit
 
 #: rows and columns of the chain
-V, R, F, M, PSI = 0, 1, 2, 3, 4
+V, R, PSI, F, M = 0, 1, 2, 3, 4
 N_CHAIN = 5
 _N_A = 4  # a11, a12, a21, a22
 _ORDER = 16  # Taylor terms: 0.5^17 / 17! is below the last bit of a double
@@ -28,6 +28,12 @@ _WEIGHTS = 0.5 * np.polynomial.legendre.leggauss(_N_NODES)[1]
 _POWERS = _NODES ** np.arange(_ORDER + 1)[:, None]
 #: largest |A| h of one step
 LONGEST = 0.5
+
+
+@njit(**STEP)
+def _moved(k):  # type: ignore[no-untyped-def]
+    """Return the k-th of the states that move others: v, r, F, M; the heading moves none."""
+    return k if k < PSI else k + 1
 
 
 @njit(**STEP)
@@ -108,29 +114,31 @@ def discretise(  # type: ignore[no-untyped-def]
             for q in range(4 * _N_A):
                 dv, dr = dT[0, q], dT[1, q]
                 dT[0, q], dT[1, q], dT[2, q] = s * (a00 * dv + a01 * dr), s * (a10 * dv + a11 * dr), s * dr
-            for c in range(columns):
-                q, sv, sr = c * _N_A, s * speed * T[V, c], s * speed * T[R, c]
+            for k_moved in range(columns):
+                c = _moved(k_moved)
+                q, sv, sr = k_moved * _N_A, s * speed * T[V, c], s * speed * T[R, c]
                 dT[0, q] += sv
                 dT[0, q + 1] += sr
                 dT[1, q + 2] += sv
                 dT[1, q + 3] += sr
-            for c in range(columns):
+            for k_moved in range(columns):
+                c = _moved(k_moved)
                 for j in range(_N_A):
-                    dPhi[V, c, j] += dT[0, c * _N_A + j]
-                    dPhi[R, c, j] += dT[1, c * _N_A + j]
-                    dPhi[PSI, c, j] += dT[2, c * _N_A + j]
+                    dPhi[V, c, j] += dT[0, k_moved * _N_A + j]
+                    dPhi[R, c, j] += dT[1, k_moved * _N_A + j]
+                    dPhi[PSI, c, j] += dT[2, k_moved * _N_A + j]
             for row in range(3):
-                i = row if row < 2 else PSI
                 for j in range(_N_A):
                     pushed = dT[row, j] * b[0] + dT[row, _N_A + j] * b[1]
-                    dg[i, j] += w * pushed
-                    dheld[i, j] += one_held * pushed
+                    dg[row, j] += w * pushed
+                    dheld[row, j] += one_held * pushed
                 for m in range(columns - 2):
                     for j in range(_N_A):
-                        t = dT[row, (F + m) * _N_A + j]
+                        t = dT[row, (2 + m) * _N_A + j]
                         for node in range(_N_NODES):
-                            danswer[m, i, j, node] += t * _POWERS[k, node]
-        for c in range(columns):
+                            danswer[m, row, j, node] += t * _POWERS[k, node]
+        for k_moved in range(columns):
+            c = _moved(k_moved)
             v, r = T[V, c], T[R, c]
             nv, nr = a00 * v + a01 * r, a10 * v + a11 * r
             if c == F:

@@ -14,11 +14,13 @@ from kempf.schemas.symbols import SYMBOLS
 #: places of symbols among the variables; states come first, in the filter's order
 DELTA, SPEED, VDOT, RDOT = (SYMBOLS.index(name) for name in ("delta", "V", "vdot", "rdot"))
 SHIP, CHANNEL, PARAMETER = SYMBOLS.index("a11"), SYMBOLS.index("U"), len(SYMBOLS)
-#: columns of the input table: V, delta, and the symbols of channels and of the run
-N_INPUT = 2 + PARAMETER - CHANNEL
+#: columns of the input table: V, delta, the symbols of channels and of the run, and the rudder that does what a unit
+#: of the speed's error does
+N_INPUT = 2 + PARAMETER - CHANNEL + 1
+SPEED_ERROR_GAIN = N_INPUT - 1
 #: states before those of effects, and after
-N_BEFORE, N_AFTER, MOST_EXTRA = 5, 3, 4
-V, R, PSI, F, M = 0, 1, 2, 3, 4
+N_BEFORE, N_AFTER, MOST_EXTRA = 6, 3, 4
+V, R, PSI, F, M, E = 0, 1, 2, 3, 4, 5
 #: what a program is added to
 ON_SPEED, ON_RUDDER, ON_SWAY, ON_YAW, ON_EXTRA, ON_LATERAL, ON_YAW_RATE, ON_HEADING = 0, 1, 2, 3, 4, 5, 6, 7
 ON_NOISE, ON_INITIAL = 8, 9
@@ -55,7 +57,8 @@ def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lane
 
     ``carried`` is ``width``, or 0 where J is not wanted.
     """
-    hull, (arm, mu_F, mu_M, exponent, V0) = ship
+    hull, (arm, mu_F, mu_M, mu_E, exponent, V0) = ship
+    gain = row[SPEED_ERROR_GAIN]
     busy = table[0].shape[0] > 0
     for b in range(each(lanes)):
         values[SPEED, b], values[DELTA, b] = row[0], rudder[b]
@@ -63,7 +66,7 @@ def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lane
         for i in range(width):
             for b in range(each(lanes)):
                 values[i, b] = x[i, b]
-        for i in range(N_INPUT - 2):
+        for i in range(N_INPUT - 3):
             for b in range(each(lanes)):
                 values[CHANNEL + i, b] = row[2 + i]
         for j in range(carried):
@@ -77,12 +80,12 @@ def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lane
                     for j in range(carried):
                         slopes[where, j, b] = total[j + 1, b]
     for b in range(each(lanes)):
-        U, delta = values[SPEED, b], values[DELTA, b]
+        U, delta = values[SPEED, b], values[DELTA, b] + gain * x[E, b]
         square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
         v, r, force = x[V, b], x[R, b], x[F, b]
         f[V, b] = hull[0, b] * U * v + hull[1, b] * U * r + hull[4, b] * square * delta + force
         f[R, b] = hull[2, b] * U * v + hull[3, b] * U * r + hull[5, b] * square * delta + arm * force + x[M, b]
-        f[PSI, b], f[F, b], f[M, b] = r, -mu_F * force, -mu_M * x[M, b]
+        f[PSI, b], f[F, b], f[M, b], f[E, b] = r, -mu_F * force, -mu_M * x[M, b], -mu_E * x[E, b]
     if carried > 0:
         J[:, :, :] = 0.0
         for b in range(each(lanes)):
@@ -90,7 +93,8 @@ def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lane
             square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
             J[V, V, b], J[V, R, b], J[V, F, b] = hull[0, b] * U, hull[1, b] * U, 1.0
             J[R, V, b], J[R, R, b], J[R, F, b], J[R, M, b] = hull[2, b] * U, hull[3, b] * U, arm, 1.0
-            J[PSI, R, b], J[F, F, b], J[M, M, b] = 1.0, -mu_F, -mu_M
+            J[PSI, R, b], J[F, F, b], J[M, M, b], J[E, E, b] = 1.0, -mu_F, -mu_M, -mu_E
+            J[V, E, b], J[R, E, b] = hull[4, b] * square * gain, hull[5, b] * square * gain
             for j in range(width):
                 J[V, j, b] += hull[4, b] * square * slopes[DELTA, j, b]
                 J[R, j, b] += hull[5, b] * square * slopes[DELTA, j, b]

@@ -1,7 +1,7 @@
 """Exact steps of the lateral model (16), all steps of a record at once.
 
-The chain is (v, r, F, M, psi): eq. (16) with the wind force F, a yaw acceleration M beside its moment l F, and the
-heading. The speed is held over a step, the rudder moves linearly. The likelihood has its own compiled steps with their
+The chain is (v, r, psi, F, M): eq. (16) with the heading, the wind force F, and a yaw acceleration M beside its moment
+l F. The speed is held over a step, the rudder moves linearly. The likelihood has its own compiled steps with their
 derivatives; this is for what is done a few times with parameters that are known already.
 """
 
@@ -15,7 +15,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
 
 #: rows and columns of the chain
-SWAY, YAW, FORCE, MOMENT, HEADING = 0, 1, 2, 3, 4
+SWAY, YAW, HEADING, FORCE, MOMENT = 0, 1, 2, 3, 4
 N_CHAIN = 5
 #: Taylor terms; 1 / 19! is below the last bit of a double for |A| h up to 1
 _ORDER = 18

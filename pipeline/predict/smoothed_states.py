@@ -11,8 +11,9 @@ import numpy as np
 from scipy.linalg import expm
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.filtered import INITIAL_STD, RunFilter
+from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.filters.smoother import LinearSystem, smooth
+from kempf.pipeline.estimate.likelihood import INITIAL_STD
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.free_run import FreeRun
 
@@ -55,7 +56,7 @@ def _departures(filtered: RunFilter, point: Point, error: Float) -> LinearSystem
     A[:, _F, _F], A[:, _M, _M] = -spec.wind_correlation_rate_per_s, -spec.moment_correlation_rate_per_s
     A[:, _C1, _C1] = A[:, _C2, _C2] = -spec.current_correlation_rate_per_s
     rudder = np.zeros((n, 8))
-    rudder[:, _V], rudder[:, _R] = b1 * V**2 * run.rudder_noise, b2 * V**2 * run.rudder_noise
+    rudder[:, _V], rudder[:, _R] = b1 * V**2 * run.shake, b2 * V**2 * run.shake
     W = rudder[:, :, None] * rudder[:, None, :]
     present = filtered.present()
     for state, level in ((_F, levels[0]), (_M, levels[1]), (_C1, levels[2]), (_C2, levels[2])):
@@ -65,7 +66,7 @@ def _departures(filtered: RunFilter, point: Point, error: Float) -> LinearSystem
     H[:, 0, _V], H[:, 0, _C1], H[:, 0, _C2] = 1.0, run.current_row[:, 0], run.current_row[:, 1]
     H[:, 1, _R], H[:, 1, _B], H[:, 2, _PSI] = 1.0, 1.0, 1.0
     R = np.tile(levels[3:] ** 2, (n, 1))
-    P0 = np.diag((INITIAL_STD * present) ** 2)
+    P0 = np.diag((np.array(INITIAL_STD) * present) ** 2)
     return LinearSystem(Phi, np.zeros((n, 8)), Q, error, H, R, np.zeros(8), P0)
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model import dynamics
 from kempf.pipeline.model.batch import ONE
-from kempf.pipeline.model.dynamics import N_BEFORE, N_INPUT, PARAMETER, PSI, RDOT, SHIP, VDOT, R, V
+from kempf.pipeline.model.dynamics import N_BEFORE, N_INPUT, PARAMETER, PSI, RDOT, SHIP, VDOT, E, R, V
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.model.terms.program import DEPTH
 from kempf.pipeline.steering.motion import LinearMotion, ShipEffects
@@ -41,15 +41,15 @@ class _Course:
         self.width = width = N_BEFORE + model.extra
         self.speed, self.length, self.table = speed_m_s, effects.length_m, model.table
         self.hull = hull.array()[:, None]
-        self.ship = (self.hull, (arm_per_m, 0.0, 0.0, 2.0, speed_m_s))
+        self.ship = (self.hull, (arm_per_m, 0.0, 0.0, 0.0, 2.0, speed_m_s))
         self.values, self.slopes = np.zeros((PARAMETER + p, 1)), np.zeros((PARAMETER + p, width, 1))
         self.values[SHIP : SHIP + 10, 0] = [*hull.array(), effects.length_m, effects.draught_m, speed_m_s, 1.0]
         self.values[PARAMETER:, 0] = effects.values
         for i in range(width):
             self.slopes[i, i] = 1.0
         self.room = (np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1)))
-        # V, delta, wind speed and angle, shaft speed, depth, roll, true heading, time, day
-        self.row = np.array([speed_m_s, 0.0, 0.0, 0.0, 1.0, _DEEP_M, 0.0, course_rad, 0.0, effects.day])
+        # V, delta, wind speed and angle, shaft speed, depth, roll, true heading, time, day; no error of the speed
+        self.row = np.array([speed_m_s, 0.0, 0.0, 0.0, 1.0, _DEEP_M, 0.0, course_rad, 0.0, effects.day, 0.0])
         assert self.row.size == N_INPUT
 
     def at(self, x: Float, rudder_rad: float) -> tuple[Float, Float, Float, Float]:
@@ -127,4 +127,6 @@ class _Course:
         corners = self.corners(x, rudder)
         B, D = self.by_rudder(x, rudder)
         _, A, offsets, C = self.at(x, rudder)
-        return LinearMotion(A, B, C, D, self.noise(), rudder, float(x[V]), offsets, corners)
+        kept = np.delete(np.arange(self.width), E)
+        A, C = A[np.ix_(kept, kept)], C[:, kept]
+        return LinearMotion(A, B[kept], C, D, self.noise(), rudder, float(x[V]), offsets, corners)

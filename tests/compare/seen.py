@@ -9,7 +9,8 @@ import numpy as np
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.filters.ekf import ROWS
-from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run, step_of
+from kempf.pipeline.estimate.record.average import step_of
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.predict.free_run import free_run_of

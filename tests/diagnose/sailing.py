@@ -16,10 +16,8 @@ from benchmarks.diagnose.hidden_effects.outsiders import OUTSIDERS
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
-from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
-from kempf.pipeline.estimate.search.pooled_start import Start, start_of
 from kempf.pipeline.simulate.trial import Trial, TrialSettings
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.effects import catalogue
@@ -37,14 +35,13 @@ class Sailed:
     """Four zigzags of one ship, ready to be diagnosed; ``c`` is the size of her effect."""
 
     runs: tuple[GridRun, ...]
-    start: Start
     spec: ModelSpec
     c: float
 
     def diagnosis(self, names: Sequence[str] = SOME, **settings: Any) -> Diagnosis:
         known = catalogue()
         effects = {name: known[name] for name in names}
-        return diagnose(self.runs, self.spec, self.start, effects, WORKERS, **settings)
+        return diagnose(self.runs, self.spec, effects, WORKERS, **settings)
 
 
 @lru_cache(maxsize=8)
@@ -66,7 +63,7 @@ def sailed(effect: str = "none", *, strength: int = 2, seed: int = 3, noise: flo
         for e in voyage.executes_s
     ]
     runs = tuple(make_run(f"run {k}", r, instruments, spec, ship, _STEP_S) for k, r in enumerate(records))
-    return Sailed(runs, start_of(records, runs, spec, split(runs)[0], WORKERS), spec, c)
+    return Sailed(runs, spec, c)
 
 
 def instruments_of(trial: Trial) -> Instruments:

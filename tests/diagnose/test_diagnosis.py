@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
-from kempf.pipeline.diagnose.forward_selection import added, is_ship, plain, staged
+from kempf.pipeline.diagnose.forward_selection import added, is_ship, staged
 from kempf.pipeline.diagnose.screen import score
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import as_json, finding, sentences, verdict
+from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.model.terms.own import from_expression
 from kempf.schemas import effects
 from kempf.schemas.errors import DataRejected
@@ -78,7 +79,7 @@ def test_a_lag_that_leaves_no_ship_without_it_is_found_with_its_size() -> None:
     """Five seconds: fitted without it, sway feeds itself and the rudder turns her the wrong way."""
     ship = sailed("rudder_lag", seed=5)
     chosen, _ = split(ship.runs)
-    bent, _ = plain([ship.runs[i] for i in chosen], ship.spec, ship.start.of(chosen), WORKERS)
+    bent = fit_plain([ship.runs[i] for i in chosen], ship.spec, WORKERS).fit
     assert not is_ship(bent.hull)
     found = added(bent, score(bent, effects.get("rudder_lag"), WORKERS), WORKERS)
     assert is_ship(found.hull)
@@ -176,7 +177,7 @@ def test_zigzags_to_one_side_alone_claim_no_asymmetry() -> None:
     """Twenty and fifteen degrees, both first to starboard: what is one side's and what is a bias is hardly told."""
     ship = sailed("none")
     numbers = [0, 2]
-    found = replace(ship, runs=tuple(ship.runs[k] for k in numbers), start=ship.start.of(numbers)).diagnosis(
+    found = replace(ship, runs=tuple(ship.runs[k] for k in numbers)).diagnosis(
         ("rudder_asymmetry", "neutral_angle", "gyro_bias")
     )
     assert verdict(found) == "adequate" and not found.held
@@ -188,7 +189,7 @@ def test_an_effect_that_runs_away_is_no_crash() -> None:
     ship = sailed("none")
     wild = from_expression(("yaw: c*V/(v - 0.31)",), "wild")
     found = diagnose(
-        *(ship.runs[:2], ship.spec, ship.start.of([0, 1]), {"wild": wild}, WORKERS),
+        *(ship.runs[:2], ship.spec, {"wild": wild}, WORKERS),
         settings=DiagnosisSettings(level=1.0, refits=1, most_steps=1),
     )
     assert len(found.steps) == 1 and verdict(found) in ("adequate", "insufficient_data")
@@ -198,7 +199,7 @@ def test_an_effect_that_runs_away_is_no_crash() -> None:
 
 def test_one_manoeuvre_is_not_enough() -> None:
     ship = sailed("none")
-    found = replace(ship, runs=ship.runs[:1], start=ship.start.of([0])).diagnosis(("gyro_bias",))
+    found = replace(ship, runs=ship.runs[:1]).diagnosis(("gyro_bias",))
     assert verdict(found) == "insufficient_data"
     assert not found.held and found.steps[0].held_out_error is None
     assert "sail at least three zigzags" in sentences(found)[-1]
@@ -211,7 +212,7 @@ def test_the_speed_lost_in_a_turn_is_looked_for_only_where_no_log_shows_it() -> 
     assert one["verdict"] == "not_testable" and np.isnan(one["score"])
     assert one["why"] == "the logs have speed_through_water, which measures it already"
     with pytest.raises(DataRejected, match="speed_through_water") as caught:
-        staged(ship.runs[:1], ship.spec, ship.start.of([0]), [effect], WORKERS)
+        staged(ship.runs[:1], ship.spec, [effect], WORKERS)
     assert caught.value.code == "effect_not_testable"
     # one run without a log is enough to ask
     runs = (*ship.runs[:1], *(replace(run, channels=run.channels - {"speed_through_water"}) for run in ship.runs[1:]))

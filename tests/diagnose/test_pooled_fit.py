@@ -14,9 +14,11 @@ from kempf.pipeline.diagnose.diagnosis import step_of
 from kempf.pipeline.diagnose.screen import score
 from kempf.pipeline.estimate import pooled_fit, sensitivity
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.estimate.levels import first_levels
 from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit, linearise
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effects import get
 from tests.diagnose.sailing import WORKERS, Sailed, sailed
 
@@ -44,24 +46,29 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Counted:
     return found
 
 
-def plain_of(ship: Sailed, iterations: int) -> PooledFit:
-    runs, start = ship.runs[:2], ship.start.of([0, 1])
-    return pooled_fit.fit(
-        *(EffectModel(), runs, ship.spec, start.hull, start.levels, np.zeros(0), WORKERS), max_iterations=iterations
-    )
+#: a model that asks the extended filter, though its effect is hardly there
+MODEL = EffectModel((get("sway_quadratic"),))
+
+
+def fit_of(ship: Sailed, iterations: int, model: EffectModel = MODEL) -> PooledFit:
+    """Climb from an ordinary ship and ordinary levels."""
+    filtered = [RunFilter(run, model, ship.spec) for run in ship.runs[:2]]
+    levels = np.array([first_levels(one) for one in filtered])
+    hull, values = mariner_like(ship.runs[0].ship.length_m).array(), np.full(len(model.names), 0.1)
+    return pooled_fit.fit(filtered, hull, levels, values, WORKERS, iterations)
 
 
 def test_derivatives_are_asked_for_only_where_the_search_goes_on(counted: Counted) -> None:
     ship = sailed("none")
-    two, each = 2, sum(len(sensitivity.active(one)) for one in plain_of(ship, 0).runs)
+    two, each = 2, sum(len(sensitivity.active(one)) for one in fit_of(ship, 0).runs)
     counted.passes = 0
-    beginning = plain_of(ship, 0)
+    beginning = fit_of(ship, 0)
     # the start and its derivatives, and none of it again for the linearisation that a fit keeps
     assert counted.passes == two + each
     layout = pooled_fit.CommonLikelihood(beginning.runs, WORKERS)
-    theta = np.concatenate([beginning.hull, beginning.values, beginning.levels.ravel()])
+    theta = np.concatenate([beginning.hull, beginning.values / layout.unit, beginning.levels.ravel()])
     value, gradient, _ = layout.full(theta)
-    lower = theta + 0.1 * np.concatenate([np.zeros(6), np.sign(-gradient[6:])])
+    lower = theta + 0.1 * np.concatenate([np.zeros(7), np.sign(-gradient[7:])])
     counted.passes = 0
     there, slope, _ = layout.full(lower)
     assert there < value and not slope.any()
@@ -69,7 +76,7 @@ def test_derivatives_are_asked_for_only_where_the_search_goes_on(counted: Counte
 
 
 def test_a_point_beside_which_the_filter_runs_away_is_no_place_to_go_on_from(monkeypatch: pytest.MonkeyPatch) -> None:
-    beginning = plain_of(sailed("none"), 0)
+    beginning = fit_of(sailed("none"), 0)
     real = pooled_fit.linearise
 
     def away(*given: Any) -> tuple[Linearised, ...]:
@@ -79,7 +86,7 @@ def test_a_point_beside_which_the_filter_runs_away_is_no_place_to_go_on_from(mon
         return (replace(first, J=J), *others)
 
     layout = pooled_fit.CommonLikelihood(beginning.runs, WORKERS)
-    theta = np.concatenate([beginning.hull, beginning.values, beginning.levels.ravel()])
+    theta = np.concatenate([beginning.hull, beginning.values / layout.unit, beginning.levels.ravel()])
     with monkeypatch.context() as patched:
         patched.setattr(pooled_fit, "linearise", away)
         value, slope, _ = layout.full(theta)
@@ -89,7 +96,7 @@ def test_a_point_beside_which_the_filter_runs_away_is_no_place_to_go_on_from(mon
 
 
 def test_a_run_by_itself_and_runs_together_are_linearised_to_the_same_bits() -> None:
-    fit = plain_of(sailed("none"), 3)
+    fit = fit_of(sailed("none"), 3)
     for number, line in enumerate(fit.linearised):
         run, point = fit.runs[number], fit.point(number)
         (alone,) = linearise((run,), (point,), (sensitivity.passed(run, point),), WORKERS)
@@ -99,7 +106,7 @@ def test_a_run_by_itself_and_runs_together_are_linearised_to_the_same_bits() -> 
 
 def test_the_gains_of_a_candidate_are_those_over_what_was_asked_of_the_base_before() -> None:
     ship = sailed("none")
-    base, held = plain_of(ship, 40), ship.runs[2:3]
+    base, held = fit_of(ship, 40, EffectModel()), ship.runs[2:3]
     before = unseen(base, held, WORKERS)
     one = confirm(base, before, score(base, get("sway_quadratic"), WORKERS), held, WORKERS)
     after = unseen(one.fit, held, WORKERS)
@@ -109,6 +116,6 @@ def test_the_gains_of_a_candidate_are_those_over_what_was_asked_of_the_base_befo
 
 def test_a_rung_by_itself_has_the_free_runs_of_its_manoeuvres_in_their_order() -> None:
     ship = sailed("none")
-    found = step_of(plain_of(ship, 3), ship.runs[2:])
+    found = step_of(fit_of(ship, 3, EffectModel()), ship.runs[2:])
     assert [one.name for one in found.fitted] == ["run 0", "run 1"]
     assert [one.name for one in found.held] == [run.name for run in ship.runs[2:]]

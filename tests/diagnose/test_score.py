@@ -66,7 +66,7 @@ def test_the_expected_change_beside_a_fitted_hull_is_the_effect(quiet: GridRun, 
     truth = RunFilter(quiet, model, STILL).free(hull, np.array([size]), _START)
     noise = np.random.default_rng(1).normal(0.0, 1.0, truth.shape) * NOISE
     run = replace(quiet, measured=truth + noise)
-    base = pooled_fit.fit(EffectModel(), [run], STILL, hull, LEVELS[None, :], np.zeros(0), WORKERS)
+    base = pooled_fit.fit([RunFilter(run, EffectModel(), STILL)], hull, LEVELS[None, :], np.zeros(0), WORKERS)
     one = score(base, catalogue()[name], WORKERS)
     assert base.converged and one.score > 20.0 and one.p_value < 1e-4
     assert one.change[0] == pytest.approx(size, abs=3.0 * one.std[0] + 0.1 * size)

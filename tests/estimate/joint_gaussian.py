@@ -17,6 +17,8 @@ from scipy.linalg import cho_factor, cho_solve, expm
 Float = NDArray[np.float64]
 #: largest |A| h that the filter crosses in one step; the joint density takes none
 LONGEST_STEP = 0.5
+#: here states are (v, r, F, M, psi, c_1, c_2, b, e); where each of the kernel's, (v, r, psi, F, M, e, c_1, c_2, b), is
+ORDER = [0, 1, 4, 2, 3, 8, 5, 6, 7]
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,8 +55,8 @@ class Case:
             self.current_rate,
             self.error_rate,
             LONGEST_STEP,
-            self.x0,
-            self.P0,
+            self.x0[ORDER],
+            self.P0[np.ix_(ORDER, ORDER)],
         )
 
 

@@ -107,11 +107,11 @@ def test_lateral_steps_are_exact(step_s: float, length_m: float) -> None:
     forces = SlowForces(0.01, 2e-3, 1 / 300.0, 1e-4, 1 / 30.0)
     A = np.zeros((5, 5))
     A[:2, :2], B = hull.continuous(V)
-    A[0, 2], A[1, 2], A[1, 3], A[4, 1] = 1.0, forces.arm_per_m, 1.0, 1.0
-    A[2, 2], A[3, 3] = -forces.force_rate_per_s, -forces.moment_rate_per_s
+    A[0, 3], A[1, 3], A[1, 4], A[2, 1] = 1.0, forces.arm_per_m, 1.0, 1.0
+    A[3, 3], A[4, 4] = -forces.force_rate_per_s, -forces.moment_rate_per_s
     G = np.zeros((5, 2))
-    G[2, 0] = forces.force_m_s2 * np.sqrt(2 * forces.force_rate_per_s)
-    G[3, 1] = forces.moment_rad_s2 * np.sqrt(2 * forces.moment_rate_per_s)
+    G[3, 0] = forces.force_m_s2 * np.sqrt(2 * forces.force_rate_per_s)
+    G[4, 1] = forces.moment_rad_s2 * np.sqrt(2 * forces.moment_rate_per_s)
     Phi, Q = van_loan(A, G, step_s)
     enters = np.concatenate([B[:, 0], np.zeros(3)])
 

@@ -120,7 +120,7 @@ def test_an_effect_is_added_gone_back_from_and_built_again(late: Late, told: dic
     for key in ("in_sample_error", "held_out_error", "log_likelihood", "hull", "effects"):
         assert added["after"][key] == told["ladder"][1][key], key
     stored = parameter_sets.get(late.warehouse, made["parameter_set_id"])
-    assert stored.parent == told["parameter_set_id"] and stored.estimator == "ml-effects"
+    assert stored.parent == told["parameter_set_id"] and stored.estimator == "ml-pooled"
     assert len(stored.parameters) == 7 and len(stored.covariance) == 7
     assert aliases.of_vessel(late.warehouse, VESSEL)["current"] == stored.parameter_set_id
     again = rerun(late.warehouse, stored.parameter_set_id)

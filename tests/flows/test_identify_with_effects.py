@@ -42,7 +42,7 @@ def identified(place: Path) -> list[dict[str, Any]]:
 
 
 def test_each_zigzag_and_all_of_them_know_the_lag(place: Path, identified: list[dict[str, Any]]) -> None:
-    assert [one["estimator"] for one in identified] == ["ml", "ml", "ml", "ml-effects"]
+    assert [one["estimator"] for one in identified] == ["ml", "ml", "ml", "ml-pooled"]
     for one in identified:
         lag = one["parameters"]["rudder_lag.tau"]
         assert lag["unit"] == "s" and abs(lag["value"] - late_rudder.LAG_S) < 4.0 * lag["std"], one["parameter_set_id"]

@@ -10,9 +10,10 @@ import pytest
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.pool_vessel import POOLED, pool_vessel
+from kempf.flows.jobs.pool_vessel import pool_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.standing_model import POOLED
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings

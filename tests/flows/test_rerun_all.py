@@ -185,7 +185,7 @@ def test_a_model_of_which_no_set_stands_is_in_the_preview_too(own: Warehouse, mo
     other_code(monkeypatch, "e")
     (found,) = preview_all(own)
     assert (found.sets, found.up_to_date, found.identical, found.moves, found.gone) == (2, 0, 2, (), ())
-    assert [one.model for one in found.new] == ["linear"] * 2
+    assert [one.model for one in found.new] == ["plain"] * 2
     assert reprocess_vessel(own, "mariner").new_sets == 4
     assert {one.parameter_set_id for one in found.new} < {s.parameter_set_id for s in standing_sets(own, "mariner")}
 

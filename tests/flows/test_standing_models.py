@@ -37,7 +37,7 @@ def test_every_model_is_kept_and_current_stays_with_the_chosen_one(ferry) -> Non
     warehouse, log, profile = ferry
     ingest(warehouse, [log], given=profile)
     identify_vessel(warehouse, "ferry")
-    assert current_model(warehouse) == "linear"
+    assert current_model(warehouse) == "plain"
     identify_vessel(warehouse, "ferry", CALM)
     assert current_model(warehouse) == "calm"
     assert reprocess_vessel(warehouse, "ferry").status == "unchanged"
@@ -45,7 +45,7 @@ def test_every_model_is_kept_and_current_stays_with_the_chosen_one(ferry) -> Non
     vessels.register(warehouse, "ferry", profile.model_copy(update={"wind_arm_per_m": 0.01}))
     assert reprocess_vessel(warehouse, "ferry").new_sets == 2
     assert current_model(warehouse) == "calm"
-    assert {row["model"] for row in history.of_vessel(warehouse, "ferry").rows()} == {"linear", "calm"}
+    assert {row["model"] for row in history.of_vessel(warehouse, "ferry").rows()} == {"plain", "calm"}
 
 
 def test_current_is_withdrawn_where_its_set_no_longer_stands(ferry) -> None:

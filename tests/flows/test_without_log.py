@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 import yaml
 
+from kempf.flows.jobs.chosen_manoeuvres import without_log
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel, inputs_of
-from kempf.flows.jobs.no_speed_log import KEY, without_log
+from kempf.flows.jobs.no_speed_log import KEY
 from kempf.flows.jobs.pool_vessel import pool_vessel
 from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings

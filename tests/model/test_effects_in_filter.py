@@ -35,7 +35,7 @@ def run() -> GridRun:
     for k, value in enumerate((8.0, 0.7, 1.8, 15.0, 0.05)):
         inputs[:, 2 + k] = value * (1.0 + 0.1 * np.sin(0.05 * fine))
     heading = 0.4 + 0.6 * np.sin(0.03 * fine)
-    inputs[:, -3], inputs[:, -2], inputs[:, -1] = heading, fine, 1.0
+    inputs[:, -4], inputs[:, -3], inputs[:, -2] = heading, fine, 1.0
     coarse = heading[::ROWS]
     measured = np.column_stack(
         [0.3 * np.cos(0.03 * fine[::ROWS]), 0.018 * np.cos(0.03 * fine[::ROWS]), coarse - coarse[0]]
@@ -45,9 +45,13 @@ def run() -> GridRun:
         start_utc_ns=0,
         step_s=step,
         inputs=inputs,
+        rudder_between=np.zeros(fine.size),
         rudder_noise=np.zeros(n),
+        speed_error_std_m_s=0.0,
+        speed_error_rate_per_s=0.0,
         measured=measured,
         offset_s=np.zeros((n, 3)),
+        noise_start=np.full(3, np.nan),
         current_row=np.column_stack([-np.sin(coarse), np.cos(coarse)]),
         heading_rad=coarse,
         approach_m_s=7.0,

@@ -29,7 +29,8 @@ def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def ran(place: Path, *arguments: object) -> Ran:
     done = kempf(*arguments, "--warehouse", place)
-    assert done.code == 0, (arguments, done)
+    # a set that other code made is built again, and differs
+    assert done.code == (5 if arguments[0] == "rerun" and LATERAL in arguments else 0), (arguments, done)
     return done
 
 
@@ -93,8 +94,8 @@ def test_reprocessing_renews_it(earlier: Path) -> None:
     told = ran(earlier, "history", "--vessel", "ferry", "--json")
     assert NEXT not in told.err, "nothing is out of date any more"
     estimators = {row["estimator"] for row in told.json}
-    assert {"ml", "ml-pooled", "ml-effects", "least-squares"} == estimators, "those that are gone are superseded"
+    assert {"ml", "ml-pooled", "least-squares"} == estimators, "those that are gone are superseded"
     old = ran(earlier, "history", "--vessel", "ferry", "--all", "--json").json
-    assert {"prediction-error", "multiple-models", "ekf-ols"} <= {row["estimator"] for row in old}
+    assert {"prediction-error", "multiple-models", "ekf-ols", "ml-effects"} <= {row["estimator"] for row in old}
     rungs = ran(earlier, "ladder", "--vessel", "ferry", "--json").json
     assert [rung["added"] for rung in rungs] == [None, "rudder_lag"]

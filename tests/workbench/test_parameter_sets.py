@@ -58,7 +58,7 @@ def test_params_show_by_a_beginning(filled: Path):
     whole = one_of(filled, "ml")
     told = kempf("params", "show", whole[:9], "--warehouse", filled)
     assert told.code == 0
-    assert told.out.startswith(f"{whole}: mariner, model linear, estimator ml")
+    assert told.out.startswith(f"{whole}: mariner, model plain, estimator ml")
     assert "Discrete, eq. (17)" in told.out
     refused(kempf("params", "show", "ps-", "--warehouse", filled, "--json"), 2, "ambiguous_parameter_set")
     refused(kempf("params", "show", "ps-zzz", "--warehouse", filled, "--json"), 4, "no_parameter_set")

@@ -46,9 +46,9 @@ def with_the_truth(folder: Path, effect: str) -> dict[str, Any]:
         try:
             found = assembled(warehouse, choose(warehouse, folder.name), PLAIN)
             chosen, left = split(found.runs)
-            fitted, start = [found.runs[i] for i in chosen], found.start.of(chosen)
+            fitted = [found.runs[i] for i in chosen]
             with ThreadPoolExecutor(max_workers=cpu_count()) as workers:
-                fits, _ = staged(fitted, found.spec, start, [catalogue()[effect]], workers)
+                _, fits = staged(fitted, found.spec, [catalogue()[effect]], workers)
             held = [found.runs[i] for i in left]
             return {
                 "plain_held_out": float(np.mean([free_run(fits[0], run).relative_error for run in held])),

@@ -1,10 +1,11 @@
 """The extended Kalman filter of eq. (16) with effects: one pass over one run, compiled.
 
-State x = (v, r, psi, F, M, m_1 .. m_k, c_1, c_2, b): the chain, the states that effects bring along, the current to the
-north and east (or the paper's V_T), the bias of the rate gyro. Between measurements the mean moves by the classical
-fourth-order Runge-Kutta rule with the terms of every effect in it, the covariance by the linearisation at the middle of
-the step (Jazwinski 1970, "Stochastic Processes and Filtering Theory", ch. 8; the exact exponential's series to the
-fourth order). A measurement off the grid by a moment is predicted there to first order in that moment.
+State x = (v, r, psi, F, M, e, m_1 .. m_k, c_1, c_2, b): the chain, the error of the speed
+(`kempf.pipeline.estimate.record.speed_error`), the states that effects bring along, the current to the north and east
+(or the paper's V_T), the bias of the rate gyro. Between measurements the mean moves by the classical fourth-order
+Runge-Kutta rule with the terms of every effect in it, the covariance by the linearisation at the middle of the step
+(Jazwinski 1970, "Stochastic Processes and Filtering Theory", ch. 8; the exact exponential's series to the fourth
+order). A measurement off the grid by a moment is predicted there to first order in that moment.
 
 Several sets of parameters go through one run side by side, in lanes (`kempf.pipeline.model.batch`): a derivative is the
 difference of two passes, and a fit asks for a dozen at a time.
@@ -38,6 +39,7 @@ from kempf.pipeline.model.dynamics import (
     SHIP,
     SPEED,
     VDOT,
+    E,
     F,
     M,
     R,
@@ -62,7 +64,7 @@ def _begin(P, table, values, slopes, stack, by, total, drive, lanes):  # type: i
             P[N_BEFORE + i, N_BEFORE + i, b] += total[0, b] ** 2
         add_programs(ON_NOISE, i, table, values, slopes, stack, by, width, total, lanes)
         for b in range(each(lanes)):
-            drive[4 + i, b] = total[0, b] ** 2
+            drive[5 + i, b] = total[0, b] ** 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -86,7 +88,7 @@ def _substep(  # type: ignore[no-untyped-def]
 ):
     """Move means and covariances over one substep.
 
-    ``drive`` holds the intensities squared of F, of M, of the rudder's error, of the current, then of effects' states.
+    ``drive`` holds the intensities squared of F, M, the rudder's error, the current, e, then of effects' states.
     """
     k1, k2, k3, k4, xs, A, J, Phi, term, work, nodes, w, W, coupled = room
     width = k1.shape[0]
@@ -119,13 +121,13 @@ def _substep(  # type: ignore[no-untyped-def]
             for b in range(each(lanes)):
                 P[i, i, b] += drive[3, b] * h
     # the rudder's error first, whose direction stands there
-    for turn in range(3 + width - N_BEFORE):
-        source = (2, 0, 1)[turn] if turn < 3 else turn + 1
+    for turn in range(4 + width - N_BEFORE):
+        source = (2, 0, 1, 4)[turn] if turn < 4 else turn + 1
         driven = False
         for b in range(each(lanes)):
             driven = driven or drive[source, b] > 0.0
         if turn > 0:
-            state = (F, M)[turn - 1] if turn < 3 else N_BEFORE + turn - 3
+            state = (F, M, E)[turn - 1] if turn < 4 else N_BEFORE + turn - 4
             for i in range(width):
                 for b in range(each(lanes)):
                     w[i, b] = 1.0 if i == state else 0.0
@@ -254,7 +256,8 @@ def extended(  # type: ignore[no-untyped-def]
     step_s : float
         From one instant to the next.
     inputs : ndarray, shape (ROWS (n - 1) + 1, N_INPUT)
-        V, m/s, delta as it was measured, then the symbols of channels and run, at a quarter of the step.
+        V, m/s, delta as it was measured, then the symbols of channels and run, and the rudder that a unit of the
+        speed's error does the work of, rad s/m; at a quarter of the step.
     rudder : ndarray, shape (ROWS (n - 1) + 1, lanes)
         delta, rad, at the same instants, as the effects have it.
     rudder_noise : ndarray, shape (n,)
@@ -268,15 +271,15 @@ def extended(  # type: ignore[no-untyped-def]
     current_row : ndarray, shape (n, 2)
     constants_of_ship : ndarray, shape (6,)
         l, L, T, V0, n0 and the exponent of V in the rudder's force.
-    rates : ndarray, shape (3,)
-        Correlation rates of F, M and the current, 1/s.
-    x0 : ndarray, shape (8 + k, lanes); P0 : ndarray, shape (8 + k, 8 + k)
+    rates : ndarray, shape (4,)
+        Correlation rates of F, M, the current and the speed's error, 1/s.
+    x0 : ndarray, shape (9 + k, lanes); P0 : ndarray, shape (9 + k, 9 + k)
         Mean and covariance of the state at the first instant; effects add to those of their own states.
     table : tuple
         ``programs`` int64 (q, 4): kind, place, first and last instruction; ``code`` and ``constants`` of all of them.
     kept : tuple of ndarray
         ``predicted`` and ``variance``, shape (n, 3, lanes), to be filled; ``states`` and ``spread``,
-        shape (n, 8 + k, lanes), the filtered states and their variances, or 0 rows.
+        shape (n, 9 + k, lanes), the filtered states and their variances, or 0 rows.
     lanes : tuple
         `ONE` or `LANES` of `kempf.pipeline.model.batch`.
 
@@ -291,7 +294,7 @@ def extended(  # type: ignore[no-untyped-def]
     for b in range(B):
         P[:, :, b] = P0
     arm, length, draught, V0, n0, exponent = constants_of_ship
-    ship = (hull, (arm, rates[0], rates[1], exponent, V0))
+    ship = (hull, (arm, rates[0], rates[1], rates[3], exponent, V0))
     m = PARAMETER + parameters.shape[0]
     values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
     values[SHIP : SHIP + 6] = hull
@@ -302,7 +305,7 @@ def extended(  # type: ignore[no-untyped-def]
     stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros((2, B)), np.zeros((width + 1, B))
     live, after = _live_states(P0, width)
     there = np.concatenate((live, after))
-    drive = np.zeros((4 + width - N_BEFORE, B))
+    drive = np.zeros((5 + width - N_BEFORE, B))
     _begin(P, table, values, slopes, stack, by, total, drive, lanes)
     k1, J = np.zeros((width, B)), np.zeros((width, width, B))
     vector, matrix = (width, B), (width, width, B)
@@ -319,7 +322,7 @@ def extended(  # type: ignore[no-untyped-def]
     h, stood, decay = np.zeros((n, B)), np.zeros((n, B)), np.ones(n)
     at_measurements = (k1, J, gain, weight, h, stood, np.zeros(B), np.zeros(B))
     decay[n - 3 : n - 1] = np.exp(-rates[2] * step_s / SUBSTEPS)
-    drive[0], drive[3] = levels[0] ** 2, levels[2] ** 2
+    drive[0], drive[3], drive[4] = levels[0] ** 2, levels[2] ** 2, 2.0 * rates[3] * P0[E, E]
     if P0[M, M] > 0.0:
         drive[1] = levels[1] ** 2
     log_likelihood = np.zeros(B)

@@ -1,10 +1,11 @@
 """The compiled likelihood of eq. (16) over one segment, with its score and Fisher information.
 
-State x = (v, r, F, M, psi, c_1, c_2, b, e); measurements y_v = v + h_1 c_1 + h_2 c_2 (eq. (18)), y_r = r + b, y_psi =
-psi, each at its own instants. With h = (1, 0) the first current state is the paper's V_T; with h = (-sin K, cos K) the
-two are the current towards north and east, and eq. (19) holds without its small angle. b is the bias of the rate gyro;
-the heading tells it from a turn. e is the error of the speed, which acts like one of the rudder
-(`kempf.pipeline.estimate.record.speed_error`). A state without variance is left out of the arithmetic.
+State x = (v, r, psi, F, M, e, c_1, c_2, b), in the order of the extended filter; measurements y_v = v + h_1 c_1 + h_2
+c_2 (eq. (18)), y_r = r + b, y_psi = psi, each at its own instants. With h = (1, 0) the first current state is the
+paper's V_T; with h = (-sin K, cos K) the two are the current towards north and east, and eq. (19) holds without its
+small angle. e is the error of the speed, which acts like one of the rudder
+(`kempf.pipeline.estimate.record.speed_error`); b is the bias of the rate gyro, which the heading tells from a turn. A
+state without variance is left out of the arithmetic.
 Sensitivities are carried forward with the filter (Astrom 1980, "Maximum likelihood and prediction error methods",
 Automatica 16), scalar measurement by scalar measurement; they lie innermost in memory.
 """
@@ -21,7 +22,7 @@ from kempf.pipeline.model.discretise import N_CHAIN, PSI, M, R, V, discretise, r
 #: are logarithms, in the order of `kempf.schemas.model_spec.NOISE_PARAMETERS`
 N_THETA = 12
 N_STATE = 9
-C1, C2, BIAS, ERROR = 5, 6, 7, 8
+ERROR, C1, C2, BIAS = 5, 6, 7, 8
 LOG_F, LOG_M, LOG_V = 6, 7, 8
 #: the first of the measurements' noise levels
 LOG_MEASUREMENT = 9

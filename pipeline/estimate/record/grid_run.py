@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -10,13 +10,13 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.filters.ekf import ROWS
-from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.model.dynamics import N_INPUT
+from kempf.pipeline.estimate.record.average import cell_means, cells, instants_of, step_of
+from kempf.pipeline.estimate.record.record import Instants, Record
+from kempf.pipeline.estimate.record.speed_error import SpeedError
+from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS
 
-#: the grid's step in times that the ship needs for her length, and its bounds, s
-_STEP_LENGTHS, _FINEST_S, _COARSEST_S = 0.06, 0.05, 1.0
 _APPROACH_S = 5.0
 
 
@@ -48,9 +48,16 @@ class GridRun:
     step_s : float
     inputs : ndarray, shape (ROWS (n - 1) + 1, N_INPUT)
         See `kempf.pipeline.estimate.filters.ekf.extended`.
+    rudder_between : ndarray, shape (ROWS (n - 1) + 1,)
+        What to add to the rudder at the instants of the input table, so that Simpson's rule over half a step, by which
+        the extended filter goes, gives its very integral: it turns corners between them. 0 at the ends of half steps.
     rudder_noise : ndarray, shape (n,)
+    speed_error_std_m_s, speed_error_rate_per_s : float
+        Of the error of the speed, a first-order process; 0 where there is none.
     measured, offset_s : ndarray, shape (n, 3)
         Means of the readings around each instant, and how much later than it their mean time is.
+    noise_start : ndarray, shape (3,)
+        Noise level of each measurement to start from, in its unit.
     current_row : ndarray, shape (n, 2)
     heading_rad : ndarray, shape (n,)
     approach_m_s, approach_per_s : float
@@ -65,9 +72,13 @@ class GridRun:
     start_utc_ns: int
     step_s: float
     inputs: Float
+    rudder_between: Float
     rudder_noise: Float
+    speed_error_std_m_s: float
+    speed_error_rate_per_s: float
     measured: Float
     offset_s: Float
+    noise_start: Float
     current_row: Float
     heading_rad: Float
     approach_m_s: float
@@ -95,33 +106,101 @@ class GridRun:
         return speed
 
     @property
+    def speed_error(self) -> SpeedError:
+        """The error of the speed at the instants of the input table."""
+        rate = self.speed_error_rate_per_s
+        return SpeedError(self.inputs[:, SPEED_ERROR_GAIN], self.speed_error_std_m_s, 1.0 / rate if rate > 0.0 else 0.0)
+
+    @property
+    def shake(self) -> Float:
+        """Intensity of the errors of rudder and speed together, as if the rudder made them, rad s^0.5, shape (n,)."""
+        result: Float = np.hypot(self.rudder_noise, self.speed_error.intensity_rad_sqrt_s[::ROWS])
+        return result
+
+    @property
     def rudder_rad(self) -> Float:
         """Rudder at the instants, shape (n,)."""
         rudder: Float = self.inputs[::ROWS, 1]
         return rudder
 
+    def instants(self) -> Instants:
+        """Return the run as the linear filter takes it, every mean at the mean instant of its readings."""
+        made = np.isfinite(self.measured)
+        own = [(self.time_s + self.offset_s[:, i])[made[:, i]] for i in range(made.shape[1])]
+        fine = self.fine_time_s
+        own = [np.clip(instants, fine[0], fine[-1]) for instants in own]
+        time = np.unique(np.concatenate([fine, *own]))
+        measured = np.full((time.size, made.shape[1]), np.nan)
+        for i, instants in enumerate(own):
+            measured[np.searchsorted(time, instants), i] = self.measured[made[:, i], i]
 
-def step_of(records: list[Record], length_m: float) -> float:
-    """Return the grid's step for a vessel, s: fine for her length, and no finer than what was measured.
+        def laid(known: Float, column: Float) -> Float:
+            course: Float = np.interp(time, known, column)
+            return course
+
+        # straight lines from quarter to quarter of a step, with the same integral as Simpson's rule
+        rudder, error = self.inputs[:, 1].copy(), self.speed_error
+        middle = rudder[1::2] + self.rudder_between[1::2]
+        rudder[1::2] = (8.0 * middle - rudder[:-1:2] - rudder[2::2]) / 6.0
+        return Instants(
+            time_s=time,
+            speed_m_s=laid(fine, self.inputs[:, 0]),
+            rudder_rad=laid(fine, rudder),
+            rudder_noise_rad_sqrt_s=laid(self.time_s, self.rudder_noise),
+            speed_error=replace(error, gain_rad_s_m=laid(fine, error.gain_rad_s_m)),
+            measured=measured,
+            heading_rad=laid(self.time_s, self.heading_rad),
+            noise_start=self.noise_start,
+        )
+
+
+def plain_run(name: str, record: Record, spec: ModelSpec, arm_per_m: float, length_m: float | None) -> GridRun:
+    """Lay a record on a grid of its own, without the channels that effects ask for.
 
     Parameters
     ----------
-    records : list of Record
-    length_m : float
+    name : str
+    record : Record
+    spec : ModelSpec
+    arm_per_m : float
+        l of eq. (16).
+    length_m : float or None
+        Of the ship, for the grid's step.
     """
-    speed = float(np.median([record.mean_speed_m_s for record in records]))
-    wanted = float(np.clip(_STEP_LENGTHS * length_m / max(speed, 0.1), _FINEST_S, _COARSEST_S))
-    fastest = min(_period(record) for record in records)
-    return float(f"{max(wanted, fastest):.2g}")
+    ship = ShipConstants(length_m or 100.0, 1.0, arm_per_m)
+    return make_run(name, record, Instruments({}, {}, ()), spec, ship, step_of([record], length_m))
 
 
-def _period(record: Record) -> float:
-    periods = []
-    for column in record.measured.T:
-        time = record.time_s[np.isfinite(column)]
-        if time.size > 1:
-            periods.append(float(np.median(np.diff(time))))
-    return min(periods)
+def averaged(record: Record, spec: ModelSpec, arm_per_m: float, length_m: float | None) -> Record:
+    """Return a record with its readings averaged as those of a run are.
+
+    Parameters
+    ----------
+    record : Record
+    spec : ModelSpec
+    arm_per_m : float
+        l of eq. (16).
+    length_m : float or None
+        Of the ship, for the grid's step.
+    """
+    return replace(record, **vars(plain_run("", record, spec, arm_per_m, length_m).instants()))
+
+
+def without(run: GridRun, instants: Instants) -> GridRun:
+    """Return a run without the measurements that are gone from its instants.
+
+    Parameters
+    ----------
+    run : GridRun
+    instants : Instants
+        `GridRun.instants` of it, some measurements NaN.
+    """
+    measured, cell = run.measured.copy(), cells(instants.time_s, run.step_s)
+    for i in range(measured.shape[1]):
+        there = np.zeros(measured.shape[0], dtype=np.bool_)
+        there[np.minimum(cell[np.isfinite(instants.measured[:, i])], there.size - 1)] = True
+        measured[~there, i] = np.nan
+    return replace(run, measured=measured)
 
 
 def make_run(
@@ -154,11 +233,11 @@ def make_run(
     -------
     GridRun
     """
-    n = int(np.floor(record.time_s[-1] / step_s)) + 1
+    n = instants_of(record, step_s)
     time = step_s * np.arange(n)
     measured, offset = np.full((n, 3), np.nan), np.zeros((n, 3))
     for i, column in enumerate(record.measured.T):
-        measured[:, i], offset[:, i] = _averaged(record.time_s, column, step_s, n)
+        measured[:, i], offset[:, i] = cell_means(record.time_s, column, step_s, n)
     fine: Float = step_s / ROWS * np.arange(ROWS * (n - 1) + 1, dtype=np.float64)
     known = np.isfinite(record.heading_rad)
     inputs = np.zeros((fine.size, N_INPUT))
@@ -176,18 +255,28 @@ def make_run(
     heading: Float = 0.0 * fine
     if known.any():
         heading = np.interp(fine, record.time_s[known], record.heading_rad[known])
-    inputs[:, -3], inputs[:, -2], inputs[:, -1] = heading, fine, day
+    first_of_run = 2 + len(CHANNEL_SYMBOLS)
+    inputs[:, first_of_run], inputs[:, first_of_run + 1], inputs[:, first_of_run + 2] = heading, fine, day
+    inputs[:, SPEED_ERROR_GAIN] = np.interp(fine, record.time_s, record.speed_error.gain_rad_s_m)
     coarse = heading[::ROWS]
     shaft = 2 + list(CHANNEL_SYMBOLS).index("n")
     first = fine <= _APPROACH_S
+    # what is over within a step is white noise to it
+    brief = record.speed_error.time_s < step_s
     return GridRun(
         name=name,
         start_utc_ns=record.start_utc_ns,
         step_s=step_s,
         inputs=inputs,
-        rudder_noise=np.interp(time, record.time_s, record.shake_rad_sqrt_s),
+        rudder_between=_between(record, fine, inputs[:, 1]),
+        rudder_noise=np.interp(
+            time, record.time_s, record.shake_rad_sqrt_s if brief else record.rudder_noise_rad_sqrt_s
+        ),
+        speed_error_std_m_s=0.0 if brief else record.speed_error.std_m_s,
+        speed_error_rate_per_s=0.0 if brief else record.speed_error.rate_per_s,
         measured=measured,
         offset_s=offset,
+        noise_start=record.noise_start,
         current_row=_current_row(spec, coarse),
         heading_rad=coarse,
         approach_m_s=float(np.median(inputs[first, 0])),
@@ -198,22 +287,22 @@ def make_run(
     )
 
 
+def _between(record: Record, fine: Float, rudder: Float) -> Float:
+    """Return `GridRun.rudder_between`, from the course of the rudder in straight lines between a record's instants."""
+    time, course = record.time_s, record.rudder_rad
+    whole = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(time) * (course[1:] + course[:-1]))])
+    at = np.clip(np.searchsorted(time, fine, side="right") - 1, 0, time.size - 1)
+    integral = whole[at] + 0.5 * (fine - time[at]) * (rudder + course[at])
+    result = np.zeros(fine.size)
+    mean = np.diff(integral[::2]) / np.diff(fine[::2])
+    result[1::2] = (6.0 * mean - rudder[:-1:2] - rudder[2::2]) / 4.0 - rudder[1::2]
+    return result
+
+
 def _current_row(spec: ModelSpec, heading: Float) -> Float:
     if spec.current == "earth":
         return np.column_stack([-np.sin(heading), np.cos(heading)])
     return np.tile([1.0 if spec.current == "lateral" else 0.0, 0.0], (heading.size, 1))
-
-
-def _averaged(time: Float, column: Float, step_s: float, n: int) -> tuple[Float, Float]:
-    good = np.isfinite(column)
-    cell = np.floor(time[good] / step_s + 0.5).astype(np.int64)
-    inside = cell < n
-    cell = cell[inside]
-    counts = np.bincount(cell, minlength=n)
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = np.bincount(cell, column[good][inside], minlength=n) / counts
-        late = np.bincount(cell, time[good][inside] - step_s * cell, minlength=n) / counts
-    return mean, np.nan_to_num(late)
 
 
 def _channel(series: Series | None, start_ns: int, fine: Float) -> Float | None:

@@ -15,13 +15,11 @@ MEASUREMENTS = ("lateral_speed", "yaw_rate", "heading")
 
 
 @dataclass(frozen=True, eq=False)
-class Record:
-    """One segment, every measurement at its own instant.
+class Instants:
+    """One segment as a likelihood takes it, every measurement at its own instant.
 
     Attributes
     ----------
-    start_utc_ns : int
-        UTC of ``time_s`` = 0.
     time_s : ndarray, shape (n,)
         Instants at which something was measured, the rudder was read or turned a corner.
     speed_m_s, rudder_rad : ndarray, shape (n,)
@@ -36,27 +34,18 @@ class Record:
         its first value.
     heading_rad : ndarray, shape (n,)
         True heading interpolated to the instants, not counted from anything; NaN in its gaps.
-    rudder_period_s : float
-        Median time between readings of the rudder; in between its course is a guess, a straight line.
-    lateral : LateralSpeed
-        Eq. (18) with its standard errors.
     noise_start : ndarray, shape (3,)
         Noise level of each measurement to start from, in its unit.
-    warnings : tuple of str
     """
 
-    start_utc_ns: int
     time_s: Float
     speed_m_s: Float
     rudder_rad: Float
-    measured: Float
-    heading_rad: Float
-    rudder_period_s: float
     rudder_noise_rad_sqrt_s: Float
     speed_error: SpeedError
-    lateral: LateralSpeed
+    measured: Float
+    heading_rad: Float
     noise_start: Float
-    warnings: tuple[str, ...]
 
     @property
     def mean_speed_m_s(self) -> float:
@@ -71,6 +60,27 @@ class Record:
 
     @property
     def used(self) -> tuple[bool, bool, bool]:
-        """Which of `MEASUREMENTS` the record holds."""
+        """Which of `MEASUREMENTS` there are."""
         has = np.any(np.isfinite(self.measured), axis=0)
         return bool(has[0]), bool(has[1]), bool(has[2])
+
+
+@dataclass(frozen=True, eq=False)
+class Record(Instants):
+    """One segment as it was cut out of a log.
+
+    Attributes
+    ----------
+    start_utc_ns : int
+        UTC of ``time_s`` = 0.
+    rudder_period_s : float
+        Median time between readings of the rudder; in between its course is a guess, a straight line.
+    lateral : LateralSpeed
+        Eq. (18) with its standard errors.
+    warnings : tuple of str
+    """
+
+    start_utc_ns: int
+    rudder_period_s: float
+    lateral: LateralSpeed
+    warnings: tuple[str, ...]

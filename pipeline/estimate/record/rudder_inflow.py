@@ -8,28 +8,32 @@ turn the race grows stronger. In between lies a force with V to a power below 2.
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import TypeVar
 
 import numpy as np
 
-from kempf.pipeline.estimate.record.record import Record
+from kempf.pipeline.estimate.record.record import Instants
 from kempf.schemas.model_spec import ModelSpec
 
 _APPROACH_S = 5.0
 _SLOWEST = 0.1
 
 
-def with_rudder_inflow(record: Record, spec: ModelSpec) -> Record:
+T = TypeVar("T", bound=Instants)
+
+
+def with_rudder_inflow(record: T, spec: ModelSpec) -> T:
     """Return the record with the rudder that, through b V^2 delta, does what the true one does in the race.
 
     Parameters
     ----------
-    record : Record
+    record : Instants
     spec : ModelSpec
         ``rudder_speed_exponent`` n: the force goes with V^n V_0^(2 - n), V_0 the speed of the approach.
 
     Returns
     -------
-    Record
+    Instants
         The same where n is 2, eq. (16).
     """
     if spec.rudder_speed_exponent == 2.0:

@@ -52,6 +52,9 @@ class Steps(Protocol[C]):
     def damped(self, score: Float, curvature: C, free: Mask, damping: float) -> Float:
         """Solve (I + damping diag I) step = score over what is free; 0 for the rest."""
 
+    def counted(self, gain: float, score: Float, curvature: C, free: Mask) -> float:
+        """Return how much of a promised gain of log-likelihood says that the search must go on."""
+
     def updated(self, curvature: C, step: Float, fall: Float, free: Mask) -> C:
         """Return the curvature corrected by what one step showed: by so much the score fell."""
 
@@ -130,7 +133,7 @@ def climb_by(
         movable = free(objective, theta, score)
         # the log-likelihood that the quadratic model still promises
         gain = float(0.5 * score @ steps.damped(score, curvature, movable, 0.0))
-        if gain < decrement:
+        if steps.counted(gain, score, curvature, movable) < decrement:
             converged, reason = True, "the log-likelihood still to be gained is below the limit"
             break
         if len(passes) > _FIRST and value + _HOPE * gain < wanted:

@@ -67,6 +67,10 @@ class DenseSteps:
         """See `damped_step`."""
         return damped_step(score, curvature, free, damping)
 
+    def counted(self, gain: float, score: Float, curvature: Float, free: Mask) -> float:
+        """Return all of it."""
+        return gain
+
     def updated(self, curvature: Float, step: Float, fall: Float, free: Mask) -> Float:
         """See `bfgs`."""
         return bfgs(curvature, step, fall, free)

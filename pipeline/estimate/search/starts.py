@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.record.record import Record
+from kempf.pipeline.estimate.record.record import Instants
 from kempf.pipeline.model.disturbances import level_of_change
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.model_spec import ModelSpec
@@ -21,12 +21,12 @@ _TURNS = 30
 _MINUTES_S = 300.0
 
 
-def starting_points(record: Record, spec: ModelSpec | None = None) -> list[tuple[str, Float]]:
+def starting_points(record: Instants, spec: ModelSpec | None = None) -> list[tuple[str, Float]]:
     """Return named starting values of theta (see `kempf.pipeline.estimate.filters.linear_kernel`).
 
     Parameters
     ----------
-    record : Record
+    record : Instants
     spec : ModelSpec, optional
         Its correlation rates tell what level a plausible change within minutes belongs to; without it the default ones.
 
@@ -34,7 +34,7 @@ def starting_points(record: Record, spec: ModelSpec | None = None) -> list[tuple
     -------
     list of (str, ndarray of shape (12,))
     """
-    sigmas = _noise_start(record, spec or ModelSpec())
+    sigmas = noise_levels(record, spec or ModelSpec())
     # A ship that answers faster than this cannot be told from one that answers at once, and costs most to compute.
     shortest = 3.0 * record.mean_speed_m_s * float(np.median(np.diff(record.time_s)))
     lengths = [length for length in _LENGTHS_M if length > shortest] or [_LENGTHS_M[-1]]
@@ -42,8 +42,19 @@ def starting_points(record: Record, spec: ModelSpec | None = None) -> list[tuple
     return [(name, np.concatenate([hull, np.log(sigmas)])) for name, hull in points]
 
 
-def _noise_start(record: Record, spec: ModelSpec) -> Float:
-    """Noise levels to start from: generous, so that a poor hull is not punished into a corner."""
+def noise_levels(record: Instants, spec: ModelSpec) -> Float:
+    """Return noise levels to start from: generous, so that a poor hull is not punished into a corner.
+
+    Parameters
+    ----------
+    record : Instants
+    spec : ModelSpec
+
+    Returns
+    -------
+    ndarray, shape (6,)
+        Order of `kempf.schemas.model_spec.NOISE_PARAMETERS`.
+    """
     spread = np.array([float(np.nanstd(column)) if np.isfinite(column).any() else 1.0 for column in record.measured.T])
     floor = np.nan_to_num(record.noise_start, nan=1e-3)
     measurement = np.maximum(floor, 0.15 * spread)
@@ -55,7 +66,7 @@ def _noise_start(record: Record, spec: ModelSpec) -> Float:
     return np.concatenate([[forces, moment, stream], np.maximum(measurement, 1e-5)])
 
 
-def thinned(record: Record, instants: int) -> Record:
+def thinned(record: Instants, instants: int) -> Instants:
     """Return the record with about this many of its instants, for the race of the starting points.
 
     Whole instants are dropped, so measurements stay where they were made; each kind of measurement keeps its share. Of
@@ -72,7 +83,7 @@ def thinned(record: Record, instants: int) -> Record:
     return _kept(record, keep)
 
 
-def _beginning(record: Record) -> Record:
+def _beginning(record: Instants) -> Instants:
     """Cut a record after `_TURNS` changes of the rudder's side; whole if there are fewer."""
     over = np.abs(record.rudder_rad) > 0.5 * float(np.std(record.rudder_rad))
     side = np.sign(record.rudder_rad[over])
@@ -80,7 +91,7 @@ def _beginning(record: Record) -> Record:
     return _kept(record, slice(0, int(turns[_TURNS]))) if turns.size > _TURNS else record
 
 
-def _kept(record: Record, rows: Any) -> Record:
+def _kept(record: Instants, rows: Any) -> Instants:
     return replace(
         record,
         time_s=record.time_s[rows],

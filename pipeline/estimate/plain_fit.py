@@ -1,0 +1,198 @@
+"""The plain model, eq. (16) without effects, fitted to several runs: each by itself first, then all with one hull.
+
+Whether they may share a hull is tested by the likelihood ratio: twice what separate hulls gain, chi-squared with six
+degrees of freedom a run beyond the first where one hull is true (Wilks 1938, Annals of Mathematical Statistics 9).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate import maximum_likelihood
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.level_bounds import to_intensities
+from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
+from kempf.pipeline.estimate.pooled_fit import DECREMENT, MAX_ITERATIONS, CommonLikelihood, PooledFit, ended
+from kempf.pipeline.estimate.record.grid_run import GridRun, without
+from kempf.pipeline.estimate.search.block_arrow import ArrowSteps
+from kempf.pipeline.estimate.search.climb import Search, climb_by
+from kempf.pipeline.estimate.uncertainty import from_information
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.schemas.errors import DataRejected, KempfError
+from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
+
+_HULL = len(HULL_PARAMETERS)
+#: with a smaller probability under one hull the runs are said not to share one
+LEVEL = 0.01
+#: hulls of single runs that a common climb may begin from where their mean is no ship
+_ENTRIES = 4
+#: a measurement's level, by its logarithm, that is so far from its usual one is on another hill
+_UNLIKE, _DISTURBANCES = np.log(3.0), 3
+
+
+@dataclass(frozen=True, eq=False)
+class Alone:
+    """One run fitted by itself.
+
+    Attributes
+    ----------
+    run : GridRun
+        Without its gross errors.
+    search : Search
+        Where it ended; theta as `kempf.pipeline.estimate.filters.linear_kernel` has it.
+    gross_errors : dict of str to int
+        How many were taken out, by measurement.
+    """
+
+    run: GridRun
+    search: Search[Float]
+    gross_errors: dict[str, int]
+
+    @property
+    def hull(self) -> Float:
+        """Its hull, shape (6,)."""
+        return self.search.theta[:_HULL]
+
+
+@dataclass(frozen=True, eq=False)
+class PlainFit:
+    """The plain model of several runs.
+
+    Attributes
+    ----------
+    fit : PooledFit
+    alone : tuple of Alone
+        Its runs one by one.
+    left_out : dict of str to str
+        Runs that cannot be identified by themselves, with the reason.
+    statistic : float
+        Likelihood ratio of separate hulls to one.
+    """
+
+    fit: PooledFit
+    alone: tuple[Alone, ...]
+    left_out: dict[str, str]
+    statistic: float
+
+    @property
+    def gross_errors(self) -> int:
+        """How many measurements were taken out."""
+        return sum(sum(one.gross_errors.values()) for one in self.alone)
+
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Of the statistic; 0 for one run."""
+        return _HULL * (len(self.alone) - 1)
+
+    @property
+    def p_value(self) -> float:
+        """Probability of a statistic as large where the runs share one hull."""
+        return float(chi2.sf(self.statistic, self.degrees_of_freedom)) if self.degrees_of_freedom else 1.0
+
+    @property
+    def widened(self) -> float:
+        """Factor by which what the runs disagree about widens standard errors (Birge 1932, Physical Review 40)."""
+        return 1.0 if self.p_value >= LEVEL else float(np.sqrt(self.statistic / self.degrees_of_freedom))
+
+    def off_in_std(self, one: Alone) -> Float:
+        """Return how far a run's own hull lies from the common one, in its own standard errors, shape (6,)."""
+        information = one.search.information
+        index = np.flatnonzero(np.diag(information) > 0.0)
+        std = np.sqrt(np.diag(from_information(information, index).covariance)[:_HULL])
+        off: Float = (one.hull - self.fit.hull) / std
+        return off
+
+
+def fit_plain(
+    runs: Sequence[GridRun],
+    spec: ModelSpec,
+    workers: Executor,
+    settings: MaximumLikelihoodSettings = STANDARD,
+) -> PlainFit:
+    """Fit eq. (16) to every run, gross errors taken out, then one hull to all of them.
+
+    Parameters
+    ----------
+    runs : sequence of GridRun
+    spec : ModelSpec
+        Disturbances.
+    workers : Executor
+        Runs share it; the sums do not depend on it.
+    settings : MaximumLikelihoodSettings, optional
+
+    Raises
+    ------
+    DataRejected
+        ``no_ship_explains_it``: none of the runs can be identified by itself, or they have no ship in common.
+    """
+    made = list(workers.map(lambda run: _alone(run, spec, settings), runs))
+    alone = tuple(one for one in made if isinstance(one, Alone))
+    left_out = {run.name: why for run, why in zip(runs, made, strict=True) if isinstance(why, str)}
+    if not alone:
+        raise DataRejected(
+            "no_ship_explains_it",
+            f"None of the {len(runs)} manoeuvres can be identified by itself: "
+            + "; ".join(f"{name}: {why}" for name, why in list(left_out.items())[:3]),
+            "Look at the channels (heading, yaw rate, speed, rudder) of these segments.",
+            {"left_out": left_out},
+        )
+    layout = CommonLikelihood([RunFilter(one.run, EffectModel(), spec) for one in alone], workers)
+    levels = _first_levels(np.array([one.search.theta[_HULL:] + to_intensities(spec) for one in alone])).ravel()
+    begin = np.concatenate([_first_hull(layout, alone, levels), levels])
+    found = climb_by(ArrowSteps(), layout, begin, MAX_ITERATIONS, DECREMENT)
+    separate = sum(one.search.log_likelihood for one in alone)
+    return PlainFit(ended(layout, found), alone, left_out, max(2.0 * (separate - found.log_likelihood), 0.0))
+
+
+def _alone(run: GridRun, spec: ModelSpec, settings: MaximumLikelihoodSettings) -> Alone | str:
+    """Fit a run by itself, or say why that cannot be."""
+    record = RunFilter(run, EffectModel(), spec).linear().record
+    try:
+        objective, best, _, details, _ = maximum_likelihood.search(record, spec, run.ship.arm_per_m, settings)
+    except KempfError as error:
+        return str(error)
+    return Alone(without(run, objective.record), best, details["gross_errors"])
+
+
+def _first_levels(levels: Float) -> Float:
+    """Return levels to begin from, shape (runs, 6): those of single runs, but for levels far from their usual ones.
+
+    The instruments are the same in every run. Where a model lacks something a single run has several maxima, and one
+    that takes, say, the yaw rate for exact and the heading for noisy is no measure of the instruments.
+    """
+    usual = np.median(levels, axis=0)
+    strange = np.abs(levels - usual) > _UNLIKE
+    strange[:, :_DISTURBANCES] = False
+    found: Float = np.where(strange, usual, levels)
+    return found
+
+
+def _first_hull(layout: CommonLikelihood, alone: Sequence[Alone], levels: Float) -> Float:
+    """Return the hull to begin from: the mean by information, or the best of a few runs' own where that is no ship."""
+    mean = _weighted_mean(alone)
+    if len(alone) == 1:
+        return alone[0].hull
+    if np.all(np.isfinite(mean)) and np.isfinite(layout.full(np.concatenate([mean, levels]))[0]):
+        return mean
+    hulls = [one.hull for one in alone[:_ENTRIES]]
+    best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
+    return best
+
+
+def _weighted_mean(alone: Sequence[Alone]) -> Float:
+    """Mean of the separate hulls, each with the information it has beside its own levels."""
+    weights = []
+    for one in alone:
+        covariance = np.linalg.pinv(one.search.information, hermitian=True)[:_HULL, :_HULL]
+        weights.append(np.linalg.pinv(covariance, hermitian=True))
+    total: Float = np.sum(weights, axis=0)
+    moment: Float = np.sum([w @ one.hull for w, one in zip(weights, alone, strict=True)], axis=0)
+    scale = np.sqrt(np.diag(total))
+    mean: Float = np.linalg.lstsq(total / np.outer(scale, scale), moment / scale, rcond=1e-12)[0] / scale
+    return mean

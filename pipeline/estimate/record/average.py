@@ -1,0 +1,84 @@
+"""Readings averaged over the cells of a grid: the measurements that every likelihood takes.
+
+The grid is fine beside the ship's own time, so that what she does within a cell is a straight line: the mean of its
+readings, at the mean of their instants, says what they say together, and there are several times fewer of them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.record.moves import moves
+from kempf.pipeline.estimate.record.record import Record
+
+#: the grid's step in times that the ship needs for her length, and in legs of the zigzag; its bounds, s
+_STEP_LENGTHS, _STEP_LEGS, _FINEST_S, _COARSEST_S = 0.06, 1.0 / 60.0, 0.05, 1.0
+
+
+def step_of(records: Sequence[Record], length_m: float | None) -> float:
+    """Return the grid's step for a vessel, s: fine for her length, and no finer than what was measured.
+
+    Parameters
+    ----------
+    records : sequence of Record
+    length_m : float or None
+        Of the ship; without it the legs of her zigzags say how fast she answers.
+    """
+    if length_m is None:
+        wanted = _STEP_LEGS * float(np.median([r.time_s[-1] / max(moves(r.rudder_rad), 1) for r in records]))
+    else:
+        speed = float(np.median([record.mean_speed_m_s for record in records]))
+        wanted = _STEP_LENGTHS * length_m / max(speed, 0.1)
+    fastest = min(_period(record) for record in records)
+    return float(f"{max(float(np.clip(wanted, _FINEST_S, _COARSEST_S)), fastest):.2g}")
+
+
+def _period(record: Record) -> float:
+    periods = []
+    for column in record.measured.T:
+        time = record.time_s[np.isfinite(column)]
+        if time.size > 1:
+            periods.append(float(np.median(np.diff(time))))
+    return min(periods)
+
+
+def instants_of(record: Record, step_s: float) -> int:
+    """Return how many instants the grid has over a record."""
+    return int(np.floor(record.time_s[-1] / step_s)) + 1
+
+
+def cells(time_s: Float, step_s: float) -> NDArray[np.int64]:
+    """Return the number of the instant of the grid that each time lies nearest to."""
+    number: NDArray[np.int64] = np.floor(time_s / step_s + 0.5).astype(np.int64)
+    return number
+
+
+def cell_means(time_s: Float, column: Float, step_s: float, n: int) -> tuple[Float, Float]:
+    """Return the mean of the readings around each instant of the grid, and how much later than it their mean time is.
+
+    Parameters
+    ----------
+    time_s, column : ndarray, shape (m,)
+        Readings, NaN where there is none.
+    step_s : float
+    n : int
+        Instants of the grid.
+
+    Returns
+    -------
+    mean, late : ndarray, shape (n,)
+        NaN and 0 where a cell has no reading.
+    """
+    good = np.isfinite(column)
+    cell = cells(time_s[good], step_s)
+    inside = cell < n
+    cell = cell[inside]
+    counts = np.bincount(cell, minlength=n)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = np.bincount(cell, column[good][inside], minlength=n) / counts
+        late = np.bincount(cell, time_s[good][inside] - step_s * cell, minlength=n) / counts
+    return mean, np.nan_to_num(late)

@@ -1,0 +1,140 @@
+"""The plain model of several manoeuvres: what one hull gains, when the runs do not share one, and who stays out."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from functools import lru_cache
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.maximum_likelihood import STANDARD, identify
+from kempf.pipeline.estimate.plain_fit import LEVEL, PlainFit, fit_plain
+from kempf.pipeline.estimate.pooled_fit import CommonLikelihood
+from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
+from kempf.pipeline.estimate.record.average import step_of
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
+from kempf.pipeline.estimate.search.climb import free
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.schemas.effects import get
+from kempf.schemas.errors import DataRejected
+from kempf.schemas.model_spec import ModelSpec
+from tests.estimate.simulated import instruments_of, record_of, sailed, truth_of
+
+SPEC = ModelSpec(moment="none")
+#: log-likelihood of three runs, by which two ways to put a measurement off the grid may differ
+MOST_APART = 10.0
+
+
+@lru_cache(maxsize=8)
+def run(seed: int, hull: str = "ferry") -> GridRun:
+    trial = sailed(hull, seed=seed, heading_deg=80.0 * seed, duration_s=500.0)
+    record = record_of(trial)
+    ship = ShipConstants(90.0, 5.0, trial.truth.wind_arm_per_m)
+    return make_run(f"{hull} {seed}", record, instruments_of(trial), SPEC, ship, step_of([record], 90.0))
+
+
+def fitted(*runs: GridRun, workers: int = 2) -> PlainFit:
+    with ThreadPoolExecutor(workers) as executor:
+        return fit_plain(runs, SPEC, executor)
+
+
+@pytest.fixture(scope="module")
+def three() -> PlainFit:
+    return fitted(*(run(seed) for seed in (21, 22, 23)))
+
+
+def test_one_hull_from_three_zigzags(three: PlainFit) -> None:
+    truth = truth_of(sailed("ferry", seed=21, heading_deg=80.0 * 21, duration_s=500.0))
+    assert three.fit.converged and not three.left_out
+    assert np.max(np.abs(three.fit.hull - truth) / three.fit.std) < 3.0
+    assert three.p_value > LEVEL and three.widened == 1.0
+    assert three.degrees_of_freedom == 12 and 0.0 < three.statistic < 30.0
+    assert [one.run.name for one in three.alone] == ["ferry 21", "ferry 22", "ferry 23"]
+
+
+def test_information_of_the_runs_adds_up(three: PlainFit) -> None:
+    trial = sailed("ferry", seed=21, heading_deg=80.0 * 21, duration_s=500.0)
+    alone = identify(record_of(trial), SPEC, trial.truth.wind_arm_per_m, STANDARD, 90.0)
+    for std, one in zip(three.fit.std, alone.parameters, strict=True):
+        # three records alike: a third of the variance, by and large
+        assert 0.45 < std / one.std < 0.75, one.name
+
+
+def test_one_run_by_itself_is_the_estimate_of_that_run() -> None:
+    trial = sailed("ferry", seed=21, heading_deg=80.0 * 21, duration_s=500.0)
+    alone = identify(record_of(trial), SPEC, trial.truth.wind_arm_per_m, STANDARD, 90.0)
+    common = fitted(run(21))
+    assert common.statistic == pytest.approx(0.0, abs=1e-3) and common.p_value == 1.0
+    assert np.max(np.abs(common.fit.hull - alone.hull.array()) / common.fit.std) < 0.01
+
+
+def test_the_workers_do_not_matter_to_the_bits() -> None:
+    first, second = fitted(run(21), run(22), workers=1), fitted(run(21), run(22))
+    assert first.statistic == second.statistic and first.fit.log_likelihood == second.fit.log_likelihood
+    np.testing.assert_array_equal(first.fit.hull, second.fit.hull)
+    np.testing.assert_array_equal(first.fit.covariance, second.fit.covariance)
+
+
+def test_linear_and_extended_filter_have_one_maximum(three: PlainFit) -> None:
+    """An effect that is held at nothing sends the same measurements through the extended filter."""
+    fit = three.fit
+    model = EffectModel((get("sway_quadratic"),))
+    theta = np.concatenate([fit.hull, [0.0], fit.levels.ravel()])
+    with ThreadPoolExecutor(2) as workers:
+        extended = CommonLikelihood([replace(one, model=model) for one in fit.runs], workers)
+        value, score, information = extended.full(theta)
+        linear = CommonLikelihood(fit.runs, workers)
+        assert linear.linear and not extended.linear
+        assert value == pytest.approx(linear.full(np.delete(theta, 6))[0], abs=MOST_APART)
+    movable = free(extended, theta, score)
+    movable[6] = False
+    # where the extended filter's maximum lies, in standard errors from that of the linear one
+    step = information.masked(movable).solve(np.where(movable, score, 0.0))[:6]
+    assert np.max(np.abs(step) / fit.std) < 0.05
+
+
+def test_standard_errors_grow_where_prediction_errors_are_not_white(three: PlainFit) -> None:
+    assert uncertainty_of(three.fit).kind == "information"
+    np.testing.assert_array_equal(uncertainty_of(three.fit).covariance, three.fit.covariance)
+    wave = 0.004 * np.sin(0.15 * run(21).time_s)
+    measured = run(21).measured.copy()
+    measured[:, 1] += wave
+    measured[:, 2] -= 0.004 / 0.15 * np.cos(0.15 * run(21).time_s)
+    shaken = uncertainty_of(fitted(replace(run(21), measured=measured), run(22)).fit)
+    assert shaken.kind in {"information", "sandwich"} and np.all(np.diag(shaken.covariance) > 0.0)
+
+
+def test_two_ships_are_no_pool() -> None:
+    other = run(23)
+    inputs = other.inputs.copy()
+    # a rudder that does a tenth less: b1 and b2 of this ship are smaller
+    inputs[:, 1] /= 0.9
+    found = fitted(run(21), run(22), replace(other, name="changed", inputs=inputs))
+    assert found.p_value < 1e-6 and found.widened > 1.5
+    off = {one.run.name: float(np.abs(found.off_in_std(one)).max()) for one in found.alone}
+    assert max(off, key=lambda name: off[name]) == "changed"
+
+
+def test_what_cannot_be_identified_by_itself_stays_out_and_is_named() -> None:
+    other = run(23)
+    inputs = other.inputs.copy()
+    inputs[:, 0] = 1e5
+    rocket = replace(other, name="rocket", inputs=inputs)
+    found = fitted(run(21), run(22), rocket)
+    assert list(found.left_out) == ["rocket"] and len(found.alone) == 2
+    with pytest.raises(DataRejected) as caught:
+        fitted(rocket)
+    assert caught.value.code == "no_ship_explains_it" and "rocket" in caught.value.details["left_out"]
+
+
+def test_gross_errors_are_taken_out_of_the_run_that_is_pooled() -> None:
+    measured = run(21).measured.copy()
+    rows = np.flatnonzero(np.isfinite(measured[:, 0]))[7::29]
+    measured[rows, 0] += 3.0
+    found = fitted(replace(run(21), measured=measured), run(22))
+    assert found.gross_errors == rows.size
+    assert not np.isfinite(found.fit.runs[0].run.measured[rows, 0]).any()
+    assert RunFilter(found.fit.runs[0].run, EffectModel(), SPEC).linear().active.sum() == 11
