@@ -200,7 +200,7 @@ def build_single(
     runs = assemble({bounds.log_id: instruments}, profile, [(segment_ids[0], bounds)], spec)
     fitted = fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
     fit, (record,) = fitted.fits[-1], runs.records
-    known = uncertainty_of(fit)
+    known = _known(fit)
     made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, segment_ids, told)
     return replace(
         made,
@@ -238,7 +238,7 @@ def _model_set(
         raise NotFound("no_parent", f"The model {effects} has no parent.", "Make it with `kempf effects add`.")
     _, left = split(runs.runs)
     step = step_of(fit, [runs.runs[i] for i in left])
-    known, plain = uncertainty_of(fit), fitted.plain
+    known, plain = _known(fit), fitted.plain
     if not effects:
         known = replace(known, covariance=known.covariance * plain.widened**2)
     made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, tuple(segment_ids), told)
@@ -263,6 +263,12 @@ def _model_set(
         ),
         parent=parent,
     )
+
+
+def _known(fit: PooledFit) -> PooledUncertainty:
+    """Return the errors of a fit; of a model with effects those by which its diagnosis judges them."""
+    known = uncertainty_of(fit)
+    return replace(known, covariance=fit.covariance, kind="information") if fit.model.effects else known
 
 
 def _pooling(plain: PlainFit) -> dict[str, Any]:

@@ -374,8 +374,10 @@ def rung(number: int, step: Step) -> dict[str, Any]:
         "converged": step.fit.converged,
         "hull": dict(zip(("a11", "a12", "a21", "a22", "b1", "b2"), (float(x) for x in step.fit.hull), strict=True)),
         "effects": {
-            name: {"value": float(v), "std": float(s)}
-            for name, v, s in zip(step.fit.model.names, step.fit.values, step.fit.std[6:], strict=True)
+            f"{effect.name}.{parameter.name}": {"value": float(v), "std": float(s), "unit": parameter.unit}
+            for (effect, parameter), v, s in zip(
+                step.fit.model.parameters, step.fit.values, step.fit.std[6:], strict=True
+            )
         },
     }
 

@@ -20,15 +20,17 @@ def command(vessel: str, uri: str, as_json: bool) -> None:
     """Show the models that lead to a vessel's current one, and how the error fell from one to the next."""
     from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.flows.jobs.standing_model import rungs_to, standing
+    from kempf.warehouse import vessels
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
+    vessels.require(warehouse, vessel)
     model = standing(warehouse, vessel)
     if model is None:
         raise NotFound(
             "no_model",
-            f"{vessel!r} has no current model with effects yet.",
-            f"Run `kempf diagnose --vessel {vessel}`, then `kempf effects add NAME --vessel {vessel}`.",
+            f"{vessel!r} has no current model of several manoeuvres yet.",
+            f"Run `kempf identify --vessel {vessel}`, or `kempf diagnose --vessel {vessel}`.",
             {"vessel": vessel},
         )
     rungs = rungs_to(warehouse, model)
@@ -46,7 +48,7 @@ def tell_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
     for one in rungs:
         held, wind = one["held_out_error"], one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"]
         own = {n.partition(".")[2]: v for n, v in one["effects"].items() if n.partition(".")[0] == one["added"]}
-        sizes = [f"{name} {number(v['value'])} ± {number(v['std'], 2)}" for name, v in own.items()]
+        sizes = [_size(name, size) for name, size in own.items()]
         rows.append(
             [
                 str(one["step"]),
@@ -60,3 +62,8 @@ def tell_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
         )
     head = ["step", "added", "size, ± 1 s.e.", "fitted", "held out", "wind, m/s^2/s^0.5", "set"]
     print_table(head, rows, f"{vessel}: free-run error, % of the motion")
+
+
+def _size(name: str, size: dict[str, Any]) -> str:
+    unit = size.get("unit") or ""
+    return f"{name} {number(size['value'])} ± {number(size['std'], 2)}{'' if unit in ('', '1') else ' ' + unit}"
