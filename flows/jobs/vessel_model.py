@@ -24,7 +24,6 @@ from kempf.pipeline.diagnose.diagnosis import step_of
 from kempf.pipeline.diagnose.forward_selection import staged
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.verdict import rung
-from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
 from kempf.pipeline.estimate.plain_fit import LEVEL, PlainFit
 from kempf.pipeline.estimate.plausibility import doubts
@@ -127,9 +126,9 @@ def store_model(
     made = []
     for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
         if name not in there:
-            told = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
+            origin = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
             ids = [segment.segment_id for segment in chosen.segments]
-            made.append(_model_set(fit, fitted, profile, inputs, chosen.vessel, ids, told, parent))
+            made.append(_model_set(fit, fitted, profile, inputs, chosen.vessel, ids, origin, parent))
     if keep is None:
         parameter_sets.insert(warehouse, made)
     else:
@@ -143,7 +142,7 @@ def build_model(
     inputs: Inputs,
     vessel: str,
     segment_ids: Sequence[str],
-    told: dict[str, Any],
+    origin: dict[str, Any],
     parent: str | None,
 ) -> ParameterSet:
     """Compute the model that some inputs describe; nothing is stored.
@@ -157,7 +156,7 @@ def build_model(
     vessel : str
     segment_ids : sequence of str
         In the order of the inputs' bounds.
-    told : dict
+    origin : dict
         Provenance.
     parent : str or None
     """
@@ -165,7 +164,7 @@ def build_model(
     runs = assemble(instruments, profile, list(zip(segment_ids, inputs.bounds, strict=True)), spec)
     own = Own.from_json(inputs.settings.get("own") or {})
     fitted = fitted_model(runs, spec, own, inputs.settings.get(SEARCH))
-    return _model_set(fitted.fits[-1], fitted, profile, inputs, vessel, segment_ids, told, parent)
+    return _model_set(fitted.fits[-1], fitted, profile, inputs, vessel, segment_ids, origin, parent)
 
 
 def build_single(
@@ -174,7 +173,7 @@ def build_single(
     inputs: Inputs,
     vessel: str,
     segment_ids: tuple[str, ...],
-    told: dict[str, Any],
+    origin: dict[str, Any],
 ) -> ParameterSet:
     """Compute the set of one manoeuvre whose model has effects; nothing is stored.
 
@@ -188,37 +187,26 @@ def build_single(
     vessel : str
     segment_ids : tuple of str
         Its id.
-    told : dict
+    origin : dict
         Provenance.
 
     Raises
     ------
     KempfError
-        The segment cannot be identified from, or an effect cannot be told from it.
+    XX
     """
     spec, (bounds,) = ModelSpec.model_validate(dict(inputs.model_spec)), inputs.bounds
     runs = assemble({bounds.log_id: instruments}, profile, [(segment_ids[0], bounds)], spec)
     fitted = fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
     fit, (record,) = fitted.fits[-1], runs.records
     known = _known(fit)
-    made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, segment_ids, told)
+    made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, segment_ids, origin)
     return replace(
         made,
-        noise=_noise(fit, runs.spec),
+        noise=tuple(Stored(name, level, None, NOISE_PARAMETERS[name]) for name, level in fit.sigmas(0).items()),
         fit=known.one_step[0],
         warnings=(*record.warnings, *made.warnings),
         parent=spec.parent,
-    )
-
-
-def _noise(fit: PooledFit, spec: ModelSpec) -> tuple[Stored, ...]:
-    """Return the noise levels of a fit of one run by name; those of the disturbances in the long run."""
-    in_the_long_run = np.exp(fit.levels[0] - to_intensities(spec)).tolist()
-    used = fit.runs[0].levels_used()
-    return tuple(
-        Stored(name, level, None, unit)
-        for (name, unit), level, there in zip(NOISE_PARAMETERS.items(), in_the_long_run, used, strict=True)
-        if there
     )
 
 
@@ -229,7 +217,7 @@ def _model_set(
     inputs: Inputs,
     vessel: str,
     segment_ids: Sequence[str],
-    told: dict[str, Any],
+    origin: dict[str, Any],
     parent: str | None,
 ) -> ParameterSet:
     """Return the set of all manoeuvres together, with what the model predicts of those held out."""
@@ -241,7 +229,7 @@ def _model_set(
     known, plain = _known(fit), fitted.plain
     if not effects:
         known = replace(known, covariance=known.covariance * plain.widened**2)
-    made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, tuple(segment_ids), told)
+    made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, tuple(segment_ids), origin)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     # of the manoeuvres that the inputs name, so that a rerun says the same
     skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in segment_ids}
@@ -309,7 +297,7 @@ def _as_parameter_set(
     inputs: Inputs,
     vessel: str,
     segment_ids: tuple[str, ...],
-    told: dict[str, Any],
+    origin: dict[str, Any],
 ) -> ParameterSet:
     """Return what every set of a fit with effects holds."""
     spec, covariance = ModelSpec.model_validate(dict(inputs.model_spec)), known.covariance
@@ -352,10 +340,10 @@ def _as_parameter_set(
             *(() if fit.converged else (f"not converged: {fit.reason}",)),
             *dict.fromkeys(sentence for one in known.one_step for sentence in doubts(fit.hull, std[:6], one)),
             *without_arm(spec, arm_of(spec, profile)),
-            *channel_warnings(told),
+            *channel_warnings(origin),
         ),
         parent=None,
-        provenance=told,
+        provenance=origin,
     )
 
 

@@ -19,7 +19,7 @@ from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
 from kempf.pipeline.estimate.pooled_fit import DECREMENT, MAX_ITERATIONS, CommonLikelihood, PooledFit, ended
-from kempf.pipeline.estimate.record.grid_run import GridRun, without
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.block_arrow import ArrowSteps
 from kempf.pipeline.estimate.search.climb import Search, climb_by
 from kempf.pipeline.estimate.uncertainty import from_information
@@ -157,7 +157,7 @@ def _alone(run: GridRun, spec: ModelSpec, settings: MaximumLikelihoodSettings) -
         objective, best, _, details, _ = maximum_likelihood.search(record, spec, run.ship.arm_per_m, settings)
     except KempfError as error:
         return str(error)
-    return Alone(without(run, objective.record), best, details["gross_errors"])
+    return Alone(run.without(objective.record), best, details["gross_errors"])
 
 
 def _first_levels(levels: Float) -> Float:

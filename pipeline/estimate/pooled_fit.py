@@ -19,6 +19,7 @@ from kempf.pipeline.estimate.sensitivity import N_HULL, N_LEVELS, Point
 from kempf.pipeline.model.batch import MOST
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
+from kempf.schemas.model_spec import NOISE_PARAMETERS
 
 #: converged when the log-likelihood that the shared parameters have still to gain falls below this: they lie within
 #: 0.05 standard errors of the maximum then
@@ -96,6 +97,12 @@ class PooledFit:
     def point(self, number: int) -> Point:
         """Where one run stands."""
         return Point(self.hull, self.values, self.levels[number])
+
+    def sigmas(self, number: int) -> dict[str, float]:
+        """Return the noise levels that one run has, those of disturbances in the long run, by name, SI."""
+        one = self.runs[number]
+        levels = np.exp(self.levels[number] - to_intensities(one.spec)).tolist()
+        return {name: x for name, x, used in zip(NOISE_PARAMETERS, levels, one.levels_used(), strict=True) if used}
 
 
 def fit(

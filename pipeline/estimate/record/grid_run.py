@@ -1,4 +1,4 @@
-"""One manoeuvre as diagnosis takes it: on a grid fine enough for the ship, every measurement with its own instant."""
+"""One manoeuvre as every fit takes it: on a grid fine enough for the ship, each mean of readings at its own instant."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.filters.ekf import ROWS
-from kempf.pipeline.estimate.record.average import cell_means, cells, instants_of, step_of
+from kempf.pipeline.estimate.record.average import cell_means, instants_of, step_of
 from kempf.pipeline.estimate.record.record import Instants, Record
 from kempf.pipeline.estimate.record.speed_error import SpeedError
 from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
@@ -125,14 +125,12 @@ class GridRun:
 
     def instants(self) -> Instants:
         """Return the run as the linear filter takes it, every mean at the mean instant of its readings."""
+        own, fine = self._own_instants(), self.fine_time_s
         made = np.isfinite(self.measured)
-        own = [(self.time_s + self.offset_s[:, i])[made[:, i]] for i in range(made.shape[1])]
-        fine = self.fine_time_s
-        own = [np.clip(instants, fine[0], fine[-1]) for instants in own]
-        time = np.unique(np.concatenate([fine, *own]))
+        time = np.unique(np.concatenate([fine, own[made]]))
         measured = np.full((time.size, made.shape[1]), np.nan)
-        for i, instants in enumerate(own):
-            measured[np.searchsorted(time, instants), i] = self.measured[made[:, i], i]
+        for i in range(made.shape[1]):
+            measured[np.searchsorted(time, own[made[:, i], i]), i] = self.measured[made[:, i], i]
 
         def laid(known: Float, column: Float) -> Float:
             course: Float = np.interp(time, known, column)
@@ -152,6 +150,26 @@ class GridRun:
             heading_rad=laid(self.time_s, self.heading_rad),
             noise_start=self.noise_start,
         )
+
+    def without(self, instants: Instants) -> GridRun:
+        """Return the run without the measurements that are gone from its instants.
+
+        Parameters
+        ----------
+        instants : Instants
+            Those of `instants`, some measurements NaN.
+        """
+        own, measured = self._own_instants(), self.measured.copy()
+        for i in range(measured.shape[1]):
+            rows = np.flatnonzero(np.isfinite(measured[:, i]))
+            kept = np.isfinite(instants.measured[np.searchsorted(instants.time_s, own[rows, i]), i])
+            measured[rows[~kept], i] = np.nan
+        return replace(self, measured=measured)
+
+    def _own_instants(self) -> Float:
+        """Return the mean instant of the readings of every cell, within the run, shape (n, 3)."""
+        own: Float = np.clip(self.time_s[:, None] + self.offset_s, 0.0, self.fine_time_s[-1])
+        return own
 
 
 def plain_run(name: str, record: Record, spec: ModelSpec, arm_per_m: float, length_m: float | None) -> GridRun:
@@ -184,23 +202,6 @@ def averaged(record: Record, spec: ModelSpec, arm_per_m: float, length_m: float 
         Of the ship, for the grid's step.
     """
     return replace(record, **vars(plain_run("", record, spec, arm_per_m, length_m).instants()))
-
-
-def without(run: GridRun, instants: Instants) -> GridRun:
-    """Return a run without the measurements that are gone from its instants.
-
-    Parameters
-    ----------
-    run : GridRun
-    instants : Instants
-        `GridRun.instants` of it, some measurements NaN.
-    """
-    measured, cell = run.measured.copy(), cells(instants.time_s, run.step_s)
-    for i in range(measured.shape[1]):
-        there = np.zeros(measured.shape[0], dtype=np.bool_)
-        there[np.minimum(cell[np.isfinite(instants.measured[:, i])], there.size - 1)] = True
-        measured[~there, i] = np.nan
-    return replace(run, measured=measured)
 
 
 def make_run(
