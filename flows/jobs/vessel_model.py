@@ -193,7 +193,7 @@ def build_single(
     Raises
     ------
     KempfError
-    XX
+        The segment cannot be identified from, or an effect cannot be determined from it.
     """
     spec, (bounds,) = ModelSpec.model_validate(dict(inputs.model_spec)), inputs.bounds
     runs = assemble({bounds.log_id: instruments}, profile, [(segment_ids[0], bounds)], spec)
