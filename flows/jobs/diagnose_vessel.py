@@ -151,7 +151,7 @@ def examine(
         made = diagnose(
             *(runs.runs, runs.spec, screened, workers, settings),
             given=named(spec.effects, known),
-            told=step,
+            announce=step,
         )
     progress(count, count, "done")
     return FullDiagnosis(chosen, runs, made)

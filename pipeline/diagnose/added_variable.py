@@ -30,7 +30,7 @@ def added_variables(diagnosis: Diagnosis) -> tuple[AddedVariable, ...]:
     steps = diagnosis.steps
     pairs = [(before.fit, step.chosen_from[0][0]) for before, step in pairwise(steps)]
     if not pairs:
-        pairs = [(steps[0].fit, one) for one in steps[0].screened if one.direction.size][:1]
+        pairs = [(steps[0].fit, candidate) for candidate in steps[0].screened if candidate.direction.size][:1]
     return tuple(_added_variable(fit, candidate) for fit, candidate in pairs)
 
 

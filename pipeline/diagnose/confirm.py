@@ -156,7 +156,7 @@ def _left_out(fit: PooledFit, workers: Executor) -> Float:
         scores.append(common.T @ line.u)
     whole = np.sum(informations, axis=0)
 
-    def one(number: int) -> float:
+    def log_likelihood_of(number: int) -> float:
         rest = whole - informations[number]
         scale = np.sqrt(np.maximum(np.diag(rest), 1e-300))
         step = np.linalg.lstsq(rest / np.outer(scale, scale), scores[number] / scale, rcond=1e-8)[0] / scale
@@ -167,4 +167,4 @@ def _left_out(fit: PooledFit, workers: Executor) -> Float:
 
     if len(fit.linearised) < 2:
         return np.zeros(len(fit.linearised))
-    return np.array(list(workers.map(one, range(len(fit.runs)))))
+    return np.array(list(workers.map(log_likelihood_of, range(len(fit.runs)))))

@@ -13,9 +13,9 @@ ALIKE = 0.9
 WINDOW = 6.0
 
 
-def alike(one: Candidate, other: Candidate) -> float:
+def alike(candidate: Candidate, other: Candidate) -> float:
     """Return the squared cosine between what two effects would explain, 0 to 1."""
-    a, b = one.direction, other.direction
+    a, b = candidate.direction, other.direction
     if a.size != b.size or not a.size:
         return 0.0
     both = float(a @ a) * float(b @ b)
@@ -24,11 +24,11 @@ def alike(one: Candidate, other: Candidate) -> float:
 
 def shortlist(candidates: Sequence[Candidate], level: float, count: int) -> list[Candidate]:
     """Return the candidates worth a refit: significant, the highest scores, and what looks like the highest."""
-    significant = [one for one in candidates if one.p_adjusted < level]
+    significant = [candidate for candidate in candidates if candidate.p_adjusted < level]
     if not significant:
         return []
     chosen = significant[:count]
-    chosen += [one for one in significant[count : 2 * count] if alike(one, chosen[0]) > ALIKE]
+    chosen += [candidate for candidate in significant[count : 2 * count] if alike(candidate, chosen[0]) > ALIKE]
     return chosen
 
 
@@ -36,6 +36,6 @@ def undecided(confirmed: Sequence[tuple[Candidate, Confirmation]]) -> list[tuple
     """Return the confirmed candidates within `WINDOW` of the best, simplest first, then the best."""
     if not confirmed:
         return []
-    best = min(one.bic_change for _, one in confirmed)
+    best = min(confirmation.bic_change for _, confirmation in confirmed)
     close = [pair for pair in confirmed if pair[1].bic_change <= best + WINDOW]
     return sorted(close, key=lambda pair: (len(pair[0].effect.parameters), pair[1].bic_change, pair[0].effect.name))

@@ -27,7 +27,7 @@ from kempf.pipeline.predict.free_run import FreeRun, free_run
 from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import ModelSpec
 
-Told = Callable[[str], None]
+Announce = Callable[[str], None]
 #: how many times its score a refit gains at most, as far as has been seen; a hull bent by what is missing hides much
 _FORETOLD = 10.0
 #: standard errors from nothing below which an effect added before does not earn its place
@@ -116,7 +116,7 @@ def diagnose(
     workers: Executor,
     settings: DiagnosisSettings = STANDARD,
     given: Sequence[Effect] = (),
-    told: Told = _silent,
+    announce: Announce = _silent,
 ) -> Diagnosis:
     """Find what a vessel's model lacks.
 
@@ -132,15 +132,15 @@ def diagnose(
     settings : DiagnosisSettings, optional
     given : sequence of Effect, optional
         Effects that the model has already.
-    told : callable, optional
+    announce : callable, optional
         Is told what is done, for a progress line.
     """
     chosen, left = split(runs)
-    told(f"fitting the model to {len(chosen)} manoeuvres, {len(left)} held out")
+    announce(f"fitting the model to {len(chosen)} manoeuvres, {len(left)} held out")
     plain, fits = staged([runs[i] for i in chosen], spec, given, workers)
     base = fits[-1]
     held = [runs[i] for i in left]
-    told(f"screening {len(effects)} effects")
+    announce(f"screening {len(effects)} effects")
     steps = [_step(base, None, (), (), held, screen(base, effects, workers), workers)]
     before = flexible(base, workers) if len(chosen) > 1 else None
     while len(steps) <= settings.most_steps:
@@ -157,7 +157,7 @@ def diagnose(
                 candidate.score * _FORETOLD < k.likelihood_ratio - WINDOW for _, k in tried if k.holds
             ):
                 continue
-            told(f"step {len(steps)}: refitting with {candidate.effect.title}")
+            announce(f"step {len(steps)}: refitting with {candidate.effect.title}")
             most = min((k.bic_change for _, k in tried if k.holds), default=np.inf) + WINDOW
             tried.append((candidate, confirm(last.fit, alone, candidate, held, workers, most)))
         best = undecided([pair for pair in tried if pair[1].holds])
@@ -166,17 +166,17 @@ def diagnose(
             break
         names = {candidate.effect.name for candidate, _ in best}
         worse = tuple(pair for pair in tried if pair[0].effect.name not in names)
-        found = best[0][1].fit
-        told(f"step {len(steps)}: screening beside {best[0][0].effect.title}")
-        screened = screen(found, effects, workers)
-        steps.append(_step(found, best[0][0].effect, tuple(best), worse, held, screened, workers))
+        fit = best[0][1].fit
+        announce(f"step {len(steps)}: screening beside {best[0][0].effect.title}")
+        screened = screen(fit, effects, workers)
+        steps.append(_step(fit, best[0][0].effect, tuple(best), worse, held, screened, workers))
         idle = _idle(steps)
         if idle is not None:
-            told(f"step {len(steps) - 1}: {idle.title} is no longer significant")
+            announce(f"step {len(steps) - 1}: {idle.title} is no longer significant")
             steps = _without(idle, steps, held, effects, workers)
-    told("measuring what is left")
+    announce("measuring what is left")
     after = flexible(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
-    fitted = tuple(one.run for one in base.runs)
+    fitted = tuple(filtered.run for filtered in base.runs)
     return Diagnosis(tuple(fits), tuple(steps), before, after, fitted, tuple(held), plain, settings)
 
 
@@ -209,10 +209,10 @@ def _without(
             continue
         base = made[-1].fit
         candidate = score(base, step.added, workers)
-        one = confirm(base, _unseen(made[-1], held, workers), candidate, held, workers)
+        confirmation = confirm(base, _unseen(made[-1], held, workers), candidate, held, workers)
         others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
-        screened = screen(one.fit, effects, workers)
-        made.append(_step(one.fit, step.added, ((candidate, one),), others, held, screened, workers))
+        screened = screen(confirmation.fit, effects, workers)
+        made.append(_step(confirmation.fit, step.added, ((candidate, confirmation),), others, held, screened, workers))
     return made
 
 
@@ -230,7 +230,7 @@ def _step(
     screened: Sequence[Candidate],
     workers: Executor | None = None,
 ) -> Step:
-    runs = [*(one.run for one in fit.runs), *held]
+    runs = [*(filtered.run for filtered in fit.runs), *held]
     each = map if workers is None else workers.map
     free = tuple(each(lambda run: free_run(fit, run), runs))
     many = len(fit.runs)

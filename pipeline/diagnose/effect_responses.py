@@ -50,16 +50,16 @@ def responses(base: PooledFit, trials: Sequence[EffectTrial], workers: Executor)
         Of each trial one column for every parameter that makes the effect; None where the filter runs away.
     """
     bundles = _bundles(trials)
-    found: list[Float | None] = [None] * len(trials)
+    result: list[Float | None] = [None] * len(trials)
     passed = workers.map(lambda bundle: _passed(base, [trials[i] for i in bundle]), bundles)
     for bundle, made in zip(bundles, passed, strict=True):
         for i, columns in zip(bundle, made, strict=True):
-            found[i] = columns
+            result[i] = columns
     # what one effect makes of a state may be no number for another one that is not there: only alone it is told
-    astray = [i for bundle in bundles if len(bundle) > 1 for i in bundle if found[i] is None]
+    astray = [i for bundle in bundles if len(bundle) > 1 for i in bundle if result[i] is None]
     for i, (columns,) in zip(astray, workers.map(lambda i: _passed(base, [trials[i]]), astray), strict=True):
-        found[i] = columns
-    return found
+        result[i] = columns
+    return result
 
 
 def _bundles(trials: Sequence[EffectTrial]) -> list[list[int]]:
@@ -106,11 +106,11 @@ def _passed(base: PooledFit, trials: Sequence[EffectTrial]) -> list[Float | None
         for lane, ((trial, k), other) in enumerate(zip(lanes, others, strict=True)):
             if np.isfinite(other.log_likelihood):
                 parts[lane].append(sensitivity.difference(line.passed, other, trial.steps[k]))
-    found: list[Float | None] = []
+    result: list[Float | None] = []
     columns = iter(parts)
     for trial in trials:
         own = [next(columns) for _ in trial.making]
         whole = all(len(part) == len(base.runs) for part in own)
         column = np.column_stack([np.concatenate(part) for part in own]) if whole else None
-        found.append(column if column is not None and np.all(np.isfinite(column)) else None)
-    return found
+        result.append(column if column is not None and np.all(np.isfinite(column)) else None)
+    return result

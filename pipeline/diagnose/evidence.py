@@ -71,7 +71,9 @@ def evidence_of(
         other = None if after is before else after.all[number]
         return manoeuvre_evidence(judged, other, after.states[number], zigzags[name], held_out=name in held)
 
-    manoeuvres = sorted(workers.map(shown, range(len(before.all))), key=lambda one: (one.start_utc_ns, one.segment_id))
+    manoeuvres = sorted(
+        workers.map(shown, range(len(before.all))), key=lambda manoeuvre: (manoeuvre.start_utc_ns, manoeuvre.segment_id)
+    )
     return DiagnosisEvidence(
         models=tuple(_model(step, first) for step in diagnosis.steps),
         candidates=_candidates(diagnosis),
@@ -101,9 +103,9 @@ class _Judged:
         self.fitted = judged_fitted(step, phases)
         self.held_out = judged_held_out(step, diagnosis.held, phases)
         self.all = (*self.fitted, *self.held_out)
-        self.runs = tuple(one.residuals.filtered.run for one in self.all)
+        self.runs = tuple(judged.residuals.filtered.run for judged in self.all)
         self.states = tuple(
-            each(lambda one: smoothed_states(one.residuals.filtered, one.point, one.residuals.free), self.all)
+            each(lambda run: smoothed_states(run.residuals.filtered, run.point, run.residuals.free), self.all)
         )
 
 
@@ -124,7 +126,7 @@ def fitted_parameters(fit: PooledFit) -> tuple[FittedParameter, ...]:
 
 
 def _model(step: Step, first: Step) -> FittedModel:
-    used = np.any([one.levels_used()[:3] for one in step.fit.runs], axis=0)
+    used = np.any([filtered.levels_used()[:3] for filtered in step.fit.runs], axis=0)
     intensities = zip(_DISTURBANCES, step.intensities, first.intensities, used, strict=True)
     fitted = np.array([run.relative_error for run in step.fitted])
     held_out = np.array([run.relative_error for run in step.held])
@@ -149,34 +151,34 @@ def _model(step: Step, first: Step) -> FittedModel:
 def _candidates(diagnosis: Diagnosis) -> dict[str, CandidateEffect]:
     refitted: dict[str, tuple[str, tuple[FittedParameter, ...]]] = {}
     for number, step in enumerate(diagnosis.steps[1:], start=1):
-        for candidate, one in step.chosen_from:
-            last = fitted_parameters(one.fit)[-len(candidate.effect.parameters) :]
+        for candidate, confirmation in step.chosen_from:
+            last = fitted_parameters(confirmation.fit)[-len(candidate.effect.parameters) :]
             refitted[candidate.effect.name] = (f"S{number}", last)
-    found = {}
+    candidates = {}
     for candidate in diagnosis.steps[0].screened:
         set_id, parameters = refitted.get(candidate.effect.name, ("", ()))
-        found[candidate.effect.name] = CandidateEffect(
+        candidates[candidate.effect.name] = CandidateEffect(
             separated_by=candidate.effect.separated_by,
             missing_channels=candidate.missing,
             set_id=set_id,
             refitted=parameters,
         )
-    return found
+    return candidates
 
 
 def _confusion(first: Step) -> ConfusionMap:
-    shown = [one for one in first.screened if one.direction.size][:_MAPPED]
+    shown = [candidate for candidate in first.screened if candidate.direction.size][:_MAPPED]
     return ConfusionMap(
-        titles=tuple(one.effect.title for one in shown),
+        titles=tuple(candidate.effect.title for candidate in shown),
         squared_cosine=np.array([[alike(a, b) for b in shown] for a in shown]).reshape(len(shown), len(shown)),
         threshold=ALIKE,
     )
 
 
 def _ranges(manoeuvres: Sequence[ManoeuvreEvidence]) -> dict[str, tuple[float, float]]:
-    found = {}
+    ranges = {}
     for name in ("drift", "turn", "rudder", "speed"):
-        every = np.concatenate([getattr(one, name) for one in manoeuvres])
+        every = np.concatenate([getattr(manoeuvre, name) for manoeuvre in manoeuvres])
         known = every[np.isfinite(every)]
-        found[name] = (float(np.min(known)), float(np.max(known))) if known.size else (np.nan, np.nan)
-    return found
+        ranges[name] = (float(np.min(known)), float(np.max(known))) if known.size else (np.nan, np.nan)
+    return ranges

@@ -65,7 +65,7 @@ def search(clean: Float, u: Float, parts: Sequence[slice], terms: Sequence[Effec
         tried = {int(k): _left_out(grams, moments, [*chosen, int(k)]) for k in usable if k not in chosen}
         if not tried:
             break
-        k = max(tried, key=lambda one: (tried[one], -one))
+        k = max(tried, key=lambda index: (tried[index], -index))
         if tried[k] - best < _EARNED:
             break
         gains.append(tried[k] - best)
@@ -74,12 +74,12 @@ def search(clean: Float, u: Float, parts: Sequence[slice], terms: Sequence[Effec
     if not chosen:
         return ()
     size = _solved(np.sum(grams, axis=0), np.sum(moments, axis=0), chosen)
-    found = []
+    formula = []
     for k, value, gain in zip(chosen, size, gains, strict=True):
         ((target, text),) = terms[k].terms.items()
         name = terms[k].parameters[0].name
-        found.append(Term(target, text.replace(f"*{name}", f"*{value:.4g}"), gain))
-    return tuple(found)
+        formula.append(Term(target, text.replace(f"*{name}", f"*{value:.4g}"), gain))
+    return tuple(formula)
 
 
 def _left_out(grams: Float, moments: Float, chosen: list[int]) -> float:
@@ -94,5 +94,5 @@ def _left_out(grams: Float, moments: Float, chosen: list[int]) -> float:
 def _solved(G: Float, m: Float, chosen: list[int]) -> Float:
     block = G[np.ix_(chosen, chosen)]
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))
-    found: Float = np.linalg.lstsq(block / np.outer(scale, scale), m[chosen] / scale, rcond=1e-8)[0] / scale
-    return found
+    solution: Float = np.linalg.lstsq(block / np.outer(scale, scale), m[chosen] / scale, rcond=1e-8)[0] / scale
+    return solution

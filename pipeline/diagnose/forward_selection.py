@@ -63,23 +63,23 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
     if len(entries) > 1:
         few = slice(0, _RUNS_OF_RACE)
         race = [_climbed(base, model, hull, size, workers, _RACE, few) for hull, size in entries]
-        best = max(race, key=lambda one: one.log_likelihood)
+        best = max(race, key=lambda fit: fit.log_likelihood)
         hull, begin = best.hull, best.values[base.values.size :]
     else:
         hull = base.hull
-    found = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted)
+    fitted = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted)
     if is_ship(base.hull):
-        return found
+        return fitted
     # what the score foretells beside such a hull says little, and the disturbances beside it have eaten the effect
     levels = base.levels.copy()
     levels[:, : len(_CALM)] = np.log(_CALM)
     calm = replace(base, levels=np.clip(levels, *level_bounds(base.runs[0].spec)))
     for size in _sizes(candidate.effect):
         # a lower hill need not be climbed to its top
-        least = max(wanted, found.log_likelihood)
+        least = max(wanted, fitted.log_likelihood)
         other = _climbed(calm, model, ordinary, size, workers, _TO_THE_END, wanted=least)
-        found = max(found, other, key=lambda one: one.log_likelihood)
-    return found
+        fitted = max(fitted, other, key=lambda fit: fit.log_likelihood)
+    return fitted
 
 
 def _sizes(effect: Effect) -> list[Float]:
@@ -115,7 +115,7 @@ def _climbed(
     chosen: slice = slice(None),
     wanted: float = -np.inf,
 ) -> PooledFit:
-    filtered = tuple(replace(one, model=model) for one in base.runs[chosen])
+    filtered = tuple(replace(run, model=model) for run in base.runs[chosen])
     values = np.concatenate([base.values, begin])
     return pooled_fit.fit(filtered, hull, base.levels[chosen], values, workers, iterations, wanted)
 
@@ -172,12 +172,12 @@ def staged(
                 "Log it, or map it in the vessel profile if the log has it under another name.",
                 {"effect": effect.name, "missing": list(candidate.missing)},
             )
-        if candidate.told_by:
+        if candidate.measured_by:
             raise DataRejected(
                 "effect_not_testable",
-                f"The logs have {', '.join(candidate.told_by)}, which measures {effect.title} already.",
+                f"The logs have {', '.join(candidate.measured_by)}, which measures {effect.title} already.",
                 "The model uses that channel; nothing need be added.",
-                {"effect": effect.name, "told_by": list(candidate.told_by)},
+                {"effect": effect.name, "told_by": list(candidate.measured_by)},
             )
         if np.isnan(candidate.score):
             raise DataRejected(

@@ -71,11 +71,11 @@ def manoeuvre_evidence(
     executes = tuple(_seconds(run, t) for t in zigzag.executes_utc_ns)
     peaks = tuple(
         OvershootPeak(
-            at_s=_seconds(run, one["peak_utc_ns"]),
-            side=1 if one["side"] == "starboard" else -1,
-            beyond_deg=one["beyond_nominal_deg"],
+            at_s=_seconds(run, overshoot["peak_utc_ns"]),
+            side=1 if overshoot["side"] == "starboard" else -1,
+            beyond_deg=overshoot["beyond_nominal_deg"],
         )
-        for one in zigzag.overshoots
+        for overshoot in zigzag.overshoots
     )
     turns = turns_of(
         [(k, peak.side, peak.at_s, peak.beyond_deg) for k, peak in enumerate(peaks, start=1)],
@@ -145,15 +145,15 @@ def _predicted(judged: JudgedRun, turns: tuple[Turn, ...], course: _BaseCourse) 
         fit_percent=_fits(judged),
         overshoots=tuple(
             OvershootPair(
-                number=one.number, side=one.side, measured_deg=one.measured_deg, predicted_deg=one.predicted_deg
+                number=pair.number, side=pair.side, measured_deg=pair.measured_deg, predicted_deg=pair.predicted_deg
             )
-            for one in pairs
+            for pair in pairs
         ),
     )
 
 
 def _fits(judged: JudgedRun) -> dict[str, dict[str, float]]:
-    found = {}
+    fits = {}
     for name in HORIZONS:
         horizon, filtered = horizon_of(name), judged.residuals.filtered
         try:
@@ -163,5 +163,5 @@ def _fits(judged: JudgedRun) -> dict[str, dict[str, float]]:
                 made = predict(filtered, judged.point, horizon)
         except DataRejected:
             continue
-        found[horizon.words] = made.fit_percent()
-    return found
+        fits[horizon.words] = made.fit_percent()
+    return fits

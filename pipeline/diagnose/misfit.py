@@ -43,5 +43,5 @@ def misfit_of(judged: Sequence[JudgedRun]) -> dict[str, Any]:
     judged : sequence of JudgedRun
         All fitted, or all held out.
     """
-    residuals = [one.residuals for one in judged if one.settles]
+    residuals = [run.residuals for run in judged if run.settles]
     return where(residuals) if residuals else {}

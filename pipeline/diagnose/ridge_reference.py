@@ -119,8 +119,8 @@ def flexible(base: PooledFit, workers: Executor) -> Flexible:
         At least two runs.
     workers : Executor
     """
-    found = responses(base, [EffectTrial(effect, (_SIZE,)) for effect in TERMS], workers)
-    X = np.column_stack([c if c is not None else np.zeros((2 * base.count, 1)) for c in found])
+    columns = responses(base, [EffectTrial(effect, (_SIZE,)) for effect in TERMS], workers)
+    X = np.column_stack([c if c is not None else np.zeros((2 * base.count, 1)) for c in columns])
     known = nuisance(base.linearised, N_HULL + len(base.model.names))
     return _cross_validated(known, X, [line.u.size for line in base.linearised])
 
@@ -141,8 +141,8 @@ def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> Flexible:
 
 def _penalty(Z: Float, shrinkage: float) -> Float:
     # a column of unit norm explains u with a coefficient of the order of one where there is only noise
-    found: Float = np.eye(Z.shape[1]) * shrinkage / 100.0
-    return found
+    penalty: Float = np.eye(Z.shape[1]) * shrinkage / 100.0
+    return penalty
 
 
 def _gains(Z: Float, u: Float, parts: Sequence[slice], shrinkage: float) -> Float:

@@ -45,7 +45,7 @@ class Candidate:
         Share of the effect's whitened trace that the fitted parameters imitate.
     missing : tuple of str
         Channels it needs that the runs lack.
-    told_by : tuple of str
+    measured_by : tuple of str
         Channels of the runs that show it already; then it is not scored.
     direction : ndarray, shape (N,)
         S' times the change: what the effect would explain of the whitened innovations.
@@ -63,7 +63,7 @@ class Candidate:
     missing: tuple[str, ...]
     direction: Float
     steps: tuple[float, ...]
-    told_by: tuple[str, ...] = ()
+    measured_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,42 +137,42 @@ def screen(base: PooledFit, effects: Mapping[str, Effect], workers: Executor) ->
     present = {effect.name for effect in base.model.effects}
     chosen = [effect for effect in effects.values() if effect.name not in present]
     known = nuisance(base.linearised, N_HULL + len(base.model.names))
-    found = _scored(base, known, chosen, workers)
-    adjusted = _adjusted([one.p_value for one in found])
-    found = [replace(one, p_adjusted=p) for one, p in zip(found, adjusted, strict=True)]
-    return sorted(found, key=lambda one: (-np.nan_to_num(one.score, nan=-1.0), one.effect.name))
+    scored = _scored(base, known, chosen, workers)
+    adjusted = _adjusted([candidate.p_value for candidate in scored])
+    scored = [replace(candidate, p_adjusted=p) for candidate, p in zip(scored, adjusted, strict=True)]
+    return sorted(scored, key=lambda candidate: (-np.nan_to_num(candidate.score, nan=-1.0), candidate.effect.name))
 
 
 def missing_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
     """Return the channels that an effect needs and some of the runs lack."""
-    return tuple(c for c in effect.needs if any(c not in one.run.channels for one in base.runs))
+    return tuple(c for c in effect.needs if any(c not in filtered.run.channels for filtered in base.runs))
 
 
-def telling_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
+def measuring_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
     """Return the channels that show an effect already in every run."""
-    return tuple(c for c in effect.measured_by if all(c in one.run.channels for one in base.runs))
+    return tuple(c for c in effect.measured_by if all(c in filtered.run.channels for filtered in base.runs))
 
 
 def score(base: PooledFit, effect: Effect, workers: Executor) -> Candidate:
     """Score one effect beside a fitted model; its p-value is adjusted for its own grid alone."""
-    (one,) = _scored(base, nuisance(base.linearised, N_HULL + len(base.model.names)), [effect], workers)
-    return replace(one, p_adjusted=one.p_value)
+    (candidate,) = _scored(base, nuisance(base.linearised, N_HULL + len(base.model.names)), [effect], workers)
+    return replace(candidate, p_adjusted=candidate.p_value)
 
 
 def _scored(base: PooledFit, known: Nuisance, effects: Sequence[Effect], workers: Executor) -> list[Candidate]:
     nothing = [_untested(base, effect) for effect in effects]
     # what a channel shows already is in the inputs: scored beside them it would stand in for something else
-    tried = [one.effect for one in nothing if not (one.missing or one.told_by)]
+    tried = [candidate.effect for candidate in nothing if not (candidate.missing or candidate.measured_by)]
     trials = [EffectTrial(effect, steps) for effect in tried for steps in _grid(effect)]
     columns = responses(base, trials, workers)
-    moved = {(trial.effect.name, trial.steps): one for trial, one in zip(trials, columns, strict=True)}
-    return list(workers.map(lambda one: _best(known, one, moved), nothing))
+    moved = {(trial.effect.name, trial.steps): column for trial, column in zip(trials, columns, strict=True)}
+    return list(workers.map(lambda candidate: _best(known, candidate, moved), nothing))
 
 
 def _untested(base: PooledFit, effect: Effect) -> Candidate:
     unknown = np.full(len(effect.parameters), np.nan)
-    missing, told_by = missing_channels(base, effect), telling_channels(base, effect)
-    return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, np.nan, missing, np.zeros(0), (), told_by)
+    missing, measured_by = missing_channels(base, effect), measuring_channels(base, effect)
+    return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, np.nan, missing, np.zeros(0), (), measured_by)
 
 
 def _best(
@@ -185,9 +185,9 @@ def _best(
         if columns is None:
             continue
         tries += 1
-        one = _tested(known, columns, nothing.effect, steps)
-        if best is nothing or one.p_value < best.p_value or np.isnan(best.score):
-            best = one
+        tested = _tested(known, columns, nothing.effect, steps)
+        if best is nothing or tested.p_value < best.p_value or np.isnan(best.score):
+            best = tested
     # the largest of several tries is larger than any one of them: Bonferroni
     return replace(best, p_value=min(1.0, max(tries, 1) * best.p_value))
 
@@ -209,21 +209,21 @@ def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float,
     scale = np.sqrt(np.diag(information))
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-9, hermitian=True) / np.outer(scale, scale)
     gradient = clean.T @ known.u
-    found = inverse @ gradient
-    score = float(gradient @ found)
+    estimate = inverse @ gradient
+    score = float(gradient @ estimate)
     made = np.array([not p.shapes for p in effect.parameters])
     change, std = np.array(steps, dtype=np.float64), unknown.copy()
-    change[made], std[made] = found, np.sqrt(np.diag(inverse))
+    change[made], std[made] = estimate, np.sqrt(np.diag(inverse))
     return Candidate(
         effect=effect,
         score=score,
-        p_value=float(chi2.sf(score, found.size)) if _plausible(effect, change) else 1.0,
+        p_value=float(chi2.sf(score, estimate.size)) if _plausible(effect, change) else 1.0,
         p_adjusted=1.0,
         change=change,
         std=std,
         absorption=absorption,
         missing=(),
-        direction=clean @ found,
+        direction=clean @ estimate,
         steps=steps,
     )
 

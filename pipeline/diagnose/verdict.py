@@ -124,8 +124,8 @@ def _untestable(candidate: Candidate) -> str:
     """Say why nothing can be told of an effect from these data; empty where something can."""
     if candidate.missing:
         return f"not in the logs: {_listed(list(candidate.missing))}"
-    if candidate.told_by:
-        return f"the logs have {_listed(list(candidate.told_by))}, which measures it already"
+    if candidate.measured_by:
+        return f"the logs have {_listed(list(candidate.measured_by))}, which measures it already"
     if np.isnan(candidate.score):
         share = _percent(candidate.absorption)
         return f"the model as it is absorbs {share} of it. {candidate.effect.separated_by}"
@@ -146,17 +146,17 @@ def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding
     return EffectFinding("absent", "significant by itself; not refitted, as others explain more")
 
 
-def refusal(one: Confirmation) -> str:
+def refusal(confirmation: Confirmation) -> str:
     """Say which test a refitted effect did not stand."""
-    gains = np.concatenate([one.fold_gains, one.held_out_gains])
-    if not np.isfinite(one.fit.log_likelihood):
+    gains = np.concatenate([confirmation.fold_gains, confirmation.held_out_gains])
+    if not np.isfinite(confirmation.fit.log_likelihood):
         return "the refitted model diverges"
-    if one.outdone:
+    if confirmation.outdone:
         return "another effect is so much better that its fit was not finished"
-    if one.at_bound:
+    if confirmation.at_bound:
         return "its size is at the limit of what is physical"
-    if one.bic_change > -6.0:
-        return f"the improvement does not justify its parameters (BIC {one.bic_change:+.1f})"
+    if confirmation.bic_change > -6.0:
+        return f"the improvement does not justify its parameters (BIC {confirmation.bic_change:+.1f})"
     if np.mean(gains > 0.0) <= 0.5 or np.sum(gains) <= 0.0:
         return (
             f"it predicts only {int(np.sum(gains > 0.0))} of {gains.size} manoeuvres better that it was not fitted to"
@@ -164,12 +164,12 @@ def refusal(one: Confirmation) -> str:
     return "another effect is clearly better"
 
 
-def sized(effect: Effect, one: Confirmation) -> str:
+def sized(effect: Effect, confirmation: Confirmation) -> str:
     """Return an effect's size with its standard errors, in the units people use."""
     size = len(effect.parameters)
-    values, std = one.fit.values[-size:], one.fit.std[-size:]
-    told = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, values, std, strict=True)]
-    return f"{effect.title}, {', '.join(told)}"
+    values, std = confirmation.fit.values[-size:], confirmation.fit.std[-size:]
+    shown = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, values, std, strict=True)]
+    return f"{effect.title}, {', '.join(shown)}"
 
 
 def _shown(name: str, value: float, std: float, unit: str) -> str:
@@ -236,7 +236,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
                 "the first explains too little to be the cause."
             )
         if diagnosis.after.formula:
-            terms = "; ".join(f"{one.target}: {one.expression}" for one in diagnosis.after.formula)
+            terms = "; ".join(f"{term.target}: {term.expression}" for term in diagnosis.after.formula)
             said.append(f"Exploratory, not a finding; a formula to try: {terms}.")
     return said
 
@@ -297,8 +297,8 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
             "formula": {
                 "exploratory": True,
                 "terms": [
-                    {"target": one.target, "expression": one.expression, "gain_left_out": one.gain}
-                    for one in diagnosis.after.formula
+                    {"target": term.target, "expression": term.expression, "gain_left_out": term.gain}
+                    for term in diagnosis.after.formula
                 ],
             },
         },
@@ -308,28 +308,28 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
-def _candidate(diagnosis: Diagnosis, one: Candidate, member: dict[str, str]) -> dict[str, Any]:
-    found = finding(diagnosis, one)
+def _candidate(diagnosis: Diagnosis, candidate: Candidate, member: dict[str, str]) -> dict[str, Any]:
+    result = finding(diagnosis, candidate)
     return {
-        "effect": one.effect.name,
-        "title": one.effect.title,
-        "set_id": None if something_left(diagnosis) else member.get(one.effect.name),
-        "score": one.score,
-        "p_adjusted": one.p_adjusted,
-        "expected_change": _values(one.effect, one.change, one.std),
-        "absorption": one.absorption,
-        "verdict": found.verdict,
-        "why": found.why,
+        "effect": candidate.effect.name,
+        "title": candidate.effect.title,
+        "set_id": None if something_left(diagnosis) else member.get(candidate.effect.name),
+        "score": candidate.score,
+        "p_adjusted": candidate.p_adjusted,
+        "expected_change": _values(candidate.effect, candidate.change, candidate.std),
+        "absorption": candidate.absorption,
+        "verdict": result.verdict,
+        "why": result.why,
     }
 
 
-def _since(diagnosis: Diagnosis, one: Confirmation) -> int | None:
+def _since(diagnosis: Diagnosis, confirmation: Confirmation) -> int | None:
     """Return when the effect is seen first, UTC ns; None where no manoeuvre shows it by itself.
 
     Seen in a manoeuvre is what predicts it better with parameters that it had no say in.
     """
     runs = (*diagnosis.fitted, *diagnosis.held)
-    gains = (*one.fold_gains, *one.held_out_gains)
+    gains = (*confirmation.fold_gains, *confirmation.held_out_gains)
     starts = [run.start_utc_ns for run, gain in zip(runs, gains, strict=True) if gain > SEEN_IN_RUN]
     return min(starts, default=None)
 
@@ -341,17 +341,17 @@ def _values(effect: Effect, values: Float, std: Float) -> dict[str, Any]:
     }
 
 
-def _refit(candidate: Candidate, one: Confirmation) -> dict[str, Any]:
+def _refit(candidate: Candidate, confirmation: Confirmation) -> dict[str, Any]:
     size = len(candidate.effect.parameters)
     return {
         "effect": candidate.effect.name,
-        "parameters": _values(candidate.effect, one.fit.values[-size:], one.fit.std[-size:]),
-        "likelihood_ratio": one.likelihood_ratio,
-        "bic_change": one.bic_change,
-        "gains_left_out": one.fold_gains,
-        "gains_held_out": one.held_out_gains,
-        "at_bound": one.at_bound,
-        "converged": one.fit.converged,
+        "parameters": _values(candidate.effect, confirmation.fit.values[-size:], confirmation.fit.std[-size:]),
+        "likelihood_ratio": confirmation.likelihood_ratio,
+        "bic_change": confirmation.bic_change,
+        "gains_left_out": confirmation.fold_gains,
+        "gains_held_out": confirmation.held_out_gains,
+        "at_bound": confirmation.at_bound,
+        "converged": confirmation.fit.converged,
     }
 
 

@@ -83,7 +83,7 @@ class PlainFit:
     @property
     def gross_errors(self) -> int:
         """How many measurements were taken out."""
-        return sum(sum(one.gross_errors.values()) for one in self.alone)
+        return sum(sum(single.gross_errors.values()) for single in self.alone)
 
     @property
     def degrees_of_freedom(self) -> int:
@@ -100,12 +100,12 @@ class PlainFit:
         """Factor by which what the runs disagree about widens standard errors (Birge 1932, Physical Review 40)."""
         return 1.0 if self.p_value >= LEVEL else float(np.sqrt(self.statistic / self.degrees_of_freedom))
 
-    def off_in_std(self, one: Alone) -> Float:
+    def off_in_std(self, single: Alone) -> Float:
         """Return how far a run's own hull lies from the common one, in its own standard errors, shape (6,)."""
-        information = one.search.information
+        information = single.search.information
         index = np.flatnonzero(np.diag(information) > 0.0)
         std = np.sqrt(np.diag(from_information(information, index).covariance)[:_HULL])
-        off: Float = (one.hull - self.fit.hull) / std
+        off: Float = (single.hull - self.fit.hull) / std
         return off
 
 
@@ -132,7 +132,7 @@ def fit_plain(
         ``no_ship_explains_it``: none of the runs can be identified by itself, or they have no ship in common.
     """
     made = list(workers.map(lambda run: _alone(run, spec, settings), runs))
-    alone = tuple(one for one in made if isinstance(one, Alone))
+    alone = tuple(single for single in made if isinstance(single, Alone))
     left_out = {run.name: why for run, why in zip(runs, made, strict=True) if isinstance(why, str)}
     if not alone:
         raise DataRejected(
@@ -142,12 +142,12 @@ def fit_plain(
             "Look at the channels (heading, yaw rate, speed, rudder) of these segments.",
             {"left_out": left_out},
         )
-    layout = CommonLikelihood([RunFilter(one.run, EffectModel(), spec) for one in alone], workers)
-    levels = _first_levels(np.array([one.search.theta[_HULL:] + to_intensities(spec) for one in alone])).ravel()
+    layout = CommonLikelihood([RunFilter(single.run, EffectModel(), spec) for single in alone], workers)
+    levels = _first_levels(np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])).ravel()
     begin = np.concatenate([_first_hull(layout, alone, levels), levels])
-    found = climb_by(ArrowSteps(), layout, begin, MAX_ITERATIONS, DECREMENT)
-    separate = sum(one.search.log_likelihood for one in alone)
-    return PlainFit(ended(layout, found), alone, left_out, max(2.0 * (separate - found.log_likelihood), 0.0))
+    climbed = climb_by(ArrowSteps(), layout, begin, MAX_ITERATIONS, DECREMENT)
+    separate = sum(single.search.log_likelihood for single in alone)
+    return PlainFit(ended(layout, climbed), alone, left_out, max(2.0 * (separate - climbed.log_likelihood), 0.0))
 
 
 def _alone(run: GridRun, spec: ModelSpec, settings: MaximumLikelihoodSettings) -> Alone | str:
@@ -169,8 +169,8 @@ def _first_levels(levels: Float) -> Float:
     usual = np.median(levels, axis=0)
     strange = np.abs(levels - usual) > _UNLIKE
     strange[:, :_DISTURBANCES] = False
-    found: Float = np.where(strange, usual, levels)
-    return found
+    begin: Float = np.where(strange, usual, levels)
+    return begin
 
 
 def _first_hull(layout: CommonLikelihood, alone: Sequence[Alone], levels: Float) -> Float:
@@ -180,7 +180,7 @@ def _first_hull(layout: CommonLikelihood, alone: Sequence[Alone], levels: Float)
         return alone[0].hull
     if np.all(np.isfinite(mean)) and np.isfinite(layout.full(np.concatenate([mean, levels]))[0]):
         return mean
-    hulls = [one.hull for one in alone[:_ENTRIES]]
+    hulls = [single.hull for single in alone[:_ENTRIES]]
     best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
     return best
 
@@ -188,11 +188,11 @@ def _first_hull(layout: CommonLikelihood, alone: Sequence[Alone], levels: Float)
 def _weighted_mean(alone: Sequence[Alone]) -> Float:
     """Mean of the separate hulls, each with the information it has beside its own levels."""
     weights = []
-    for one in alone:
-        covariance = np.linalg.pinv(one.search.information, hermitian=True)[:_HULL, :_HULL]
+    for single in alone:
+        covariance = np.linalg.pinv(single.search.information, hermitian=True)[:_HULL, :_HULL]
         weights.append(np.linalg.pinv(covariance, hermitian=True))
     total: Float = np.sum(weights, axis=0)
-    moment: Float = np.sum([w @ one.hull for w, one in zip(weights, alone, strict=True)], axis=0)
+    moment: Float = np.sum([w @ single.hull for w, single in zip(weights, alone, strict=True)], axis=0)
     scale = np.sqrt(np.diag(total))
     mean: Float = np.linalg.lstsq(total / np.outer(scale, scale), moment / scale, rcond=1e-12)[0] / scale
     return mean

@@ -28,7 +28,7 @@ class OwnClocks:
 
     def __init__(self, source: Source | None) -> None:
         channels = source.channels if source else {}
-        self._late = {key: one for key, one in channels.items() if one.delay_s or one.clock_rate != 1.0}
+        self._late = {key: channel for key, channel in channels.items() if channel.delay_s or channel.clock_rate != 1.0}
         self._first: dict[str, int] = {}
 
     def notes(self) -> tuple[str, ...]:

@@ -146,18 +146,18 @@ def _as_utf8(data: bytes, encoding: str) -> bytes:
 
 
 def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
-    found = list(layout.columns)
-    missing = [column for column in wanted if column not in found]
+    columns = list(layout.columns)
+    missing = [column for column in wanted if column not in columns]
     if missing:
         raise DataRejected(
             "columns_missing",
             f"{name} lacks columns that the profile maps: {', '.join(map(repr, missing))}; "
-            f"it has {', '.join(map(repr, found[:_SHOWN])) or 'none'}"
-            f"{f' and {len(found) - _SHOWN} more' if len(found) > _SHOWN else ''}.",
+            f"it has {', '.join(map(repr, columns[:_SHOWN])) or 'none'}"
+            f"{f' and {len(columns) - _SHOWN} more' if len(columns) > _SHOWN else ''}.",
             "Mend the names in the profile's source, or its separator, header_lines or columns.",
-            {"name": name, "missing": missing, "found": found[:_SHOWN]},
+            {"name": name, "missing": missing, "found": columns[:_SHOWN]},
         )
-    twice = sorted({column for column in wanted if found.count(column) > 1})
+    twice = sorted({column for column in wanted if columns.count(column) > 1})
     if twice:
         raise DataRejected(
             "columns_ambiguous",

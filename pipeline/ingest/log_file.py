@@ -64,7 +64,7 @@ class LogFile:
     @cached_property
     def sha256(self) -> str:
         """SHA-256 of the bytes as they were when it was first asked for, 64 hex digits."""
-        found = hashlib.sha256()
+        digest = hashlib.sha256()
         for piece in self.pieces():
-            found.update(piece)
-        return found.hexdigest()
+            digest.update(piece)
+        return digest.hexdigest()

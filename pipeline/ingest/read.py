@@ -23,7 +23,7 @@ MOST_TEXT_BYTES = 2 << 30
 #: Notes that a refusal repeats, at most.
 _NOTES = 3
 
-_TOLD = "See docs/profile.md for how to describe a log."
+_SEE_PROFILE = "See docs/profile.md for how to describe a log."
 
 
 def read_log(name: str, log: bytes | LogFile, profile: VesselProfile) -> Readings:
@@ -78,22 +78,22 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
         raise DataRejected(
             "unknown_format",
             f"{name} is neither MCAP, nor NMEA 0183, nor delimited text{' once unpacked' if packed else ''}.",
-            "Export the log as one of these; " + _TOLD,
+            "Export the log as one of these; " + _SEE_PROFILE,
             {"name": name},
         )
-    screen, clocks, found = Screen(log_format), OwnClocks(source), _Found()
+    screen, clocks, summary = Screen(log_format), OwnClocks(source), _Summary()
     for decoded in _decode(log_format, name, file, profile, source):
         checked = screen.part(decoded)
-        found.add(checked)
+        summary.add(checked)
         if not decoded.ends:
             yield clocks.set_right(checked)
             continue
-        if found.tally.records_kept == 0:
-            raise _nothing(name, checked, found)
+        if summary.tally.records_kept == 0:
+            raise _nothing(name, checked, summary)
         yield replace(clocks.set_right(checked), notes=(*notes, *checked.notes, *clocks.notes()))
 
 
-class _Found:
+class _Summary:
     """What all parts of a log together say, for the message where it is nothing."""
 
     def __init__(self) -> None:
@@ -131,14 +131,15 @@ def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source |
 
     data = _whole(name, log)
     if source is None or source.time is None or not source.channels:
-        found = delimited.columns_found(data, source)
+        columns = delimited.columns_found(data, source)
         lacks = "no source" if source is None else "a source without time or channels"
         raise UsageError(
             "no_source_for_log",
             f"{name} is delimited text, for which the profile has {lacks}; "
-            f"the columns found in it are {', '.join(repr(c) for c in found) or 'none'}.",
-            f"`kempf profile draft {name}` writes a profile to complete: the time column and the channels. " + _TOLD,
-            {"name": name, "columns": found, "patterns": [s.match for s in profile.sources]},
+            f"the columns found in it are {', '.join(repr(c) for c in columns) or 'none'}.",
+            f"`kempf profile draft {name}` writes a profile to complete: the time column and the channels. "
+            + _SEE_PROFILE,
+            {"name": name, "columns": columns, "patterns": [s.match for s in profile.sources]},
         )
     return delimited.decode(name, data, source)
 
@@ -154,12 +155,12 @@ def _whole(name: str, log: LogFile) -> bytes:
     return log.whole()
 
 
-def _nothing(name: str, last: Readings, found: _Found) -> DataRejected:
-    counts = found.tally.by_reason
+def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
+    counts = summary.tally.by_reason
     listed = ", ".join(f"{count} {reason}" for reason, count in sorted(counts.items(), key=lambda c: (-c[1], c[0])))
     years = ""
-    if found.unset:
-        since, until = map(_year, found.unset)
+    if summary.unset:
+        since, until = map(_year, summary.unset)
         years = f" Its times lie in {since}." if since == until else f" Its times lie between {since} and {until}."
     step = {
         "clock_unset": "The logger's clock was not set: correct the times in a copy of the log, or ingest another log.",
@@ -170,12 +171,12 @@ def _nothing(name: str, last: Readings, found: _Found) -> DataRejected:
     most = max(sorted(counts), key=lambda reason: counts[reason]) if counts else ""
     return DataRejected(
         "no_valid_reading",
-        f"{name} holds no valid reading: {found.tally.records_read} records, "
+        f"{name} holds no valid reading: {summary.tally.records_read} records, "
         f"of them {listed or 'none usable'}.{years}{''.join(f' {note}' for note in last.notes[:_NOTES])}",
         step.get(most, "Look at the reasons; most often the profile does not fit the log."),
         {
             "name": name,
-            "records_read": found.tally.records_read,
+            "records_read": summary.tally.records_read,
             "by_reason": counts,
             "notes": list(last.notes),
         },

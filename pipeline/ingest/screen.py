@@ -117,11 +117,11 @@ def _by_source(decoded: Decoded, reason: Code) -> list[Index]:
 
 def _sharing_an_instant(decoded: Decoded, reason: Code) -> Index:
     """Return the good records that have their source and time in common with another, ascending."""
-    found = []
+    records = []
     for record in _by_source(decoded, reason):
         same = np.diff(decoded.time_utc_ns[record]) == 0
-        found.append(record[np.append(same, [False]) | np.append([False], same)])
-    return np.sort(np.concatenate(found)) if found else np.empty(0, dtype=np.int64)
+        records.append(record[np.append(same, [False]) | np.append([False], same)])
+    return np.sort(np.concatenate(records)) if records else np.empty(0, dtype=np.int64)
 
 
 def _first_of(decoded: Decoded, record: Index, content: pl.Series | None = None) -> NDArray[np.bool_]:

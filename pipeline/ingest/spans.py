@@ -135,8 +135,8 @@ def first_within(places: Index, start: Index, stop: Index) -> Index:
     if places.size == 0:
         return np.full(start.shape, -1, dtype=np.int64)
     at = np.searchsorted(places, start)
-    found = places[np.minimum(at, places.size - 1)]
-    return np.where((at < places.size) & (found < stop), found, -1)
+    candidate = places[np.minimum(at, places.size - 1)]
+    return np.where((at < places.size) & (candidate < stop), candidate, -1)
 
 
 def spans_of(column: pl.Series) -> Spans:

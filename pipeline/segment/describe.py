@@ -45,7 +45,7 @@ class _Leg:
 def describe(
     signals: Signals,
     chain: Chain,
-    found: Switching,
+    switching: Switching,
     window_s: float,
     *,
     speed: Series | None,
@@ -59,7 +59,7 @@ def describe(
         Heading and rudder.
     chain : Chain
         The chain of legs.
-    found : Switching
+    switching : Switching
         Which legs of it are the zigzag.
     window_s : float
         Half width of the local cubic, s.
@@ -73,11 +73,11 @@ def describe(
     Zigzag
         The record.
     """
-    legs = _legs(signals, chain, found, window_s)
-    psi0, delta0 = _nominal(chain, found)
-    executes = _executes(signals, chain, found)
-    overshoots = _overshoots(signals, legs, found, psi0, window_s)
-    start_s = _approach_start(signals, chain, found, legs, settings)
+    legs = _legs(signals, chain, switching, window_s)
+    psi0, delta0 = _nominal(chain, switching)
+    executes = _executes(signals, chain, switching)
+    overshoots = _overshoots(signals, legs, switching, psi0, window_s)
+    start_s = _approach_start(signals, chain, switching, legs, settings)
     phases = _phases(signals, legs, start_s, window_s)
     start_ns, end_ns = signals.utc_ns(start_s), signals.utc_ns(legs[-1].end_s)
     first_ns = executes[0].time_utc_ns
@@ -85,15 +85,15 @@ def describe(
         speed, start_ns, first_ns, executes[1].time_utc_ns if len(executes) > 1 else first_ns, end_ns
     )
     side: Side = "starboard" if legs[0].side > 0 else "port"
-    quality = _quality(signals, chain, found, start_s=start_s, end_s=legs[-1].end_s, speed=constancy)
+    quality = _quality(signals, chain, switching, start_s=start_s, end_s=legs[-1].end_s, speed=constancy)
     return Zigzag(
         kind="zigzag" if len(overshoots) >= 2 else "zigzag_broken_off",
         psi0_deg=psi0,
         delta0_deg=delta0,
-        psi0_measured_deg=float(np.rad2deg(found.heading_change)),
-        delta0_measured_deg=measured_angles(chain, found)[1],
+        psi0_measured_deg=float(np.rad2deg(switching.heading_change)),
+        delta0_measured_deg=measured_angles(chain, switching)[1],
         first_side=side,
-        base_heading_deg=float(np.rad2deg(found.base_heading)) % 360.0,
+        base_heading_deg=float(np.rad2deg(switching.base_heading)) % 360.0,
         start_utc_ns=start_ns,
         end_utc_ns=end_ns,
         executes=executes,
@@ -104,44 +104,44 @@ def describe(
     )
 
 
-def _legs(signals: Signals, chain: Chain, found: Switching, window_s: float) -> list[_Leg]:
+def _legs(signals: Signals, chain: Chain, switching: Switching, window_s: float) -> list[_Leg]:
     """Put the legs on the clock, the last one cut where the next execute would have been due."""
     legs: list[_Leg] = []
-    for k in range(found.first, found.last + 1):
+    for k in range(switching.first, switching.last + 1):
         leg, ramp = chain.legs[k], chain.ramps[k]
-        opening = k == found.first
-        execute = ramp is not None and not (opening and found.start == "unknown")
+        opening = k == switching.first
+        execute = ramp is not None and not (opening and switching.start == "unknown")
         start = ramp.start_s if execute and ramp is not None else leg.start_s
         held = ramp.end_s if execute and ramp is not None else leg.start_s
-        from_approach = opening and found.start != "switching"
-        after = chain.ramps[k + 1] if k < found.last else None
+        from_approach = opening and switching.start != "switching"
+        after = chain.ramps[k + 1] if k < switching.last else None
         end = leg.end_s if after is None else after.start_s
         turned = None if from_approach else turning_point(signals, start, end, -leg.side, window_s)
-        if k == found.last:
-            end = _due(signals, found, leg.side, turned[0] if turned else start, end)
+        if k == switching.last:
+            end = _due(signals, switching, leg.side, turned[0] if turned else start, end)
         legs.append(_Leg(start, held, max(end, held), leg.side, execute, from_approach, turned))
     return legs
 
 
-def _due(signals: Signals, found: Switching, side: int, from_s: float, to_s: float) -> float:
+def _due(signals: Signals, switching: Switching, side: int, from_s: float, to_s: float) -> float:
     """Return when the heading reaches the next switching heading, at most the end of the leg."""
     first, last = np.searchsorted(signals.heading_s, [from_s, to_s])
-    past = side * (signals.heading[first:last] - found.centre) >= found.heading_change
+    past = side * (signals.heading[first:last] - switching.centre) >= switching.heading_change
     return float(signals.heading_s[first + int(np.argmax(past))]) if bool(np.any(past)) else to_s
 
 
-def _nominal(chain: Chain, found: Switching) -> tuple[float, float]:
+def _nominal(chain: Chain, switching: Switching) -> tuple[float, float]:
     """Return psi0 and delta0 as they were most likely ordered, deg."""
-    psi0, delta0, late = measured_angles(chain, found)
+    psi0, delta0, late = measured_angles(chain, switching)
     ordered = nominal_angle(delta0, 0.0, RUDDER_TOLERANCE)
     return nominal_angle(psi0, late, HEADING_TOLERANCE, expected_deg=ordered), ordered
 
 
-def _executes(signals: Signals, chain: Chain, found: Switching) -> tuple[Execute, ...]:
+def _executes(signals: Signals, chain: Chain, switching: Switching) -> tuple[Execute, ...]:
     executes = []
-    for k in range(found.first, found.last + 1):
+    for k in range(switching.first, switching.last + 1):
         ramp = chain.ramps[k]
-        if ramp is None or (k == found.first and found.start == "unknown"):
+        if ramp is None or (k == switching.first and switching.start == "unknown"):
             continue
         executes.append(
             Execute(
@@ -150,7 +150,7 @@ def _executes(signals: Signals, chain: Chain, found: Switching) -> tuple[Execute
                 rudder_held_utc_ns=signals.utc_ns(ramp.end_s),
                 rudder_before_deg=float(np.rad2deg(ramp.held_before)),
                 rudder_after_deg=float(np.rad2deg(ramp.held_after)),
-                heading_deg=float(np.rad2deg(chain.heading[k] - found.base_heading)),
+                heading_deg=float(np.rad2deg(chain.heading[k] - switching.base_heading)),
                 yaw_rate_deg_s=float(np.rad2deg(chain.yaw_rate[k])),
             )
         )
@@ -158,7 +158,7 @@ def _executes(signals: Signals, chain: Chain, found: Switching) -> tuple[Execute
 
 
 def _overshoots(
-    signals: Signals, legs: list[_Leg], found: Switching, psi0_deg: float, window_s: float
+    signals: Signals, legs: list[_Leg], switching: Switching, psi0_deg: float, window_s: float
 ) -> tuple[Overshoot, ...]:
     overshoots: list[Overshoot] = []
     for leg in legs:
@@ -173,7 +173,7 @@ def _overshoots(
                 side="starboard" if swing > 0 else "port",
                 peak_utc_ns=signals.utc_ns(instant),
                 duration_s=instant - leg.start_s,
-                beyond_nominal_deg=float(np.rad2deg(swing * (heading - found.base_heading))) - psi0_deg,
+                beyond_nominal_deg=float(np.rad2deg(swing * (heading - switching.base_heading))) - psi0_deg,
                 beyond_execute_deg=float(np.rad2deg(swing * (heading - at_execute))),
             )
         )
@@ -181,19 +181,19 @@ def _overshoots(
 
 
 def _approach_start(
-    signals: Signals, chain: Chain, found: Switching, legs: list[_Leg], settings: SegmentSettings
+    signals: Signals, chain: Chain, switching: Switching, legs: list[_Leg], settings: SegmentSettings
 ) -> float:
     """Go back from the first execute for at most one leg, as long as course and rudder stay where they were."""
-    ramp = chain.ramps[found.first]
-    if found.start not in ("steady", "turning") or ramp is None:
+    ramp = chain.ramps[switching.first]
+    if switching.start not in ("steady", "turning") or ramp is None:
         return legs[0].start_s
     spacing = float(np.median(np.diff([leg.start_s for leg in legs])))
     earliest = max(ramp.start_s - spacing, float(signals.heading_s[0]), float(signals.rudder_s[0]))
-    course = max(settings.approach_share * found.heading_change, np.deg2rad(settings.switching_slack_deg))
+    course = max(settings.approach_share * switching.heading_change, np.deg2rad(settings.switching_slack_deg))
     rudder = 0.25 * abs(ramp.held_after - ramp.held_before)
     start = earliest
     for time_s, value, level, band in (
-        (signals.heading_s, signals.heading, found.base_heading, course),
+        (signals.heading_s, signals.heading, switching.base_heading, course),
         (signals.rudder_s, signals.rudder, ramp.held_before, rudder),
     ):
         first, last = np.searchsorted(time_s, [earliest, ramp.start_s])
@@ -228,13 +228,13 @@ def _phases(signals: Signals, legs: list[_Leg], start_s: float, window_s: float)
 def _quality(
     signals: Signals,
     chain: Chain,
-    found: Switching,
+    switching: Switching,
     *,
     start_s: float,
     end_s: float,
     speed: SpeedConstancy | None,
 ) -> Quality:
-    angles_deg = np.rad2deg([leg.rudder for leg in chain.legs[found.first : found.last + 1]])
+    angles_deg = np.rad2deg([leg.rudder for leg in chain.legs[switching.first : switching.last + 1]])
     port, starboard = float(np.median(angles_deg[angles_deg < 0])), float(np.median(angles_deg[angles_deg > 0]))
     gap_s = signals.gap_s(start_s, end_s)
     reasons = {
@@ -242,18 +242,18 @@ def _quality(
         "switching": "The approach is not there: the first execute recorded is a switching one.",
         "unknown": "The approach is not there: the first leg begins before the log or after another manoeuvre.",
     }
-    told = [reasons[found.start]] if found.start in reasons else []
+    shown = [reasons[switching.start]] if switching.start in reasons else []
     if speed is not None and not abs(speed.trend_percent) <= _SPEED_TREND_PERCENT:
-        told.append(f"The speed changed by {speed.trend_percent:.0f} % after the second execute.")
+        shown.append(f"The speed changed by {speed.trend_percent:.0f} % after the second execute.")
     if gap_s > 0:
-        told.append(f"Heading or rudder were not recorded for {gap_s:.1f} s.")
+        shown.append(f"Heading or rudder were not recorded for {gap_s:.1f} s.")
     return Quality(
-        n_legs=found.last - found.first + 1,
+        n_legs=switching.last - switching.first + 1,
         rudder_scatter_deg=float(np.max(np.abs(angles_deg - np.where(angles_deg > 0, starboard, port)))),
         rudder_offset_deg=(starboard + port) / 2,
-        switching_scatter_deg=float(np.rad2deg(found.scatter)),
-        switching_centre_deg=float(np.rad2deg(found.centre - found.base_heading)),
-        start=found.start,
+        switching_scatter_deg=float(np.rad2deg(switching.scatter)),
+        switching_centre_deg=float(np.rad2deg(switching.centre - switching.base_heading)),
+        start=switching.start,
         gap_s=gap_s,
-        reasons=tuple(told),
+        reasons=tuple(shown),
     )

@@ -50,24 +50,25 @@ def find_manoeuvres(
     for legs in find_chains(signals.rudder_s, signals.rudder, settings):
         chain, window_s = measure(signals, legs, settings)
         candidates += [
-            (chain, found, window_s)
-            for found in zigzags_in(chain, settings)
-            if is_trial(signals, chain, found, window_s)
+            (chain, switching, window_s)
+            for switching in zigzags_in(chain, settings)
+            if is_trial(signals, chain, switching, window_s)
         ]
     # the same manoeuvre is seen at several rudder bands: the longest view of it, then the most regular one
     candidates.sort(key=lambda c: (c[1].first - c[1].last, c[1].scatter, _span(c[0], c[1])))
     taken: list[tuple[Chain, Switching, float]] = []
     for candidate in candidates:
         begin, end = _span(candidate[0], candidate[1])
-        spans = (_span(chain, found) for chain, found, _ in taken)
+        spans = (_span(chain, switching) for chain, switching, _ in taken)
         if all(end <= other_begin or begin >= other_end for other_begin, other_end in spans):
             taken.append(candidate)
     taken.sort(key=lambda c: _span(c[0], c[1]))
     return [
-        describe(signals, chain, found, window_s, speed=speed, settings=settings) for chain, found, window_s in taken
+        describe(signals, chain, switching, window_s, speed=speed, settings=settings)
+        for chain, switching, window_s in taken
     ]
 
 
-def _span(chain: Chain, found: Switching) -> tuple[float, float]:
+def _span(chain: Chain, switching: Switching) -> tuple[float, float]:
     """Return from when to when the rudder is held in the zigzag, s."""
-    return chain.legs[found.first].start_s, chain.legs[found.last].end_s
+    return chain.legs[switching.first].start_s, chain.legs[switching.last].end_s

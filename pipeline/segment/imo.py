@@ -127,11 +127,11 @@ def judge(zigzag: Zigzag, length_m: float | None, trial_speed_m_s: float | None)
         return (Criterion("overshoot", _overshoot(zigzag, 0), None, None, why),)
     obstacle = _obstacle(zigzag, length_m, measured, trial_speed_m_s)
     return tuple(
-        _one(zigzag, k, name, limit, obstacle) for k, (name, limit) in enumerate(zip(names, limits, strict=True))
+        _criterion(zigzag, k, name, limit, obstacle) for k, (name, limit) in enumerate(zip(names, limits, strict=True))
     )
 
 
-def _one(zigzag: Zigzag, number: int, name: str, limit: float, obstacle: str) -> Criterion:
+def _criterion(zigzag: Zigzag, number: int, name: str, limit: float, obstacle: str) -> Criterion:
     value = _overshoot(zigzag, number)
     why = obstacle or ("the manoeuvre was broken off before this overshoot" if value is None else "")
     return Criterion(name, value, limit, None if why or value is None else value <= limit, why)

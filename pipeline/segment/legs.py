@@ -213,7 +213,7 @@ def find_chains(time_s: Float, rudder: Float, settings: SegmentSettings) -> list
     low, high = np.deg2rad([settings.smallest_rudder_deg, settings.largest_rudder_deg])
     low = max(float(low), 4.0 * noise)  # a rudder that drowns in its noise cannot be seen to be held
     steps = int(np.ceil(np.log(high / low) / np.log(_LADDER))) if high > low else -1
-    found: dict[tuple[tuple[int, int], ...], list[Leg]] = {}
+    chains: dict[tuple[tuple[int, int], ...], list[Leg]] = {}
     for amplitude in low * _LADDER ** np.arange(steps + 1):
         rough = held_legs(time_s, rudder, float(amplitude), 0.0, settings.search_band * float(amplitude))
         levels = {_levels(chain) for chain in chains_of(rough, settings, noise)}
@@ -221,8 +221,8 @@ def find_chains(time_s: Float, rudder: Float, settings: SegmentSettings) -> list
             half, offset = (starboard - port) / 2, (starboard + port) / 2
             band = min(max(settings.held_band * half, slack), settings.search_band * half)
             for chain in chains_of(held_legs(time_s, rudder, half, offset, band), settings, noise):
-                found.setdefault(tuple((leg.first, leg.last) for leg in chain), chain)
-    return list(found.values())
+                chains.setdefault(tuple((leg.first, leg.last) for leg in chain), chain)
+    return list(chains.values())
 
 
 def _levels(chain: list[Leg]) -> tuple[float, float]:

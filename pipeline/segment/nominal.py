@@ -17,14 +17,14 @@ HEADING_TOLERANCE = 0.07
 _DELAY_SHARE = 0.025
 
 
-def measured_angles(chain: Chain, found: Switching) -> tuple[float, float, float]:
+def measured_angles(chain: Chain, switching: Switching) -> tuple[float, float, float]:
     """Return what was measured of both ordered angles.
 
     Parameters
     ----------
     chain : Chain
         The chain of legs.
-    found : Switching
+    switching : Switching
         The zigzag in it.
 
     Returns
@@ -32,12 +32,12 @@ def measured_angles(chain: Chain, found: Switching) -> tuple[float, float, float
     tuple of float
         psi0, delta0, and how far psi0 may exceed the order because the rudder starts late, deg.
     """
-    legs = chain.legs[found.first : found.last + 1]
+    legs = chain.legs[switching.first : switching.last + 1]
     starboard = float(np.median([leg.rudder for leg in legs if leg.side > 0]))
     port = float(np.median([leg.rudder for leg in legs if leg.side < 0]))
-    rate = float(np.mean(np.abs(chain.yaw_rate[found.first + 1 : found.last + 1])))
+    rate = float(np.mean(np.abs(chain.yaw_rate[switching.first + 1 : switching.last + 1])))
     spacing = float(np.median(np.diff([leg.start_s for leg in legs])))
-    psi0, delta0, late = np.rad2deg([found.heading_change, (starboard - port) / 2, rate * _DELAY_SHARE * spacing])
+    psi0, delta0, late = np.rad2deg([switching.heading_change, (starboard - port) / 2, rate * _DELAY_SHARE * spacing])
     return float(psi0), float(delta0), float(late)
 
 

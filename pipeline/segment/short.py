@@ -25,7 +25,7 @@ _PASSING_SHARE = 0.5
 _PAST_SHARE = 0.5
 
 
-def is_trial(signals: Signals, chain: Chain, found: Switching, window_s: float) -> bool:
+def is_trial(signals: Signals, chain: Chain, switching: Switching, window_s: float) -> bool:
     """Whether a zigzag of few legs was run as one.
 
     Parameters
@@ -34,7 +34,7 @@ def is_trial(signals: Signals, chain: Chain, found: Switching, window_s: float) 
         Heading and rudder.
     chain : Chain
         The chain of legs.
-    found : Switching
+    switching : Switching
         Part of it.
     window_s : float
         Half width of the local cubic, s.
@@ -46,24 +46,24 @@ def is_trial(signals: Signals, chain: Chain, found: Switching, window_s: float) 
         where moreover no other leg follows, the approach is steady, both rudder angles are alike, and the ship swung
         back past where the rudder was reversed, but no farther than in a zigzag.
     """
-    if found.last - found.first > 2:
+    if switching.last - switching.first > 2:
         return True
-    psi0, delta0, late = measured_angles(chain, found)
+    psi0, delta0, late = measured_angles(chain, switching)
     if not (is_customary(delta0, 0.0, RUDDER_TOLERANCE) and is_customary(psi0, late, HEADING_TOLERANCE)):
         return False
-    return found.last - found.first > 1 or _swung_back(signals, chain, found, window_s)
+    return switching.last - switching.first > 1 or _swung_back(signals, chain, switching, window_s)
 
 
-def _swung_back(signals: Signals, chain: Chain, found: Switching, window_s: float) -> bool:
+def _swung_back(signals: Signals, chain: Chain, switching: Switching, window_s: float) -> bool:
     """Whether the second of two legs was held until the ship had swung back."""
-    first, second = chain.legs[found.first], chain.legs[found.last]
-    follows = chain.legs[found.last + 1 :]
-    if found.start != "steady" or any(leg.duration_s > _PASSING_SHARE * second.duration_s for leg in follows):
+    first, second = chain.legs[switching.first], chain.legs[switching.last]
+    follows = chain.legs[switching.last + 1 :]
+    if switching.start != "steady" or any(leg.duration_s > _PASSING_SHARE * second.duration_s for leg in follows):
         return False
     offset = abs(abs(first.rudder) - abs(second.rudder))
     if offset > max(_ALIKE_SHARE * (abs(first.rudder) + abs(second.rudder)) / 2, _ALIKE_RAD):
         return False
-    ramp = chain.ramps[found.last]
+    ramp = chain.ramps[switching.last]
     if ramp is None:
         return False
     turned = peak(
@@ -72,6 +72,6 @@ def _swung_back(signals: Signals, chain: Chain, found: Switching, window_s: floa
     if turned is None:
         return False
     at_end = value_and_rate(signals.heading_s, signals.heading, min(second.end_s, signals.heading_s[-1]), window_s)[0]
-    swung = first.side * (at_end - found.base_heading)
-    back = first.side * (float(chain.heading[found.last]) - found.base_heading)
-    return bool(-(1.0 + _PAST_SHARE) * found.heading_change <= swung <= back)
+    swung = first.side * (at_end - switching.base_heading)
+    back = first.side * (float(chain.heading[switching.last]) - switching.base_heading)
+    return bool(-(1.0 + _PAST_SHARE) * switching.heading_change <= swung <= back)

@@ -97,25 +97,25 @@ def zigzags_in(chain: Chain, settings: SegmentSettings) -> list[Switching]:
     steady = _scan(chain, 0, len(chain.legs) - 1, settings, steady=True)
     borders = [-1, *(k for s in steady for k in (s.first, s.last)), len(chain.legs)]
     others = [
-        found
+        zigzag
         for begin, end in zip(borders[::2], borders[1::2], strict=True)
-        for found in _scan(chain, begin + 1, end - 1, settings, steady=False)
+        for zigzag in _scan(chain, begin + 1, end - 1, settings, steady=False)
     ]
     return sorted(steady + others, key=lambda s: s.first)
 
 
 def _scan(chain: Chain, first: int, last: int, settings: SegmentSettings, *, steady: bool) -> list[Switching]:
     """Go through a range of legs and take the longest zigzag that starts at each."""
-    found: list[Switching] = []
+    zigzags: list[Switching] = []
     leg = first
     while leg < last:
         best = _longest(chain, leg, last, settings, steady=steady)
         if best is None:
             leg += 1
             continue
-        found.append(best)
+        zigzags.append(best)
         leg = best.last + 1
-    return found
+    return zigzags
 
 
 def _longest(chain: Chain, leg: int, last: int, settings: SegmentSettings, *, steady: bool) -> Switching | None:

@@ -235,17 +235,17 @@ class _DecodeJob:
         done = route.read(Spans(batch.content, batch.first[record], batch.end[record]))
         part.reason[record[~done.good]] = CODE[Reason.MALFORMED]
         if done.time_ns is not None:
-            told = done.time_ns >= 0
-            self.timed |= bool(told.any())
-            part.time_ns[record[told]] = done.time_ns[told]
-            if not told[done.good].all():
+            timed = done.time_ns >= 0
+            self.timed |= bool(timed.any())
+            part.time_ns[record[timed]] = done.time_ns[timed]
+            if not timed[done.good].all():
                 self.untimed.add(topic)
         for key, (value, present) in done.values.items():
             mapped = route.mapped[key]
             if present.any():
                 self.seen.setdefault(topic, set()).add(key)
-                found = record[present], value[present] * mapped.factor + mapped.offset_si
-                part.values.setdefault(mapped.channel, []).append(found)
+                samples = record[present], value[present] * mapped.factor + mapped.offset_si
+                part.values.setdefault(mapped.channel, []).append(samples)
 
     def _route(self, number: int, channel: McapChannel) -> Route | None:
         """Return the reader of a channel, None where nothing is asked of it or it cannot be read."""
@@ -268,7 +268,7 @@ class _DecodeJob:
         kind = plain_name(schema.name) if schema else ""
         if not self.keys and kind in TAKEN:
             mapped = TAKEN[kind]
-            self.taken.append(f"{channel.topic} ({', '.join(one.channel for one in mapped.values())})")
+            self.taken.append(f"{channel.topic} ({', '.join(entry.channel for entry in mapped.values())})")
         elif not mapped and kind in OFFERED:
             self.offered[channel.topic] = _lines(channel.topic, OFFERED[kind])
         if not mapped:
@@ -356,11 +356,11 @@ class _DecodeJob:
 def _lines(topic: str, fields: dict[str, ChannelMap]) -> str:
     """Return lines for a profile."""
     lines = []
-    for key, one in fields.items():
-        extra = (", positive: port" if one.positive == "port" else "") + (
-            f", offset: {one.offset:.6g}" if one.offset else ""
+    for key, entry in fields.items():
+        extra = (", positive: port" if entry.positive == "port" else "") + (
+            f", offset: {entry.offset:.6g}" if entry.offset else ""
         )
-        lines.append(f"'{topic}.{key}: {{channel: {one.channel}, unit: {one.unit}{extra}}}'")
+        lines.append(f"'{topic}.{key}: {{channel: {entry.channel}, unit: {entry.unit}{extra}}}'")
     return ", ".join(lines)
 
 
@@ -383,8 +383,8 @@ def _dense(parts: list[Part]) -> dict[str, Values]:
     channels: dict[str, Values] = {}
     base = 0
     for part in parts:
-        for name, found in part.values.items():
-            for record, value in found:
+        for name, samples in part.values.items():
+            for record, value in samples:
                 channels.setdefault(name, Values.empty(n)).put(base + record, value)
         base += part.time_ns.size
     return channels

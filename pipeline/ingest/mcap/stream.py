@@ -92,7 +92,7 @@ class McapStream:
         self._crc: int | None = 0 if self._summary.data_end < 0 or self._summary.data_crc else None
         self._crc_to = 0
         self._last_ns: int | None = None
-        self._found = 0
+        self._read = 0
 
     @property
     def partial(self) -> bool:
@@ -132,13 +132,13 @@ class McapStream:
         if waiting:
             yield joined(waiting)
         expected = self._summary.messages
-        if expected is not None and expected > self._found and not self.lost:
+        if expected is not None and expected > self._read and not self.lost:
             self._lose(
-                LostStretch(None, None, expected - self._found, "the summary counts more messages than were found")
+                LostStretch(None, None, expected - self._read, "the summary counts more messages than were found")
             )
 
     def _count(self, batch: Batch) -> None:
-        self._found += batch.first.size
+        self._read += batch.first.size
         self._records_left -= batch.first.size
         self._room -= batch.content.size
         if self._room < 0:
@@ -148,7 +148,7 @@ class McapStream:
         if batch.log_time.size and not batch.lost:
             self._last_ns = int(batch.log_time.max())
 
-    def _lose(self, lost: LostStretch, told: str = "") -> None:
+    def _lose(self, lost: LostStretch, note: str = "") -> None:
         if len(self.lost) >= _MOST_STRETCHES:
             since = self.lost[-1].since_ns
             self.lost[-1] = stretch(since, lost.until_ns, None, "the file is damaged in very many places")
@@ -156,7 +156,7 @@ class McapStream:
         self.lost.append(lost)
         span = _span(lost) or "at a time unknown"
         count = f"{lost.messages} messages" if lost.messages is not None else "an unknown number of messages"
-        self.notes.append(told or f"Lost: {count}, {span}: {lost.why}.")
+        self.notes.append(note or f"Lost: {count}, {span}: {lost.why}.")
 
     def _pieces(self) -> Iterator[Batch]:
         at, stop = len(MCAP_MAGIC), self._summary.stop
@@ -215,14 +215,15 @@ class McapStream:
             own = np.minimum(np.searchsorted(self._expected, at + first - HEAD), self._expected.size - 1)
             is_chunk = self._expected[own] == at + first - HEAD
             strange |= is_chunk & (end - first + HEAD != self._lengths[own])
-        found = np.flatnonzero(strange)
-        return int(found[0]) if found.size else int(opcode.size)
+        damaged = np.flatnonzero(strange)
+        return int(damaged[0]) if damaged.size else int(opcode.size)
 
     def _window(self, at: int, data: bytes, opcode: NDArray[np.uint8], first: Index, end: Index) -> Iterator[Batch]:
         """Hand on the messages of some records, those of chunks and those outside in the order of the file."""
-        buffer, told = as_bytes(data), np.flatnonzero((opcode == CHUNK) | (opcode == CHANNEL) | (opcode == SCHEMA))
+        buffer = as_bytes(data)
+        structural = np.flatnonzero((opcode == CHUNK) | (opcode == CHANNEL) | (opcode == SCHEMA))
         loose_from = 0
-        for i in [*told.tolist(), opcode.size]:
+        for i in [*structural.tolist(), opcode.size]:
             loose = loose_from + np.flatnonzero(opcode[loose_from:i] == MESSAGE)
             if loose.size:
                 low, high = int(first[loose[0]]), int(end[loose[-1]])
@@ -324,8 +325,8 @@ class McapStream:
     def _end(self, data: bytes, length: int, at: int, first: int, end: int) -> None:
         """Compare the CRC of the data section with the one that its last record tells."""
         self._check_window(at, data, length)
-        told = int.from_bytes(data[first : first + 4], "little") if end - first >= 4 else 0
-        if told and self._crc is not None and self._crc != told and not self.lost:
+        stored_crc = int.from_bytes(data[first : first + 4], "little") if end - first >= 4 else 0
+        if stored_crc and self._crc is not None and self._crc != stored_crc and not self.lost:
             why = "the CRC of the data section does not match, so that what has no CRC of its own may be damaged"
             self._lose(
                 LostStretch(None, None, None, why), f"Something in the file is damaged, and nothing tells where: {why}."

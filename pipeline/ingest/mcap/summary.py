@@ -86,49 +86,49 @@ def read_summary(log: LogFile) -> Summary:
     footer = parse_footer(tail[HEAD:]) if tail.endswith(MCAP_MAGIC) and tail[0] == FOOTER else None
     if footer is None or struct.unpack_from("<Q", tail, 1)[0] != FOOTER_SIZE:
         return Summary(ended=False, stop=log.size)
-    found = Summary(ended=True, stop=place)
+    summary = Summary(ended=True, stop=place)
     if footer.summary_start == 0:
-        _note_data_end(log, found, place)
-        return found
+        _note_data_end(log, summary, place)
+        return summary
     length = place - footer.summary_start
     if not (0 <= length <= SUMMARY_LIMIT and footer.summary_start >= len(MCAP_MAGIC)):
-        found.notes.append("The footer of the file points nowhere: its summary was not used.")
-        return found
+        summary.notes.append("The footer of the file points nowhere: its summary was not used.")
+        return summary
     content = log.read(footer.summary_start, length)
-    _note_data_end(log, found, footer.summary_start)
+    _note_data_end(log, summary, footer.summary_start)
     # the CRC covers the summary and the footer up to the CRC itself
     if footer.summary_crc and zlib.crc32(tail[: HEAD + 16], zlib.crc32(content)) != footer.summary_crc:
-        found.notes.append("The CRC of the file's summary does not match: its summary was not used.")
-        return found
-    found.stop = footer.summary_start
-    _take(found, content)
-    return found
+        summary.notes.append("The CRC of the file's summary does not match: its summary was not used.")
+        return summary
+    summary.stop = footer.summary_start
+    _take(summary, content)
+    return summary
 
 
-def _note_data_end(log: LogFile, found: Summary, behind: int) -> None:
+def _note_data_end(log: LogFile, summary: Summary, behind: int) -> None:
     """Look at the record in front of the summary, which ends the data section."""
     place = behind - HEAD - DATA_END_SIZE
     record = log.read(place, HEAD + DATA_END_SIZE) if place >= len(MCAP_MAGIC) else b""
     if len(record) == HEAD + DATA_END_SIZE and record[0] == DATA_END:
         size, crc = struct.unpack_from("<QI", record, 1)
         if size == DATA_END_SIZE:
-            found.data_end, found.data_crc = place, crc
+            summary.data_end, summary.data_crc = place, crc
 
 
-def _take(found: Summary, content: bytes) -> None:
+def _take(summary: Summary, content: bytes) -> None:
     opcode, first, end, reached = walk(as_bytes(content), 0, len(content))
     if reached < len(content):
-        found.notes.append("The summary of the file is damaged: what is whole of it was used.")
+        summary.notes.append("The summary of the file is damaged: what is whole of it was used.")
     for kind, at, to in zip(opcode.tolist(), first.tolist(), end.tolist(), strict=True):
         record = content[at:to]
         if kind == CHANNEL and (channel := parse_channel(record)):
-            found.channels.setdefault(*channel)
+            summary.channels.setdefault(*channel)
         elif kind == SCHEMA and (schema := parse_schema(record)):
-            found.schemas.setdefault(*schema)
+            summary.schemas.setdefault(*schema)
         elif kind == CHUNK_INDEX and (chunk := parse_chunk_place(record)):
-            found.chunks.append(chunk)
+            summary.chunks.append(chunk)
         elif kind == STATISTICS:
-            found.messages, found.chunk_count = parse_statistics(record)
-    found.chunks = sorted(
-        {(at, size) for at, size in found.chunks if len(MCAP_MAGIC) <= at and at + size <= found.stop}
+            summary.messages, summary.chunk_count = parse_statistics(record)
+    summary.chunks = sorted(
+        {(at, size) for at, size in summary.chunks if len(MCAP_MAGIC) <= at and at + size <= summary.stop}
     )

@@ -87,15 +87,15 @@ class Route:
     def read(self, payloads: Spans) -> DecodedTopics:
         """Decode messages, shape (m,)."""
         columns = self._reader.read(payloads)
-        found = {}
+        values = {}
         for key in self.mapped:
             value, present = self._column(columns, key)
             for begin, test in self._void:
                 if key.startswith(begin):
-                    sign, told = self._of(columns, test)
-                    present = present & ~(told & (sign < 0))
-            found[key] = value, present
-        return DecodedTopics(columns.good, found, None if self._time is None else self._instants(columns))
+                    sign, known = self._of(columns, test)
+                    present = present & ~(known & (sign < 0))
+            values[key] = value, present
+        return DecodedTopics(columns.good, values, None if self._time is None else self._instants(columns))
 
     def _of(self, columns: Columns, key: str) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
         at = self._wanted.index(key)
@@ -122,9 +122,11 @@ class Route:
             usable = present & (value >= 0) & (value * scale + start < _LAST)
         time[usable] = _nanoseconds(value[usable], scale) + start
         for whole, rest in _STAMPS:
-            (second, told), (nano, told_too) = (self._of(columns, f"{self._time.column}.{p}") for p in (whole, rest))
+            (second, has_second), (nano, has_nano) = (
+                self._of(columns, f"{self._time.column}.{p}") for p in (whole, rest)
+            )
             with np.errstate(invalid="ignore"):
-                usable = told & told_too & (second >= 0) & (second < _LAST / 1e9) & (nano >= 0) & (nano < 1e9)
+                usable = has_second & has_nano & (second >= 0) & (second < _LAST / 1e9) & (nano >= 0) & (nano < 1e9)
             time[usable] = second[usable].astype(np.int64) * 1_000_000_000 + nano[usable].astype(np.int64)
         return time
 
@@ -157,19 +159,20 @@ def _angle(
 
 def _reader(channel: McapChannel, schema: Schema | None, wanted: list[str]) -> MessageReader:
     """Return a reader of a channel's encoding; each is imported where it is used, for what it compiles."""
-    told = schema.encoding if schema else ""
+    schema_encoding = schema.encoding if schema else ""
     if channel.encoding == "json":
         from kempf.pipeline.ingest.messages.json_reader import JsonReader
 
         return JsonReader(wanted)
-    if channel.encoding == "cdr" and schema and told == "ros2msg":
+    if channel.encoding == "cdr" and schema and schema_encoding == "ros2msg":
         from kempf.pipeline.ingest.messages.cdr_reader import CdrReader
 
         return CdrReader(schema.name, schema.data.decode("utf-8", errors="replace"), wanted)
-    if channel.encoding == "protobuf" and schema and told == "protobuf":
+    if channel.encoding == "protobuf" and schema and schema_encoding == "protobuf":
         from kempf.pipeline.ingest.messages.protobuf_reader import ProtobufReader
 
         return ProtobufReader(schema.name, schema.data, wanted)
     if channel.encoding in ("cdr", "protobuf"):
-        raise NoReaderError(f"is encoded as {channel.encoding} with {f'a schema in {told}' if told else 'no schema'}")
+        described = f"a schema in {schema_encoding}" if schema_encoding else "no schema"
+        raise NoReaderError(f"is encoded as {channel.encoding} with {described}")
     raise NoReaderError(f"is encoded as {channel.encoding or 'nothing that is named'}; JSON, CDR and protobuf are read")

@@ -91,8 +91,8 @@ def _begins_with_messages(log: LogFile, stop: int) -> bool:
 
 def _attached(log: LogFile, first: int, end: int) -> bool:
     """Tell whether the content of an attachment has a CRC that is right."""
-    told = log.read(end - 4, 4) if end - first >= 4 else b""
-    return told not in (b"", bytes(4)) and _crc(log, first, end - 4) == struct.unpack("<I", told)[0]
+    stored_crc = log.read(end - 4, 4) if end - first >= 4 else b""
+    return stored_crc not in (b"", bytes(4)) and _crc(log, first, end - 4) == struct.unpack("<I", stored_crc)[0]
 
 
 def _crc(log: LogFile, first: int, end: int) -> int:

@@ -117,7 +117,7 @@ def full_name(name: str, package: str) -> str:
 
 
 def _fields(text: str, package: str) -> tuple[Field, ...]:
-    found = []
+    fields = []
     for line in text.splitlines():
         content = line.partition("#")[0].strip()
         if not content:
@@ -132,5 +132,5 @@ def _fields(text: str, package: str) -> tuple[Field, ...]:
             kind = full_name(kind, package)
         array = match["array"]
         count = None if array is None else -1 if array == "[]" or array.startswith("[<=") else int(array[1:-1])
-        found.append(Field(match["name"], kind, count))
-    return tuple(found)
+        fields.append(Field(match["name"], kind, count))
+    return tuple(fields)

@@ -57,16 +57,16 @@ class CdrReader:
             With their encapsulation, shape (m,).
         """
         m, k = len(payloads), len(self._kinds)
-        found = Columns.empty(k, m)
+        columns = Columns.empty(k, m)
         bits, present = np.zeros((m, k), dtype=np.uint64), np.zeros((m, k), dtype=np.bool_)
-        walk(payloads.buffer, payloads.start, payloads.stop, self._steps, self._closed, bits, present, found.good)
+        walk(payloads.buffer, payloads.start, payloads.stop, self._steps, self._closed, bits, present, columns.good)
         for slot, kind in enumerate(self._kinds):
             if kind:
                 dtype = np.dtype(kind)
                 raw = bits[:, slot].astype(f"<u{dtype.itemsize}").view(dtype.newbyteorder("<"))
-                found.present[slot] = present[:, slot] & found.good
-                found.value[slot] = np.where(found.present[slot], raw.astype(np.float64), np.nan)
-        return found
+                columns.present[slot] = present[:, slot] & columns.good
+                columns.value[slot] = np.where(columns.present[slot], raw.astype(np.float64), np.nan)
+        return columns
 
 
 @dataclass
@@ -128,9 +128,9 @@ def program_for(types: Types, name: str, wanted: list[str]) -> CdrProgram:
     """
     program = CdrProgram(kinds=[""] * len(wanted))
     slots = {tuple(key.split(".")): slot for slot, key in enumerate(wanted)}
-    told = {path: _no_number(types, full_name(name, ""), path) for path in slots}
-    program.missing = {".".join(path): why for path, why in told.items() if why}
-    missing = {path for path, why in told.items() if why}
+    reasons = {path: _no_number(types, full_name(name, ""), path) for path in slots}
+    program.missing = {".".join(path): why for path, why in reasons.items() if why}
+    missing = {path for path, why in reasons.items() if why}
     try:
         _message(program, types, full_name(name, ""), {p: s for p, s in slots.items() if p not in missing}, 0)
     except _StopError as why:

@@ -60,7 +60,7 @@ def _counted(buffer, begin, at, end, little, steps, step, i, out, present):
 
 
 @njit(cache=True)
-def _one(buffer, begin, end, little, steps, left, back, i, out, present):
+def _walk_message(buffer, begin, end, little, steps, left, back, i, out, present):
     """Run the walk over one message; return the place behind its last step, -1 where the message is cut."""
     at, step, level = begin, 0, -1
     while step < steps.shape[0]:
@@ -114,5 +114,5 @@ def walk(buffer, start, stop, steps, closed, out, present, good):
         if begin > end or buffer[start[i]] != 0 or buffer[start[i] + 1] > 1:
             continue
         little = buffer[start[i] + 1] == 1
-        at = _one(buffer, begin, end, little, steps, left, back, i, out, present)
+        at = _walk_message(buffer, begin, end, little, steps, left, back, i, out, present)
         good[i] = at >= 0 and (not closed or end - at <= _PADDING)

@@ -47,9 +47,11 @@ class JsonReader:
         """
         m, k = len(payloads), len(self._paths)
         columns = Columns.empty(k, m)
-        found, value = np.zeros((m, k, 3), dtype=np.int64), np.zeros((m, k))
-        walk(payloads.buffer, payloads.start, payloads.stop, self._nodes.copy(), self._keys, found, value, columns.good)
-        kind, first, last = found[..., 0], found[..., 1], found[..., 2]
+        tokens, value = np.zeros((m, k, 3), dtype=np.int64), np.zeros((m, k))
+        walk(
+            payloads.buffer, payloads.start, payloads.stop, self._nodes.copy(), self._keys, tokens, value, columns.good
+        )
+        kind, first, last = tokens[..., 0], tokens[..., 1], tokens[..., 2]
         for i in np.flatnonzero(~columns.good):
             payload = payloads.buffer[payloads.start[i] : payloads.stop[i]].tobytes()
             columns.good[i] = self._slow(payload, kind[i], value[i])

@@ -187,7 +187,7 @@ def _child(buffer, at, end, node, nodes, keys):
 
 
 @njit(cache=True, inline="always")
-def _scalar(buffer, at, end, row, slot, found, value):
+def _scalar(buffer, at, end, row, slot, tokens, value):
     """Read text, a number or a literal; return the place behind it, -1 where it is odd."""
     byte = buffer[at]
     if byte == 34:
@@ -195,17 +195,17 @@ def _scalar(buffer, at, end, row, slot, found, value):
         if close < 0 or (escaped and slot >= 0):
             return -1
         if slot >= 0:
-            found[row, slot, 0], found[row, slot, 1], found[row, slot, 2] = TEXT, at + 1, close
+            tokens[row, slot, 0], tokens[row, slot, 1], tokens[row, slot, 2] = TEXT, at + 1, close
         return close + 1
     if byte == 45 or 48 <= byte <= 57:
         close, number, exact = _number(buffer, at, end, slot >= 0)
         if close >= 0 and slot >= 0:
             value[row, slot] = number
-            found[row, slot, 0], found[row, slot, 1], found[row, slot, 2] = NUMBER if exact else TEXT, at, close
+            tokens[row, slot, 0], tokens[row, slot, 1], tokens[row, slot, 2] = NUMBER if exact else TEXT, at, close
         return close
     length = _literal(buffer, at, end)
     if slot >= 0 and byte != 110:
-        found[row, slot, 0] = OTHER
+        tokens[row, slot, 0] = OTHER
     return at + length if length > 0 else -1
 
 
@@ -226,7 +226,7 @@ def _key(buffer, at, end, parent, nodes, keys):
 
 
 @njit(cache=True)
-def _one(buffer, at, end, nodes, keys, inside, row, found, value):
+def _walk_message(buffer, at, end, nodes, keys, inside, row, tokens, value):
     """Walk through one message; tell whether it is a whole object without anything odd.
 
     What is open around a value stands in ``inside``: the node of an object, -1 of one nobody wants, -2 of a list.
@@ -245,11 +245,11 @@ def _one(buffer, at, end, nodes, keys, inside, row, found, value):
             inside[depth] = node if byte == 123 else -2
             depth += 1
             if slot >= 0:
-                found[row, slot, 0] = OTHER
+                tokens[row, slot, 0] = OTHER
             at = _blank_until(buffer, at + 1, end)
             opened = at < end and buffer[at] != (125 if byte == 123 else 93)
         else:
-            at = _scalar(buffer, at, end, row, slot, found, value)
+            at = _scalar(buffer, at, end, row, slot, tokens, value)
             if at < 0:
                 return False
         if not opened:
@@ -277,7 +277,7 @@ def _one(buffer, at, end, nodes, keys, inside, row, found, value):
 
 
 @njit(cache=True)
-def walk(buffer, start, stop, nodes, keys, found, value, good):
+def walk(buffer, start, stop, nodes, keys, tokens, value, good):
     """Walk through all messages and fill what was found, by message and slot.
 
     Parameters
@@ -286,11 +286,11 @@ def walk(buffer, start, stop, nodes, keys, found, value, good):
         The tree of wanted keys, its columns numbered `FIRST` to `SEEN`: children, place of the key's bytes, slot or -1,
         and the last message that had the key, -1 at first. Node 0 is the message itself.
     keys : ndarray of uint8
-    found : ndarray of int64, shape (m, k, 3)
+    tokens : ndarray of int64, shape (m, k, 3)
         `ABSENT` at first; what was found, and its first byte and the one behind its last, of numbers and text.
     value : ndarray of float64, shape (m, k)
     good : ndarray of bool, shape (m,)
     """
     inside = np.empty(_DEEPEST, dtype=np.int64)
     for i in range(start.size):
-        good[i] = _one(buffer, start[i], stop[i], nodes, keys, inside, i, found, value)
+        good[i] = _walk_message(buffer, start[i], stop[i], nodes, keys, inside, i, tokens, value)

@@ -116,22 +116,21 @@ class ProtobufReader:
             Shape (m,).
         """
         m, k = len(payloads), len(self._kinds)
-        found = Columns.empty(k, m)
+        columns = Columns.empty(k, m)
         bits = np.zeros((m, k), dtype=np.uint64)
         present = np.zeros((m, k), dtype=np.bool_)
         entered = np.zeros((m, len(self._nodes)), dtype=np.bool_)
-        walk(
-            payloads.buffer, payloads.start, payloads.stop, self._rows, self._row_of, bits, present, entered, found.good
-        )
+        rows, row_of = self._rows, self._row_of
+        walk(payloads.buffer, payloads.start, payloads.stop, rows, row_of, bits, present, entered, columns.good)
         for slot, kind in enumerate(self._kinds):
             there = present[:, slot].copy()
             if self._parent[slot] >= 0:
                 there |= entered[:, self._parent[slot]]
-            there &= found.good
-            found.present[slot] = there
+            there &= columns.good
+            columns.present[slot] = there
             if kind:
-                found.value[slot] = np.where(there, _numbers(bits[:, slot], kind), np.nan)
-        return found
+                columns.value[slot] = np.where(there, _numbers(bits[:, slot], kind), np.nan)
+        return columns
 
 
 def _numbers(bits: NDArray[np.uint64], kind: str) -> NDArray[np.float64]:
@@ -211,12 +210,13 @@ def _message(types: ProtoTypes, content: bytes, scope: str, proto3: bool) -> Non
 
 
 def _field(content: bytes, proto3: bool) -> tuple[str, ProtoField]:
-    told = dict(_fields(content))
-    number, kind, label = (told.get(n, 0) for n in (3, 5, 4))
+    descriptor = dict(_fields(content))
+    number, kind, label = (descriptor.get(n, 0) for n in (3, 5, 4))
     if not (isinstance(number, int) and isinstance(kind, int)):
         raise NoReaderError("its descriptor is damaged")
-    implicit = proto3 and 9 not in told  # a field of a oneof, and an optional one, tells zero from absent
-    return _text(told.get(1, b"")), ProtoField(number, kind, _text(told.get(6, b"")), label == _REPEATED, implicit)
+    implicit = proto3 and 9 not in descriptor  # a field of a oneof, and an optional one, tells zero from absent
+    name, type_name = _text(descriptor.get(1, b"")), _text(descriptor.get(6, b""))
+    return name, ProtoField(number, kind, type_name, label == _REPEATED, implicit)
 
 
 def _text(value: bytes | int) -> str:

@@ -34,7 +34,7 @@ def _varint(buffer, at, end):
 
 
 @njit(cache=True)
-def _one(buffer, at, end, rows, row_of, ends, nodes, i, out, present, entered):
+def _walk_message(buffer, at, end, rows, row_of, ends, nodes, i, out, present, entered):
     """Walk through one message; tell whether it is whole."""
     ends[0], nodes[0], level = end, 0, 0
     entered[i, 0] = True
@@ -87,4 +87,4 @@ def walk(buffer, start, stop, rows, row_of, out, present, entered, good):
     ends = np.empty(DEEPEST + 1, dtype=np.int64)
     nodes = np.empty(DEEPEST + 1, dtype=np.int64)
     for i in range(start.size):
-        good[i] = _one(buffer, start[i], stop[i], rows, row_of, ends, nodes, i, out, present, entered)
+        good[i] = _walk_message(buffer, start[i], stop[i], rows, row_of, ends, nodes, i, out, present, entered)

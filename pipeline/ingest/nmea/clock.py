@@ -49,7 +49,7 @@ class NmeaClock:
 
 
 @dataclass(frozen=True, eq=False)
-class _Told:
+class _LineTimes:
     """What the sentences themselves tell of time, line by line; `NO_TIME` where nothing."""
 
     of_day: Nanoseconds
@@ -59,14 +59,14 @@ class _Told:
     @property
     def timed(self) -> Flag:
         """Whether the line tells a time of day."""
-        told: Flag = self.of_day != NO_TIME
-        return told
+        has_time: Flag = self.of_day != NO_TIME
+        return has_time
 
     @property
     def dated(self) -> Flag:
         """Whether the line tells a date too."""
-        told: Flag = self.full != NO_TIME
-        return told
+        has_date: Flag = self.full != NO_TIME
+        return has_date
 
 
 def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
@@ -82,24 +82,24 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
     -------
     NmeaClock
     """
-    told, late = _told(frames, said)
+    times, late = _line_times(frames, said)
     notes = []
     if late:
         notes.append(
             f"{late} dates were 1024 weeks or twice that too early (the overflow of GPS weeks) and were put right."
         )
     if frames.stamped:
-        both = told.dated & (frames.stamp_ns != NO_TIME)
-        lead = np.median((frames.stamp_ns - told.full)[both]) if both.any() else np.float64(0.0)
+        both = times.dated & (frames.stamp_ns != NO_TIME)
+        lead = np.median((frames.stamp_ns - times.full)[both]) if both.any() else np.float64(0.0)
         near = np.where(frames.stamp_ns != NO_TIME, frames.stamp_ns - np.int64(np.round(lead)), NO_TIME)
-        own = _nearest_day(told, near, notes)
+        own = _nearest_day(times, near, notes)
         if abs(lead) > _LEAD_S * SECOND_NS:
             ahead = "ahead of" if lead > 0 else "behind"
             seconds = abs(float(lead)) / SECOND_NS
             notes.append(f"The logger's stamps are {seconds:.3f} s {ahead} the receiver's UTC (median).")
         return NmeaClock(np.where(own != NO_TIME, own, frames.stamp_ns), notes)
-    speaks = _of_a_dated_talker(frames, told.dated) & told.timed
-    own = _nearest_day(told, _by_counting_days(told, speaks), notes)
+    speaks = _of_a_dated_talker(frames, times.dated) & times.timed
+    own = _nearest_day(times, _by_counting_days(times, speaks), notes)
     follows = _follows(said)
     if follows:
         notes.append("VTG repeats the fix behind it: sentences without a time are given that of the next fix.")
@@ -141,7 +141,7 @@ def _delays(
     return delays
 
 
-def _told(frames: Frames, said: dict[str, Said]) -> tuple[_Told, int]:
+def _line_times(frames: Frames, said: dict[str, Said]) -> tuple[_LineTimes, int]:
     """Collect what the sentences tell of time; also return how many dates were put right."""
     n = len(frames.lines)
     of_day, midnight = np.full(n, NO_TIME, dtype=np.int64), np.full(n, NO_TIME, dtype=np.int64)
@@ -159,7 +159,7 @@ def _told(frames: Frames, said: dict[str, Said]) -> tuple[_Told, int]:
     dated = (of_day != NO_TIME) & (midnight != NO_TIME)
     full = np.where(dated, midnight + of_day, NO_TIME)
     full, late = _correct_rollover(full, dated, frames.stamp_ns)
-    return _Told(of_day, full, void), late
+    return _LineTimes(of_day, full, void), late
 
 
 def _of_a_dated_talker(frames: Frames, dated: Flag) -> Flag:
@@ -170,26 +170,26 @@ def _of_a_dated_talker(frames: Frames, dated: Flag) -> Flag:
     """
     talker = ["GN" if name[:2] in SATELLITES else name[:2] for name in frames.names]
     talkers = {talker[code] for code in np.flatnonzero(np.bincount(frames.address[dated]))}
-    of_name = [one in talkers for one in talker]
+    of_name = [prefix in talkers for prefix in talker]
     return np.array([*of_name, False], dtype=np.bool_)[frames.address]
 
 
-def _by_counting_days(told: _Told, speaks: Flag) -> Nanoseconds:
+def _by_counting_days(times: _LineTimes, speaks: Flag) -> Nanoseconds:
     """Return for each line the latest instant before it - before the first one, the first.
 
     Times of day are counted on from one sentence to the next, over any number of midnights; a date puts the count
     right. What a receiver without a fix says counts only where no other speaks.
     """
-    fixed = speaks & ~told.void
-    at = np.flatnonzero(fixed if bool(np.any(fixed & told.dated)) else speaks)
-    n = told.of_day.size
+    fixed = speaks & ~times.void
+    at = np.flatnonzero(fixed if bool(np.any(fixed & times.dated)) else speaks)
+    n = times.of_day.size
     if at.size == 0:
         return np.full(n, NO_TIME)
     half = DAY_NS // 2
-    step = (np.diff(told.of_day[at]) + half) % DAY_NS - half
-    counted = told.of_day[at[0]] + np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(step)))
-    anchor = np.flatnonzero(told.dated[at])
-    offset, _ = _without_brief_dates(told.full[at[anchor]] - counted[anchor], counted[anchor])
+    step = (np.diff(times.of_day[at]) + half) % DAY_NS - half
+    counted = times.of_day[at[0]] + np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(step)))
+    anchor = np.flatnonzero(times.dated[at])
+    offset, _ = _without_brief_dates(times.full[at[anchor]] - counted[anchor], counted[anchor])
     latest = np.searchsorted(anchor, np.arange(at.size), side="right") - 1
     instant = counted + offset[np.maximum(latest, 0)]
     place = np.searchsorted(at, np.arange(n), side="right") - 1
@@ -211,13 +211,13 @@ def _without_brief_dates(offset: Nanoseconds, counted: Nanoseconds) -> tuple[Nan
     return offset, replaced
 
 
-def _nearest_day(told: _Told, near: Nanoseconds, notes: list[str]) -> Nanoseconds:
+def _nearest_day(times: _LineTimes, near: Nanoseconds, notes: list[str]) -> Nanoseconds:
     """Complete the times of day by their own date, else by the day that brings them nearest to other instants."""
-    own = told.full.copy()
-    known = np.flatnonzero(told.timed & (near != NO_TIME))
+    own = times.full.copy()
+    known = np.flatnonzero(times.timed & (near != NO_TIME))
     half = DAY_NS // 2
-    anchor, full = near[known], told.full[known]
-    guess = anchor + (told.of_day[known] - anchor % DAY_NS + half) % DAY_NS - half
+    anchor, full = near[known], times.full[known]
+    guess = anchor + (times.of_day[known] - anchor % DAY_NS + half) % DAY_NS - half
     dated = np.flatnonzero(full != NO_TIME)
     offset, brief = _without_brief_dates(full[dated] - guess[dated], guess[dated])
     guess[dated] += offset

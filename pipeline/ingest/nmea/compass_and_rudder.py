@@ -46,7 +46,7 @@ def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
     notes: list[str] = []
     if not {"HDG", "HDM"} & set(said):
         return notes
-    carried = _told(frames, said)
+    carried = _carried_variation(frames, said)
     for name in ("HDG", "HDM"):
         if name not in said:
             continue
@@ -83,7 +83,7 @@ def _variation(fields: Fields, name: str) -> tuple[Float, Flag]:
     return degrees * east(fields.at(side)) * _DEGREE, cells.there()
 
 
-def _told(frames: Frames, said: dict[str, Said]) -> tuple[Index, Float, str] | None:
+def _carried_variation(frames: Frames, said: dict[str, Said]) -> tuple[Index, Float, str] | None:
     """Return records and values of the variation that one source tells, and its name; None where there is none."""
     for name in _VARIATION:
         if name not in said:
@@ -138,10 +138,10 @@ def _judge(starboard: Float, there: Flag, port: Float, filled: Flag) -> tuple[bo
     both = there & filled & np.isfinite(starboard) & np.isfinite(port)
     if not there.any():
         return True, "the rudder angle is that of the port rudder, the only one that is valid."
-    one, other = starboard[both], port[both]
-    if both.any() and float(np.ptp(one)) >= _MOVES:
-        slope = float(np.dot(one - one.mean(), other - other.mean()) / np.sum((one - one.mean()) ** 2))
-        apart = float(np.degrees(np.sqrt(np.mean((other - one) ** 2))))
+    main, second = starboard[both], port[both]
+    if both.any() and float(np.ptp(main)) >= _MOVES:
+        slope = float(np.dot(main - main.mean(), second - second.mean()) / np.sum((main - main.mean()) ** 2))
+        apart = float(np.degrees(np.sqrt(np.mean((second - main) ** 2))))
         if _FOLLOWS[0] <= slope <= _FOLLOWS[1]:
             return True, f"the rudder angle is the mean of both rudders, which differ by {apart:.2f} deg rms."
         return False, (

@@ -127,10 +127,10 @@ def _times(buffer: Bytes, opening: Index, star: Index) -> tuple[Nanoseconds, Fla
     front = buffer[colon - 2]
     colon = colon[(buffer[colon - 1] == _C) & ((front == BACKSLASH) | (front == _COMMA))]
     ends = np.flatnonzero((buffer == _COMMA) | (buffer == _STAR))
-    told = first_within(colon, opening, star)
-    stop = first_within(ends, np.where(told >= 0, told, star), star + 1)
-    timed = (told >= 0) & (stop >= 0)
-    value, whole = Cells(buffer, np.where(timed, told + 1, 0), np.where(timed, stop, 0)).integer()
+    place = first_within(colon, opening, star)
+    stop = first_within(ends, np.where(place >= 0, place, star), star + 1)
+    timed = (place >= 0) & (stop >= 0)
+    value, whole = Cells(buffer, np.where(timed, place + 1, 0), np.where(timed, stop, 0)).integer()
     timed &= whole & (value < 1000 * _SECONDS_END)
     milliseconds = np.where(value > _SECONDS_END, value, value * 1000)
     return np.where(timed, milliseconds * (SECOND_NS // 1000), 0), timed

@@ -63,9 +63,9 @@ def words(buffer: Bytes, place: Index) -> Word:
             buffer, place = np.concatenate((np.zeros(8, np.uint8), buffer, np.zeros(8, np.uint8))), place + 8
         else:
             # only the last few reach beyond the end
-            found = words(buffer, np.minimum(place, buffer.size - 8))
+            word = words(buffer, np.minimum(place, buffer.size - 8))
             beyond = np.maximum(place - (buffer.size - 8), 0)
-            return np.where(beyond < 8, found >> (8 * np.minimum(beyond, 7)).astype(np.uint64), np.uint64(0))
+            return np.where(beyond < 8, word >> (8 * np.minimum(beyond, 7)).astype(np.uint64), np.uint64(0))
     view: Word = np.ndarray((buffer.size - 7,), dtype="<u8", buffer=np.ascontiguousarray(buffer), strides=(1,))
     return view[place].astype(np.uint64, copy=False)
 
@@ -164,10 +164,10 @@ class Cells:
             among[[ord(text) if text else 0 for text in texts]] = True
             return among[self.letter()]
         word = self.word()
-        found = np.zeros(word.shape, dtype=np.bool_)
+        matches = np.zeros(word.shape, dtype=np.bool_)
         for text in sorted(texts):
-            found |= word == as_word(text)
-        return found
+            matches |= word == as_word(text)
+        return matches
 
     def integer(self) -> tuple[NDArray[np.int64], Flag]:
         """Return each text of one to sixteen digits as an integer, zero for any other, and which are such."""

@@ -163,18 +163,18 @@ def _zone(text: Spans, place: Index) -> tuple[Index, Flag, Flag]:
     zoned = (rest == 1) & ((sign == ord("Z")) | (sign == ord("z")))
     seconds = np.zeros(place.shape, dtype=np.int64)
     fits = (rest == 0) | zoned
-    told = np.flatnonzero(~fits & np.isin(rest, (3, 5, 6)) & ((sign == ord("+")) | (sign == ord("-"))))
-    if told.size:
-        colon = rest[told] == 6
-        word = words(text.buffer, place[told] + 1)
+    numeric = np.flatnonzero(~fits & np.isin(rest, (3, 5, 6)) & ((sign == ord("+")) | (sign == ord("-"))))
+    if numeric.size:
+        colon = rest[numeric] == 6
+        word = words(text.buffer, place[numeric] + 1)
         good = ~colon | ((word >> np.uint64(16)) & np.uint64(0xFF) == ord(":"))
         minutes = word >> np.where(colon, 24, 16).astype(np.uint64)
-        both = first_digits(word, np.full(told.size, 2)), first_digits(minutes, np.where(rest[told] == 3, 0, 2))
+        both = first_digits(word, np.full(numeric.size, 2)), first_digits(minutes, np.where(rest[numeric] == 3, 0, 2))
         good &= all_digits(both[0]) & all_digits(both[1])
         hour, minute = eight_digits(both[0]), eight_digits(both[1])
         good &= (hour <= 15) & (minute < 60)
-        seconds[told] = np.where(good, (hour * 3_600 + minute * 60) * np.where(sign[told] == ord("-"), -1, 1), 0)
-        zoned[told] = fits[told] = good
+        seconds[numeric] = np.where(good, (hour * 3_600 + minute * 60) * np.where(sign[numeric] == ord("-"), -1, 1), 0)
+        zoned[numeric] = fits[numeric] = good
     return seconds, zoned, fits
 
 
@@ -197,16 +197,16 @@ def time_of_day(cells: Cells) -> Nanoseconds:
     if point.any():
         good &= ~point | (cells.buffer[np.minimum(cells.start + 6, size)] == ord("."))
     early = words(cells.buffer, np.minimum(cells.start + 7, size + 1))
-    told = np.clip(length - 7, 0, None)
+    decimals = np.clip(length - 7, 0, None)
     count = leading_digits(early)
-    first = np.minimum(np.where(point, told, 0), 8)
+    first = np.minimum(np.where(point, decimals, 0), 8)
     fraction = eight_digits(first_digits(early, np.minimum(first, count))) * _POWER[9 - first]
-    long = np.flatnonzero(told > 8)
+    long = np.flatnonzero(decimals > 8)
     if long.size:
         late = words(cells.buffer, np.minimum(cells.start[long] + 15, size + 1))
         count[long] += np.where(count[long] == 8, leading_digits(late), 0)
         fraction[long] += (late & np.uint64(0xFF)).astype(np.int64) - ord("0")
-    good &= (told <= count) | ~point
+    good &= (decimals <= count) | ~point
     hours, minutes, seconds = value // 10_000, value // 100 % 100, value % 100
     # 60 is a leap second; it becomes the first of the next minute
     good &= (hours < 24) & (minutes < 60) & (seconds <= 60)
