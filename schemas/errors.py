@@ -10,7 +10,7 @@ from typing import Any
 
 
 class KempfError(Exception):
-    """Base of every error that is told to a person.
+    """Base of every error that is shown to a person.
 
     Parameters
     ----------

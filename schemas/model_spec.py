@@ -36,7 +36,7 @@ class ModelSpec(BaseModel):
     """Which model is fitted: base, effects in order, disturbance model.
 
     The correlation rates of the Gauss-Markov disturbances are stated, not estimated: one zigzag holds too few of their
-    correlation times to tell them.
+    correlation times to determine them.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)

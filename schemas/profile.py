@@ -164,7 +164,7 @@ def parse(mapping: Any, where: str) -> VesselProfile:
         raise UsageError(
             "profile_invalid",
             f"{where} is not a valid vessel profile: {'; '.join(faults)}.",
-            "Mend these keys; docs/profile.md lists every key with its unit.",
+            "Correct these keys; docs/profile.md lists every key with its unit.",
             {"faults": faults},
         ) from error
 
@@ -188,7 +188,7 @@ def merge(profiles: list[tuple[str, VesselProfile]]) -> VesselProfile:
         Two of them give one key different values, or one file pattern different sources.
     """
     values: dict[str, Any] = {}
-    told_by: dict[str, str] = {}
+    said_by: dict[str, str] = {}
     sources: dict[str, tuple[str, Source]] = {}
     for where, profile in profiles:
         given = profile.model_dump(exclude_unset=True, exclude={"sources"})
@@ -196,12 +196,12 @@ def merge(profiles: list[tuple[str, VesselProfile]]) -> VesselProfile:
             if key in values and values[key] != value:
                 raise UsageError(
                     "profiles_disagree",
-                    f"Two profiles disagree on {key}: {told_by[key]} says {values[key]!r}, {where} says {value!r}.",
+                    f"Two profiles disagree on {key}: {said_by[key]} says {values[key]!r}, {where} says {value!r}.",
                     "Make the two files agree, or give only one of them.",
-                    {"key": key, told_by[key]: values[key], where: value},
+                    {"key": key, said_by[key]: values[key], where: value},
                 )
             values.setdefault(key, value)
-            told_by.setdefault(key, where)
+            said_by.setdefault(key, where)
         for source in profile.sources:
             other = sources.setdefault(source.match, (where, source))
             if other[1] != source:

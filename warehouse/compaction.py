@@ -96,7 +96,7 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
         return False
     written = WriterProperties(compression="ZSTD", max_row_group_size=_ROW_GROUP)
     sortable = "vessel_key" in {c.name for c in TABLES[name].columns} - set(table.metadata().partition_columns)
-    with delta.refusals_told(warehouse.address(name)):
+    with delta.refusals_as_errors(warehouse.address(name)):
         removed = 0
         if name in _SMALL and sortable:
             removed = table.optimize.z_order(["vessel_key"], writer_properties=written)["numFilesRemoved"]
@@ -115,9 +115,9 @@ def pinned(warehouse: Warehouse) -> dict[str, tuple[int, ...]]:
     NotFound
         ``no_warehouse``.
     """
-    told = delta.read(warehouse, "parameter_sets", columns=("provenance_json",))
+    provenances = delta.read(warehouse, "parameter_sets", columns=("provenance_json",))
     found: dict[str, set[int]] = {}
-    for text in told["provenance_json"].str.json_path_match("$.table_versions").drop_nulls().unique().to_list():
+    for text in provenances["provenance_json"].str.json_path_match("$.table_versions").drop_nulls().unique().to_list():
         for name, version in json.loads(text).items():
             found.setdefault(name, set()).add(int(version))
     return {name: tuple(sorted(found[name])) for name in sorted(found)}
@@ -182,7 +182,7 @@ def _vacuumed(
     ask = partial(
         table.vacuum, retention_hours=hours, enforce_retention_duration=False, full=True, keep_versions=list(keep)
     )
-    with delta.refusals_told(warehouse.address(name)):
+    with delta.refusals_as_errors(warehouse.address(name)):
         # what was deleted before is named again for ever
         sizes = [warehouse.size_of(name, *unquote(path).split("/")) for path in ask(dry_run=True)]
         there = [size for size in sizes if size is not None]

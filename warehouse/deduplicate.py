@@ -40,7 +40,7 @@ def overlap(one: Segment, other: Segment) -> bool:
 def same(one: Segment, other: Segment) -> bool:
     """Tell whether two segments are one manoeuvre: at the same time, to the same side, executes at the same instants.
 
-    The time alone does not tell: logs of a tank count from one stated start.
+    The time alone does not decide: logs of a tank count from one stated start.
     """
     if not overlap(one, other):
         return False

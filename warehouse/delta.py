@@ -123,7 +123,7 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
     if table is not None:
         return table
     warehouse.create()
-    with refusals_told(warehouse.address(name)):
+    with refusals_as_errors(warehouse.address(name)):
         try:
             DeltaTable.create(
                 warehouse.address(name),
@@ -164,7 +164,7 @@ def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> De
     missing = [field for field in wanted if field.name not in held]
     if not missing:
         return table
-    with refusals_told(warehouse.address(name)):
+    with refusals_as_errors(warehouse.address(name)):
         table.alter.add_columns(missing)
     altered = open_table(warehouse, name)
     assert altered is not None
@@ -238,7 +238,7 @@ def lent(
     """
     warehouse.require()
     try:
-        with _unreadable_told(name), reading(warehouse, name, version) as table:
+        with _unreadable_as_error(name), reading(warehouse, name, version) as table:
             yield scanned(table, name, where)
     except KempfError:
         warehouse.reach()  # a bucket that does not answer leaves the tables as they are: no copy need be restored
@@ -248,12 +248,12 @@ def lent(
 def rows(table: DeltaTable | None, name: str, where: Where | None = None, columns: Sequence[str] = ()) -> pl.DataFrame:
     """Return rows of an open table, see `read`."""
     lazy = scanned(table, name, where)
-    with _unreadable_told(name):
+    with _unreadable_as_error(name):
         return (lazy.select(columns) if columns else lazy).collect()
 
 
 @contextmanager
-def _unreadable_told(name: str) -> Iterator[None]:
+def _unreadable_as_error(name: str) -> Iterator[None]:
     import polars as pl
 
     try:
@@ -298,7 +298,7 @@ def replace(
         data = pa.Table.from_pylist(list(new), schema=schema)
     else:
         data = pa.RecordBatchReader.from_batches(schema, _batches(new, schema))
-    with refusals_told(table.table_uri):
+    with refusals_as_errors(table.table_uri):
         write_deltalake(
             table,
             data,
@@ -325,8 +325,8 @@ def _batches(frames: Iterator[pl.DataFrame], schema: pa.Schema) -> Iterator[pa.R
 
 
 @contextmanager
-def refusals_told(address: str) -> Iterator[None]:
-    """Tell what the storage refuses while something is written to an address as one clear error.
+def refusals_as_errors(address: str) -> Iterator[None]:
+    """Raise what the storage refuses while something is written to an address as one clear error.
 
     Raises
     ------
@@ -342,14 +342,14 @@ def refusals_told(address: str) -> Iterator[None]:
     except OSError as error:
         raise not_writable(address, error) from error
     except DeltaError as error:
-        told = not_writable(address, error)
+        refusal = not_writable(address, error)
         # a commit that the disk has no room for is no lost race: trying it again would not help
-        if told.code == "disk_full":
-            raise told from error
+        if refusal.code == "disk_full":
+            raise refusal from error
         # on a disk the rest is no matter of the connection
         if isinstance(error, CommitFailedError) or "://" not in address.removeprefix("file://"):
             raise
-        raise told from error
+        raise refusal from error
 
 
 def versions(warehouse: Warehouse) -> dict[str, int]:
@@ -378,8 +378,8 @@ def commit_times(table: DeltaTable) -> list[int]:
     if missing > 0:
         # the newest first, and before them those of other writers since the table was opened; these are numbered as if
         # they were this table's, which makes the numbers wrong: counted from the oldest they are right
-        told = [int(entry["timestamp"]) for entry in table.history(missing)][::-1]
-        known += told[:missing]
+        times = [int(entry["timestamp"]) for entry in table.history(missing)][::-1]
+        known += times[:missing]
     return list(accumulate(known, max))
 
 

@@ -61,7 +61,7 @@ def held(
 ) -> Deposit | None:
     """Return the deposit of a log that is there already as read with this profile and code; ask before reading it.
 
-    A raw copy that was damaged in the warehouse is mended on the way.
+    A raw copy that was damaged in the warehouse is replaced on the way.
 
     Raises
     ------
@@ -110,7 +110,7 @@ def deposit(warehouse: Warehouse, deliveries: Sequence[Delivery]) -> list[Deposi
         if row.log_id not in known or known[row.log_id].ingest_id != row.ingest_id:
             fresh.setdefault(row.log_id, (delivery, row))
     for delivery in deliveries:
-        raw.put(warehouse, delivery.log)  # mends a damaged copy of a log that is there, too
+        raw.put(warehouse, delivery.log)  # replaces a damaged copy of a log that is there, too
     recorded = {row.log_id: row.revision for row in _store(warehouse, list(fresh.values()))}
     return [Deposit(row.log_id, row.ingest_id, _outcome(recorded.pop(row.log_id, None))) for row in rows]
 

@@ -332,8 +332,8 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
     """
     import polars as pl
 
-    told = [name for name in ("segment_ids", "provenance_json") if name not in columns]
-    sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, (*columns, *told))
+    extra = [name for name in ("segment_ids", "provenance_json") if name not in columns]
+    sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, (*columns, *extra))
     provenance = pl.col("provenance_json").str
     at = provenance.json_path_match("$.table_versions.parameter_sets").cast(pl.Int64).fill_null(-1)
     sets = sets.with_columns(_code=provenance.json_path_match("$.code_version"), _at=at)
@@ -346,7 +346,7 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
         old |= provenance.json_path_match("$.ingest_ids").str.contains_any(known.past).fill_null(value=False)
     if known.segments is not None:
         old |= ~pl.col("segment_ids").list.eval(pl.element().is_in(known.segments)).list.all()
-    marked = sets.with_columns(superseded=old).drop("_code", "_at", *told)
+    marked = sets.with_columns(superseded=old).drop("_code", "_at", *extra)
     return marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
 
 

@@ -45,10 +45,10 @@ def options_of(given: Mapping[str, str] | None = None, environment: Mapping[str,
     >>> found["AWS_ALLOW_HTTP"], found["AWS_REGION"], found["AWS_ACCESS_KEY_ID"]
     ('true', 'us-east-1', 'me')
     """
-    told = os.environ if environment is None else environment
+    variables = os.environ if environment is None else environment
     found: dict[str, str] = {}
     for name in _PYARROW:
-        value = next((told[n] for n in (name, *_ALSO.get(name, ())) if told.get(n)), None)
+        value = next((variables[n] for n in (name, *_ALSO.get(name, ())) if variables.get(n)), None)
         if value is not None:
             found[name] = value
     found |= {key.upper(): value for key, value in (given or {}).items()}

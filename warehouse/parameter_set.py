@@ -45,7 +45,7 @@ class Inputs:
     bounds : tuple of Bounds
         The segments; kept sorted by log, then start.
     companions : tuple of Bounds
-        Segments that tell something of these without being identified themselves; kept sorted likewise.
+        Segments that say something of these without being identified themselves; kept sorted likewise.
     model_spec : mapping
         The model specification as JSON content.
     estimator : str

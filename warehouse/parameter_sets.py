@@ -156,8 +156,8 @@ def models(warehouse: Warehouse, vessel: str) -> list[tuple[dict[str, Any], str,
 
 def codes(warehouse: Warehouse, vessel: str) -> set[str]:
     """Return the fingerprints of the code that made a vessel's sets."""
-    told = delta.read(warehouse, "parameter_sets", {"vessel_key": vessel_key(vessel)}, ("provenance_json",))
-    return set(told["provenance_json"].str.json_path_match("$.code_version").drop_nulls().to_list())
+    provenances = delta.read(warehouse, "parameter_sets", {"vessel_key": vessel_key(vessel)}, ("provenance_json",))
+    return set(provenances["provenance_json"].str.json_path_match("$.code_version").drop_nulls().to_list())
 
 
 def _refuse_other(stored: ParameterSet, given: ParameterSet) -> None:

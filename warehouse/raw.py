@@ -43,7 +43,7 @@ def put(warehouse: Warehouse, log: LogFile) -> str:
     if is_whole:
         for _ in _unchanged(log):
             pass
-    else:  # a damaged copy is mended by a whole one
+    else:  # a damaged copy is replaced by a whole one
         warehouse.write(_unchanged(log), *_place(name))
     return name
 

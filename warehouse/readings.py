@@ -114,9 +114,9 @@ def _write(
         import polars as pl
 
         for vessel, ingest, frames in batch:
-            told = {"vessel_key": vessel_key(vessel), "vessel": vessel, "ingest_id": ingest}
+            constants = {"vessel_key": vessel_key(vessel), "vessel": vessel, "ingest_id": ingest}
             for frame in frames():
-                yield frame.with_columns(pl.lit(value).alias(column) for column, value in told.items())
+                yield frame.with_columns(pl.lit(value).alias(column) for column, value in constants.items())
 
     def attempt() -> None:
         with delta.ensured(warehouse, name) as table:

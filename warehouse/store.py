@@ -160,8 +160,8 @@ class Warehouse:
                 return None
             return found.st_ino, found.st_mtime_ns, found.st_size
         files, root = self._files
-        told = files.get_file_info("/".join((root, *parts)))
-        return None if told.mtime_ns is None else (told.mtime_ns, told.size or 0)
+        info = files.get_file_info("/".join((root, *parts)))
+        return None if info.mtime_ns is None else (info.mtime_ns, info.size or 0)
 
     def write_bytes(self, data: bytes, *parts: str) -> None:
         """Write a file inside, all of it or nothing; raises what `write` raises."""
@@ -313,8 +313,8 @@ def not_writable(where: str, error: Exception) -> KempfError:
     """
     if where.startswith("file://"):
         where = unquote(where.removeprefix("file://")).rstrip("/")
-    told = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", str(error)).split())
-    if getattr(error, "errno", None) in _FULL or any(words in told.lower() for words in _FULL_WORDS):
+    message = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", str(error)).split())
+    if getattr(error, "errno", None) in _FULL or any(words in message.lower() for words in _FULL_WORDS):
         free = _free_bytes(where)
         return KempfError(
             "disk_full",
@@ -326,7 +326,7 @@ def not_writable(where: str, error: Exception) -> KempfError:
         )
     return KempfError(
         "warehouse_not_writable",
-        f"Writing to {where} failed: {told}.",
+        f"Writing to {where} failed: {message}.",
         "Look at the free space and the permissions of the folder, or at the bucket and its credentials; then run the "
         "command again.",
         {"path": where},
@@ -334,7 +334,7 @@ def not_writable(where: str, error: Exception) -> KempfError:
 
 
 def _free_bytes(where: str) -> int | None:
-    """Return what a person without special rights may still write there, bytes; None where nobody can tell."""
+    """Return what a person without special rights may still write there, bytes; None where that is unknown."""
     if "://" in where:
         return None
     path = Path(where)

@@ -88,7 +88,7 @@ def _taken(warehouse: Warehouse, name: str, key: tuple[object, ...]) -> DeltaTab
 def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: DeltaTable | None) -> None:
     mark = None
     if table is not None:
-        with suppress(OSError):  # what was done with the table is done: a bucket that is gone now is told at the next
+        with suppress(OSError):  # what was done with the table is done: a bucket that is gone now shows at the next
             mark = warehouse.mark_of(name, *_commit(table.version()))
     if table is None or mark is None or table.version() - vars(table)[_BORN] > MOST_COMMITS:
         return

@@ -99,13 +99,13 @@ def to_mcap(
 
 
 def about(found: Comparison) -> dict[str, str]:
-    """Return what a file tells of where its predictions come from.
+    """Return what a file says of where its predictions come from.
 
     Parameters
     ----------
     found : Comparison
     """
-    told = {
+    content = {
         "vessel": found.vessel,
         "parameter_set_id": found.parameter_set.parameter_set_id,
         "estimator": found.parameter_set.estimator,
@@ -113,8 +113,8 @@ def about(found: Comparison) -> dict[str, str]:
         "code_version": str(found.parameter_set.provenance.get("code_version", "")),
     }
     for run in found.runs:
-        told[run.name] = f"{run.sample.replace('_', ' ')}; noise levels {run.levels_from}"
-    return told
+        content[run.name] = f"{run.sample.replace('_', ' ')}; noise levels {run.levels_from}"
+    return content
 
 
 def _schema(topic: _Topic) -> bytes:

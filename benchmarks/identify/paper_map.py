@@ -1,7 +1,7 @@
 """Where the paper's procedure works and where it does not: ``python -m benchmarks.identify.paper_map``.
 
 The experiment of `flows.jobs.reproduce_paper`, mapped over measurement noise and over how much force and current
-vary: how it ends, how far off it is, and how much of that the theory of errors in the regressors foretells.
+vary: how it ends, how far off it is, and how much of that the theory of errors in the regressors predicts.
 """
 
 from __future__ import annotations
@@ -132,7 +132,7 @@ def errors(sailed: Sailed, A: Float, B: Float) -> Float:
 
 
 def attenuated(sailed: Sailed, noise: float) -> Float:
-    """What the theory foretells for a regression on noisy regressors, [A B] M (M + R)^-1; errors in percent."""
+    """What the theory predicts for a regression on noisy regressors, [A B] M (M + R)^-1; errors in percent."""
     s = sailed.sampled
     A, B = discretise(sailed.truth, s.speed_m_s, s.step_s)
     Z = np.column_stack([sailed.states, s.rudder])[:-1]

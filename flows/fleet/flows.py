@@ -63,7 +63,7 @@ def ingest(
     warehouse : str, optional
         Its address.
     vessel : str, optional
-        Whose they are; else the profile tells.
+        Whose they are; else the profile says so.
     profiles : sequence of str, optional
         Profile files.
     """

@@ -225,7 +225,7 @@ def do_fleet(
     changed_only : bool, optional
         False also verifies every kept parameter set from the raw bytes.
     progress : Progress, optional
-        Told after every batch.
+        Called after every batch.
 
     Returns
     -------

@@ -146,7 +146,7 @@ def ingest(
     paths : sequence of Path
         Raw logs.
     vessel : str, optional
-        Whose they are; else the profile tells.
+        Whose they are; else the profile says so.
     given : VesselProfile, optional
         Laid over the stored profile of the vessel.
     progress : Progress, optional

@@ -1,4 +1,4 @@
-"""Lost stretches of a log as a person and a program are told of them."""
+"""Lost stretches of a log as they are shown to a person and to a program."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 #: a gear has one rate if so many of its fast intervals, those above half the fastest, agree on it within so much of it
 _AGREE, _WITHIN = 0.6, 0.1
 _FEWEST_FAST = 6
-#: the slope between two readings tells standing from running only if its noise is below this share of the rate; of an
+#: the slope between two readings shows whether a gear runs only if its noise is below this share of the rate; of an
 #: instrument read faster the corners are too small to matter
 _CLEAR = 0.15
 _NOISES = 4.0

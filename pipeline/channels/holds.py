@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float, Nanoseconds
 
-#: fewer runs than this tell nothing about an instrument's period
+#: fewer runs than this say nothing about an instrument's period
 _MIN_RUNS = 20
 #: a channel that knows no more values than this is an order (starboard, port, amidships), not a measurement
 _ORDERS = 5

@@ -72,7 +72,7 @@ def smoothed(series: Series, noise_std: float, shapes: Sequence[Float] = ()) -> 
     References
     ----------
     Craven and Wahba (1978), "Smoothing noisy data with spline functions", Numerische Mathematik 31: where the noise is
-    known, what is left over and the weight of a reading in its own value tell the error of each stiffness.
+    known, what is left over and the weight of a reading in its own value give the error of each stiffness.
     Silverman (1984), "Spline smoothing: the equivalent variable kernel method", Annals of Statistics 12: a spline of
     penalty h^4 passes the share 1 / (1 + (h w)^4) of what swings at w.
     Speckman (1988), "Kernel smoothing in partial linear models", Journal of the Royal Statistical Society B 50: the

@@ -1,4 +1,4 @@
-"""Runs beside their predictions as they are told: one object a run, and means of fitted and of held-out ones."""
+"""Runs beside their predictions as they are shown: one object a run, and means of fitted and of held-out ones."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def started_from(run: ComparedRun) -> dict[str, Any]:
     v, r, psi, force, moment, first, second, bias = (float(x) for x in run.predicted.constants)
     has, earth = run.looked.filtered.present(), run.looked.filtered.spec.current == "earth"
     state = {"lateral_speed_m_s": v, "yaw_rate_deg_s": _DEG * r, "heading_from_first_deg": _DEG * psi}
-    told = (
+    disturbances = (
         (has[3], "wind_force_m_s2", force),
         (has[4], "yaw_acceleration_rad_s2", moment),
         (has[5], "current_north_m_s" if earth else "current_lateral_m_s", first),
@@ -129,7 +129,7 @@ def started_from(run: ComparedRun) -> dict[str, Any]:
     )
     return {
         "initial_state": state,
-        "disturbances": {name: value for there, name, value in told if there},
+        "disturbances": {name: value for there, name, value in disturbances if there},
         "note": "constants fitted to this very run, the same few for every model; whatever changes on the way is error",
     }
 

@@ -22,7 +22,7 @@ from kempf.schemas.symbols import CHANNEL_SYMBOLS
 #: lags go up to this time, and to so many steps at most
 _LONGEST_S, _MOST = 60.0, 120
 _WIDTH = float(norm.ppf(0.5 + BAND / 2.0))
-#: pairs below which nothing is told of a lag
+#: pairs below which a lag is left out
 _FEWEST_PAIRS = 20
 
 
@@ -57,9 +57,9 @@ def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
         cross = {}
         for name in names:
             rho, counts = _pooled(z, [one[name] for one in given], [0, *lags])
-            cross[name] = _told(rho, counts, step * np.array([0, *lags]))
+            cross[name] = _summary(rho, counts, step * np.array([0, *lags]))
         found[channel] = {
-            "auto": {**_told(auto, pairs, step * np.array(lags)), **_ljung_box(auto, pairs)},
+            "auto": {**_summary(auto, pairs, step * np.array(lags)), **_ljung_box(auto, pairs)},
             "cross": cross,
         }
     return found
@@ -99,7 +99,7 @@ def _pooled(z: Sequence[Float], other: Sequence[Float], lags: Sequence[int]) -> 
     return rho, pairs
 
 
-def _told(rho: Float, pairs: Float, lag_s: Float) -> dict[str, Any]:
+def _summary(rho: Float, pairs: Float, lag_s: Float) -> dict[str, Any]:
     good = np.isfinite(rho)
     if not good.any():
         nothing = {"band": None, "outside": 0, "expected_outside": 0.0, "largest": None, "largest_lag_s": None}

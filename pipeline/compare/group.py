@@ -1,4 +1,4 @@
-"""What is told of a group of instants: whitened innovations beside those of a right model, and the free run's error.
+"""What is said of a group of instants: whitened innovations beside those of a right model, and the free run's error.
 
 Whitened innovations of a right model are independent with variance 1 (Mehra & Peschon 1971, "An innovations approach
 to fault detection and diagnosis in dynamic systems", Automatica 7): the mean square of n is chi-squared over n.
@@ -18,7 +18,7 @@ from kempf.pipeline.predict.run_residuals import Samples
 
 #: probability of the bands
 BAND = 0.99
-#: unit and factor from SI in which errors are told
+#: unit and factor from SI in which errors are shown
 UNITS: dict[str, tuple[str, float]] = {
     "lateral_speed": ("m/s", 1.0),
     "yaw_rate": ("deg/s", float(np.rad2deg(1.0))),

@@ -57,14 +57,14 @@ def _stands_out(named: dict[str, dict[str, Any]], bins: dict[str, list[dict[str,
     entries += [(f"by_bin {of}", _interval(one), one) for of, groups in bins.items() for one in groups]
     tested = [(of, which, *pair) for of, which, one in entries for pair in one["channels"].items() if pair[1]["n"]]
     found = []
-    for of, which, channel, told in tested:
-        square = told["n"] * told["whitened_rms"] ** 2
-        adjusted = min(1.0, len(tested) * float(chi2.sf(square, told["n"])))
+    for of, which, channel, reading in tested:
+        square = reading["n"] * reading["whitened_rms"] ** 2
+        adjusted = min(1.0, len(tested) * float(chi2.sf(square, reading["n"])))
         if adjusted < 1.0 - BAND:
-            kept = {key: told[key] for key in ("n", "whitened_rms", "band")}
-            rank = float(chi2.logsf(square, told["n"]))
+            kept = {key: reading[key] for key in ("n", "whitened_rms", "band")}
+            rank = float(chi2.logsf(square, reading["n"]))
             found.append((rank, {"of": of, "which": which, "channel": channel, **kept, "p_adjusted": adjusted}))
-    return [told for _, told in sorted(found, key=lambda pair: pair[0])[:_NAMED]]
+    return [entry for _, entry in sorted(found, key=lambda pair: pair[0])[:_NAMED]]
 
 
 def _interval(one: dict[str, Any]) -> str:

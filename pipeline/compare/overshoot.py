@@ -78,8 +78,8 @@ def compare_overshoots(
         error = None
         if len(gained) == 2 and gained[0] is not None and gained[1] is not None:
             error = float(np.rad2deg(gained[1] - gained[0]))
-        told = None if error is None else turn.overshoot_deg + error
-        found.append(OvershootError(turn.number, turn.side, turn.overshoot_deg, told, error))
+        predicted_deg = None if error is None else turn.overshoot_deg + error
+        found.append(OvershootError(turn.number, turn.side, turn.overshoot_deg, predicted_deg, error))
     return tuple(found)
 
 

@@ -13,8 +13,8 @@ from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import Looked
 
-#: a window in instants, and how many windows are told of each kind
-_WINDOW, _TOLD = 20, 5
+#: a window in instants, and how many windows are shown of each kind
+_WINDOW, _SHOWN = 20, 5
 _FEWEST = 4
 
 
@@ -36,35 +36,36 @@ def worst(looked: Sequence[Looked]) -> list[dict[str, Any]]:
     found = []
     for i, name in enumerate(CHANNELS):
         found += _one_step(looked, i, name) + _free(looked, i, name)
-    told = []
+    shown = []
     for measure in ("one step", "free run"):
-        these = sorted((one for one in found if one["measure"] == measure), key=lambda one: -float(one["_rank"]))
-        told += [{k: v for k, v in one.items() if k != "_rank"} for one in these[:_TOLD]]
-    return told
+        these = [window for window in found if window["measure"] == measure]
+        these.sort(key=lambda window: -float(window["_rank"]))
+        shown += [{k: v for k, v in window.items() if k != "_rank"} for window in these[:_SHOWN]]
+    return shown
 
 
 def _one_step(looked: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
     found = []
-    for one in looked:
-        for at, mean, count in _windows(one.whitened[:, channel] ** 2):
+    for run in looked:
+        for at, mean, count in _windows(run.whitened[:, channel] ** 2):
             probability = float(chi2.sf(mean * count, count))
-            told = {"whitened_rms": float(np.sqrt(mean)), "p_value": probability}
+            measured = {"whitened_rms": float(np.sqrt(mean)), "p_value": probability}
             rank = -float(chi2.logsf(mean * count, count))
-            found.append({**_window(one, at), "channel": name, "measure": "one step", **told, "_rank": rank})
+            found.append({**_window(run, at), "channel": name, "measure": "one step", **measured, "_rank": rank})
     return found
 
 
 def _free(looked: Sequence[Looked], channel: int, name: str) -> list[dict[str, Any]]:
     unit, factor = UNITS[name]
-    whole = np.concatenate([one.free.error[:, channel] for one in looked])
+    whole = np.concatenate([run.free.error[:, channel] for run in looked])
     if not np.isfinite(whole).any():
         return []
     usual, found = float(np.nanmean(whole**2)), []
-    for one in looked:
-        for at, mean, _ in _windows(one.free.error[:, channel] ** 2):
+    for run in looked:
+        for at, mean, _ in _windows(run.free.error[:, channel] ** 2):
             times = float(np.sqrt(mean / usual)) if usual > 0.0 else 0.0
-            told = {"free_run_rms": factor * float(np.sqrt(mean)), "unit": unit, "times_its_rms": times}
-            found.append({**_window(one, at), "channel": name, "measure": "free run", **told, "_rank": times})
+            measured = {"free_run_rms": factor * float(np.sqrt(mean)), "unit": unit, "times_its_rms": times}
+            found.append({**_window(run, at), "channel": name, "measure": "free run", **measured, "_rank": times})
     return found
 
 
@@ -77,7 +78,7 @@ def _windows(square: Float) -> list[tuple[int, float, int]]:
     count = np.round(np.convolve(good.astype(np.float64), kernel, "valid"))
     mean = np.where(count >= _FEWEST, total / np.maximum(count, 1.0), -np.inf)
     found = []
-    for _ in range(_TOLD):
+    for _ in range(_SHOWN):
         at = int(np.argmax(mean))
         if not np.isfinite(mean[at]):
             break

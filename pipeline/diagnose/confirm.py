@@ -60,7 +60,7 @@ class Confirmation:
     likelihood_ratio : float
         Twice the log-likelihood gained.
     bic_change : float
-        Negative where the effect earns its parameters.
+        Negative where the effect is worth its parameters.
     fold_gains : ndarray, shape (runs,)
         Log-likelihood gained in each fitted run by parameters that did not see it, to first order.
     held_out_gains : ndarray, shape (held,)
@@ -127,7 +127,7 @@ def confirm(
     last = slice(base.values.size, None)
     reach = 1e-9 * np.maximum(np.abs(model.high[last]), np.abs(model.low[last]))
     low, high, at = model.low[last], model.high[last], fit.values[last]
-    # at a lower bound of 0 the effect is absent, which the criterion tells; any other bound is implausible
+    # at a lower bound of 0 the effect is absent, which the criterion shows; any other bound is implausible
     bound = (at >= high - reach) | ((at <= low + reach) & (low != 0.0))
     outdone = not fit.converged and fit.log_likelihood < wanted
     after = before if outdone else unseen(fit, held, workers)

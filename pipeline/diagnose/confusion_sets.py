@@ -1,4 +1,4 @@
-"""Confusion sets: effects that these data cannot tell from each other."""
+"""Confusion sets: effects that these data cannot distinguish."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from kempf.pipeline.diagnose.screen import Candidate
 
 #: share of what one effect explains that another would explain alike, above which they are put to the same test
 ALIKE = 0.9
-#: refits within this of the best information criterion are not told from it
+#: refits within this of the best information criterion are not distinguished from it
 WINDOW = 6.0
 
 

@@ -29,8 +29,8 @@ from kempf.schemas.model_spec import ModelSpec
 
 Announce = Callable[[str], None]
 #: how many times its score a refit gains at most, as far as has been seen; a hull bent by what is missing hides much
-_FORETOLD = 10.0
-#: standard errors from nothing below which an effect added before does not earn its place
+_MOST_GAIN = 10.0
+#: standard errors from nothing below which an effect added before is taken out again
 _SEEN = 2.0
 
 
@@ -133,7 +133,7 @@ def diagnose(
     given : sequence of Effect, optional
         Effects that the model has already.
     announce : callable, optional
-        Is told what is done, for a progress line.
+        Called with what is being done, for a progress line.
     """
     chosen, left = split(runs)
     announce(f"fitting the model to {len(chosen)} manoeuvres, {len(left)} held out")
@@ -151,10 +151,10 @@ def diagnose(
             break
         alone = _unseen(last, held, workers)
         for candidate in worth:
-            # the score foretells the likelihood ratio, but beside what is no ship; what is far behind the best refit
+            # the score predicts the likelihood ratio, but not beside what is no ship; what is far behind the best refit
             # cannot come near it
             if is_ship(last.fit.hull) and any(
-                candidate.score * _FORETOLD < k.likelihood_ratio - WINDOW for _, k in tried if k.holds
+                candidate.score * _MOST_GAIN < k.likelihood_ratio - WINDOW for _, k in tried if k.holds
             ):
                 continue
             announce(f"step {len(steps)}: refitting with {candidate.effect.title}")
@@ -201,7 +201,7 @@ def _idle(steps: Sequence[Step]) -> Effect | None:
 def _without(
     idle: Effect, steps: list[Step], held: Sequence[GridRun], effects: Mapping[str, Effect], workers: Executor
 ) -> list[Step]:
-    """Climb the ladder again without an effect; what was refused on the way stays told."""
+    """Climb the ladder again without an effect; what was refused on the way stays listed."""
     made = [steps[0]]
     refused = [pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused)]
     for step in steps[1:]:

@@ -55,7 +55,7 @@ def responses(base: PooledFit, trials: Sequence[EffectTrial], workers: Executor)
     for bundle, made in zip(bundles, passed, strict=True):
         for i, columns in zip(bundle, made, strict=True):
             result[i] = columns
-    # what one effect makes of a state may be no number for another one that is not there: only alone it is told
+    # what one effect makes of a state may be no number for another one that is not there: it is passed again, alone
     astray = [i for bundle in bundles if len(bundle) > 1 for i in bundle if result[i] is None]
     for i, (columns,) in zip(astray, workers.map(lambda i: _passed(base, [trials[i]]), astray), strict=True):
         result[i] = columns

@@ -39,7 +39,7 @@ _CALM = (1e-4, 1e-6, 1e-3)
 def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: float = -np.inf) -> PooledFit:
     """Fit a model with one effect more.
 
-    A hull fitted without a lag of the rudder has bent itself to stand in for it, and from there the way to the true
+    A hull fitted without a lag of the rudder has been bent to imitate it, and from there the way to the true
     hull leads through worse ones. So an effect with a threshold races from several sizes and two hulls, and where the
     hull has bent so far that it is no ship, every effect climbs from an ordinary one too.
 
@@ -70,7 +70,7 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
     fitted = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted)
     if is_ship(base.hull):
         return fitted
-    # what the score foretells beside such a hull says little, and the disturbances beside it have eaten the effect
+    # what the score predicts beside such a hull says little, and the disturbances beside it have eaten the effect
     levels = base.levels.copy()
     levels[:, : len(_CALM)] = np.log(_CALM)
     calm = replace(base, levels=np.clip(levels, *level_bounds(base.runs[0].spec)))
@@ -83,7 +83,7 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
 
 
 def _sizes(effect: Effect) -> list[Float]:
-    """Sizes to begin with where the score foretells none: of what delays the rudder several, it has several tops."""
+    """Sizes to begin with where the score predicts none: of what delays the rudder several, it has several tops."""
     first, *rest = (p.steps for p in effect.parameters)
     if effect.rudder_course is None:
         chosen = first[:1]
@@ -158,7 +158,7 @@ def staged(
     Raises
     ------
     DataRejected
-        ``effect_not_testable``: nothing can be told of an effect from these runs, or a channel tells it already; the
+        ``effect_not_testable``: these runs say nothing of an effect, or a channel measures it already; the
         message says which.
     """
     plain = fit_plain(runs, spec, workers, settings)

@@ -24,7 +24,7 @@ from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect
 
-#: share of an effect that the fitted parameters imitate, above which nothing can be told of it
+#: share of an effect that the fitted parameters imitate, above which it cannot be tested
 NOT_TESTABLE = 0.999
 
 
@@ -161,7 +161,7 @@ def score(base: PooledFit, effect: Effect, workers: Executor) -> Candidate:
 
 def _scored(base: PooledFit, known: Nuisance, effects: Sequence[Effect], workers: Executor) -> list[Candidate]:
     nothing = [_untested(base, effect) for effect in effects]
-    # what a channel shows already is in the inputs: scored beside them it would stand in for something else
+    # what a channel shows already is in the inputs: scored beside them it would imitate something else
     tried = [candidate.effect for candidate in nothing if not (candidate.missing or candidate.measured_by)]
     trials = [EffectTrial(effect, steps) for effect in tried for steps in _grid(effect)]
     columns = responses(base, trials, workers)
@@ -178,7 +178,7 @@ def _untested(base: PooledFit, effect: Effect) -> Candidate:
 def _best(
     known: Nuisance, nothing: Candidate, moved: Mapping[tuple[str, tuple[float, ...]], Float | None]
 ) -> Candidate:
-    """Return an effect at the point of its grid where it tells most, or untested where there is none."""
+    """Return an effect at the point of its grid where it explains most, or untested where there is none."""
     best, tries = nothing, 0
     for steps in _grid(nothing.effect):
         columns = moved.get((nothing.effect.name, steps))

@@ -121,7 +121,7 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
 
 
 def _untestable(candidate: Candidate) -> str:
-    """Say why nothing can be told of an effect from these data; empty where something can."""
+    """Say why these data do not determine an effect; empty where they do."""
     if candidate.missing:
         return f"not in the logs: {_listed(list(candidate.missing))}"
     if candidate.measured_by:

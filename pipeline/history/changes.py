@@ -41,7 +41,7 @@ class Change:
     width : float
         Simultaneous intervals of all parameters are ``change`` +- ``width`` ``std``.
     rival : float
-        BIC of the other form, step or drift, less that of this one; under 2 the data hardly tell which it was.
+        BIC of the other form, step or drift, less that of this one; under 2 the data hardly show which it was.
     alone : tuple of (int, float, float)
         Parameters that could have changed alone: index, change and standard error if they did.
     """

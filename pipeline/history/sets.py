@@ -88,7 +88,7 @@ def usable(value: Float, covariance: Float) -> Mask:
 def occasions(history: ParameterHistory, within_s: float) -> ParameterHistory:
     """Merge sets begun within a time of the first of them into one.
 
-    Trials of one day share draught, trim, sea state and water: as witnesses of how well trials repeat they count once.
+    Trials of one day share draught, trim, sea state and water: as evidence of how well trials repeat they count once.
     The mean is weighted by one number a set, the inverse of its average variance, not by its whole covariance: matrix
     weights lean on combinations that the sets claim to know far better than trials repeat.
 

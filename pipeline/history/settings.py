@@ -18,7 +18,7 @@ class ChangeSettings:
     seed : int
         Of them: equal histories give equal answers.
     smallest_side : int
-        Occasions that must lie on either side of a step: one alone cannot be told from a trial that went wrong.
+        Occasions that must lie on either side of a step: one alone may be a trial that went wrong.
     prior_dof : float
         How many degrees of freedom the sets' own covariances are worth against their scatter.
     tail_dof : float
@@ -29,7 +29,7 @@ class ChangeSettings:
     occasion_s : float
         Sets begun within this time are one occasion, s.
     power : float
-        Probability with which the smallest change that is told would be seen.
+        Probability with which the smallest change that is reported would be seen.
     """
 
     level: float = 0.05

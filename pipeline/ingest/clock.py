@@ -1,4 +1,4 @@
-"""The clock of one source of a log: which records have a time that runs back, told as they come."""
+"""The clock of one source of a log: which records have a time that runs back, found as they come."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Clock:
         self._before: int | None = None
 
     def goes_back(self, time: NDArray[np.int64], *, ends: bool) -> NDArray[np.bool_]:
-        """Tell of times that follow on those before whether they are earlier than one before, or alone far ahead.
+        """Return of times that follow on those before whether they are earlier than one before, or alone far ahead.
 
         Parameters
         ----------

@@ -1,6 +1,6 @@
 """Channels whose clock the profile sets right: a known delay, a clock that runs too fast.
 
-The checks of the clock were made before, on the times that the log tells; here they are put right. A record whose
+The checks of the clock were made before, on the times of the log; here they are put right. A record whose
 channels are late by different times becomes one row a time.
 """
 

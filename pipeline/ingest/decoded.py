@@ -49,9 +49,9 @@ class LostStretch:
     Attributes
     ----------
     since_ns, until_ns : int or None
-        By the logger's clock, UTC nanoseconds; None where nothing tells.
+        By the logger's clock, UTC nanoseconds; None where unknown.
     messages : int or None
-        How many records are lost, where the file tells.
+        How many records are lost, where the file says so.
     why : str
     """
 
@@ -148,11 +148,11 @@ class Decoded:
     raw : Pieces
         Each record as it stands in the file, shape (n,).
     content : Pieces
-        The part that tells two records apart (without the logger's stamp), shape (n,).
+        The part that distinguishes two records (without the logger's stamp), shape (n,).
     time_utc_ns : ndarray of int64, shape (n,)
         `NO_TIME` where there is none.
     source : ndarray of int64, shape (n,)
-        Index into ``source_names``; -1 where it cannot be told.
+        Index into ``source_names``; -1 where it is unknown.
     source_names : tuple of str
         Talker and sentence, topic, or ``row``; a later part of the same log may have more, behind these.
     reason : ndarray of int8, shape (n,)

@@ -154,7 +154,7 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
             f"{name} lacks columns that the profile maps: {', '.join(map(repr, missing))}; "
             f"it has {', '.join(map(repr, columns[:_SHOWN])) or 'none'}"
             f"{f' and {len(columns) - _SHOWN} more' if len(columns) > _SHOWN else ''}.",
-            "Mend the names in the profile's source, or its separator, header_lines or columns.",
+            "Correct the names in the profile's source, or its separator, header_lines or columns.",
             {"name": name, "missing": missing, "found": columns[:_SHOWN]},
         )
     twice = sorted({column for column in wanted if columns.count(column) > 1})

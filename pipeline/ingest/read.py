@@ -164,7 +164,7 @@ def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
         years = f" Its times lie in {since}." if since == until else f" Its times lie between {since} and {until}."
     step = {
         "clock_unset": "The logger's clock was not set: correct the times in a copy of the log, or ingest another log.",
-        "no_time": "No sentence tells the time: log RMC or ZDA too, or let the logger stamp the lines.",
+        "no_time": "No sentence gives the time: log RMC or ZDA too, or let the logger stamp the lines.",
         "checksum": "The lines are damaged, or their checksums were cut off: export the log again.",
         "no_channel": "The log holds none of the canonical channels: check that it is the right file.",
     }

@@ -1,6 +1,6 @@
 """The checks that every record of every format passes, in columns: clock, repetition, numbers, physical range.
 
-Here the readings of a log are told from what is refused, and both ledgers are drawn up. Whether a channel makes sense
+Here the readings of a log are parted from what is refused, and both ledgers are drawn up. Whether a channel makes sense
 as a whole is the doctor's question, not one of this room.
 """
 

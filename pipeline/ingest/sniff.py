@@ -1,4 +1,4 @@
-"""Which format a log has, told by its content and not by its name."""
+"""Which format a log has, by its content and not by its name."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Compressed logs, told by their first bytes and unpacked within a bound."""
+"""Compressed logs, known by their first bytes and unpacked within a bound."""
 
 from __future__ import annotations
 
@@ -97,7 +97,7 @@ def _zstd(name: str, data: bytes, limit: int) -> tuple[bytes, list[str]]:
         if length := _skippable(data[at : at + 8]):
             at += length
             continue
-        # the reader stops without a word at a cut: the frame is told whole by the object below
+        # the reader stops without a word at a cut: whether the frame is whole is known by the object below
         frame, step = zstandard.ZstdDecompressor().decompressobj(), _FIRST_STEP
         while not frame.eof and at < len(data):
             piece = data[at : at + step]
@@ -124,7 +124,7 @@ def _behind_zeros(data: bytes, at: int) -> int:
 
 
 def _rest(kind: str, data: bytes, at: int) -> list[str]:
-    """Tell of bytes behind the compressed data."""
+    """Note bytes behind the compressed data."""
     if _behind_zeros(data, at) >= len(data):
         return []
     return [f"{len(data) - at} bytes behind the end of the {kind} data were left out."]

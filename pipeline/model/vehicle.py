@@ -90,7 +90,7 @@ class LinearVehicle:
     >>> cart.augmented(np.array([[0.9]]), np.array([[1.0]])).H
     array([[1., 0., 1.]])
 
-    Speed alone cannot tell the two apart:
+    Speed alone cannot separate the two:
 
     >>> cart.hidden(np.array([[0.9]]))
     ('wind', 'bias')

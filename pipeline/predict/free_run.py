@@ -99,7 +99,7 @@ def free_run_of(filtered: RunFilter, hull: Float, values: Float) -> FreeRun:
         n = run.measured.shape
         return FreeRun(run.name, np.full(n, np.nan), np.where(made, np.inf, np.nan), start)
     anchor = start.copy()
-    # beside thousands of measurements the prior only keeps what they do not tell from growing
+    # beside thousands of measurements the prior only keeps what they do not determine from growing
     loose = 0.05 * np.sqrt(base.size) / _PRIOR[used]
     for _ in range(_ROUNDS):
         steps = np.diag(_STEP)[:, used]

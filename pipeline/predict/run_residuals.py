@@ -61,7 +61,7 @@ class Looked:
 
 
 def phases_s(detail: Sequence[Mapping[str, Any]], start_utc_ns: int) -> tuple[PhaseInterval, ...]:
-    """Return phases as a segment tells them on the clock of a run.
+    """Return phases as a segment has them on the clock of a run.
 
     Parameters
     ----------

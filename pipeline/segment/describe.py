@@ -1,4 +1,4 @@
-"""From a zigzag found in a chain of legs to the record that is told: angles, instants, phases, quality."""
+"""From a zigzag found in a chain of legs to its record: angles, instants, phases, quality."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def describe(
     speed: Series | None,
     settings: SegmentSettings,
 ) -> Zigzag:
-    """Measure everything that is told of a zigzag.
+    """Measure everything that is recorded of a zigzag.
 
     Parameters
     ----------

@@ -1,7 +1,7 @@
-"""The entry of the room: all zigzags of one log, found without being told what was ordered.
+"""The entry of the room: all zigzags of one log, found without knowing what was ordered.
 
-Rudder legs that alternate are candidates (`legs`), the headings at which they switch decide (`switching`), what is told
-of them is measured in `describe`.
+Rudder legs that alternate are candidates (`legs`), the headings at which they switch decide (`switching`); the record
+of each is measured in `describe`.
 """
 
 from __future__ import annotations

@@ -117,7 +117,7 @@ def measure(signals: Signals, legs: list[Leg], settings: SegmentSettings) -> tup
 
 
 def _ramps(signals: Signals, legs: list[Leg]) -> list[Ramp | None]:
-    """Measure the movement before each leg; the rate told by the slower ones serves those too quick to sample."""
+    """Measure the movement before each leg; the rate of the slower ones serves those too quick to sample."""
     time_s, rudder, noise = signals.rudder_s, signals.rudder, signals.rudder_noise
 
     def reversals(known_rate: float) -> list[Ramp | None]:

@@ -66,7 +66,7 @@ def measure_ramp(
     noise : float
         Standard deviation of the rudder's noise, rad.
     known_rate : float, optional
-        Rate of the steering gear, rad/s, used where the samples on the ramp are too few to tell it.
+        Rate of the steering gear, rad/s, used where the samples on the ramp are too few to determine it.
 
     Returns
     -------

@@ -42,7 +42,7 @@ class SegmentSettings:
     gap_share : float
         Longest gap in heading or rudder, as a share of the shorter leg beside it, that does not break the manoeuvre.
     switchings_without_approach : int
-        Switchings that must agree where no steady approach tells K0: K0 and psi0 are two unknowns, and four leave
+        Switchings that must agree where no steady approach gives K0: K0 and psi0 are two unknowns, and four leave
         two checks.
     """
 

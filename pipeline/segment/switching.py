@@ -1,7 +1,7 @@
 """Which part of a chain of rudder legs is one zigzag: the heading must switch the rudder at K0 + psi0 and K0 - psi0.
 
 Overshoots may grow and the speed may fall: that is the ship's answer, the manoeuvre is a zigzag for as long as the
-order was carried out. It is none where no course was steady before and too few switchings agree to tell K0 instead, as
+order was carried out. It is none where no course was steady before and too few switchings agree to give K0 instead, as
 when a ship that no longer obeys is given the next order. Overshoots and phases are measured later.
 """
 
@@ -80,7 +80,7 @@ def zigzags_in(chain: Chain, settings: SegmentSettings) -> list[Switching]:
     """Find the zigzags in a chain, from the left, each as long as it goes.
 
     One that starts from a steady approach is looked for first. What is left over may be one whose approach was not
-    steady or not recorded; since K0 is then told by the switchings alone, more of them must agree.
+    steady or not recorded; since K0 then follows from the switchings alone, more of them must agree.
 
     Parameters
     ----------
@@ -163,7 +163,7 @@ def _judge(chain: Chain, first: int, last: int, settings: SegmentSettings) -> Sw
 
 
 def _start(chain: Chain, first: int, settings: SegmentSettings, *, centre: float, change: float, swing: float) -> Start:
-    """Tell how the first leg begins."""
+    """Return how the first leg begins."""
     ramp, leg = chain.ramps[first], chain.legs[first]
     if ramp is None or not np.isfinite(chain.heading[first]):
         return "unknown"

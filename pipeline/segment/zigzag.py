@@ -1,4 +1,4 @@
-"""What is told of one zigzag: a record of plain numbers, angles in deg because that is how a trial is ordered.
+"""What is recorded of one zigzag: a record of plain numbers, angles in deg because that is how a trial is ordered.
 
 Nothing is measured here.
 """

@@ -134,7 +134,7 @@ def measure(
     since_start = np.rint(ticks * SECOND_NS).astype(np.int64)
     delay = instrument.latency_s + instrument.latency_jitter_s * clock.standard_normal(ticks.size)
     delay_ns = np.rint(np.maximum(delay, 0.0) * SECOND_NS).astype(np.int64)
-    # what is measured is the truth at the very instant that is told, nanoseconds included
+    # what is measured is the truth at the very instant of the stamp, nanoseconds included
     sample = trajectory.at(since_start / SECOND_NS)
     noise = {name: std * noise_scale for name, std in instrument.noise.items()}
     values = SENSORS[instrument.name].read(sample, hull, setting, noise, stream(seed, f"noise {instrument.name}"))
@@ -161,5 +161,5 @@ def _check(instrument: Instrument) -> None:
             "instrument_clock",
             f"The instrument {instrument.name!r} samples at {instrument.rate_hz} Hz from {instrument.phase_s} s on, "
             f"jitter {instrument.jitter_s} s; expected a positive rate, a phase from 0 on, jitter below half a period.",
-            "Mend rate_hz, phase_s or jitter_s.",
+            "Correct rate_hz, phase_s or jitter_s.",
         )

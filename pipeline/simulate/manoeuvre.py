@@ -1,4 +1,4 @@
-"""The trial programme: what the helmsman is told to do, step by step, and what is on record of each step."""
+"""The trial programme: what the helmsman is ordered to do, step by step, and what is on record of each step."""
 
 from __future__ import annotations
 

@@ -162,7 +162,7 @@ def simulate_trial(settings: TrialSettings) -> Trial:
             "trial_settings",
             f"seed {settings.seed}, substeps {settings.substeps}, noise_scale {settings.noise_scale}: expected "
             "at least 0, 1 and 0.",
-            "Mend the settings.",
+            "Correct the settings.",
         )
     trajectory, manoeuvres = sail(
         settings.hull,

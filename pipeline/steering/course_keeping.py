@@ -156,7 +156,7 @@ def course_law(
     UsageError
         A setting is out of its range.
     DataRejected
-        These parameters allow no law: the rudder does not turn such a ship, or her wind and current cannot be told
+        These parameters allow no law: the rudder does not turn such a ship, or her wind and current cannot be separated
         from the measurements.
     """
     chosen = settings or LawSettings()
@@ -227,7 +227,7 @@ def _observer(plant: StateSpace) -> Float:
     """Steady gain of eqs. (4)-(5), in the form that corrects the prediction."""
     A, H, R = plant.A, plant.measured, plant.R
     if _deficient(A, H):
-        raise _no_law("wind and current cannot be told apart by such a ship")
+        raise _no_law("wind and current cannot be separated by such a ship")
     P = solve_discrete_are(A.T, H.T, plant.Q, R)
     gain: Float = np.linalg.solve(H @ P @ H.T + R, H @ P).T
     return gain

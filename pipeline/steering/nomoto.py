@@ -117,8 +117,8 @@ def nomoto(hull: Hull, covariance: Float, speed_m_s: float, length_m: float | No
     Examples
     --------
     >>> from kempf.pipeline.model.ship import mariner_like
-    >>> told = nomoto(mariner_like(160.93), np.zeros((6, 6)), 7.7, 160.93)
-    >>> told.poles, round(told.constants["K'"].value, 2), round(told.constants["T'"].value, 2)
+    >>> steering = nomoto(mariner_like(160.93), np.zeros((6, 6)), 7.7, 160.93)
+    >>> steering.poles, round(steering.constants["K'"].value, 2), round(steering.constants["T'"].value, 2)
     ('real', 3.84, 4.86)
     """
     require_numbers(hull, speed_m_s)
@@ -171,13 +171,15 @@ def _quotients(p: Float, V: float, name: str) -> tuple[Float, Float]:
 
 
 def _warnings(p: Float, covariance: Float, determinant: float, turning: float, apart: float) -> tuple[str, ...]:
-    told = []
+    warnings = []
     if determinant < 0.0:
-        told.append("unstable on a straight course: K and T1 are negative and no steady turn belongs to a small rudder")
+        warnings.append(
+            "unstable on a straight course: K and T1 are negative and no steady turn belongs to a small rudder"
+        )
     if turning * p[5] <= 0.0 or p[5] <= 0.0:
-        told.append("the signs are not those of a ship with a stern rudder: K and T3 should be read with care")
+        warnings.append("the signs are not those of a ship with a stern rudder: K and T3 should be read with care")
     if not np.all(np.isfinite(covariance)):
-        return (*told, "the parameters have no covariance: no standard errors")
+        return (*warnings, "the parameters have no covariance: no standard errors")
     slopes = gradient(
         lambda q: np.array(
             [
@@ -191,16 +193,16 @@ def _warnings(p: Float, covariance: Float, determinant: float, turning: float, a
     std = np.sqrt(np.diag(slopes @ covariance @ slopes.T))
     for name, value, error in (("K, T1 and T", determinant, std[0]), ("T3 and T", turning, std[1])):
         if abs(value) < _SAFE * error:
-            told.append(
+            warnings.append(
                 f"{name} divide by a number only {abs(value) / error:.1f} standard errors from zero: "
                 "read the interval, not the standard error"
             )
     if abs(apart) < _SAFE * std[2]:
-        told.append(
+        warnings.append(
             f"the two poles are as good as equal (their discriminant lies {abs(apart) / std[2]:.1f} standard errors "
-            "from zero): T1 and T2 one by one, or that they exist, cannot be told; T and K can"
+            "from zero): T1 and T2 one by one, or that they exist, cannot be determined; T and K can"
         )
-    return tuple(told)
+    return tuple(warnings)
 
 
 def largest_rate_per_s(hull: Hull, speed_m_s: float) -> float:

@@ -21,7 +21,7 @@ from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.steering.delta_method import gradient
 from kempf.pipeline.steering.nomoto import require_numbers
 
-Verdict = Literal["stable", "unstable", "cannot be told from these data"]
+Verdict = Literal["stable", "unstable", "cannot be determined from these data"]
 #: how sure a verdict must be
 CONFIDENCE = 0.95
 _LOG2_DRAWS = 14
@@ -34,7 +34,7 @@ class Stability:
     Attributes
     ----------
     verdict : str
-        ``stable`` or ``unstable`` where the data say so with 95 %, else ``cannot be told from these data``.
+        ``stable`` or ``unstable`` where the data say so with 95 %, else ``cannot be determined from these data``.
     reason : str
         Why.
     probability : float
@@ -92,14 +92,14 @@ def stability(hull: Hull, covariance: Float, speed_m_s: float) -> Stability:
     verdict, reason = _verdict(probability, float(value[0]), float(std[0]))
     units = ("1/m^2", "1/s", "1/s")
     names = ("a11 a22 - a12 a21", "slower eigenvalue", "faster eigenvalue")
-    told = [Value(n, float(x), float(s), u) for n, x, s, u in zip(names, value, std, units, strict=True)]
-    return Stability(verdict, reason, probability, told[0], (told[1], told[2]), poles)
+    values = [Value(n, float(x), float(s), u) for n, x, s, u in zip(names, value, std, units, strict=True)]
+    return Stability(verdict, reason, probability, values[0], (values[1], values[2]), poles)
 
 
 def _verdict(probability: float, determinant: float, std: float) -> tuple[Verdict, str]:
     if np.isnan(probability):
         return (
-            "cannot be told from these data",
+            "cannot be determined from these data",
             "the parameters have no covariance, so nothing says how sure the sign is",
         )
     where = f"a11 a22 - a12 a21 is {determinant:.3g}" + (f" with standard error {std:.2g}" if std > 0 else "")
@@ -109,7 +109,7 @@ def _verdict(probability: float, determinant: float, std: float) -> tuple[Verdic
         return "stable", f"{where}; {chance}"
     if probability <= 1.0 - CONFIDENCE:
         return "unstable", f"{where}; {chance}"
-    return "cannot be told from these data", f"{where}: too near to zero; {chance}"
+    return "cannot be determined from these data", f"{where}: too near to zero; {chance}"
 
 
 def _probability(p: Float, covariance: Float) -> float:

@@ -63,7 +63,7 @@ def usual_levels(spec: ModelSpec) -> NoiseLevels:
     Parameters
     ----------
     spec : ModelSpec
-        Its correlation rates tell which levels in the long run these changes belong to.
+        Its correlation rates say which levels in the long run these changes belong to.
     """
     (force, force_s), (stream, stream_s) = _CHANGES
     return NoiseLevels(

@@ -213,7 +213,7 @@ def test_a_magnetic_heading_is_made_true_by_the_variation_that_the_log_tells():
     fix = "GPRMC,074701.15,A,5954.0003,N,02435.9999,E,17.64,13.43,030525,3.4,W,A"
     readings = read(fix, "HCHDM,10.0,M", "HCHDG,1.0,1.0,E,,")
     assert np.degrees(column(readings, "heading_rad")[1:]) == pytest.approx([6.6, 358.6])
-    assert any("HDM were made true by the variation that GPRMC tells: -3.4 deg" in note for note in readings.notes)
+    assert any("HDM were made true by the variation that GPRMC sends: -3.4 deg" in note for note in readings.notes)
 
 
 def test_the_compass_own_variation_comes_before_that_of_the_receiver():
@@ -230,7 +230,7 @@ def test_a_variation_of_more_than_half_a_turn_is_none(degrees):
     )
     assert np.degrees(column(readings, "heading_rad")[2:]) == pytest.approx([6.6])
     assert readings.tally.by_reason == {"not_a_number": 1, "out_of_range": 1}
-    assert any("tells: -3.4 deg" in note for note in readings.notes)
+    assert any("sends: -3.4 deg" in note for note in readings.notes)
 
 
 def test_two_rudders_that_turn_together_are_their_mean():

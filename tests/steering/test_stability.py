@@ -46,9 +46,9 @@ def test_verdicts():
     assert stability(unstable, covariance_of(unstable), 7.5).verdict == "unstable"
     near = less_stable(0.1)
     told = stability(near, covariance_of(near), 7.5)
-    assert told.verdict == "cannot be told from these data" and "too near to zero" in told.reason
+    assert told.verdict == "cannot be determined from these data" and "too near to zero" in told.reason
     blind = stability(stable, np.full((6, 6), np.nan), 7.7)
-    assert blind.verdict == "cannot be told from these data" and np.isnan(blind.probability)
+    assert blind.verdict == "cannot be determined from these data" and np.isnan(blind.probability)
 
 
 def test_a_ship_on_the_border_is_seldom_given_a_verdict():

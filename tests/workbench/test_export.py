@@ -129,7 +129,7 @@ def test_steering_of_a_set(filled: Path):
     truth = {"K": 0.185, "T2": 7.8, "T3": 18.5}  # published of the simulated ship
     for key, exact in truth.items():
         assert abs(constants[key]["value"] - exact) < 4 * constants[key]["std"]
-    assert told["stability"]["verdict"] in ("stable", "unstable", "cannot be told from these data")
+    assert told["stability"]["verdict"] in ("stable", "unstable", "cannot be determined from these data")
     assert 0.0 <= told["stability"]["probability_stable"] <= 1.0
     faster = kempf(
         "params", "steering", name, "--speed", str(2 * told["speed_m_s"]), "--warehouse", filled, "--json"

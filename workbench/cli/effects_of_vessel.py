@@ -32,7 +32,7 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.flows.jobs.standing_model import Own, standing_model
     from kempf.pipeline.diagnose.settings import DiagnosisSettings
-    from kempf.pipeline.diagnose.verdict import as_json as told_as_json
+    from kempf.pipeline.diagnose.verdict import as_json as diagnosis_as_json
     from kempf.warehouse.canonical import plain
     from kempf.warehouse.store import Warehouse
 
@@ -46,7 +46,7 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
         settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
         found = examine(warehouse, chosen, spec, own, settings, tell, only=(name,))
     print_note(said_of_vessel(warehouse, vessel))
-    document = told_as_json(found.diagnosis)
+    document = diagnosis_as_json(found.diagnosis)
     document = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **document})
     if as_json:
         print_json(document)

@@ -206,14 +206,14 @@ def steering(set_id: str, speed: float | None, verbose: bool, uri: str, as_json:
                 "length_m": ship.length_m,
                 "nomoto": {
                     "poles": constants.poles,
-                    "constants": {n: _told(c) for n, c in constants.constants.items()},
+                    "constants": {n: _as_json(c) for n, c in constants.constants.items()},
                 },
                 "stability": {
                     "verdict": judged.verdict,
                     "reason": judged.reason,
                     "probability_stable": judged.probability,
-                    "determinant": _told(judged.determinant),
-                    "eigenvalues_real_part": [_told(v) for v in judged.real_parts],
+                    "determinant": _as_json(judged.determinant),
+                    "eigenvalues_real_part": [_as_json(v) for v in judged.real_parts],
                 },
                 "effects": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in effects},
                 "warnings": warnings,
@@ -229,9 +229,9 @@ def steering(set_id: str, speed: float | None, verbose: bool, uri: str, as_json:
     show_warnings(warnings, verbose=verbose)
 
 
-def _told(one: Constant | Value) -> dict[str, object]:
-    interval = {"interval_95": one.interval_95} if hasattr(one, "interval_95") else {}
-    return {"value": one.value, "std": one.std, "unit": one.unit, **interval}
+def _as_json(value: Constant | Value) -> dict[str, object]:
+    interval = {"interval_95": value.interval_95} if hasattr(value, "interval_95") else {}
+    return {"value": value.value, "std": value.std, "unit": value.unit, **interval}
 
 
 def _interval(one: Constant) -> str:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 _NAMES = {"yaw_rate": "yaw rate", "heading": "heading", "lateral_speed": "lateral speed"}
-#: of Okabe & Ito (2008), told apart by the colour-blind: predicted, and badges of held-out and fitted runs
+#: of Okabe & Ito (2008), which the colour-blind can distinguish: predicted, and badges of held-out and fitted runs
 _PREDICTED, _HELD_OUT, _FITTED = "#0072B2", "#D55E00", "#555555"
 
 

@@ -1,4 +1,4 @@
-"""Two channels that should tell one motion: how much of it, how late, and by a clock how much faster.
+"""Two channels that should show one motion: how much of it, how late, and by a clock how much faster.
 
 Increments over windows are compared, one of them read later by a lag that may grow over the log.
 """
@@ -38,7 +38,7 @@ class Alignment:
     slope, slope_std : float
         Change of the second for a change of 1 in the first.
     lag_s, lag_std_s : float
-        How much later the second tells it, in the middle of the log, s.
+        How much later the second shows it, in the middle of the log, s.
     rate, rate_std : float
         By how much the lag grows in a second: how much faster the second one's clock runs, s/s.
     left_over : float

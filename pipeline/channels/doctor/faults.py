@@ -73,7 +73,7 @@ class Fault:
 
     @property
     def key(self) -> tuple[str, tuple[str, ...], str]:
-        """What tells two faults apart; estimates of one are one."""
+        """What distinguishes two faults; estimates of one are one."""
         return self.kind, self.channels, self.name
 
     def corrected(self, log: Log) -> Log:

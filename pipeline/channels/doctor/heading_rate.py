@@ -1,4 +1,4 @@
-"""Heading against yaw rate: the one is the integral of the other, and both tell of it at one instant."""
+"""Heading against yaw rate: the one is the integral of the other, and both show it at one instant."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What the doctor looks at: the channels of one log, as delivered, and the motions that they tell of."""
+"""What the doctor looks at: the channels of one log, as delivered, and the motions that they show."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
 Complex = NDArray[np.complex128]
 
-#: Pairs of channels that tell the velocity over ground: by speed and course, earth-fixed, body-fixed.
+#: Pairs of channels that give the velocity over ground: by speed and course, earth-fixed, body-fixed.
 VELOCITIES: dict[str, tuple[str, str]] = {
     "course": ("speed_over_ground", "course_over_ground"),
     "earth": ("velocity_north", "velocity_east"),
@@ -24,9 +24,9 @@ VELOCITIES: dict[str, tuple[str, str]] = {
 }
 #: A ship slower than this share of her fast speed makes no way worth a course.
 _UNDER_WAY = 0.4
-#: No GNSS tells a course below this speed, m/s.
+#: No GNSS gives a course below this speed, m/s.
 _SLOWEST_M_S = 0.2
-#: Fixes that tell a motion; how many times their noise the way between two of them is; the finest noise that is
+#: Fixes that show a motion; how many times their noise the way between two of them is; the finest noise that is
 #: believed, m; 90th percentile of a second difference of places with unit noise north and east,
 #: sqrt(6) sqrt(2 ln 10).
 _FEWEST_FIXES, _CLEAR, _FINEST_M, _BEND = 20, 15.0, 0.1, 5.257
@@ -43,7 +43,7 @@ class Velocity:
     Attributes
     ----------
     channels : tuple of str
-        What tells it.
+        What gives it.
     time_utc_ns : ndarray, shape (n,)
     value : ndarray of complex128, shape (n,)
         Towards north plus i times towards east (ahead plus i times to starboard for a body-fixed one), m/s.

@@ -30,7 +30,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
 
     Seen from the bow, the velocity over ground is a constant A (the way she makes), plus a stream C that turns
     backwards as she turns, plus a drift S r that goes with the yaw rate: w = A + C exp(-i psi) + S r. The angle of A
-    is how far heading or course are turned. Legs on several headings tell A and C apart; where they do not, what is
+    is how far heading or course are turned. Legs on several headings separate A and C; where they do not, what is
     known of streams beforehand is part of the standard error.
 
     Parameters

@@ -91,7 +91,7 @@ def _compare(
         return [untestable(name, channels, "the rudder was hardly used, or she hardly turned")]
     edges = edges_of(rudder, angle, rate, window_s=_window(rudder))
     if edges.size < _FEWEST:
-        return [untestable(name, channels, "too short to tell her answer from chance")]
+        return [untestable(name, channels, "too short to distinguish her answer from chance")]
     shifts = _SHIFTS if thorough else np.array([USUAL_S[0], 0.5 * (USUAL_S[0] + USUAL_S[1]), USUAL_S[1]])
     answered = _best(edges, rudder, angle, rate, _makes_way(log, edges), shifts)
     if answered is None:
@@ -111,7 +111,7 @@ def _window(rudder: Series) -> float:
 
 
 def _makes_way(log: Log, edges: Nanoseconds) -> NDArray[np.bool_]:
-    """Tell in which windows she makes so much way that the rudder acts, shape (n,); all where no speed is known."""
+    """Return in which windows she makes so much way that the rudder acts, shape (n,); all where no speed is known."""
     for name in ("speed_through_water", "speed_over_ground"):
         speed = log.series.get(name)
         if speed is not None:
@@ -185,7 +185,7 @@ def _mean_squares(put: Float, turn: Float, long: Float, observed: Float) -> Floa
 def _clock(name: str, channels: tuple[str, ...], found: RobustLine, shift: float, explains: float) -> Outcome:
     """Judge the shift of the rudder at which she answers best."""
     if explains < _CLOCKED or abs(found.value[0]) < SURE * found.std[0]:
-        return untestable(name, channels, "her answer to the rudder is too faint to tell when it was put over")
+        return untestable(name, channels, "her answer to the rudder is too faint to show when it was put over")
     figure = Figure("time of the rudder behind that of her answer", shift, _SHIFT_STD_S, *USUAL_S, "s")
     when = "before" if shift > 0 else "after"
     words = f"she turns as if the rudder had been put over {abs(shift):.0f} s {when} the log says"

@@ -66,7 +66,7 @@ class Batch:
     first, end : ndarray of int64, shape (m,)
         Payloads in it; empty stretches for messages that are lost.
     channel : ndarray of int64, shape (m,)
-        Channel ids, -1 where it cannot be told.
+        Channel ids, -1 where it is unknown.
     log_time, publish_time : ndarray of int64, shape (m,)
         Nanoseconds.
     pieces : tuple of Piece
@@ -127,7 +127,7 @@ def stretch(since_ns: int | None, until_ns: int | None, messages: int | None, wh
 
 
 def lost_chunk(log: LogFile, place: int, length: int, why: str) -> tuple[Batch, LostStretch]:
-    """Stand in for a chunk that cannot be read: its messages by the index behind it, or one where there is none.
+    """Return a batch for a chunk that cannot be read: its messages by the index behind it, or one where there is none.
 
     Parameters
     ----------
@@ -151,7 +151,7 @@ def lost_chunk(log: LogFile, place: int, length: int, why: str) -> tuple[Batch, 
 
 
 def _indexed(log: LogFile, at: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Return channel and log time of the messages that the indexes from a place on tell, sorted by time."""
+    """Return channel and log time of the messages that the indexes from a place on list, sorted by time."""
     channels, times = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     while len(head := log.read(at, HEAD + 6)) == HEAD + 6 and head[0] == MESSAGE_INDEX:
         length, channel, size = struct.unpack_from("<QHI", head, 1)
@@ -188,7 +188,7 @@ class PayloadsBuilder:
         self._blocks.append(_ChunkBlock(batch.pieces, batch.first.astype(np.uint32), batch.end.astype(np.uint32)))
 
     def build(self, log: LogFile, is_text: NDArray[np.bool_]) -> Payloads:
-        """Return all payloads; ``is_text`` tells of each whether it is shown as it stands."""
+        """Return all payloads; ``is_text`` says of each whether it is shown as it stands."""
         return Payloads(log, self._blocks, is_text)
 
 

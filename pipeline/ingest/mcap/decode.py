@@ -1,4 +1,4 @@
-"""MCAP logs: the messages of every topic to canonical channels, as the profile maps them or their definition tells."""
+"""MCAP logs: the messages of every topic to canonical channels, as the profile maps them or their definition says."""
 
 from __future__ import annotations
 
@@ -39,7 +39,7 @@ class Part:
         Where they stand.
     time_ns : ndarray of int64, shape (m,)
     topic : ndarray of int64, shape (m,)
-        Place of the topic in the order in which topics come, -1 where it cannot be told.
+        Place of the topic in the order in which topics come, -1 where it is unknown.
     reason : ndarray of int8, shape (m,)
         Code of the reason for which a record is refused, 0 for none.
     text : ndarray of bool, shape (m,)
@@ -108,7 +108,7 @@ def parts(name: str, log: LogFile, source: Source) -> Iterator[Part]:
     Raises
     ------
     UsageError, DataRejected
-        See `decode`, but for what can be told only at the end of the file.
+        See `decode`, but for what is known only at the end of the file.
     """
     return _DecodeJob(name, log, source).parts()
 
@@ -149,7 +149,7 @@ def decode(name: str, log: LogFile, source: Source | None, patterns: list[str]) 
 def _topics(name: str, log: LogFile, source: Source | None, known: McapStream) -> set[str]:
     """Return the topics of a file, as far as they decide to which of them a key of the profile belongs.
 
-    The key /a.b.c may be the field c of /a.b or the field b.c of /a. Where the summary does not tell the topics, the
+    The key /a.b.c may be the field c of /a.b or the field b.c of /a. Where the summary does not list the topics, the
     file is read through for them first.
     """
     channels = known.channels
@@ -346,7 +346,7 @@ class _DecodeJob:
             raise DataRejected(
                 "topics_missing",
                 f"{self.name} lacks topics that the profile maps: {', '.join(missing)}; it has {named}.",
-                "Mend the keys '<topic>.<field>' in the profile's source, or take out those that this logger lacks.",
+                "Correct the keys '<topic>.<field>' in the profile's source, or take out those that this logger lacks.",
                 {"name": self.name, "missing": missing, "found": topics},
             )
         if missing:

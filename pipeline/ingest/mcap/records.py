@@ -34,7 +34,7 @@ _CHUNK_HEAD = struct.Struct("<QQQII")
 
 @dataclass(frozen=True)
 class Schema:
-    """How the messages of a channel are built; ``encoding`` says in which language ``data`` tells it."""
+    """How the messages of a channel are built; ``encoding`` says in which language ``data`` says it."""
 
     name: str
     encoding: str

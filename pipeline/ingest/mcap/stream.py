@@ -1,7 +1,7 @@
 """An MCAP file from its first byte to its last, a few megabytes in memory at a time; damage costs what it lies in.
 
 The file is read in the order it was written, so that one that was never closed, one without an index and one that
-lost its end are read the same way as a whole one. The summary tells where to go on behind damage; where it is gone
+lost its end are read the same way as a whole one. The summary says where to go on behind damage; where it is gone
 too, the next chunk is looked for. What the messages say is read in `decode`.
 
 References
@@ -51,7 +51,7 @@ _HEADS = 40
 #: From here on a chunk is handed on as it is; smaller ones are worth a copy that puts them together.
 _LARGE = 1 << 19
 
-#: Lost stretches that are told apart; what more there are is one.
+#: Lost stretches that are listed one by one; what more there are is one.
 _MOST_STRETCHES = 1_000
 
 #: Largest record that is read for what it says; a larger one, such as an attachment, is stepped over.
@@ -281,7 +281,7 @@ class McapStream:
     def _resume(self, at: int, stop: int) -> int:
         """Return where to go on behind damage: at the next chunk that the summary knows, or that can be found."""
         if at in self._length:
-            self.notes.append(f"The file is damaged at byte {at}: its summary tells where the chunk there ends.")
+            self.notes.append(f"The file is damaged at byte {at}: its summary says where the chunk there ends.")
             return at + self._length[at]
         later = self._expected[self._expected > at]
         place = int(later[0]) if later.size else -1
@@ -289,7 +289,7 @@ class McapStream:
             place = chunk_behind(self._log, at + 1, stop, stop)
         if place < 0:
             if self._summary.ended and self._summary.data_end > at:
-                if self._summary.messages is None:  # else their count tells
+                if self._summary.messages is None:  # else their count shows it
                     self._lose(stretch(self._last_ns, None, None, f"the file is damaged from byte {at} to its end"))
                 return self._summary.data_end
             self._cut(f"the file is cut short or damaged at byte {at}")
@@ -323,13 +323,13 @@ class McapStream:
             at += len(piece)
 
     def _end(self, data: bytes, length: int, at: int, first: int, end: int) -> None:
-        """Compare the CRC of the data section with the one that its last record tells."""
+        """Compare the CRC of the data section with the one in its last record."""
         self._check_window(at, data, length)
         stored_crc = int.from_bytes(data[first : first + 4], "little") if end - first >= 4 else 0
         if stored_crc and self._crc is not None and self._crc != stored_crc and not self.lost:
             why = "the CRC of the data section does not match, so that what has no CRC of its own may be damaged"
             self._lose(
-                LostStretch(None, None, None, why), f"Something in the file is damaged, and nothing tells where: {why}."
+                LostStretch(None, None, None, why), f"Something in the file is damaged, and nothing says where: {why}."
             )
         if not self._summary.ended:
             self.notes.append("The end of the file is missing; its data section is whole.")
@@ -337,7 +337,7 @@ class McapStream:
 
 
 def _alone(opcode: int, length: int) -> tuple[NDArray[np.uint8], Index, Index]:
-    """Return one record as a walk tells it."""
+    """Return one record as a walk returns it."""
     return np.array([opcode], dtype=np.uint8), np.array([HEAD]), np.array([HEAD + length])
 
 

@@ -36,7 +36,7 @@ class DecodedTopics:
     values : dict of str to (value, present)
         By field, in the log's unit, shapes (m,).
     time_ns : ndarray of int64, shape (m,), or None
-        Where the time is asked of the messages; -1 where they do not tell it.
+        Where the time is asked of the messages; -1 where they do not give it.
     """
 
     good: NDArray[np.bool_]

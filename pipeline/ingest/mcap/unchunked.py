@@ -24,7 +24,7 @@ from kempf.pipeline.ingest.spans import as_bytes
 #: damage, where there may be more of it, or the next chunk near.
 WINDOW, FIRST_WINDOW = 4 << 20, 1 << 14
 
-#: Bytes of a chunk's head that tell it for one.
+#: Bytes of a chunk's head by which it is recognised.
 _CHUNK_HEAD = 64
 
 #: Most records in front of the first message or chunk, which describe what comes.

@@ -45,7 +45,7 @@ class MessageReader(Protocol):
     Attributes
     ----------
     missing : dict of str to str
-        Fields that are no number of the messages, as far as their definition tells; each with why.
+        Fields that are no number of the messages, as far as their definition says; each with why.
     """
 
     missing: dict[str, str]

@@ -214,7 +214,7 @@ def _field(content: bytes, proto3: bool) -> tuple[str, ProtoField]:
     number, kind, label = (descriptor.get(n, 0) for n in (3, 5, 4))
     if not (isinstance(number, int) and isinstance(kind, int)):
         raise NoReaderError("its descriptor is damaged")
-    implicit = proto3 and 9 not in descriptor  # a field of a oneof, and an optional one, tells zero from absent
+    implicit = proto3 and 9 not in descriptor  # a field of a oneof, and an optional one, distinguishes zero from absent
     name, type_name = _text(descriptor.get(1, b"")), _text(descriptor.get(6, b""))
     return name, ProtoField(number, kind, type_name, label == _REPEATED, implicit)
 

@@ -50,7 +50,7 @@ class NmeaClock:
 
 @dataclass(frozen=True, eq=False)
 class _LineTimes:
-    """What the sentences themselves tell of time, line by line; `NO_TIME` where nothing."""
+    """What the sentences themselves say of time, line by line; `NO_TIME` where nothing."""
 
     of_day: Nanoseconds
     full: Nanoseconds  # with the date
@@ -58,13 +58,13 @@ class _LineTimes:
 
     @property
     def timed(self) -> Flag:
-        """Whether the line tells a time of day."""
+        """Whether the line gives a time of day."""
         has_time: Flag = self.of_day != NO_TIME
         return has_time
 
     @property
     def dated(self) -> Flag:
-        """Whether the line tells a date too."""
+        """Whether the line gives a date too."""
         has_date: Flag = self.full != NO_TIME
         return has_date
 
@@ -125,7 +125,7 @@ def _delays(
     source = np.full(own.size, -1, dtype=np.int64)
     for name, what in said.items():
         good = (what.reason == 0) & (own[what.record] == NO_TIME) & (carried[what.record] != NO_TIME)
-        # an instrument may tell roll and pitch in two sentences of one address: these are one measurement
+        # an instrument may send roll and pitch in two sentences of one address: these are one measurement
         kinds = (
             [there.astype(np.int64) << k for k, (_, there) in enumerate(what.values.values())] if name == "XDR" else []
         )
@@ -142,7 +142,7 @@ def _delays(
 
 
 def _line_times(frames: Frames, said: dict[str, Said]) -> tuple[_LineTimes, int]:
-    """Collect what the sentences tell of time; also return how many dates were put right."""
+    """Collect what the sentences say of time; also return how many dates were put right."""
     n = len(frames.lines)
     of_day, midnight = np.full(n, NO_TIME, dtype=np.int64), np.full(n, NO_TIME, dtype=np.int64)
     void = np.zeros(n, dtype=np.bool_)
@@ -163,7 +163,7 @@ def _line_times(frames: Frames, said: dict[str, Said]) -> tuple[_LineTimes, int]
 
 
 def _of_a_dated_talker(frames: Frames, dated: Flag) -> Flag:
-    """Tell which sentences come from a talker that also tells the date.
+    """Tell which sentences come from a talker that also sends the date.
 
     A display that repeats a receiver's position without the date repeats it late, too: it gives its own sentences
     their time, but carries none to others.
@@ -222,7 +222,7 @@ def _nearest_day(times: _LineTimes, near: Nanoseconds, notes: list[str]) -> Nano
     offset, brief = _without_brief_dates(full[dated] - guess[dated], guess[dated])
     guess[dated] += offset
     if brief:
-        notes.append(f"{brief} dates that disagree with those around them were put right: told late at midnight.")
+        notes.append(f"{brief} dates that disagree with those around them were put right: sent late at midnight.")
     own[known] = guess
     return own
 
@@ -248,7 +248,7 @@ def _follows(said: dict[str, Said]) -> bool:
     between = (behind > 0) & (behind < at.size)
     ahead = np.abs(its - speed[np.clip(behind - 1, 0, at.size - 1)])
     after = np.abs(its - speed[np.clip(behind, 0, at.size - 1)])
-    # NaN compares false: what is void bears no witness
+    # NaN compares false: what is void does not count
     next_wins, last_wins = int(np.sum(between & (after < ahead))), int(np.sum(between & (ahead < after)))
     return next_wins >= _LEAST_AGREEMENTS and next_wins > _RATIO * last_wins
 
@@ -257,12 +257,12 @@ def _correct_rollover(full: Nanoseconds, dated: Flag, stamp: Nanoseconds) -> tup
     """Put dates that are 1024 or 2048 weeks late where the log shows it.
 
     It shows it where the lines bear stamps of another clock, or where another receiver, or the same one at another
-    instant, tells a date that is later by just that.
+    instant, gives a date that is later by just that.
 
     Parameters
     ----------
     full : ndarray of int64, shape (n,)
-        Instants that sentences tell with their date.
+        Instants that sentences give with their date.
     dated : ndarray of bool, shape (n,)
         Which sentences do.
     stamp : ndarray of int64, shape (n,)
@@ -281,7 +281,7 @@ def _correct_rollover(full: Nanoseconds, dated: Flag, stamp: Nanoseconds) -> tup
     known = stamp[at] != NO_TIME
     latest = own.max()
     reference = np.where(known, stamp[at], latest)
-    # the stamps are minutes off at most; another receiver may tell its date at the other end of the log
+    # the stamps are minutes off at most; another receiver may send its date at the other end of the log
     slack = np.where(known, DAY_NS, _LONGEST_LOG_NS)
     weeks = (reference - own + ROLLOVER_NS // 2) // ROLLOVER_NS
     late = (weeks > 0) & (np.abs(reference - own - weeks * ROLLOVER_NS) <= slack)
@@ -297,13 +297,13 @@ def _spread(
 ) -> tuple[Nanoseconds, Index]:
     """Return how far behind their fix sentences were said.
 
-    A receiver tells its fix once a second, a compass its heading ten times: the ten would all have the time of the fix.
+    A receiver sends its fix once a second, a compass its heading ten times: the ten would all have the time of the fix.
     Those of one source that come between two fixes are taken for evenly spaced.
 
     Parameters
     ----------
     fix_ns, fix : ndarray of int64, shape (m,)
-        Instants of the fixes and their records, ascending; several may tell one instant.
+        Instants of the fixes and their records, ascending; several may have one instant.
     record, source : ndarray of int64, shape (n,)
         Records, ascending, of the sentences that were given the time of a fix, and which source they come from.
     follows : bool

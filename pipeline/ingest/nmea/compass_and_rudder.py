@@ -28,8 +28,8 @@ _FOLLOWS = (0.5, 2.0)
 def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
     """Add the variation to the headings of HDG and HDM, in place.
 
-    A heading whose sentence lacks the variation is given the latest that one other source has told, or the first where
-    none was told yet: it changes by less than a degree a day's sail. Where the log tells none, a magnetic heading is no
+    A heading whose sentence lacks the variation is given the latest that one other source has sent, or the first where
+    none was sent yet: it changes by less than a degree a day's sail. Where the log has none, a magnetic heading is no
     channel.
 
     Parameters
@@ -65,7 +65,7 @@ def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
             low, high = np.degrees(value.min()), np.degrees(value.max())
             shown = f"{low:.1f}" if round(low, 1) == round(high, 1) else f"{low:.1f} to {high:.1f}"
             notes.append(
-                f"Magnetic headings of {name} were made true by the variation that {teller} tells: {shown} deg."
+                f"Magnetic headings of {name} were made true by the variation that {teller} sends: {shown} deg."
             )
         # what is no heading stays as it is, to be refused: on the circle it would look like one
         known = (magnetic >= CHANNELS["heading"].low) & (magnetic <= CHANNELS["heading"].high)
@@ -75,7 +75,7 @@ def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
 
 
 def _variation(fields: Fields, name: str) -> tuple[Float, Flag]:
-    """Return the variation, rad, east positive, NaN for more than half a turn, and where the sentences tell one."""
+    """Return the variation, rad, east positive, NaN for more than half a turn, and where the sentences give one."""
     place, side = _VARIATION[name]
     cells = fields.at(place)
     degrees = cells.number()
@@ -84,7 +84,7 @@ def _variation(fields: Fields, name: str) -> tuple[Float, Flag]:
 
 
 def _carried_variation(frames: Frames, said: dict[str, Said]) -> tuple[Index, Float, str] | None:
-    """Return records and values of the variation that one source tells, and its name; None where there is none."""
+    """Return records and values of the variation that one source sends, and its name; None where there is none."""
     for name in _VARIATION:
         if name not in said:
             continue
@@ -134,7 +134,7 @@ def both_rudders(frames: Frames, said: dict[str, Said]) -> list[str]:
 
 
 def _judge(starboard: Float, there: Flag, port: Float, filled: Flag) -> tuple[bool, str]:
-    """Tell whether the port rudder is one, and say so."""
+    """Return whether the port rudder is one, and say so."""
     both = there & filled & np.isfinite(starboard) & np.isfinite(port)
     if not there.any():
         return True, "the rudder angle is that of the port rudder, the only one that is valid."
@@ -147,4 +147,4 @@ def _judge(starboard: Float, there: Flag, port: Float, filled: Flag) -> tuple[bo
         return False, (
             f"the port field turns by {slope:.2f} times the starboard rudder, so it was taken for no second rudder."
         )
-    return False, "the port field was left aside: the starboard rudder moves too little to tell whether it is a second."
+    return False, "the port field was left aside: the starboard rudder moves too little to show whether it is a second."

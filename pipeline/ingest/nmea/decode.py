@@ -23,7 +23,7 @@ _NONE: Corrections = {}
 def decode(data: bytes, corrections: Corrections = _NONE) -> Decoded:
     """Decode an NMEA 0183 log.
 
-    A record is a line that is not blank. RMC, ZDA, GGA and GLL tell their own time; any other sentence has that of its
+    A record is a line that is not blank. RMC, ZDA, GGA and GLL have their own time; any other sentence has that of its
     stamp, or in a log without stamps the time of the latest of those four before it - of the next one behind
     it, where VTG shows that the receiver sends its fix last. What comes several times between two fixes is spread
     evenly over the time between them.

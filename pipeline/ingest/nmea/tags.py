@@ -39,9 +39,9 @@ class Tags:
     start, behind : ndarray of int64, shape (n,)
         Place of the first backslash (of the line's end where there is no block), and where the sentence may begin.
     time_utc_ns : ndarray of int64, shape (n,)
-        Time of arrival, zero where it tells none.
+        Time of arrival, zero where it gives none.
     timed : ndarray of bool, shape (n,)
-        Whether it tells one, under the right checksum.
+        Whether it gives one, under the right checksum.
     broken : ndarray of bool, shape (n,)
         Whether there is a block without its own checksum, or without its end.
     """
@@ -107,7 +107,7 @@ def tags_of(buffer: Bytes, prefix: Bytes, openings: Index, strokes: Index, lines
     sentence = first_within(openings, lines.start, lines.stop)
     tagged = (opening >= 0) & ((sentence < 0) | (opening < sentence))
     closing = first_within(strokes, np.where(tagged, opening + 1, lines.stop), lines.stop)
-    open_ended = tagged & (closing < 0)  # one of its backslashes is lost: where it ended only the sentence tells
+    open_ended = tagged & (closing < 0)  # one of its backslashes is lost: where it ended only the sentence shows
     at = np.flatnonzero(tagged & ~open_ended)
     start, behind, broken = np.where(open_ended, opening, lines.stop), lines.start.copy(), open_ended
     opening, closing = opening[at], closing[at]

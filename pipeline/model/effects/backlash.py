@@ -9,7 +9,7 @@ from kempf.pipeline.compiled import njit
 
 
 def rudder_course(time_s: Float, rudder_rad: Float, values: Float) -> Float:
-    """Return the rudder behind a play, in whose middle it stood at the first instant.
+    """Return the rudder behind a play, in whose middle it was at the first instant.
 
     Parameters
     ----------

@@ -14,7 +14,7 @@ from kempf.pipeline.compiled import njit
 
 
 def rudder_course(time_s: Float, rudder_rad: Float, values: Float) -> Float:
-    """Return the rudder that follows its reading at a limited rate, and stood at it at the first instant.
+    """Return the rudder that follows its reading at a limited rate, and was there at the first instant.
 
     Parameters
     ----------

@@ -65,7 +65,7 @@ def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
         raise UsageError(
             "effect_numbers",
             f"The formula has {len(unknown)} unknown numbers, {_MOST_UNKNOWN} is the most.",
-            "Try it in parts: a trial tells few numbers apart.",
+            "Try it in parts: a trial determines few numbers.",
         )
     effect = Effect(
         name=name,
