@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unseen
 from kempf.pipeline.diagnose.confusion_sets import WINDOW, shortlist, undecided
 from kempf.pipeline.diagnose.forward_selection import is_ship, staged
+from kempf.pipeline.diagnose.ladder_step import Step, make_step
 from kempf.pipeline.diagnose.ridge_reference import Flexible, flexible
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
@@ -23,7 +23,6 @@ from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.plain_fit import PlainFit
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.predict.free_run import FreeRun, free_run
 from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import ModelSpec
 
@@ -32,50 +31,6 @@ Announce = Callable[[str], None]
 _MOST_GAIN = 10.0
 #: standard errors from nothing below which an effect added before is taken out again
 _SEEN = 2.0
-
-
-@dataclass(frozen=True, eq=False)
-class Step:
-    """One rung of the ladder.
-
-    Attributes
-    ----------
-    fit : PooledFit
-    added : Effect or None
-        None on the first.
-    chosen_from : tuple of (Candidate, Confirmation)
-        The set it was taken from, itself first.
-    refused : tuple of (Candidate, Confirmation)
-        What was refitted and did not stand the tests, or was clearly worse.
-    screened : tuple of Candidate
-        What the screen of this step's model says of everything else.
-    fitted, held : tuple of FreeRun
-        Free runs of the fitted and of the held-out manoeuvres.
-    """
-
-    fit: PooledFit
-    added: Effect | None
-    chosen_from: tuple[tuple[Candidate, Confirmation], ...]
-    refused: tuple[tuple[Candidate, Confirmation], ...]
-    screened: tuple[Candidate, ...]
-    fitted: tuple[FreeRun, ...]
-    held: tuple[FreeRun, ...]
-
-    @property
-    def in_sample_error(self) -> float:
-        """Mean relative error of the free runs of fitted manoeuvres."""
-        return float(np.mean([run.relative_error for run in self.fitted]))
-
-    @property
-    def held_out_error(self) -> float | None:
-        """Mean relative error of the free runs of held-out manoeuvres."""
-        return float(np.mean([run.relative_error for run in self.held])) if self.held else None
-
-    @property
-    def intensities(self) -> Float:
-        """Geometric means over the runs of the levels of the disturbances' drives, shape (3,)."""
-        result: Float = np.exp(np.mean(self.fit.levels[:, :3], axis=0))
-        return result
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,7 +96,7 @@ def diagnose(
     base = fits[-1]
     held = [runs[i] for i in left]
     announce(f"screening {len(effects)} effects")
-    steps = [_step(base, None, (), (), held, screen(base, effects, workers), workers)]
+    steps = [make_step(base, None, (), (), held, screen(base, effects, workers), workers)]
     before = flexible(base, workers) if len(chosen) > 1 else None
     while len(steps) <= settings.most_steps:
         last = steps[-1]
@@ -169,7 +124,7 @@ def diagnose(
         fit = best[0][1].fit
         announce(f"step {len(steps)}: screening beside {best[0][0].effect.title}")
         screened = screen(fit, effects, workers)
-        steps.append(_step(fit, best[0][0].effect, tuple(best), worse, held, screened, workers))
+        steps.append(make_step(fit, best[0][0].effect, tuple(best), worse, held, screened, workers))
         idle = _idle(steps)
         if idle is not None:
             announce(f"step {len(steps) - 1}: {idle.title} is no longer significant")
@@ -212,26 +167,7 @@ def _without(
         confirmation = confirm(base, _unseen(made[-1], held, workers), candidate, held, workers)
         others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
         screened = screen(confirmation.fit, effects, workers)
-        made.append(_step(confirmation.fit, step.added, ((candidate, confirmation),), others, held, screened, workers))
+        made.append(
+            make_step(confirmation.fit, step.added, ((candidate, confirmation),), others, held, screened, workers)
+        )
     return made
-
-
-def step_of(fit: PooledFit, held: Sequence[GridRun]) -> Step:
-    """Return a fitted model as a rung by itself, with its free runs and nothing screened."""
-    return _step(fit, fit.model.effects[-1] if fit.model.effects else None, (), (), held, ())
-
-
-def _step(
-    fit: PooledFit,
-    added: Effect | None,
-    chosen_from: tuple[tuple[Candidate, Confirmation], ...],
-    refused: tuple[tuple[Candidate, Confirmation], ...],
-    held: Sequence[GridRun],
-    screened: Sequence[Candidate],
-    workers: Executor | None = None,
-) -> Step:
-    runs = [*(filtered.run for filtered in fit.runs), *held]
-    each = map if workers is None else workers.map
-    free = tuple(each(lambda run: free_run(fit, run), runs))
-    many = len(fit.runs)
-    return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:])

@@ -10,8 +10,9 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.added_variable import added_variables
 from kempf.pipeline.diagnose.confusion_sets import ALIKE, alike
-from kempf.pipeline.diagnose.diagnosis import Diagnosis, Step
+from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.judged_run import JudgedRun, judged_fitted, judged_held_out
+from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.manoeuvre_evidence import SailedZigzag, manoeuvre_evidence
 from kempf.pipeline.diagnose.misfit import misfit_of
 from kempf.pipeline.diagnose.unmodelled_acceleration import unmodelled_acceleration

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.diagnose.diagnosis import Step
+from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.levels import fit_levels

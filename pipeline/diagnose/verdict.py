@@ -9,7 +9,8 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
-from kempf.pipeline.diagnose.diagnosis import Diagnosis, Step
+from kempf.pipeline.diagnose.diagnosis import Diagnosis
+from kempf.pipeline.diagnose.ladder_step import Step, rung
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.schemas.effect import Effect
 
@@ -353,34 +354,3 @@ def _refit(candidate: Candidate, confirmation: Confirmation) -> dict[str, Any]:
         "at_bound": confirmation.at_bound,
         "converged": confirmation.fit.converged,
     }
-
-
-def rung(number: int, step: Step) -> dict[str, Any]:
-    """Return one rung of the ladder as JSON content."""
-    force, moment, current = step.intensities
-    return {
-        "step": number,
-        "added": None if step.added is None else step.added.name,
-        "in_sample_error": step.in_sample_error,
-        "held_out_error": step.held_out_error,
-        "held_out": {run.name: _rms(run.rms) for run in step.held},
-        "in_sample": {run.name: _rms(run.rms) for run in step.fitted},
-        "disturbance_intensity": {
-            "wind_force_m_s2_per_sqrt_s": float(force),
-            "moment_rad_s2_per_sqrt_s": float(moment),
-            "current_m_s_per_sqrt_s": float(current),
-        },
-        "log_likelihood": step.fit.log_likelihood,
-        "converged": step.fit.converged,
-        "hull": dict(zip(("a11", "a12", "a21", "a22", "b1", "b2"), (float(x) for x in step.fit.hull), strict=True)),
-        "effects": {
-            f"{effect.name}.{parameter.name}": {"value": float(v), "std": float(s), "unit": parameter.unit}
-            for (effect, parameter), v, s in zip(
-                step.fit.model.parameters, step.fit.values, step.fit.std[6:], strict=True
-            )
-        },
-    }
-
-
-def _rms(rms: Float) -> dict[str, float]:
-    return dict(zip(("lateral_speed", "yaw_rate", "heading"), (float(x) for x in rms), strict=True))

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.diagnose.confirm import confirm, unseen
-from kempf.pipeline.diagnose.diagnosis import step_of
+from kempf.pipeline.diagnose.ladder_step import step_of
 from kempf.pipeline.diagnose.screen import score
 from kempf.pipeline.estimate import pooled_fit, sensitivity
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
