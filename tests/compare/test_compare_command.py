@@ -14,6 +14,7 @@ from kempf.warehouse import aliases, parameter_sets, segments
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.notebook.warehouse_view import open_warehouse
+from kempf.workbench.terminal import WIDEST
 from tests.conftest import Ship
 from tests.workbench.driving import kempf, refused, tree
 
@@ -136,6 +137,17 @@ def test_where_it_fails_is_told_by_sample(place: Path) -> None:
     assert "horizon: one step" in told.out
     assert "fitted: 1 manoeuvre" in told.out and "held out: no manoeuvre" in told.out
     assert "where it fails, fitted manoeuvres" in told.out and "worst stretches" in told.out
+
+
+def test_a_manoeuvre_is_one_line_of_the_table_and_all_overshoots_are_verbose(place: Path, document: dict) -> None:
+    short = document["runs"][0]["segment_id"][:12]
+    errors = [f"{error:+.2f}" for error in document["runs"][0]["overshoot_error_deg"]]
+    for more, lines in (((), 1), (("--verbose",), 2)):
+        done = kempf("compare", "--vessel", "mariner", *more, "--warehouse", place)
+        shown = [line for line in done.out.splitlines() if short in line]
+        assert len(shown) == lines and all(len(line) <= WIDEST for line in shown), done.out
+        assert shown[0].split()[-1] == max(errors, key=lambda error: abs(float(error)))
+        assert [" ".join(errors) in line for line in shown[1:]] == [True] * (lines - 1)
 
 
 def test_a_threshold_that_is_exceeded_is_an_exit_code(place: Path, document: dict) -> None:

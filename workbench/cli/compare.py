@@ -148,14 +148,15 @@ def _tell(document: dict[str, Any], *, verbose: bool) -> None:
     else:
         click.echo(f"initial state: {start['initial_state']}; {start['disturbances']}")
     for sample, title in _SAMPLES.items():
-        _tell_sample(title, [r for r in document["runs"] if r["sample"] == sample], document["summary"][sample])
+        runs = [run for run in document["runs"] if run["sample"] == sample]
+        _tell_sample(title, runs, document["summary"][sample], verbose=verbose)
     _tell_skipped(document["skipped"], verbose=verbose)
     for sample, title in _SAMPLES.items():
         if document.get("where", {}).get(sample):
             _tell_where(title, document["where"][sample])
 
 
-def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | None) -> None:
+def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | None, *, verbose: bool) -> None:
     if mean is None:
         click.echo(click.style(f"{title}: no manoeuvre", bold=True))
         return
@@ -163,14 +164,18 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
     head = ["manoeuvre", "zigzag", "start UTC"]
     for name in there:
         head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_told'][name]['unit']}"]
-    head += ["overshoot errors deg (free run)"]
+    head += ["largest overshoot error deg (free run)"]
     rows, short = [], short_ids(run["segment_id"] for run in runs)
     for run in runs:
         row = [short[run["segment_id"]], f"{run['psi0_deg']:g}/{run['delta0_deg']:g}", run["start"][:16]]
         for name in there:
             row += [_percent(run["fit_percent"].get(name)), number(run["rms_told"].get(name, {}).get("value"), 3)]
-        rows.append([*row, " ".join(_signed(e) for e in run["overshoot_error_deg"]) or "-"])
+        errors = [error for error in run["overshoot_error_deg"] if error is not None]
+        rows.append([*row, _signed(max(errors, key=abs, default=None))])
     print_table(head, rows, f"{title}: {len(runs)} manoeuvre{'s' if len(runs) > 1 else ''}")
+    for run in runs if verbose else ():
+        errors = " ".join(_signed(error) for error in run["overshoot_error_deg"])
+        click.echo(f"  overshoot errors of {short[run['segment_id']]}: {errors or '-'} deg")
     parts = [f"{_CHANNELS[name]} {_with_error(mean['fit_percent'][name])} %" for name in there]
     click.echo(f"  mean fit: {', '.join(parts)}")
     turns = mean["overshoot_error_deg"]
