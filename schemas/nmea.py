@@ -1,6 +1,6 @@
 """The sentences of NMEA 0183 that carry a canonical channel: type, fields, units, and where each says that it is void.
 
-Positions count the fields behind the address, from 1. Sentences whose channels do not stand at fixed fields with one
+Positions count the fields behind the address, from 1. Sentences whose channels are not in fixed fields with one
 unit, such as the list of transducers of XDR, are named in `SPECIAL`.
 
 References
@@ -197,7 +197,7 @@ _ALL = (
 #: Sentences by their three letters.
 SENTENCES: dict[str, Sentence] = {sentence.name: sentence for sentence in _ALL}
 
-#: Channels of the sentences whose channels do not stand at fixed fields with one unit -> unit that the standard fixes.
+#: Channels of the sentences whose channels are not in fixed fields with one unit -> unit that the standard fixes.
 SPECIAL: dict[str, dict[str, str]] = {
     "HDG": {"heading": "deg"},
     "HDM": {"heading": "deg"},
