@@ -169,7 +169,7 @@ def follow(text: str, folder: Path, *before: str) -> int:
             found, code = sessions[step.kind].run(names.resolved(step.line))
             assert code == 0, (step.line, found)
             told = difference(step.shown, found, names)
-            assert told is None, f"{step.line}\n{told}\nmend it with python -m benchmarks.documents.refresh_documents"
+            assert told is None, f"{step.line}\n{told}\nrenew it with python -m benchmarks.documents.refresh_documents"
     finally:
         for session in sessions.values():
             session.close()

@@ -164,7 +164,7 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
     head = ["manoeuvre", "zigzag", "start UTC"]
     for name in there:
         head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_told'][name]['unit']}"]
-    head += ["largest overshoot error deg (free run)"]
+    head += ["largest overshoot error deg"]
     rows, short = [], short_ids(run["segment_id"] for run in runs)
     for run in runs:
         row = [short[run["segment_id"]], f"{run['psi0_deg']:g}/{run['delta0_deg']:g}", run["start"][:16]]
@@ -181,7 +181,7 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
     turns = mean["overshoot_error_deg"]
     if turns["n"]:
         click.echo(
-            f"  overshoot, predicted less measured: {_with_error(turns)} deg over {turns['n']}, "
+            f"  overshoot of the free run, predicted less measured: {_with_error(turns)} deg over {turns['n']}, "
             f"mean size {turns['mean_size']:.2f} deg"
             + (f"; {turns['not_predicted']} not predicted" if turns["not_predicted"] else "")
         )

@@ -37,7 +37,9 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
     if vessel is not None:
         vessels.require(warehouse, vessel)
         print_note(said_of_vessel(warehouse, vessel))
-    found = parameter_sets.summaries(warehouse, vessel).rows(named=True)
+    # a pooled set begins with its first manoeuvre: it comes behind that manoeuvre's own, whatever their ids
+    known = parameter_sets.summaries(warehouse, vessel)
+    found = known.sort("vessel", "start_utc_ns", "estimator", "parameter_set_id").rows(named=True)
     pointed: dict[str, list[str]] = {}
     for name in sorted({row["vessel"] for row in found}):
         for alias, target in aliases.of_vessel(warehouse, name).items():
