@@ -174,8 +174,8 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
         rows.append([*row, _signed(max(errors, key=abs, default=None))])
     print_table(head, rows, f"{title}: {len(runs)} manoeuvre{'s' if len(runs) > 1 else ''}")
     for run in runs if verbose else ():
-        errors = " ".join(_signed(error) for error in run["overshoot_error_deg"])
-        click.echo(f"  overshoot errors of {short[run['segment_id']]}: {errors or '-'} deg")
+        every = " ".join(_signed(error) for error in run["overshoot_error_deg"])
+        click.echo(f"  overshoot errors of {short[run['segment_id']]}: {every or '-'} deg")
     parts = [f"{_CHANNELS[name]} {_with_error(mean['fit_percent'][name])} %" for name in there]
     click.echo(f"  mean fit: {', '.join(parts)}")
     turns = mean["overshoot_error_deg"]
