@@ -18,7 +18,7 @@ from benchmarks.baselines.start import named, ranked_starts
 from benchmarks.baselines.step import exact_step
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import njit
-from kempf.pipeline.estimate.classical.report import told
+from kempf.pipeline.estimate.classical.report import estimate_of
 from kempf.pipeline.estimate.classical.resample import even, step_of
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate, Value
@@ -164,7 +164,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Multip
     covariance = (last.weight[:, None] * off).T @ off + relative @ relative.T / 12.0
     reason = "the bank still moved when the rounds ran out"
     warnings = ["not every direction is determined: the bank was not let grow on"] if last.held else []
-    return told(
+    return estimate_of(
         "multiple-models",
         used,
         last.mean,

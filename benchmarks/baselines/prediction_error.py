@@ -21,7 +21,7 @@ from scipy.optimize import least_squares
 from benchmarks.baselines.start import named, ranked_starts
 from benchmarks.baselines.step import exact_step, innovations
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.classical.report import NO_UNCERTAINTY, told
+from kempf.pipeline.estimate.classical.report import NO_UNCERTAINTY, estimate_of
 from kempf.pipeline.estimate.classical.resample import even, step_of, without_means
 from kempf.pipeline.estimate.one_step_fit import one_step_fit
 from kempf.pipeline.estimate.record.record import Record
@@ -215,7 +215,7 @@ def _report(
     std = np.sqrt(np.nanmean(out**2, axis=0))
     padded = np.column_stack([out, np.full(out.shape[0], np.nan)])
     fit = one_step_fit(problem.record.measured, padded, np.tile([std[0] ** 2, std[1] ** 2, 1.0], (out.shape[0], 1)))
-    return told(
+    return estimate_of(
         "prediction-error",
         problem.record,
         hull,

@@ -19,7 +19,7 @@ from benchmarks.baselines.start import named, ranked_starts
 from benchmarks.baselines.step import exact_step
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import njit
-from kempf.pipeline.estimate.classical.report import NO_UNCERTAINTY, told
+from kempf.pipeline.estimate.classical.report import NO_UNCERTAINTY, estimate_of
 from kempf.pipeline.estimate.classical.resample import even, step_of
 from kempf.pipeline.estimate.paper.least_squares import regress
 from kempf.pipeline.estimate.record.record import Record
@@ -109,7 +109,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Smooth
         if change < settings.tolerance:
             converged, reason = True, f"the last pass changed the parameters by {change:.1e}"
             break
-    return told(
+    return estimate_of(
         "ekf-ols",
         used,
         hull,

@@ -197,7 +197,7 @@ class RunFilter:
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
             *(spec.current_correlation_rate_per_s, run.speed_error_rate_per_s),
         )
-        told = np.array(
+        constants = np.array(
             [
                 *(ship.arm_per_m, ship.length_m, ship.draught_m, run.approach_m_s, run.approach_per_s),
                 spec.rudder_speed_exponent,
@@ -210,7 +210,7 @@ class RunFilter:
         )
         found = extended(
             *(hulls, levels, values, run.step_s, run.inputs, self._rudders(values), run.rudder_noise, run.measured),
-            *(run.offset_s, np.zeros(n, dtype=np.bool_) if withheld is None else withheld, run.current_row, told),
+            *(run.offset_s, np.zeros(n, dtype=np.bool_) if withheld is None else withheld, run.current_row, constants),
             *(np.zeros(4) if still else np.array(rates), x0, P0, self.model.table, kept, lanes),
         )
         predicted, variance, filtered, spread = (np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in kept)

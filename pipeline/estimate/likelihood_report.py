@@ -30,13 +30,13 @@ from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpe
 
 #: rate at which the ship answers times the rudder's period, above which its samples leave too much open
 _RUDDER_TOO_SLOW = 0.3
-#: a bias of the rate gyro is told when it is so many standard errors from nothing
+#: a bias of the rate gyro is reported when it is so many standard errors from nothing
 _BIASED = 4.0
 #: with less than so many of her slowest time constants in a record, errors of the slow motion are not those of a bound
 _FEW_TIMES = 5.0
-#: relative standard error from which on a weak direction is told
+#: relative standard error from which on a weak direction is reported
 _VAGUE = 0.1
-#: time within which the changes of the disturbances are told
+#: time within which the changes of the disturbances are reported
 _CHANGE_S = 600.0
 _HULL = len(HULL_PARAMETERS)
 _NAMES = (*HULL_PARAMETERS, *NOISE_PARAMETERS)
@@ -198,11 +198,11 @@ def _std_of_level(objective: Likelihood, best: Search[Float], covariance: Float,
 
 def _vague(weak: tuple[tuple[float, Float], ...], names: list[str], off: dict[str, float]) -> list[str]:
     """Tell the weak directions in which some relative standard error ``off`` is large: others are known well enough."""
-    told = [(value, list(_largest(vector, names))) for value, vector in weak]
+    directions = [(value, list(_largest(vector, names))) for value, vector in weak]
     return [
         f"these data hardly determine a direction of the parameters ({', '.join(largest)}; eigenvalue {value:.1g} of "
         "1): sail a zigzag of other angles, or pool several"
-        for value, largest in told
+        for value, largest in directions
         if not max(off[name] for name in largest) <= _VAGUE
     ]
 
@@ -265,5 +265,5 @@ def _iteration(count: int, one: Pass) -> dict[str, Any]:
     parameters = dict(zip(HULL_PARAMETERS, (float(t) for t in one.theta[:6]), strict=True))
     sigmas = dict(zip(NOISE_PARAMETERS, (float(np.exp(t)) for t in one.theta[6:]), strict=True))
     gain = None if np.isnan(one.expected_gain) else one.expected_gain
-    told = {"iteration": count, "log_likelihood": one.log_likelihood, "expected_gain": gain, "damping": one.damping}
-    return {**told, **parameters, **sigmas}
+    entry = {"iteration": count, "log_likelihood": one.log_likelihood, "expected_gain": gain, "damping": one.damping}
+    return {**entry, **parameters, **sigmas}

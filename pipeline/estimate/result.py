@@ -14,7 +14,7 @@ from kempf.schemas.model_spec import HULL_PARAMETERS
 
 @dataclass(frozen=True)
 class Value:
-    """A number with its standard error and unit; ``std`` is NaN where the estimator cannot tell it."""
+    """A number with its standard error and unit; ``std`` is NaN where the estimator has none."""
 
     name: str
     value: float

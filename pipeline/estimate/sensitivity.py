@@ -4,7 +4,7 @@ For Gaussian innovations e with variance S the log-likelihood is -(log S + e^2 /
 u = (e / sqrt S, (e^2 / S - 1) / sqrt 2) and J = (-de / sqrt S, d log S / sqrt 2) the score is J' u and the expected
 information J' J (Harvey 1989, "Forecasting, structural time series models and the Kalman filter", sec. 3.4).
 Whatever an effect is (a term, a lag of the rudder, an error of a sensor), its J is the difference of two passes: built
-from predicted states, with the filter's own way of swallowing it, by no formula that could be wrong for it alone.
+from predicted states, with all that the filter absorbs of it, by no formula that could be wrong for it alone.
 """
 
 from __future__ import annotations
@@ -64,7 +64,7 @@ def passes(filtered: RunFilter, points: Sequence[Point]) -> list[Passed]:
 
 
 def whitened(one: Passed) -> Float:
-    """Return u, shape (2 m,): over the measurements made, whitened innovations, then what tells of their spread."""
+    """Return u, shape (2 m,): over the measurements made, whitened innovations, then what shows their spread."""
     made = np.isfinite(one.innovation)
     z = one.innovation[made] / np.sqrt(one.variance[made])
     return np.concatenate([z, (z * z - 1.0) / _ROOT_2])

@@ -16,7 +16,7 @@ from kempf.schemas.model_spec import ModelSpec
 NO_UNCERTAINTY = np.full((6, 6), np.nan)
 
 
-def told(
+def estimate_of(
     name: str,
     record: Record,
     hull: Float | None,

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.classical.report import NO_UNCERTAINTY, told
+from kempf.pipeline.estimate.classical.report import NO_UNCERTAINTY, estimate_of
 from kempf.pipeline.estimate.classical.resample import even, step_of, without_means
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate
@@ -110,7 +110,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Subspa
         hull = None if ship is None else ship.array()
         if hull is None:
             reason = "the realisation belongs to no continuous ship: an eigenvalue is not positive"
-    return told(
+    return estimate_of(
         "subspace",
         used,
         hull,

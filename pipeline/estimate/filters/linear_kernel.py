@@ -4,8 +4,8 @@ State x = (v, r, psi, F, M, e, c_1, c_2, b), in the order of the extended filter
 c_2 (eq. (18)), y_r = r + b, y_psi = psi, each at its own instants. With h = (1, 0) the first current state is the
 paper's V_T; with h = (-sin K, cos K) the two are the current towards north and east, and eq. (19) holds without its
 small angle. e is the error of the speed, which acts like one of the rudder
-(`kempf.pipeline.estimate.record.speed_error`); b is the bias of the rate gyro, which the heading tells from a turn. A
-state without variance is left out of the arithmetic.
+(`kempf.pipeline.estimate.record.speed_error`); b is the bias of the rate gyro, which the heading separates from a
+turn. A state without variance is left out of the arithmetic.
 Sensitivities are carried forward with the filter (Astrom 1980, "Maximum likelihood and prediction error methods",
 Automatica 16), scalar measurement by scalar measurement; they lie innermost in memory.
 """
@@ -269,7 +269,7 @@ def likelihood(  # type: ignore[no-untyped-def]
     measured : ndarray, shape (n, 3)
         y_v, y_r, y_psi at the instants, NaN where not measured then.
     withheld : ndarray of bool, shape (n,)
-        Instants whose measurements are predicted, innovation and variance told, and not taken in.
+        Instants whose measurements are predicted, their innovations and variances kept, and not taken in.
     current_row : ndarray, shape (n, 2)
         h_1 and h_2 at the instants; used where y_v is measured.
     arm, mu_F, mu_M, mu_V, mu_e : float
@@ -394,7 +394,7 @@ def likelihood(  # type: ignore[no-untyped-def]
 
 
 def no_trace() -> tuple[Float, Float, Float, Float, Float]:
-    """Return the empty arrays that tell `likelihood` to keep nothing by the way."""
+    """Return the empty arrays with which `likelihood` keeps nothing by the way."""
     return (
         *(np.empty((0, 3)), np.empty((0, 3)), np.empty((0, N_STATE)), np.empty((0, N_STATE))),
         np.empty((0, 3, N_THETA)),

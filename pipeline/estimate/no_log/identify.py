@@ -54,7 +54,7 @@ class NoLogSettings:
     ----------
     trial_speed_m_s, trial_speed_std_m_s : float or None
         Speed through the water on a straight course at the shaft speed of the run, and how well it is known, m/s; None
-        where it is not. The rudder's own drag is not told apart from it: leave room for that. A speed without a
+        where it is not. The rudder's own drag is not separated from it: leave room for that. A speed without a
         standard deviation is taken to be known to 10 %, and counts only for a run within 25 % of it over ground: at
         another engine setting it says nothing.
     current_std_m_s : float

@@ -5,7 +5,7 @@ that the whole is linear; the speed it estimates is fed back by the caller. The 
 
     y_v = v - c_N sin K + c_E cos K - m sin(K - K_0)        y_u = V + c_N cos K + c_E sin K
 
-A current along the course is told from the speed by the first of these while the heading swings, and by runs on other
+The first of these separates a current along the course from the speed while the heading swings, and so do runs on other
 headings, which share V_0 and k. m is what the linear hull lacks and a current along the course would look like, to
 each run its own.
 """

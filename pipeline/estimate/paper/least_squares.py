@@ -115,17 +115,17 @@ def estimate_from_discrete(
     iterations: tuple[dict[str, object], ...] = (),
 ) -> Estimate:
     """Turn matrices of eq. (17) into an `Estimate` with the parameters of eq. (16) at the mean speed."""
-    told = list(warnings)
+    caveats = list(warnings)
     hull = continuous_from_discrete(found.A, found.B, sampled.speed_m_s, sampled.step_s)
     if found.rank < 3:
-        told.append(f"the regressor matrix is singular (rank {found.rank} of 3): minimum-norm solution")
+        caveats.append(f"the regressor matrix is singular (rank {found.rank} of 3): minimum-norm solution")
     if hull is None:
-        told.append("the discrete matrices belong to no continuous ship: an eigenvalue is not positive")
-    told.append("standard errors leave out the bias that noise in the regressors causes")
+        caveats.append("the discrete matrices belong to no continuous ship: an eigenvalue is not positive")
+    caveats.append("standard errors leave out the bias that noise in the regressors causes")
     values = hull.array() if hull is not None else np.full(6, np.nan)
     covariance = _continuous_covariance(found, hull, sampled) if hull is not None else np.full((6, 6), np.nan)
     if hull is not None:
-        told += doubts(values, np.sqrt(np.diag(covariance)), {})
+        caveats += doubts(values, np.sqrt(np.diag(covariance)), {})
     names = ("A11", "A12", "A21", "A22", "B1", "B2")
     units = ("1", "m/rad", "rad/m", "1", "m/s/rad", "1/s")
     flat = np.concatenate([found.A.ravel(), found.B.ravel()])
@@ -147,7 +147,7 @@ def estimate_from_discrete(
         },
         iterations=iterations,
         fit={},
-        warnings=tuple(told),
+        warnings=tuple(caveats),
     )
 
 

@@ -92,7 +92,7 @@ class ProcedureCourse:
     period : int or None
         Passes after which a cycle repeats.
     hidden : tuple of str
-        States and disturbances that the measurements cannot tell with the [A B] of the first approximation.
+        States and disturbances that the measurements do not determine with the [A B] of the first approximation.
     last : Filtered or None
         States and disturbances with the [A B] of the last pass; None where the filter does not exist.
     """
@@ -146,8 +146,8 @@ def iterate(
         W, entering = filtered.updated[:, len(vehicle.states) :], vehicle.entering(found.A)
         size = _size(vehicle, W, entering, measured)
         if not size < _ABSURD:
-            told = f"disturbances {size:.0f} times what was measured"
-            end = ("diverged", f"diverged in iteration {count}: the filter finds {told}", None)
+            words = f"disturbances {size:.0f} times what was measured"
+            end = ("diverged", f"diverged in iteration {count}: the filter finds {words}", None)
             break
         corrected = measured - W @ vehicle.carried.T  # (15)
         states, targets = corrected[now], corrected[now + 1] - W[now] @ entering.T
@@ -190,10 +190,10 @@ def judge(passes: list[ProcedurePass], scale: Float) -> tuple[End, str, int | No
     if not strides:
         return "still moving", "no iteration was asked for: this is the first approximation", None
     if strides[-1] > max(1.0, strides[0]):
-        told = f"by {strides[-1]:.1e} times the states' own increments, more than the first"
-        return "diverged", f"diverged: the last pass moved the parameters {told}", None
-    told = f"the iterations ran out while the parameters still moved, by {strides[-1]:.1e} in the last one"
-    return "still moving", told, None
+        words = f"by {strides[-1]:.1e} times the states' own increments, more than the first"
+        return "diverged", f"diverged: the last pass moved the parameters {words}", None
+    words = f"the iterations ran out while the parameters still moved, by {strides[-1]:.1e} in the last one"
+    return "still moving", words, None
 
 
 def _whole_steps(vehicle: LinearVehicle, measured: Float, skip: int) -> NDArray[np.int64]:
@@ -237,7 +237,7 @@ def _filtered(vehicle: LinearVehicle, found: Regression, measured: Float, inputs
     P0 = vehicle.initial_covariance
     system = vehicle.augmented(found.A, found.B)
     start = np.zeros(P0.shape[0])
-    with np.errstate(all="ignore"):  # parameters that run away overflow here, and are told so
+    with np.errstate(all="ignore"):  # parameters that run away overflow here, which is reported
         try:
             filtered = run_filter(system.A, system.B, system.G, system.H, R, measured, inputs, start, P0)
         except np.linalg.LinAlgError:

@@ -153,7 +153,7 @@ def check_way(speed_m_s: Float) -> tuple[str, ...]:
 def check_sway(lateral: LateralSpeed, heading: Series, rudder: Series, yaw_rate: Series) -> tuple[str, ...]:
     """Ask whether the lateral speed says anything that yaw rate and rudder do not say already.
 
-    Where it does not, the columns of the sway equation are collinear: a11 v cannot be told from a12 V r and b1 V delta.
+    Where it does not, the columns of the sway equation, of a11 v, a12 V r and b1 V delta, are collinear.
     A stream, constant or fixed in the earth frame, is allowed for.
 
     Parameters

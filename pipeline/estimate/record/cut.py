@@ -32,8 +32,8 @@ _MIN_RUDDER_STD_RAD = np.deg2rad(0.2)
 def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Record:
     """Cut one segment out of a log.
 
-    The heading is a measurement of its own beside the yaw rate, whose integral it is: it tells a bias of the rate gyro
-    from a turn, and stands in for it where there is none.
+    The heading is a measurement of its own beside the yaw rate, whose integral it is: it separates a bias of the rate
+    gyro from a turn, and replaces it where there is none.
 
     Parameters
     ----------

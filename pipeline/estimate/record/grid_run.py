@@ -215,7 +215,7 @@ def make_run(
 ) -> GridRun:
     """Lay a record on the grid.
 
-    Readings of one kind around an instant are averaged, value and time; what is a moment off the grid is told to the
+    Readings of one kind around an instant are averaged, value and time; how far a mean is off the grid goes to the
     filter, so that no reading is moved.
 
     Parameters

@@ -35,7 +35,7 @@ def starting_points(record: Instants, spec: ModelSpec | None = None) -> list[tup
     list of (str, ndarray of shape (12,))
     """
     sigmas = noise_levels(record, spec or ModelSpec())
-    # A ship that answers faster than this cannot be told from one that answers at once, and costs most to compute.
+    # a ship that answers faster than this is like one that answers at once, and costs most to compute
     shortest = 3.0 * record.mean_speed_m_s * float(np.median(np.diff(record.time_s)))
     lengths = [length for length in _LENGTHS_M if length > shortest] or [_LENGTHS_M[-1]]
     points = [(f"Mariner scaled to {length:g} m", mariner_like(length).array()) for length in lengths]
