@@ -32,7 +32,7 @@ def test_every_key_is_told() -> None:
         assert f"| `{key}` |" in TEXT, key
 
 
-@pytest.mark.parametrize(("key", "told"), [("name", "`linear`"), ("base", "`sway-yaw-16`"), ("wind", "`force`")])
+@pytest.mark.parametrize(("key", "told"), [("name", "`plain`"), ("base", "`sway-yaw-16`"), ("wind", "`force`")])
 def test_defaults_are_as_told(key: str, told: str) -> None:
     assert f"| `{key}` | {told} |" in TEXT
     assert told.strip("`") == getattr(ModelSpec(), key)

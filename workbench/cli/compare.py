@@ -181,8 +181,8 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
     turns = mean["overshoot_error_deg"]
     if turns["n"]:
         click.echo(
-            f"  overshoot of the free run, predicted less measured: {_with_error(turns)} deg over {turns['n']}, "
-            f"mean size {turns['mean_size']:.2f} deg"
+            f"  free-run overshoot, predicted less measured: {_with_error(turns)} deg over {turns['n']}; "
+            f"size {turns['mean_size']:.2f} deg"
             + (f"; {turns['not_predicted']} not predicted" if turns["not_predicted"] else "")
         )
     inside = mean["inside_95_percent"]
