@@ -50,9 +50,15 @@ def test_decision_on_the_current_quotes_its_benchmark() -> None:
 def test_honesty_quotes_the_benchmarks() -> None:
     text = " ".join((ROOT / "docs" / "honesty.md").read_text(encoding="utf-8").split())
     results = ROOT / "benchmarks" / "results"
-    coverage = re.search(r"within 3 standard errors: (\d+ of \d+)", (results / "monte_carlo.md").read_text("utf-8"))
-    assert coverage
+    trials = (results / "monte_carlo.md").read_text("utf-8")
+    assert (coverage := re.search(r"within 3 standard errors: (\d+ of \d+)", trials))
     assert f"standard errors of the truth in {coverage[1]} [trials]" in text
+    logs = {log: (int(runs), int(within)) for log, runs, within in re.findall(r"\| (\S+) \| (\d+) \| (\d+) \|", trials)}
+    messages = [logs["nmea.gz"][i] + logs["mcap"][i] for i in (1, 0)]
+    assert f"in {messages[0]} of {messages[1]} logged as NMEA or MCAP" in text
+    assert f"in {logs['csv.gz'][1]} of {logs['csv.gz'][0]} logged as a table" in text
+    assert (boat := re.search(r"All six within 3 standard errors: (\d+ of \d+) runs", trials))
+    assert f"there they lay so in {boat[1]}," in text
     tank = (results / "hsva.md").read_text("utf-8")
     assert (runs := re.search(r"\| of (\d+) runs \| no estimate \| converged \| signs a hull can have", tank))
     assert (default := re.search(r"\| Maximum likelihood, the default model.*?\| \d+ \| (\d+) \|", tank))
