@@ -176,8 +176,10 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
     for run in runs if verbose else ():
         every = " ".join(_signed(error) for error in run["overshoot_error_deg"])
         click.echo(f"  overshoot errors of {short[run['segment_id']]}: {every or '-'} deg")
-    parts = [f"{_CHANNELS[name]} {_with_error(mean['fit_percent'][name])} %" for name in there]
-    click.echo(f"  mean fit: {', '.join(parts)}")
+    fits = [mean["fit_percent"][name] for name in there]
+    parts = [f"{_CHANNELS[name]} {_plus_minus(fit)} %" for name, fit in zip(there, fits, strict=True)]
+    errors = "" if any(fit["std_error"] is None for fit in fits) else " ± 1 s.e."
+    click.echo(f"  mean fit{errors}: {', '.join(parts)}")
     turns = mean["overshoot_error_deg"]
     if turns["n"]:
         click.echo(
@@ -257,5 +259,8 @@ def _signed(value: float | None) -> str:
 
 
 def _with_error(mean: dict[str, Any]) -> str:
-    error = mean["std_error"]
-    return f"{mean['mean']:.2f}" + ("" if error is None else f" ± {error:.2f} (1 s.e.)")
+    return _plus_minus(mean) + ("" if mean["std_error"] is None else " (1 s.e.)")
+
+
+def _plus_minus(mean: dict[str, Any]) -> str:
+    return f"{mean['mean']:.2f}" + ("" if mean["std_error"] is None else f" ± {mean['std_error']:.2f}")

@@ -12,7 +12,7 @@ import click
 
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.workbench.cli.given_once import GivenOnceGroup
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import json_option, output_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import counted, print_json, print_note, progress
 
 if TYPE_CHECKING:
@@ -25,15 +25,12 @@ F = TypeVar("F", bound=Callable[..., Any])
 def command() -> None:
     """Write a parameter set, or manoeuvres with their predictions, as a file that other programs read.
 
-    A unique beginning of its id is enough. Without --out it goes to stdout. Nothing is overwritten.
+    A unique beginning of its id is enough. Without --output it goes to stdout. Nothing is overwritten.
     """
 
 
 def _file_options(function: F) -> F:
-    out = click.option(
-        "--out", type=click.Path(path_type=Path), metavar="FILE", help="Write here instead of to stdout."
-    )
-    return click.argument("set_id")(out(warehouse_option(json_option(function))))
+    return click.argument("set_id")(output_option()(warehouse_option(json_option(function))))
 
 
 def _linear_options(function: F) -> F:
@@ -47,58 +44,60 @@ def _linear_options(function: F) -> F:
 
 @command.command("yaml")
 @_file_options
-def yaml_file(set_id: str, out: Path | None, uri: str, as_json: bool) -> None:
+def yaml_file(set_id: str, output: Path | None, uri: str, as_json: bool) -> None:
     """Values, units, standard errors, covariance, noise, fit, inputs by hash, parent, as YAML."""
-    _text("yaml", set_id, out, uri, as_json)
+    _text("yaml", set_id, output, uri, as_json)
 
 
 @command.command("csv")
 @_file_options
-def csv_file(set_id: str, out: Path | None, uri: str, as_json: bool) -> None:
+def csv_file(set_id: str, output: Path | None, uri: str, as_json: bool) -> None:
     """Parameters, discrete parameters and noise levels with standard errors and units, as CSV."""
-    _text("csv", set_id, out, uri, as_json)
+    _text("csv", set_id, output, uri, as_json)
 
 
 @command.command("control")
 @_linear_options
 def control_file(
-    set_id: str, out: Path | None, uri: str, as_json: bool, speed: float | None, step: float, course: float
+    set_id: str, output: Path | None, uri: str, as_json: bool, speed: float | None, step: float, course: float
 ) -> None:
     """State space as a Python module for python-control: named systems, noise, covariance."""
     from kempf.workbench.export import as_control
 
     model = _linear(uri, set_id, speed, step, course)
-    _deliver("control", model.ship.parameter_set.parameter_set_id, as_control(model), out, as_json)
+    _deliver("control", model.ship.parameter_set.parameter_set_id, as_control(model), output, as_json)
 
 
 @command.command("mat")
 @_linear_options
 def mat_file(
-    set_id: str, out: Path | None, uri: str, as_json: bool, speed: float | None, step: float, course: float
+    set_id: str, output: Path | None, uri: str, as_json: bool, speed: float | None, step: float, course: float
 ) -> None:
     """State space as a MATLAB file; there: load FILE, then ss(A, B, C, D) or ss(Ad, Bd, C, D, step_s)."""
     from kempf.workbench.export import as_mat
 
-    if out is None:
+    if output is None:
         raise UsageError(
-            "no_file_given", "A MATLAB file is not text and does not go to stdout.", "Give a file with --out FILE.mat."
+            "no_file_given",
+            "A MATLAB file is not text and does not go to stdout.",
+            "Give a file with --output FILE.mat.",
         )
     model = _linear(uri, set_id, speed, step, course)
-    _deliver("mat", model.ship.parameter_set.parameter_set_id, as_mat(model), out, as_json)
+    _deliver("mat", model.ship.parameter_set.parameter_set_id, as_mat(model), output, as_json)
 
 
 @command.command("mcap")
 @vessel_option(required=True)
 @click.option("--set", "set_id", metavar="ID", help="Parameter set, by id or alias; default: current.")
-@click.option(
-    "--output", "--out", "out", type=click.Path(path_type=Path), metavar="FILE", required=True, help="Write here."
-)
+@output_option("Write here.", required=True)
 @click.option(
     "--segment", "segments", multiple=True, metavar="ID", help="Only this manoeuvre; may be repeated. Default: all."
 )
 @warehouse_option
 @json_option
-def mcap_file(vessel: str, set_id: str | None, out: Path, segments: tuple[str, ...], uri: str, as_json: bool) -> None:
+def mcap_file(
+    vessel: str, set_id: str | None, output: Path, segments: tuple[str, ...], uri: str, as_json: bool
+) -> None:
     """Measured and predicted channels of a vessel's manoeuvres side by side, for Foxglove and PlotJuggler.
 
     One step ahead with 95 % intervals, and the free run, with what each leaves, and the position; UTC nanoseconds, JSON
@@ -112,26 +111,26 @@ def mcap_file(vessel: str, set_id: str | None, out: Path, segments: tuple[str, .
     from kempf.workbench.export_mcap import about, to_mcap
     from kempf.workbench.new_file import require_new
 
-    require_new(out, "--output")
+    require_new(output, "--output")
     warehouse = Warehouse(uri)
     with progress() as tell:
         found = compare_vessel(warehouse, vessel, set_id, "1", tell)
     print_note(said_of_vessel(warehouse, vessel))
     found = _only(found, segments) if segments else found
     data = to_mcap(found.runs, about(found), measured_positions(warehouse, found.found))
-    write_new(out, data, "--output")
+    write_new(output, data, "--output")
     name = found.parameter_set.parameter_set_id
     if as_json:
         content = {
             "vessel": vessel,
             "parameter_set_id": name,
             "format": "mcap",
-            "out": str(out),
+            "out": str(output),
             "runs": len(found.runs),
         }
         print_json({**content, "skipped": found.skipped})
     else:
-        click.echo(f"{vessel}, {name}: {counted(len(found.runs), 'run')} written to {out}", err=True)
+        click.echo(f"{vessel}, {name}: {counted(len(found.runs), 'run')} written to {output}", err=True)
 
 
 def _only(found: Comparison, wanted: Sequence[str]) -> Comparison:
@@ -163,7 +162,7 @@ def _linear(uri: str, set_id: str, speed: float | None, step: float, course: flo
     return linear(ship, step, radians(course))
 
 
-def _text(form: str, set_id: str, out: Path | None, uri: str, as_json: bool) -> None:
+def _text(form: str, set_id: str, output: Path | None, uri: str, as_json: bool) -> None:
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
@@ -171,18 +170,18 @@ def _text(form: str, set_id: str, out: Path | None, uri: str, as_json: bool) -> 
 
     one = named_set(Warehouse(uri), set_id)
     print_note(said_of_sets([one]))
-    _deliver(form, one.parameter_set_id, as_text(one, form), out, as_json)
+    _deliver(form, one.parameter_set_id, as_text(one, form), output, as_json)
 
 
-def _deliver(form: str, name: str, content: str | bytes, out: Path | None, as_json: bool) -> None:
+def _deliver(form: str, name: str, content: str | bytes, output: Path | None, as_json: bool) -> None:
     from kempf.workbench.export import write_new
 
-    if out is not None:
-        write_new(out, content, "--out")
-    text = content if isinstance(content, str) and out is None else None
+    if output is not None:
+        write_new(output, content, "--output")
+    text = content if isinstance(content, str) and output is None else None
     if as_json:
-        print_json({"parameter_set_id": name, "format": form, "out": str(out) if out else None, "text": text})
-    elif out is not None:
-        click.echo(f"{name}: {form} written to {out}", err=True)
+        print_json({"parameter_set_id": name, "format": form, "out": str(output) if output else None, "text": text})
+    elif output is not None:
+        click.echo(f"{name}: {form} written to {output}", err=True)
     else:
         click.echo(text, nl=False)

@@ -60,3 +60,16 @@ def profile_option(function: F) -> F:
         metavar="FILE",
         help="Vessel profile in YAML or JSON; several are laid over each other and must not disagree.",
     )(function)
+
+
+def output_option(help_text: str = "Write here instead of to stdout.", *, required: bool = False) -> Callable[[F], F]:
+    """Add ``--output``, also called ``--out``: a file, or None."""
+    return click.option(
+        "--output",
+        "--out",
+        "output",
+        type=click.Path(path_type=Path),
+        required=required,
+        metavar="FILE",
+        help=help_text,
+    )

@@ -9,7 +9,13 @@ from typing import TYPE_CHECKING
 import click
 
 from kempf.workbench.cli.given_once import GivenOnceGroup
-from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import (
+    json_option,
+    output_option,
+    verbose_option,
+    vessel_option,
+    warehouse_option,
+)
 from kempf.workbench.terminal import number, print_json, print_note, print_table
 
 if TYPE_CHECKING:
@@ -120,7 +126,7 @@ def diff(first: str, second: str, uri: str, as_json: bool) -> None:
 @command.command("export")
 @click.argument("set_id")
 @click.option("--format", "form", type=click.Choice(["yaml", "csv", "json"]), default="yaml", show_default=True)
-@click.option("--output", type=click.Path(path_type=Path), metavar="FILE", help="Write here instead of to stdout.")
+@output_option()
 @warehouse_option
 @json_option
 def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool) -> None:

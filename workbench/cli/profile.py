@@ -7,7 +7,7 @@ from pathlib import Path
 import click
 
 from kempf.workbench.cli.given_once import GivenOnceGroup
-from kempf.workbench.cli.options import json_option
+from kempf.workbench.cli.options import json_option, output_option
 from kempf.workbench.terminal import print_json
 
 
@@ -18,7 +18,7 @@ def command() -> None:
 
 @command.command("draft")
 @click.argument("log", type=click.Path(path_type=Path))
-@click.option("--output", type=click.Path(path_type=Path), metavar="FILE", help="Write here instead of to stdout.")
+@output_option()
 @json_option
 def draft(log: Path, output: Path | None, as_json: bool) -> None:
     """Draft a profile from the columns of a log: guessed channels and units are marked with a ?.

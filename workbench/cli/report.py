@@ -8,7 +8,7 @@ from pathlib import Path
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import json_option, output_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import print_json, progress
 
 
@@ -18,12 +18,7 @@ from kempf.workbench.terminal import print_json, progress
 @click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Begin from this model, YAML.")
 @click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
               help="An effect of your own, YAML; tried beside the catalogue. May be repeated.")  # fmt: skip
-@click.option(
-    "--output",
-    type=click.Path(path_type=Path),
-    metavar="FILE",
-    help="Write here; default: the vessel's name with .html. Nothing is overwritten.",
-)
+@output_option("Write here; default: the vessel's name with .html. Nothing is overwritten.")
 @warehouse_option
 @json_option
 def command(
@@ -38,7 +33,7 @@ def command(
     """Write the diagnosis of a vessel as one HTML file, with every figure and table in it.
 
     The file asks for nothing outside itself and can be sent as it is. A diagnosis that `kempf diagnose` stored is read;
-    one that is not stored is made first.
+    one that is not stored is made first, and stored.
     """
     from kempf.flows.jobs.standing_model import Own
     from kempf.warehouse.store import Warehouse
