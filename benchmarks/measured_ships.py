@@ -17,19 +17,12 @@ _PROFILES = Path(__file__).parents[1] / "docs" / "profiles"
 
 @dataclass(frozen=True)
 class Ship:
-    """The logs of one ship.
-
-    Attributes
-    ----------
-    name : str
-    profiles : tuple of Path
-        Laid over each other.
-    logs : tuple of Path
-        In the order of their names.
-    """
+    """The logs of one ship."""
 
     name: str
+    #: Laid over each other.
     profiles: tuple[Path, ...]
+    #: In the order of their names.
     logs: tuple[Path, ...]
 
 

@@ -28,7 +28,6 @@ def write(name: str, title: str, lines: Sequence[str], *, options: str = "") -> 
     ----------
     name : str
         Of the benchmark's module below `benchmarks`, such as ``identify.hsva``.
-    title : str
     lines : sequence of str
         Markdown after the line that names command and versions.
     options : str, optional

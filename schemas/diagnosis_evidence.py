@@ -41,63 +41,39 @@ class _Part(BaseModel):
 
 
 class FittedParameter(_Part):
-    """One parameter of a fitted model.
-
-    Attributes
-    ----------
-    name, unit : str
-    value, std : float
-        And its standard error, in the unit; NaN where a bound is active.
-    """
+    """One parameter of a fitted model."""
 
     name: str
     unit: str
+    #: value, std: And its standard error, in the unit; NaN where a bound is active.
     value: Number
     std: Number
 
 
 class DisturbanceLevel(_Part):
-    """How strong a disturbance a model needs.
-
-    Attributes
-    ----------
-    name, unit : str
-    intensity : float
-        Geometric mean over the fitted manoeuvres, in the unit.
-    share : float
-        Of the intensity that the first model needs.
-    """
+    """How strong a disturbance a model needs."""
 
     name: str
     unit: str
+    #: Geometric mean over the fitted manoeuvres, in the unit.
     intensity: Number
+    #: Of the intensity that the first model needs.
     share: Number
 
 
 class FittedModel(_Part):
-    """One model of the ladder.
+    """One model of the ladder."""
 
-    Attributes
-    ----------
-    effects : tuple of str
-        Titles of all its effects, in order.
-    added : str
-        Title of the effect that the model before lacks; empty for the first.
-    parameters : tuple of FittedParameter
-    fitted_errors, held_out_errors : ndarray, shape (runs,)
-        Relative free-run error of each fitted and each held-out manoeuvre.
-    fitted_error, held_out_error : float
-        Their means; NaN where there is none, or a free run diverges.
-    disturbances : tuple of DisturbanceLevel
-    log_likelihood : float
-    converged : bool
-    """
-
+    #: Titles of all its effects, in order.
     effects: tuple[str, ...]
+    #: Title of the effect that the model before lacks; empty for the first.
     added: str
     parameters: tuple[FittedParameter, ...]
+    #: fitted_errors, held_out_errors: Shape (runs,). Relative free-run error of each fitted and each held-out
+    #: manoeuvre.
     fitted_errors: Curve
     held_out_errors: Curve
+    #: fitted_error, held_out_error: Their means; NaN where there is none, or a free run diverges.
     fitted_error: Number
     held_out_error: Number
     disturbances: tuple[DisturbanceLevel, ...]
@@ -106,78 +82,51 @@ class FittedModel(_Part):
 
 
 class CandidateEffect(_Part):
-    """What the report says of an effect beside the stored verdict on it.
+    """What the report says of an effect beside the stored verdict on it."""
 
-    Attributes
-    ----------
-    separated_by : str
-        The manoeuvre or channel that distinguishes it from what looks alike.
-    missing_channels : tuple of str
-        Canonical channels without which it cannot be tested.
-    set_id : str
-        Of the confusion set that it was refitted in; empty where it was not, or was refused.
-    refitted : tuple of FittedParameter
-        Its parameters after the refit; empty where ``set_id`` is.
-    """
-
+    #: The manoeuvre or channel that distinguishes it from what looks alike.
     separated_by: str
+    #: Canonical channels without which it cannot be tested.
     missing_channels: tuple[str, ...]
+    #: Of the confusion set that it was refitted in; empty where it was not, or was refused.
     set_id: str
+    #: Its parameters after the refit; empty where ``set_id`` is.
     refitted: tuple[FittedParameter, ...]
 
 
 class ConfusionMap(_Part):
-    """How much of what one effect would explain another would explain alike.
-
-    Attributes
-    ----------
-    titles : tuple of str
-    squared_cosine : ndarray, shape (k, k)
-        0 to 1.
-    threshold : float
-        Above it two effects are put to the same test.
-    """
+    """How much of what one effect would explain another would explain alike."""
 
     titles: tuple[str, ...]
+    #: Shape (k, k). 0 to 1.
     squared_cosine: Curve
+    #: Above it two effects are put to the same test.
     threshold: float
 
 
 class AddedVariable(_Part):
-    """What is left of the innovations against what an effect would explain, without what fitted parameters imitate.
-
-    Attributes
-    ----------
-    title : str
-    expected, left : ndarray, shape (N,)
-        Standard deviations of the innovation; expected at the size that the score predicts.
-    score, slope : float
-        The slope of ``left`` over ``expected``; 1 is the expected size.
-    slope_half_95 : float
-        Half the width of the 95 % interval of the slope.
-    bin_middle, bin_mean, bin_half_95 : ndarray, shape (b,)
-        Means of ``left`` over bins of ``expected`` that hold equally many, with half the width of their 95 % interval.
-    """
+    """What is left of the innovations against what an effect would explain, without what fitted parameters imitate."""
 
     title: str
+    #: expected, left: Shape (N,). Standard deviations of the innovation; expected at the size that the score predicts.
     expected: Curve
     left: Curve
+    #: score, slope: The slope of ``left`` over ``expected``; 1 is the expected size.
     score: Number
     slope: Number
+    #: Half the width of the 95 % interval of the slope.
     slope_half_95: Number
+    #: bin_middle, bin_mean, bin_half_95: Shape (b,). Means of ``left`` over bins of ``expected`` that hold equally
+    #: many, with half the width of their 95 % interval.
     bin_middle: Curve
     bin_mean: Curve
     bin_half_95: Curve
 
 
 class Quartiles(_Part):
-    """Medians and quartiles over bins of equal width.
+    """Medians and quartiles over bins of equal width."""
 
-    Attributes
-    ----------
-    middle, low, median, high : ndarray, shape (b,)
-    """
-
+    #: middle, low, median, high: Shape (b,).
     middle: Curve
     low: Curve
     median: Curve
@@ -185,48 +134,29 @@ class Quartiles(_Part):
 
 
 class UnmodelledPart(_Part):
-    """One component of the acceleration beside a model, the mean of each manoeuvre taken off.
+    """One component of the acceleration beside a model, the mean of each manoeuvre taken off."""
 
-    Attributes
-    ----------
-    values : ndarray, shape (N,)
-        m/s^2 or rad/s^2.
-    std : float
-    against : mapping of str to Quartiles
-        By what it is drawn over, see `UnmodelledAcceleration.against`.
-    """
-
+    #: Shape (N,). m/s^2 or rad/s^2.
     values: Curve
     std: Number
+    #: By what it is drawn over, see `UnmodelledAcceleration.against`.
     against: dict[str, Quartiles]
 
 
 class UnmodelledAcceleration(_Part):
-    """What acts on the ship beside a model at the instants of all manoeuvres whose free run does not diverge.
+    """What acts on the ship beside a model at the instants of all manoeuvres whose free run does not diverge."""
 
-    Attributes
-    ----------
-    sway, yaw : UnmodelledPart
-        m/s^2 and rad/s^2.
-    against : mapping of str to ndarray, shape (N,)
-        ``lateral_speed``, m/s, ``yaw_rate``, ``rudder``, ``heading``, rad.
-    """
-
+    #: sway, yaw: m/s^2 and rad/s^2.
     sway: UnmodelledPart
     yaw: UnmodelledPart
+    #: Shape (N,). ``lateral_speed``, m/s, ``yaw_rate``, ``rudder``, ``heading``, rad.
     against: dict[str, Curve]
 
 
 class OvershootPair(_Part):
-    """One overshoot, measured and predicted in free run, deg; the prediction NaN where the ship does not turn back.
+    """One overshoot, measured and predicted in free run, deg; the prediction NaN where the ship does not turn back."""
 
-    Attributes
-    ----------
-    number, side : int
-        Side +1 for starboard.
-    measured_deg, predicted_deg : float
-    """
-
+    #: number, side: Side +1 for starboard.
     number: int
     side: int
     measured_deg: Number
@@ -234,39 +164,24 @@ class OvershootPair(_Part):
 
 
 class PredictedManoeuvre(_Part):
-    """One manoeuvre under one model.
+    """One manoeuvre under one model."""
 
-    Attributes
-    ----------
-    free_run, free_run_error : ndarray, shape (n, 3)
-        Lateral speed, yaw rate, heading as they would be measured, and measured less that.
-    heading_deviation : ndarray, shape (n,)
-        Heading of the free run from the base course, rad.
-    whitened : ndarray, shape (n, 3)
-        One-step innovations over their standard deviation; NaN where not measured.
-    whitened_rms : float
-    fit_percent : mapping of str to mapping of str to float
-        By horizon in words, then by channel.
-    overshoots : tuple of OvershootPair
-    """
-
+    #: free_run, free_run_error: Shape (n, 3). Lateral speed, yaw rate, heading as they would be measured, and measured
+    #: less that.
     free_run: Curve
     free_run_error: Curve
+    #: Shape (n,). Heading of the free run from the base course, rad.
     heading_deviation: Curve
+    #: Shape (n, 3). One-step innovations over their standard deviation; NaN where not measured.
     whitened: Curve
     whitened_rms: Number
+    #: By horizon in words, then by channel.
     fit_percent: dict[str, dict[str, Number]]
     overshoots: tuple[OvershootPair, ...]
 
 
 class ManoeuvrePhase(_Part):
-    """A phase of a manoeuvre, s from its first instant.
-
-    Attributes
-    ----------
-    name : str
-    start_s, end_s : float
-    """
+    """A phase of a manoeuvre, s from its first instant."""
 
     name: str
     start_s: float
@@ -274,109 +189,71 @@ class ManoeuvrePhase(_Part):
 
 
 class OvershootPeak(_Part):
-    """The turning point of an overshoot as it was measured.
+    """The turning point of an overshoot as it was measured."""
 
-    Attributes
-    ----------
-    at_s : float
-        From the first instant of the manoeuvre.
-    side : int
-        +1 for starboard.
-    beyond_deg : float
-        Beyond the nominal heading.
-    """
-
+    #: From the first instant of the manoeuvre.
     at_s: float
+    #: +1 for starboard.
     side: int
+    #: Beyond the nominal heading.
     beyond_deg: float
 
 
 class ManoeuvreEvidence(_Part):
-    """One manoeuvre, measured and predicted by the first model of the ladder and by the last.
-
-    Attributes
-    ----------
-    segment_id : str
-    start_utc_ns : int
-    held_out : bool
-    time_s, rudder, speed : ndarray, shape (n,)
-        s, rad, m/s.
-    measured : ndarray, shape (n, 3)
-        Lateral speed, yaw rate, heading; NaN where there is none.
-    drift, turn : ndarray, shape (n,)
-        Lateral speed, m/s, and yaw rate, rad/s, given all measurements; as measured where the free run diverges.
-    heading_deviation : ndarray, shape (n,)
-        Measured heading from the base course, rad.
-    phases : tuple of ManoeuvrePhase
-    peaks : tuple of OvershootPeak
-    before, after : PredictedManoeuvre
-        Under the first model and the last; ``after`` None where they are the same.
-    """
+    """One manoeuvre, measured and predicted by the first model of the ladder and by the last."""
 
     segment_id: str
     start_utc_ns: int
     held_out: bool
+    #: time_s, rudder, speed: Shape (n,). s, rad, m/s.
     time_s: Curve
     rudder: Curve
     speed: Curve
+    #: Shape (n, 3). Lateral speed, yaw rate, heading; NaN where there is none.
     measured: Curve
+    #: drift, turn: Shape (n,). Lateral speed, m/s, and yaw rate, rad/s, given all measurements; as measured where the
+    #: free run diverges.
     drift: Curve
     turn: Curve
+    #: Shape (n,). Measured heading from the base course, rad.
     heading_deviation: Curve
     phases: tuple[ManoeuvrePhase, ...]
     peaks: tuple[OvershootPeak, ...]
+    #: before, after: Under the first model and the last; ``after`` None where they are the same.
     before: PredictedManoeuvre
     after: PredictedManoeuvre | None
 
 
 class MisfitPlaces(_Part):
-    """Where models fail, as `kempf.pipeline.compare.misfit.where` has it; empty where there is no manoeuvre to say.
+    """Where models fail, as `kempf.pipeline.compare.misfit.where` has it; empty where there is no manoeuvre to say."""
 
-    Attributes
-    ----------
-    before, after : mapping
-        The first model and the last on fitted manoeuvres.
-    held_out : mapping
-        The last one on held-out manoeuvres.
-    """
-
+    #: before, after: The first model and the last on fitted manoeuvres.
     before: dict[str, Any]
     after: dict[str, Any]
+    #: The last one on held-out manoeuvres.
     held_out: dict[str, Any]
 
 
 class DiagnosisEvidence(_Part):
-    """All that a report shows of a diagnosis beyond its verdict.
+    """All that a report shows of a diagnosis beyond its verdict."""
 
-    Attributes
-    ----------
-    models : tuple of FittedModel
-        The diagnosed model first.
-    candidates : mapping of str to CandidateEffect
-        By the effect's name.
-    confusion : ConfusionMap
-    added_variables : tuple of AddedVariable
-        Of the effects that were added; of the strongest candidate where none was.
-    unmodelled_before, unmodelled_after : UnmodelledAcceleration
-        Beside the first model and beside the last; ``after`` None where they are the same.
-    manoeuvres : tuple of ManoeuvreEvidence
-        In order of time.
-    ranges : mapping of str to (float, float)
-        Lowest and highest of ``drift``, ``turn``, ``rudder`` and ``speed`` over all manoeuvres.
-    misfit : MisfitPlaces
-    left_out : mapping of str to str
-        Why a segment was not used, by its id.
-    """
-
+    #: The diagnosed model first.
     models: tuple[FittedModel, ...]
+    #: By the effect's name.
     candidates: dict[str, CandidateEffect]
     confusion: ConfusionMap
+    #: Of the effects that were added; of the strongest candidate where none was.
     added_variables: tuple[AddedVariable, ...]
+    #: unmodelled_before, unmodelled_after: Beside the first model and beside the last; ``after`` None where they are
+    #: the same.
     unmodelled_before: UnmodelledAcceleration
     unmodelled_after: UnmodelledAcceleration | None
+    #: In order of time.
     manoeuvres: tuple[ManoeuvreEvidence, ...]
+    #: Lowest and highest of ``drift``, ``turn``, ``rudder`` and ``speed`` over all manoeuvres.
     ranges: dict[str, tuple[Number, Number]]
     misfit: MisfitPlaces
+    #: Why a segment was not used, by its id.
     left_out: dict[str, str]
 
     @property
@@ -391,12 +268,7 @@ def evidence_as_json(evidence: DiagnosisEvidence) -> str:
 
 
 def evidence_from_json(text: str) -> DiagnosisEvidence | None:
-    """Return what `evidence_as_json` gave; None where another version of the code wrote another form.
-
-    Parameters
-    ----------
-    text : str
-    """
+    """Return what `evidence_as_json` gave; None where another version of the code wrote another form."""
     try:
         return DiagnosisEvidence.model_validate_json(text)
     except ValueError:

@@ -31,21 +31,15 @@ class Parameter(Frozen):
 
     Either it makes the effect, which is absent with 0, or it shapes what others make, such as a frequency: then 0 lies
     outside its bounds.
-
-    Attributes
-    ----------
-    name, unit, meaning : str
-    low, high : float
-        Bounds that are physical.
-    steps : tuple of float
-        Values at which the effect is tried. One is enough for what goes linearly with the parameter; a threshold
-        (backlash, dead time) needs several.
     """
 
     name: str
     unit: str = Field(default="", max_length=40)
+    #: low, high: Bounds that are physical.
     low: float
     high: float
+    #: Values at which the effect is tried. One is enough for what goes linearly with the parameter; a threshold
+    #: (backlash, dead time) needs several.
     steps: tuple[float, ...] = Field(min_length=1, max_length=9)
     meaning: _Words = ""
 
@@ -72,63 +66,40 @@ class Parameter(Frozen):
 
 
 class ExtraState(Frozen):
-    """A state that an effect brings along, such as a memory of the sway: all three are formulas.
+    """A state that an effect brings along, such as a memory of the sway: all three are formulas."""
 
-    Attributes
-    ----------
-    name : str
-        ``m1`` to ``m4``.
-    derivative : str
-        Of time.
-    noise : str
-        Intensity of the white noise that drives it.
-    initial_std : str
-        Standard deviation at the first instant.
-    """
-
+    #: ``m1`` to ``m4``.
     name: str
+    #: Of time.
     derivative: _Formula
+    #: Intensity of the white noise that drives it.
     noise: _Formula = "0"
+    #: Standard deviation at the first instant.
     initial_std: _Formula = "0"
 
 
 class Effect(Frozen):
-    """One physical effect that eq. (16) lacks.
+    """One physical effect that eq. (16) lacks."""
 
-    Attributes
-    ----------
-    name, title : str
-        The key, and how it is called in a sentence.
-    group : str
-    plain : str
-        What it does, for a naval architect: one sentence without symbols.
-    equation, reference : str
-    parameters : tuple of Parameter
-    terms : mapping of str to str
-        Formula by target, see `kempf.schemas.symbols.TARGETS`.
-    rudder_course : str, optional
-        What becomes of the rudder's course before it reaches the hull; the first parameter is its size.
-    states : tuple of ExtraState
-    needs : tuple of str
-        Canonical channels without which it cannot be tested: those that its formulas speak of, and any that are named.
-    measured_by : tuple of str
-        Canonical channels that show it already: where every run has one of them there is nothing left to look for.
-    confounded_with, separated_by : str
-        What looks alike, and the manoeuvre or channel that distinguishes the two.
-    """
-
+    #: name, title: The key, and how it is called in a sentence.
     name: _Line
     title: _Line = ""
     group: Group = "own"
+    #: What it does, for a naval architect: one sentence without symbols.
     plain: _Line
     equation: str = ""
     reference: _Line
     parameters: tuple[Parameter, ...] = Field(min_length=1, max_length=9)
+    #: Formula by target, see `kempf.schemas.symbols.TARGETS`.
     terms: dict[str, _Formula] = Field(default_factory=dict, max_length=len(TARGETS))
+    #: What becomes of the rudder's course before it reaches the hull; the first parameter is its size.
     rudder_course: RudderCourse | None = None
     states: tuple[ExtraState, ...] = Field(default=(), max_length=len(OWN_STATES))
+    #: Canonical channels without which it cannot be tested: those that its formulas speak of, and any that are named.
     needs: tuple[_Line, ...] = Field(default=(), validate_default=True)
+    #: Canonical channels that show it already: where every run has one of them there is nothing left to look for.
     measured_by: tuple[_Line, ...] = ()
+    #: confounded_with, separated_by: What looks alike, and the manoeuvre or channel that distinguishes the two.
     confounded_with: _Words = ""
     separated_by: _Words = ""
 

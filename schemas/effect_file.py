@@ -25,10 +25,6 @@ def read(text: str, where: str) -> Effect:
     where : str
         Its name, for the messages.
 
-    Returns
-    -------
-    Effect
-
     Raises
     ------
     UsageError
@@ -49,8 +45,6 @@ def invalid(where: str, why: str, details: Mapping[str, Any] | None = None, next
     ----------
     where, why : str
         Name of the file, and what is wrong with it.
-    details : mapping, optional
-    next_step : str, optional
     """
     return UsageError(
         "effect_file_invalid",

@@ -31,10 +31,6 @@ class TooLarge(NotYaml):
 def load(text: str | bytes) -> Any:
     """Return what a YAML text says.
 
-    Parameters
-    ----------
-    text : str or bytes
-
     Returns
     -------
     object

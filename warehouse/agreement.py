@@ -23,21 +23,14 @@ _PATH = ("iterations", "convergence")
 
 @dataclass(frozen=True)
 class Difference:
-    """One field in which two sets differ.
+    """One field in which two sets differ."""
 
-    Attributes
-    ----------
-    field : str
-        Such as ``parameters.a11.value``.
-    stored, rebuilt : object
-        JSON leaf of either; None where one lacks the field.
-    relative : float or None
-        Difference over the size of the field (see `differences`); None where it is no pair of numbers.
-    """
-
+    #: Such as ``parameters.a11.value``.
     field: str
+    #: stored, rebuilt: JSON leaf of either; None where one lacks the field.
     stored: Any
     rebuilt: Any
+    #: Difference over the size of the field (see `differences`); None where it is no pair of numbers.
     relative: float | None
 
     def as_json(self) -> dict[str, Any]:
@@ -62,10 +55,6 @@ def differences(stored: ParameterSet, rebuilt: ParameterSet, tolerance: float = 
         Largest relative difference that counts as equal. 0 asks for equal bits. The size of a number is the larger
         magnitude of the two; of an estimate at least its standard error; of an entry of the covariance the product of
         the two standard errors.
-
-    Returns
-    -------
-    list of Difference
     """
     ours, theirs = (dict(_leaves(_content(s))) for s in (stored, rebuilt))
     sizes = _sizes(stored)

@@ -52,7 +52,6 @@ def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tu
 
     Parameters
     ----------
-    warehouse : Warehouse
     wanted : mapping of (str, str) to str
         Whole ids of the vessels' own parameter sets, by vessel and alias.
 

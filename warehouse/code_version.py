@@ -28,19 +28,13 @@ Stage = Literal["ingest", "segment", "estimate", "diagnose"]
 
 @dataclass(frozen=True)
 class Entry:
-    """Where the code of a stage begins.
+    """Where the code of a stage begins."""
 
-    Attributes
-    ----------
-    modules : tuple of str
-        What its jobs call, in ``kempf.pipeline``; all that these import counts with them. The catalogue of effects does
-        not: which effects a set has, and which a diagnosis tries, stands with their hashes among the inputs of these.
-    rests_on : tuple of Stage
-        Stages whose results its own are made of, and whose code therefore counts, too. The bounds of a segment are
-        named among the inputs of a parameter set, so that the code that finds segments does not count in it.
-    """
-
+    #: What its jobs call, in ``kempf.pipeline``; all that these import counts with them. The catalogue of effects does
+    #: not: which effects a set has, and which a diagnosis tries, stands with their hashes among the inputs of these.
     modules: tuple[str, ...]
+    #: Stages whose results its own are made of, and whose code therefore counts, too. The bounds of a segment are named
+    #: among the inputs of a parameter set, so that the code that finds segments does not count in it.
     rests_on: tuple[Stage, ...] = ()
 
 
@@ -101,7 +95,6 @@ def modules_in(folder: Path, stage: Stage) -> dict[str, str]:
 
     Parameters
     ----------
-    folder : Path
     stage : {"ingest", "segment", "estimate", "diagnose"}
 
     Raises

@@ -38,20 +38,13 @@ RETENTION_HOURS = 168.0
 
 @dataclass(frozen=True)
 class Cleared:
-    """What vacuuming deleted, or would delete, in one table.
-
-    Attributes
-    ----------
-    table : str
-    files, size_bytes : int
-        Files of no version that is kept, and what they take.
-    kept_versions : int
-        Versions that stay readable.
-    """
+    """What vacuuming deleted, or would delete, in one table."""
 
     table: str
+    #: files, size_bytes: Files of no version that is kept, and what they take.
     files: int
     size_bytes: int
+    #: Versions that stay readable.
     kept_versions: int
 
     def show(self) -> dict[str, Any]:
@@ -134,8 +127,6 @@ def vacuum(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    older_than_hours : float, optional
     dry_run : bool, optional
         Only say what would be deleted.
 

@@ -17,7 +17,6 @@ def once(found: Sequence[Segment], twins: Callable[[Segment, Segment], bool]) ->
 
     Parameters
     ----------
-    found : sequence of Segment
     twins : callable
         `overlap` or `same`; is given the later choice first.
     """

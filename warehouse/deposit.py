@@ -21,29 +21,19 @@ Outcome = Literal["new", "reread", "unchanged"]
 
 @dataclass(frozen=True, eq=False)
 class Delivery:
-    """One log with what was read from it.
+    """One log with what was read from it."""
 
-    Attributes
-    ----------
-    vessel : str
-        Her name.
-    file_name : str
-        As delivered, without its folder.
-    log : LogFile
-        As delivered.
-    profile : VesselProfile
-        What it was read with.
-    readings : LogReadings
-        What the reader returned.
-    code_version : str
-        Of the code that read it: stage ``ingest`` of `kempf.warehouse.code_version`.
-    """
-
+    #: Her name.
     vessel: str
+    #: As delivered, without its folder.
     file_name: str
+    #: As delivered.
     log: LogFile
+    #: What it was read with.
     profile: VesselProfile
+    #: What the reader returned.
     readings: LogReadings
+    #: Of the code that read it: stage ``ingest`` of `kempf.warehouse.code_version`.
     code_version: str
 
 

@@ -22,29 +22,18 @@ def diagnosis_id(inputs: Mapping[str, Any]) -> str:
 
 @dataclass(frozen=True)
 class StoredDiagnosis:
-    """One diagnosis as it is kept.
-
-    Attributes
-    ----------
-    diagnosis_id, vessel : str
-    parameter_set_id : str
-        The model that was diagnosed.
-    start_utc_ns : int
-        First instant of the manoeuvres.
-    verdict : str
-    effects : tuple of str
-        Of all sets.
-    content, inputs : mapping
-        JSON content.
-    code_version : str
-    """
+    """One diagnosis as it is kept."""
 
     diagnosis_id: str
     vessel: str
+    #: The model that was diagnosed.
     parameter_set_id: str
+    #: First instant of the manoeuvres.
     start_utc_ns: int
     verdict: str
+    #: Of all sets.
     effects: tuple[str, ...]
+    #: content, inputs: JSON content.
     content: Mapping[str, Any]
     inputs: Mapping[str, Any]
     code_version: str
@@ -97,10 +86,8 @@ def keep_evidence(warehouse: Warehouse, vessel: str, name: str, evidence: Diagno
 
     Parameters
     ----------
-    warehouse : Warehouse
     vessel, name : str
         The diagnosis by its vessel and id.
-    evidence : DiagnosisEvidence
     """
     key = vessel_key(vessel)
     row = {"vessel_key": key, "vessel": vessel, "diagnosis_id": name, "evidence_json": evidence_as_json(evidence)}
@@ -118,7 +105,6 @@ def evidence(warehouse: Warehouse, vessel: str, name: str) -> DiagnosisEvidence 
 
     Parameters
     ----------
-    warehouse : Warehouse
     vessel, name : str
         The diagnosis by its vessel and id.
     """

@@ -16,25 +16,17 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class StoredExamination:
-    """The doctor's verdict on one ingest.
-
-    Attributes
-    ----------
-    vessel, ingest_id, log_id, code_version : str
-    verdict : str
-        ``clean``, ``faults``, ``untested``, or ``failed``: the doctor himself failed.
-    findings : tuple of str
-        One sentence each.
-    content : mapping
-        JSON content, with the notes on how the channels were chosen.
-    """
+    """The doctor's verdict on one ingest."""
 
     vessel: str
     ingest_id: str
     log_id: str
     code_version: str
+    #: ``clean``, ``faults``, ``untested``, or ``failed``: the doctor himself failed.
     verdict: str
+    #: One sentence each.
     findings: tuple[str, ...]
+    #: JSON content, with the notes on how the channels were chosen.
     content: Mapping[str, Any] = field(default_factory=dict)
 
     @property

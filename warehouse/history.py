@@ -33,21 +33,14 @@ _HALF_WIDTH = NormalDist().inv_cdf(0.975)
 
 @dataclass(frozen=True, eq=False)
 class History:
-    """The history of one vessel.
+    """The history of one vessel."""
 
-    Attributes
-    ----------
-    frame : polars.DataFrame
-        One row a parameter of a set: parameter_set_id, start_utc_ns, model, estimator, parameter, value, std, unit,
-        superseded; sorted by start, superseded ones first, then id, then as the set lists them.
-    version : int or None
-        Version of the table that was read; None where there was none.
-    note : str or None
-        Why it is empty, where it is.
-    """
-
+    #: One row a parameter of a set: parameter_set_id, start_utc_ns, model, estimator, parameter, value, std, unit,
+    #: superseded; sorted by start, superseded ones first, then id, then as the set lists them.
     frame: pl.DataFrame
+    #: Version of the table that was read; None where there was none.
     version: int | None
+    #: Why it is empty, where it is.
     note: str | None
 
     def rows(self) -> list[dict[str, Any]]:
@@ -71,30 +64,22 @@ def _interval(value: float, std: float | None) -> dict[str, float | None]:
 
 @dataclass(frozen=True)
 class Comparable:
-    """Sets of one vessel, one model and one estimator with its settings, each from one segment of its own.
-
-    Attributes
-    ----------
-    model, model_sha256, estimator : str
-    parameter_set_ids, starts_utc_ns : tuple of str, tuple of int
-        In the order of time.
-    names, units : tuple of str
-        Parameters that have a standard error.
-    values : tuple of tuple of float, shape (n_set, n_parameter)
-    covariances : tuple of tuple of tuple of float, shape (n_set, n_parameter, n_parameter)
-    left_out : dict of str to int
-        How many more sets there are of the kind, by the reason why they are not among these.
-    """
+    """Sets of one vessel, one model and one estimator with its settings, each from one segment of its own."""
 
     model: str
     model_sha256: str
     estimator: str
+    #: parameter_set_ids, starts_utc_ns: Tuple of int. In the order of time.
     parameter_set_ids: tuple[str, ...]
     starts_utc_ns: tuple[int, ...]
+    #: names, units: Parameters that have a standard error.
     names: tuple[str, ...]
     units: tuple[str, ...]
+    #: Shape (n_set, n_parameter).
     values: tuple[tuple[float, ...], ...]
+    #: Shape (n_set, n_parameter, n_parameter).
     covariances: tuple[tuple[tuple[float, ...], ...], ...]
+    #: How many more sets there are of the kind, by the reason why they are not among these.
     left_out: dict[str, int]
 
 
@@ -277,17 +262,11 @@ def _sets_as_of(warehouse: Warehouse, as_of: datetime | None) -> Iterator[DeltaT
 
 @dataclass(frozen=True)
 class _Logs:
-    """What was known of a vessel's logs at some time.
+    """What was known of a vessel's logs at some time."""
 
-    Attributes
-    ----------
-    past : list of str
-        Ingests after which their logs had been read anew.
-    segments : list of str or None
-        Segments found in the others; None where nobody had looked for any, or nobody knows any more.
-    """
-
+    #: Ingests after which their logs had been read anew.
     past: list[str]
+    #: Segments found in the others; None where nobody had looked for any, or nobody knows any more.
     segments: list[str] | None
 
 

@@ -19,15 +19,7 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class LogRow:
-    """One ingest of one log.
-
-    Attributes
-    ----------
-    revision : int
-        1 for the first ingest of the log; the highest is the current one. 0 before it is recorded.
-    start_utc_ns, end_utc_ns : int
-        First and last instant of the readings, UTC nanoseconds.
-    """
+    """One ingest of one log."""
 
     log_id: str
     ingest_id: str
@@ -37,10 +29,12 @@ class LogRow:
     size_bytes: int
     profile_sha256: str
     code_version: str
+    #: start_utc_ns, end_utc_ns: First and last instant of the readings, UTC nanoseconds.
     start_utc_ns: int
     end_utc_ns: int
     tally: Tally
     notes: tuple[str, ...] = ()
+    #: 1 for the first ingest of the log; the highest is the current one. 0 before it is recorded.
     revision: int = 0
 
 

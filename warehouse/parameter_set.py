@@ -34,35 +34,23 @@ class Bounds:
 
 @dataclass(frozen=True)
 class Inputs:
-    """All that a parameter set is a function of.
+    """All that a parameter set is a function of."""
 
-    Attributes
-    ----------
-    log_ids : tuple of str
-        SHA-256 of the logs; kept sorted.
-    profile_sha256 : str
-        Hash of the vessel profile.
-    bounds : tuple of Bounds
-        The segments; kept sorted by log, then start.
-    companions : tuple of Bounds
-        Segments that say something of these without being identified themselves; kept sorted likewise.
-    model_spec : mapping
-        The model specification as JSON content.
-    estimator : str
-        Its name.
-    settings : mapping
-        Of the estimator, JSON content.
-    code_version : str
-        Fingerprint of the code that reads logs and estimates: stage ``estimate`` of `kempf.warehouse.code_version`.
-    """
-
+    #: SHA-256 of the logs; kept sorted.
     log_ids: tuple[str, ...]
+    #: Hash of the vessel profile.
     profile_sha256: str
+    #: The segments; kept sorted by log, then start.
     bounds: tuple[Bounds, ...]
+    #: The model specification as JSON content.
     model_spec: Mapping[str, Any]
+    #: Its name.
     estimator: str
+    #: Of the estimator, JSON content.
     settings: Mapping[str, Any]
+    #: Fingerprint of the code that reads logs and estimates: stage ``estimate`` of `kempf.warehouse.code_version`.
     code_version: str
+    #: Segments that say something of these without being identified themselves; kept sorted likewise.
     companions: tuple[Bounds, ...] = ()
 
     def __post_init__(self) -> None:
@@ -99,52 +87,41 @@ def parameter_set_id(inputs: Inputs) -> str:
 class ParameterSet:
     """One identified model.
 
-    Attributes
-    ----------
-    parameter_set_id : str
-        See `parameter_set_id`.
-    model_spec, model_sha256 : mapping, str
-        Specification as JSON content, and its hash.
-    segment_ids, log_ids : tuple of str
-        What it was identified from.
-    start_utc_ns : int
-        Start of the first segment, UTC nanoseconds.
-    parameters, discrete, noise : tuple of StoredValue
-        In continuous time; of the discrete model, eq. (17); noise levels.
-    covariance_names : tuple of str
-        What the rows and columns of the covariance are.
-    covariance : tuple of tuple of float, shape (n, n)
-        In products of the units of the estimates.
-    fit, iterations, convergence, settings, provenance : JSON content
-        What is not finite becomes null. ``provenance["inputs"]`` holds what the id is made of.
-    parent : str or None
-        Parameter set it grew from.
-
     Raises
     ------
     ValueError
         Two estimates of one group share a name, or the covariance is not square in its names.
     """
 
+    #: See `parameter_set_id`.
     parameter_set_id: str
     vessel: str
     model_name: str
+    #: model_spec, model_sha256: Str. Specification as JSON content, and its hash.
     model_spec: Mapping[str, Any]
     model_sha256: str
     estimator: str
+    #: fit, iterations, convergence, settings, provenance: What is not finite becomes null. ``provenance["inputs"]``
+    #: holds what the id is made of.
     settings: Mapping[str, Any]
+    #: segment_ids, log_ids: What it was identified from.
     segment_ids: tuple[str, ...]
     log_ids: tuple[str, ...]
+    #: Start of the first segment, UTC nanoseconds.
     start_utc_ns: int
+    #: parameters, discrete, noise: In continuous time; of the discrete model, eq. (17); noise levels.
     parameters: tuple[StoredValue, ...]
     discrete: tuple[StoredValue, ...] = ()
     noise: tuple[StoredValue, ...] = ()
+    #: What the rows and columns of the covariance are.
     covariance_names: tuple[str, ...] = ()
+    #: Shape (n, n). In products of the units of the estimates.
     covariance: tuple[tuple[float, ...], ...] = ()
     fit: Mapping[str, Any] = field(default_factory=dict)
     iterations: Sequence[Any] = ()
     convergence: Mapping[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
+    #: Parameter set it grew from.
     parent: str | None = None
     provenance: Mapping[str, Any] = field(default_factory=dict)
 

@@ -103,8 +103,6 @@ def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = N
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     names : collection of str, optional
         Ids; one that she does not have is left out.
 

@@ -31,7 +31,6 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
         Open.
     name : str
         Key of `kempf.schemas.tables.TABLES`; a column of it that the table lacks is null.
-    where : mapping of str to str or list of str, optional
 
     Returns
     -------

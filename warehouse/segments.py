@@ -26,36 +26,27 @@ def segment_id(log_id: str, kind: str, start_utc_ns: int, end_utc_ns: int) -> st
 
 @dataclass(frozen=True)
 class Segment:
-    """One manoeuvre, as stored.
-
-    Attributes
-    ----------
-    psi0_deg, delta0_deg : float
-        Nominal heading deviation and rudder angle, deg.
-    base_heading_deg : float
-        Heading before the first execute, deg.
-    executes_utc_ns : tuple of int
-        Instants of the executes, UTC nanoseconds.
-    overshoots_deg : tuple of float
-        Overshoot angles beyond the nominal heading deviation, deg.
-    imo, quality, detail : mapping
-        JSON content; what is not finite becomes null.
-    """
+    """One manoeuvre, as stored."""
 
     segment_id: str
     vessel: str
     log_id: str
     ingest_id: str
     kind: str
+    #: psi0_deg, delta0_deg: Nominal heading deviation and rudder angle, deg.
     psi0_deg: float
     delta0_deg: float
     first_side: str
+    #: Heading before the first execute, deg.
     base_heading_deg: float
     start_utc_ns: int
     end_utc_ns: int
+    #: Instants of the executes, UTC nanoseconds.
     executes_utc_ns: tuple[int, ...]
+    #: Overshoot angles beyond the nominal heading deviation, deg.
     overshoots_deg: tuple[float, ...]
     code_version: str
+    #: imo, quality, detail: JSON content; what is not finite becomes null.
     imo: Mapping[str, Any] = field(default_factory=dict)
     quality: Mapping[str, Any] = field(default_factory=dict)
     detail: Mapping[str, Any] = field(default_factory=dict)

@@ -29,29 +29,18 @@ _FORM, _MOST_KEPT = 1, 4000
 
 @dataclass(frozen=True)
 class Module:
-    """What one file of source does.
+    """What one file of source does."""
 
-    Attributes
-    ----------
-    digest : str
-        Of its syntax tree.
-    imports : tuple of str
-        Dotted names that may be modules, relative ones with their dots.
-    by_name : bool
-        Whether it opens files beside it by name.
-    """
-
+    #: Of its syntax tree.
     digest: str
+    #: Dotted names that may be modules, relative ones with their dots.
     imports: tuple[str, ...]
+    #: Whether it opens files beside it by name.
     by_name: bool
 
 
 def read_module(content: bytes) -> Module:
     """Return what a file of source does.
-
-    Parameters
-    ----------
-    content : bytes
 
     Raises
     ------

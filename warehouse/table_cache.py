@@ -39,7 +39,6 @@ def borrowed(
 
     Parameters
     ----------
-    warehouse : Warehouse
     name : str
         Of the table.
     opened : callable

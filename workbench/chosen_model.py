@@ -23,8 +23,6 @@ def chosen_model(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     set_id : str or None
         Parameter set.
     model : Path or None

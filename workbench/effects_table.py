@@ -10,12 +10,7 @@ _HEAD = "| effect | group | what it does | equation | needs |\n|---|---|---|---|
 
 
 def effects_table(effects: Iterable[Effect]) -> str:
-    """Return one row an effect, in the order given.
-
-    Parameters
-    ----------
-    effects : iterable of Effect
-    """
+    """Return one row an effect, in the order given."""
     rows = [
         f"| `{e.name}` | {e.group} | {e.plain} | `{_cell(e.equation)}` | {', '.join(e.needs) or '-'} |\n"
         for e in effects

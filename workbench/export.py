@@ -37,7 +37,6 @@ def as_text(one: ParameterSet, form: str) -> str:
 
     Parameters
     ----------
-    one : ParameterSet
     form : {"yaml", "csv", "json"}
         CSV holds the parameters alone: group, name, value, std, unit.
     """
@@ -179,7 +178,6 @@ def write_new(path: Path, data: str | bytes, option: str) -> None:
 
     Parameters
     ----------
-    path : Path
     data : str or bytes
         Text is written as UTF-8.
     option : str

@@ -99,12 +99,7 @@ def to_mcap(
 
 
 def about(found: Comparison) -> dict[str, str]:
-    """Return what a file says of where its predictions come from.
-
-    Parameters
-    ----------
-    found : Comparison
-    """
+    """Return what a file says of where its predictions come from."""
     content = {
         "vessel": found.vessel,
         "parameter_set_id": found.parameter_set.parameter_set_id,

@@ -12,7 +12,6 @@ def require_new(path: Path, option: str) -> None:
 
     Parameters
     ----------
-    path : Path
     option : str
         Option that named the file, for the message.
 

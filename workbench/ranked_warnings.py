@@ -60,7 +60,6 @@ def show_warnings(warnings: Sequence[str], *, verbose: bool, word: str = "warnin
 
     Parameters
     ----------
-    warnings : sequence of str
     verbose : bool
         All, each for itself.
     word : str, optional

@@ -48,28 +48,18 @@ _QUADRATIC = _quadratic()
 
 @dataclass(frozen=True)
 class MultipleModelsSettings:
-    """Settings of the bank.
+    """Settings of the bank."""
 
-    Attributes
-    ----------
-    step_s : float or None
-        Common step, s; None takes the GNSS period.
-    starts : int
-        Mariner-like ships round which the first bank is laid.
-    first_spacing : float
-        Distance of neighbouring hulls in the first bank, as a share of each parameter.
-    rounds : int
-        Banks at most.
-    process_share : float
-        White acceleration in the first filters, as a share of the accelerations' rms over the record; each further bank
-        takes the likeliest of a fourth of it, itself and four times it, between ``process_low`` and 1.
-    process_low : float
-    """
-
+    #: Common step, s; None takes the GNSS period.
     step_s: float | None = None
+    #: Mariner-like ships round which the first bank is laid.
     starts: int = 3
+    #: Distance of neighbouring hulls in the first bank, as a share of each parameter.
     first_spacing: float = 0.25
+    #: Banks at most.
     rounds: int = 60
+    #: White acceleration in the first filters, as a share of the accelerations' rms over the record; each further bank
+    #: takes the likeliest of a fourth of it, itself and four times it, between ``process_low`` and 1.
     process_share: float = 0.05
     process_low: float = 1e-4
 
@@ -85,7 +75,6 @@ def bank_log_likelihood(hulls, process, noise, step_s, speed, rudder, measured, 
         Intensity of the white acceleration, m^2/s^3 and rad^2/s^3.
     noise : ndarray, shape (2,)
         Variances of y_v and y_r.
-    step_s : float
     speed, rudder : ndarray, shape (n,)
     measured : ndarray, shape (n, 2)
     out : ndarray, shape (n_model,)
@@ -131,12 +120,10 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Multip
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Its wind and current are left out.
     arm_per_m : float
         Without meaning here.
-    settings : MultipleModelsSettings
 
     Returns
     -------
@@ -308,7 +295,6 @@ def accelerations(measured: Float, step_s: float) -> Float:
     Parameters
     ----------
     measured : ndarray, shape (n, 2)
-    step_s : float
     """
     reach = max(1, measured.shape[0] // 100)
     slope = (measured[reach:] - measured[:-reach]) / (reach * step_s)

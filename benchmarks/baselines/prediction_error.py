@@ -37,30 +37,20 @@ _FORGOTTEN, _PUSH = 4.0, 30.0
 
 @dataclass(frozen=True)
 class PredictionErrorSettings:
-    """Settings of the search.
+    """Settings of the search."""
 
-    Attributes
-    ----------
-    step_s : float or None
-        Common step, s; None takes the GNSS period.
-    starts : int
-        How many of the Mariner-like starts are carried to the end.
-    rounds : int
-        How often weights and fit may take turns.
-    evaluations : int
-        Of the Jacobian in one fit.
-    decrement : float
-        Converged when a round gains, and the quadratic model promises, less log-likelihood than this; on the bound of
-        the predictor's memory, where there is no such model, a round's gain alone decides.
-    remove_means : bool
-        Take the means off measurements and rudder first, the usual remedy against what is constant.
-    """
-
+    #: Common step, s; None takes the GNSS period.
     step_s: float | None = None
+    #: How many of the Mariner-like starts are carried to the end.
     starts: int = 2
+    #: How often weights and fit may take turns.
     rounds: int = 30
+    #: Of the Jacobian in one fit.
     evaluations: int = 60
+    #: Converged when a round gains, and the quadratic model promises, less log-likelihood than this; on the bound of
+    #: the predictor's memory, where there is no such model, a round's gain alone decides.
     decrement: float = 1e-3
+    #: Take the means off measurements and rudder first, the usual remedy against what is constant.
     remove_means: bool = False
 
 
@@ -81,16 +71,10 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Predic
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Its wind and current are left out; the gain takes what it can of them.
     arm_per_m : float
         Without meaning here.
-    settings : PredictionErrorSettings
-
-    Returns
-    -------
-    Estimate
 
     Raises
     ------

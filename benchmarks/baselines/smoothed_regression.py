@@ -33,27 +33,18 @@ _ORDER = [0, 1, 3, 4, 2, 5]
 
 @dataclass(frozen=True)
 class SmoothedRegressionSettings:
-    """Settings of the procedure.
+    """Settings of the procedure."""
 
-    Attributes
-    ----------
-    step_s : float or None
-        Common step, s; None takes the GNSS period.
-    iterations : int
-        Passes of filter, smoother and regression at most.
-    process_share : float
-        White acceleration in the filter, as a share of the accelerations' rms over the record.
-    constant : bool
-        Regress on V^2 too, as the package's linear model does: a constant force and moment. Without it everything
-        that acts is taken for the ship.
-    tolerance : float
-        Converged when no parameter changes by more than this share.
-    """
-
+    #: Common step, s; None takes the GNSS period.
     step_s: float | None = None
+    #: Passes of filter, smoother and regression at most.
     iterations: int = 50
+    #: White acceleration in the filter, as a share of the accelerations' rms over the record.
     process_share: float = 0.3
+    #: Regress on V^2 too, as the package's linear model does: a constant force and moment. Without it everything that
+    #: acts is taken for the ship.
     constant: bool = True
+    #: Converged when no parameter changes by more than this share.
     tolerance: float = 1e-4
 
 
@@ -62,12 +53,10 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Smooth
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Its wind and current are left out.
     arm_per_m : float
         Without meaning here.
-    settings : SmoothedRegressionSettings
 
     Returns
     -------
@@ -159,7 +148,6 @@ def smooth(record: Record, hull: Float, pushed: Float, settings: SmoothedRegress
     hull : ndarray, shape (6,)
     pushed : ndarray, shape (2,)
         dv/dt and dr/dt over V^2 that act all the time, 1/m and 1/m^2.
-    settings : SmoothedRegressionSettings
     """
     step, measured = step_of(record), np.ascontiguousarray(record.measured[:, :2])
     stated = np.nan_to_num(record.noise_start[:2], nan=0.0)

@@ -80,7 +80,6 @@ def innovations(hull, K, x0, step_s, speed, rudder, measured, out):  # type: ign
     K : ndarray, shape (2, 2)
     x0 : ndarray, shape (2,)
         v, m/s, and r, rad/s, at the first instant.
-    step_s : float
     speed, rudder : ndarray, shape (n,)
     measured : ndarray, shape (n, 2)
         y_v and y_r; NaN where not measured, and no correction there.

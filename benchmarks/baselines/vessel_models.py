@@ -90,7 +90,6 @@ def run(record: Record, matrices: Any) -> tuple[list[np.ndarray], float]:
 
     Parameters
     ----------
-    record : Record
     matrices : SystemMatrixes
         The package's symbolic work, done once for all records and not counted.
     """

@@ -18,36 +18,24 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class Run:
-    """What one run did and cost.
+    """What one run did and cost."""
 
-    Attributes
-    ----------
-    vessels : int
-        In the fleet, or asked for.
-    changed, sets, reread : int
-        Vessels that something was done for, new parameter sets, logs read anew.
-    wall_s : float
-        From the call of the flow to its end.
-    cpu_s : float
-        Of the processor, all threads of this process together.
-    busy_s : float
-        Time inside the batches, summed over the threads; 0 where they ran elsewhere.
-    batches : int
-    commits : dict of str to int
-        By table.
-    plan_s : float
-        Time for finding out who has something to do.
-    """
-
+    #: In the fleet, or asked for.
     vessels: int
+    #: changed, sets, reread: Vessels that something was done for, new parameter sets, logs read anew.
     changed: int
     sets: int
     reread: int
+    #: From the call of the flow to its end.
     wall_s: float
+    #: Of the processor, all threads of this process together.
     cpu_s: float
+    #: Time inside the batches, summed over the threads; 0 where they ran elsewhere.
     busy_s: float = 0.0
     batches: int = 0
+    #: By table.
     commits: dict[str, int] = field(default_factory=dict)
+    #: Time for finding out who has something to do.
     plan_s: float = 0.0
 
     @property

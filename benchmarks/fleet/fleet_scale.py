@@ -20,36 +20,25 @@ _BEGIN, _END = "<!-- computed by python -m benchmarks.fleet.fleet -->", "<!-- to
 
 @dataclass(frozen=True)
 class Large:
-    """What a run over many vessels takes, each of them with everything to do.
+    """What a run over many vessels takes, each of them with everything to do."""
 
-    Attributes
-    ----------
-    batches, most : int
-        Batches that `kempf.flows.fleet.plan` makes, and vessels of the largest.
-    core_s : float
-        Of the processor without the commits, s: that of the fleet measured times the vessels.
-    writers, a_second, commit_s : int, float, float
-        How many at once the table that was measured took most commits a second from, how many it took, and what each
-        was of the processor, s.
-    commit_core_s : float
-        Of the processor for the commits to all tables, s: each taken for one to that table.
-    busiest : str
-        Table that is committed to most.
-    commits : float
-        To that table.
-    serial_s : float
-        For these, one after the other as fast as the table took them, s.
-    """
-
+    #: batches, most: Batches that `kempf.flows.fleet.plan` makes, and vessels of the largest.
     batches: int
     most: int
+    #: Of the processor without the commits, s: that of the fleet measured times the vessels.
     core_s: float
+    #: writers, a_second, commit_s: Float, float. How many at once the table that was measured took most commits a
+    #: second from, how many it took, and what each was of the processor, s.
     writers: int
     a_second: float
     commit_s: float
+    #: Of the processor for the commits to all tables, s: each taken for one to that table.
     commit_core_s: float
+    #: Table that is committed to most.
     busiest: str
+    #: To that table.
     commits: float
+    #: For these, one after the other as fast as the table took them, s.
     serial_s: float
 
     @property

@@ -22,7 +22,6 @@ def draw(left: Panel, right: Panel, path: Path) -> None:
     ----------
     left, right : Panel
         Seconds may be NaN where not measured.
-    path : Path
     """
     figure, panels = plt.subplots(1, 2, figsize=(11.0, 4.4), layout="constrained")
     for panel, (counts, lines, name) in zip(panels, (left, right), strict=True):

@@ -38,8 +38,6 @@ def draw(levels: Sequence[float], error: Mapping[str, Mapping[str, Sequence[floa
     ----------
     levels : sequence of float
         Disturbance over the paper's.
-    error : mapping of ship to mapping of method to sequence of float
-    path : Path
     """
     figure, panels = plt.subplots(1, len(error), figsize=(6.2 * len(error), 6.2), sharey=True, layout="constrained")
     where = list(range(len(levels)))

@@ -30,7 +30,6 @@ def draw_information(grid: Sequence[Cell], cells: Sequence[Cell], paper_percent:
         All, of which those of the paper's scenario are taken.
     paper_percent : ndarray, shape (6,)
         Errors that the paper reports.
-    path : Path
     """
     figure, axes = plt.subplots(3, 2, figsize=(13, 12), layout="constrained")
     runs = max(len(c.z) for c in grid)

@@ -39,7 +39,6 @@ def draw_paper_map(
         Noises and variabilities.
     parts : dict of str to ndarray, shape (n_noise, 6)
         Mean errors in percent by cause.
-    path : Path
     """
     noises, variabilities = axes_values
     figure, axes = plt.subplots(1, len(maps) + 1, figsize=(17, 5), layout="constrained")

@@ -30,10 +30,8 @@ def information_at(
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Correlation rates of the slow parts.
-    arm_per_m : float
     theta : ndarray, shape (12,)
         Truth; a level at or below the bound of the search is nothing, and not free.
     mean_force_m_s2 : float

@@ -63,34 +63,23 @@ class Run:
 
 @dataclass(frozen=True, eq=False)
 class Cell:
-    """The usable runs of one cell together; arrays have shape (6,) and are relative to the true parameters.
-
-    Attributes
-    ----------
-    case : Case
-    runs, failures : int
-        All of them, and those without an estimate, not converged, or without standard errors.
-    z : ndarray, shape (n, 6)
-        Errors in reported standard errors.
-    rms, bias : ndarray
-        Of the errors.
-    bound, own : ndarray
-        Cramer-Rao bound at the truth, and the root mean square of the reported standard errors.
-    widened : int
-        Runs whose standard errors are those of the sandwich.
-    levels : dict of str to float
-        Median estimated noise levels.
-    """
+    """The usable runs of one cell together; arrays have shape (6,) and are relative to the true parameters."""
 
     case: Case
+    #: runs, failures: All of them, and those without an estimate, not converged, or without standard errors.
     runs: int
     failures: int
+    #: Shape (n, 6). Errors in reported standard errors.
     z: Float
+    #: rms, bias: Of the errors.
     rms: Float
     bias: Float
+    #: bound, own: Cramer-Rao bound at the truth, and the root mean square of the reported standard errors.
     bound: Float
     own: Float
+    #: Runs whose standard errors are those of the sandwich.
     widened: int
+    #: Median estimated noise levels.
     levels: dict[str, float]
 
     @property

@@ -14,17 +14,11 @@ from kempf.pipeline.predict.prediction import WIDTH_95
 
 @dataclass(frozen=True, eq=False)
 class Ahead:
-    """Predictions between half of a horizon and the whole of it ahead.
-
-    Attributes
-    ----------
-    horizon_s : float
-    error, std : ndarray, shape (n, 3)
-        Measured less predicted and its standard deviation, columns `pipeline.estimate.record.record.MEASUREMENTS`;
-        NaN where nothing was predicted so far ahead.
-    """
+    """Predictions between half of a horizon and the whole of it ahead."""
 
     horizon_s: float
+    #: error, std: Shape (n, 3). Measured less predicted and its standard deviation, columns
+    #: `pipeline.estimate.record.record.MEASUREMENTS`; NaN where nothing was predicted so far ahead.
     error: Float
     std: Float
 
@@ -47,14 +41,9 @@ def predict_ahead(objective: Likelihood, theta: Float, horizon_s: float) -> Ahea
 
     Parameters
     ----------
-    objective : Likelihood
     theta : ndarray, shape (12,)
     horizon_s : float
         Positive.
-
-    Returns
-    -------
-    Ahead
     """
     time = objective.record.time_s
     error, std = np.full((time.size, 3), np.nan), np.full((time.size, 3), np.nan)

@@ -21,20 +21,13 @@ _NOTHING, _INITIAL_S = -400.0, 1.0
 
 @dataclass(frozen=True, eq=False)
 class LinearFreeRun:
-    """A free run beside the measurements.
+    """A free run beside the measurements."""
 
-    Attributes
-    ----------
-    time_s : ndarray, shape (n,)
-        Of the record.
-    predicted : ndarray, shape (n, 3)
-        Lateral speed through the water, m/s, yaw rate, rad/s, heading from its first value, rad.
-    error : ndarray, shape (n, 3)
-        Measured less predicted; NaN where not measured.
-    """
-
+    #: Shape (n,). Of the record.
     time_s: Float
+    #: Shape (n, 3). Lateral speed through the water, m/s, yaw rate, rad/s, heading from its first value, rad.
     predicted: Float
+    #: Shape (n, 3). Measured less predicted; NaN where not measured.
     error: Float
 
     @property
@@ -64,13 +57,8 @@ def free_run(record: Record, hull: Hull, spec: ModelSpec) -> LinearFreeRun:
     ----------
     record : Record
         Gives the inputs, and the initial state as the mean of its first second's measurements.
-    hull : Hull
     spec : ModelSpec
         For the rudder's inflow; wind, current and other disturbances are none.
-
-    Returns
-    -------
-    LinearFreeRun
     """
     used = with_rudder_inflow(record, spec)
     n = used.time_s.size

@@ -18,21 +18,13 @@ from kempf.schemas.profile import VesselProfile, parse
 
 @dataclass(frozen=True)
 class Trap:
-    """A lie of the real world: the logs, how their profile is spoilt, what must be named.
-
-    Attributes
-    ----------
-    name, kind : str
-    channels : tuple of str
-    logs : tuple of Path
-    profile : VesselProfile
-        Without the line that mends it.
-    """
+    """A lie of the real world: the logs, how their profile is spoilt, what must be named."""
 
     name: str
     kind: str
     channels: tuple[str, ...]
     logs: tuple[Path, ...]
+    #: Without the line that mends it.
     profile: VesselProfile
 
 

@@ -222,14 +222,7 @@ def reprocess(
 
 
 def reports_of(warehouse: str, vessels: list[str] | None = None, *, changed_only: bool = True) -> list[dict[str, Any]]:
-    """Run the flow `reprocess` and return its reports, whichever way it ended.
-
-    Parameters
-    ----------
-    warehouse : str
-    vessels : list of str or None
-    changed_only : bool
-    """
+    """Run the flow `reprocess` and return its reports, whichever way it ended."""
     state = reprocess(warehouse, vessels, changed_only, return_state=True)
     found: Any = state.result(raise_on_failure=False)
     if isinstance(found, fleet_report.VesselsFailed):

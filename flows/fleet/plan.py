@@ -30,17 +30,11 @@ Report = dict[str, Any]
 
 @dataclass(frozen=True)
 class Plan:
-    """What a run over the fleet has to do.
+    """What a run over the fleet has to do."""
 
-    Attributes
-    ----------
-    due : tuple of (str, int)
-        Vessels that have something to do with the number of their logs, the heavier ones first.
-    kept : tuple of dict
-        Reports of the others.
-    """
-
+    #: Vessels that have something to do with the number of their logs, the heavier ones first.
     due: tuple[tuple[str, int], ...]
+    #: Reports of the others.
     kept: tuple[Report, ...]
 
     @property
@@ -87,7 +81,6 @@ def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_on
 
     Parameters
     ----------
-    warehouse : Warehouse
     names : sequence of str, optional
         Only these; the whole fleet by default.
     changed_only : bool, optional
@@ -135,10 +128,6 @@ def do_batch(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    batch : sequence of str
-    changed_only : bool
-    flow_run : str, optional
     code : sequence of str, optional
         `responsible_code` of the machine that asks; where it is not that of this one, nothing is done.
     tell : callable, optional
@@ -178,7 +167,6 @@ def lost(batch: Sequence[str], error: BaseException) -> list[Report]:
 
     Parameters
     ----------
-    batch : sequence of str
     error : BaseException
         What the engine says.
     """
@@ -219,7 +207,6 @@ def do_fleet(
 
     Parameters
     ----------
-    warehouse : Warehouse
     names : sequence of str, optional
         Only these; the whole fleet by default.
     changed_only : bool, optional

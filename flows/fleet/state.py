@@ -25,26 +25,17 @@ _Rows = Sequence[Mapping[str, Any]]
 
 @dataclass(frozen=True)
 class VesselState:
-    """What the results of one vessel rest on now.
-
-    Attributes
-    ----------
-    vessel : str
-    profile_sha256 : str
-        Of her current profile; blank where she has none.
-    log_ids, ingest_ids : tuple of str
-        Her logs by their bytes, and how each was last read; sorted.
-    set_ids : tuple of str
-        Her parameter sets, sorted.
-    aliases : tuple of (str, str)
-        What her aliases point to, sorted.
-    """
+    """What the results of one vessel rest on now."""
 
     vessel: str
+    #: Of her current profile; blank where she has none.
     profile_sha256: str = ""
+    #: log_ids, ingest_ids: Her logs by their bytes, and how each was last read; sorted.
     log_ids: tuple[str, ...] = ()
     ingest_ids: tuple[str, ...] = ()
+    #: Her parameter sets, sorted.
     set_ids: tuple[str, ...] = ()
+    #: What her aliases point to, sorted.
     aliases: tuple[tuple[str, str], ...] = ()
 
     @property
@@ -80,7 +71,6 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
 
     Parameters
     ----------
-    warehouse : Warehouse
     vessels : iterable of str, optional
         Also those that the warehouse does not know; all of its vessels by default.
 

@@ -25,13 +25,10 @@ def add_effect(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     name : str
         Of the catalogue, or of an effect in ``own``.
     own : Own, optional
         An effect of a person's own.
-    progress : Progress, optional
 
     Raises
     ------

@@ -19,25 +19,15 @@ _ENOUGH = 2
 
 @dataclass(frozen=True, eq=False)
 class Chosen:
-    """Which segments of a vessel count, and how her logs are read.
-
-    Attributes
-    ----------
-    vessel : str
-    profile_sha256 : str
-    segments : tuple of Segment
-        Sorted by log and time, as the inputs of a parameter set are.
-    ingests : dict of str to str
-        Ingest by log, of these segments.
-    file_names : dict of str to str
-        By log.
-    skipped : dict of str to str
-    """
+    """Which segments of a vessel count, and how her logs are read."""
 
     vessel: str
     profile_sha256: str
+    #: Sorted by log and time, as the inputs of a parameter set are.
     segments: tuple[Segment, ...]
+    #: Ingest by log, of these segments.
     ingests: dict[str, str]
+    #: By log.
     file_names: dict[str, str]
     skipped: dict[str, str]
 
@@ -52,8 +42,6 @@ def choose(warehouse: Warehouse, vessel: str, failed: Collection[str] = ()) -> C
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     failed : collection of str, optional
         Ingests that are out of date and could not be brought up to date: they do not count.
 
@@ -95,12 +83,6 @@ def choose(warehouse: Warehouse, vessel: str, failed: Collection[str] = ()) -> C
 
 def choose_refreshed(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Chosen:
     """Choose as `choose`, once what other code read and found is brought up to date: for what is stored.
-
-    Parameters
-    ----------
-    warehouse : Warehouse
-    vessel : str
-    progress : Progress, optional
 
     Raises
     ------

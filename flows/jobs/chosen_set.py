@@ -13,8 +13,6 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     name : str, optional
         An alias of hers, an id, or a unique beginning of one; by default ``current``.
 

@@ -37,29 +37,18 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
-    """A vessel's runs beside what a parameter set predicts of them.
-
-    Attributes
-    ----------
-    vessel : str
-    parameter_set : ParameterSet
-    alias : str or None
-        By which the set was chosen; None where it was named.
-    horizon : Horizon
-    runs : tuple of ComparedRun
-        In order of time.
-    found : tuple of Segment
-        One a run.
-    skipped : dict of str to str
-        Why a segment is not among them, by its id.
-    """
+    """A vessel's runs beside what a parameter set predicts of them."""
 
     vessel: str
     parameter_set: ParameterSet
+    #: By which the set was chosen; None where it was named.
     alias: str | None
     horizon: Horizon
+    #: In order of time.
     runs: tuple[ComparedRun, ...]
+    #: One a run.
     found: tuple[Segment, ...]
+    #: Why a segment is not among them, by its id.
     skipped: dict[str, str]
 
     def show(self) -> dict[str, Any]:
@@ -108,13 +97,10 @@ def compare_vessel(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     set_id : str, optional
         Parameter set, by id or alias; by default the current one.
     horizon : str, optional
         See `kempf.pipeline.predict.horizon.horizon_of`.
-    progress : Progress, optional
 
     Raises
     ------

@@ -46,22 +46,12 @@ _PROGRAMME = (
 
 @dataclass(frozen=True)
 class Demonstration:
-    """What the demonstration did.
+    """What the demonstration did."""
 
-    Attributes
-    ----------
-    folder : Path
-        Where the raw logs, the profile and the warehouse go.
-    vessel : str
-    truth : dict of str to float
-        The six parameters that the simulator used.
-    ingested : list of IngestOutcome
-    identified : list of IdentifyOutcome
-    reruns : list of Rerun
-    """
-
+    #: Where the raw logs, the profile and the warehouse go.
     folder: Path
     vessel: str
+    #: The six parameters that the simulator used.
     truth: dict[str, float]
     ingested: list[IngestOutcome]
     identified: list[IdentifyOutcome]
@@ -75,11 +65,6 @@ def demonstrate(folder: Path, progress: Progress = silent) -> Demonstration:
     ----------
     folder : Path
         Made where it is not; a second demonstration in the same folder changes nothing.
-    progress : Progress, optional
-
-    Returns
-    -------
-    Demonstration
 
     Raises
     ------

@@ -47,14 +47,10 @@ def diagnose_vessel(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     spec : ModelSpec
         The model to begin from; its effects are taken as given.
     own : Own, optional
         Effects beyond the catalogue that are tried too.
-    settings : DiagnosisSettings, optional
-    progress : Progress, optional
 
     Returns
     -------
@@ -80,14 +76,10 @@ def diagnose_again(
 
     Parameters
     ----------
-    warehouse : Warehouse
     chosen : Chosen
         Manoeuvres.
     spec : ModelSpec
         The model to begin from; its effects are taken as given.
-    own : Own, optional
-    settings : DiagnosisSettings, optional
-    progress : Progress, optional
     """
     examined = examine(warehouse, chosen, spec, own, settings, progress)
     return _kept(warehouse, examined, spec, own, inputs_of_diagnosis(chosen, spec, own, settings))

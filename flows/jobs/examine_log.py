@@ -21,22 +21,14 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True, eq=False)
 class ExaminedLog:
-    """One log and what the doctor found.
-
-    Attributes
-    ----------
-    file_name, format : str
-    log : Log
-        The channels as they came.
-    examination : Examination
-    content : dict
-        The same as JSON content, with the profile lines.
-    """
+    """One log and what the doctor found."""
 
     file_name: str
     format: str
+    #: The channels as they came.
     log: Log
     examination: Examination
+    #: The same as JSON content, with the profile lines.
     content: dict[str, Any]
 
 
@@ -47,10 +39,8 @@ def examine_instruments(
 
     Parameters
     ----------
-    instruments : Instruments
     profile : VesselProfile
         With which they were read.
-    file_name : str
     log_format : {"delimited", "mcap", "nmea"}
     """
     known = entries(profile.source_for(file_name), log_format, instruments.sources)

@@ -32,8 +32,6 @@ def find_segments(
 
     Parameters
     ----------
-    ingest : Ingest
-    profile : VesselProfile
     instruments : Instruments
         Its channels.
 

@@ -87,12 +87,8 @@ def identify_vessel(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
-    request : Request, optional
     flow_run : str, optional
         Run that asks, for the provenance.
-    progress : Progress, optional
 
     Returns
     -------
@@ -124,21 +120,12 @@ def identify_segments(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
-    request : Request
     refreshed : Refreshed
         What came of reading the logs anew.
     new : Waiting
         Takes the new sets, and where ``current`` shall point.
     adopt : bool, optional
         Whether ``current`` may move to this model from another one.
-    flow_run : str, optional
-    progress : Progress, optional
-
-    Returns
-    -------
-    list of IdentifyOutcome
 
     Raises
     ------
@@ -251,9 +238,6 @@ def inputs_of(segment: Segment, profile_sha256: str, request: Request, companion
 
     Parameters
     ----------
-    segment : Segment
-    profile_sha256 : str
-    request : Request
     companions : sequence of Segment
         Of a segment without a log.
     """
@@ -287,11 +271,8 @@ def build(
     ----------
     instruments : Instruments
         Series of the log.
-    profile : VesselProfile
     inputs : Inputs
         One segment.
-    vessel : str
-    segment_ids : tuple of str
     origin : dict
         Provenance.
     others : mapping of str to Instruments, optional

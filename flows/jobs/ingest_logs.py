@@ -33,38 +33,25 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class IngestOutcome:
-    """What became of one file.
+    """What became of one file."""
 
-    Attributes
-    ----------
-    path : str
-        As given.
-    outcome : str
-        ``new``, ``reread``, ``unchanged`` or ``failed``.
-    log_id, ingest_id : str or None
-    tally : Tally or None
-        Records and values read, kept and rejected.
-    notes : tuple of str
-        How it was read, and why zigzags could not be looked for, where that is so.
-    segments : tuple of Segment
-        Found in this log.
-    lost : tuple of LostStretch
-        What of a damaged log could not be read.
-    examination : StoredExamination or None
-        What the channel doctor found in it.
-    error : KempfError or None
-        Why it failed; then nothing of the log was stored.
-    """
-
+    #: As given.
     path: str
+    #: ``new``, ``reread``, ``unchanged`` or ``failed``.
     outcome: str
     log_id: str | None = None
     ingest_id: str | None = None
+    #: Records and values read, kept and rejected.
     tally: Tally | None = None
+    #: How it was read, and why zigzags could not be looked for, where that is so.
     notes: tuple[str, ...] = ()
+    #: Found in this log.
     segments: tuple[Segment, ...] = ()
+    #: What of a damaged log could not be read.
     lost: tuple[LostStretch, ...] = ()
+    #: What the channel doctor found in it.
     examination: StoredExamination | None = None
+    #: Why it failed; then nothing of the log was stored.
     error: KempfError | None = None
 
     def show(self) -> dict[str, Any]:
@@ -149,7 +136,6 @@ def ingest(
         Whose they are; else the profile says so.
     given : VesselProfile, optional
         Laid over the stored profile of the vessel.
-    progress : Progress, optional
 
     Returns
     -------

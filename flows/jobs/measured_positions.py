@@ -11,13 +11,7 @@ from kempf.warehouse.store import Warehouse
 
 
 def measured_positions(warehouse: Warehouse, segments: Sequence[Segment]) -> dict[str, tuple[Series, Series]]:
-    """Return latitude and longitude, rad, of the segments whose logs hold them, by segment.
-
-    Parameters
-    ----------
-    warehouse : Warehouse
-    segments : sequence of Segment
-    """
+    """Return latitude and longitude, rad, of the segments whose logs hold them, by segment."""
     found = {}
     logs = {name: channels_of(warehouse, name) for name in dict.fromkeys(segment.ingest_id for segment in segments)}
     for segment in segments:

@@ -41,7 +41,6 @@ def companions_of(segment: Segment, found: Sequence[Segment], by_ingest: Mapping
 
     Parameters
     ----------
-    segment : Segment
     found : sequence of Segment
         Of the same vessel.
     by_ingest : mapping of str to LogRow
@@ -81,12 +80,10 @@ def estimate_of(
     ----------
     record : Record
         Of the segment.
-    spec : ModelSpec
     arm_per_m : float
         l of eq. (16), 1/m.
     profile : VesselProfile
         Its trial speed counts where the settings have none.
-    inputs : Inputs
     instruments : mapping of str to Instruments
         Series by log; those of the companions.
     """

@@ -22,7 +22,6 @@ def unread(rows: Sequence[LogRow], profiles: Mapping[str, str]) -> list[LogRow]:
 
     Parameters
     ----------
-    rows : sequence of LogRow
     profiles : mapping of str to str
         Hash of the present profile by vessel.
     """

@@ -15,38 +15,27 @@ from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue
 
 @dataclass(frozen=True)
 class Move:
-    """What becomes of one parameter of one set.
-
-    Attributes
-    ----------
-    vessel, model, estimator, parameter, unit : str
-    parameter_set_id, becomes : str
-        The set that stands, and the one that would take its place.
-    start : str
-        Of its first segment, ISO 8601.
-    before, after : float
-        In ``unit``.
-    std : float or None
-        Standard error of the value that stands, in ``unit``.
-    in_std : float or None
-        The move in that standard error. Both values are of the same data: much less than 1 is what a change that
-        should not matter leaves.
-    std_ratio : float or None
-        New standard error over the old one.
-    """
+    """What becomes of one parameter of one set."""
 
     vessel: str
     model: str
     estimator: str
     parameter: str
     unit: str
+    #: parameter_set_id, becomes: The set that stands, and the one that would take its place.
     parameter_set_id: str
     becomes: str
+    #: Of its first segment, ISO 8601.
     start: str
+    #: before, after: In ``unit``.
     before: float
     after: float
+    #: Standard error of the value that stands, in ``unit``.
     std: float | None
+    #: The move in that standard error. Both values are of the same data: much less than 1 is what a change that should
+    #: not matter leaves.
     in_std: float | None
+    #: New standard error over the old one.
     std_ratio: float | None
 
     @property

@@ -40,10 +40,6 @@ def as_parameter_set(
 
     Parameters
     ----------
-    result : Estimate
-    inputs : Inputs
-    vessel : str
-    segment_ids : tuple of str
     origin : dict
         Provenance.
     warnings : tuple of str, optional

@@ -51,7 +51,6 @@ class Waiting:
 
         Parameters
         ----------
-        spec : ModelSpec
         adopt : bool
             Whether it may leave another model.
         """

@@ -47,8 +47,6 @@ def pool_segments(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     request : Request
         What the segments were identified with.
     outcomes : sequence of IdentifyOutcome
@@ -57,8 +55,6 @@ def pool_segments(
         Takes the set where it is new, and where ``current`` shall point.
     adopt : bool, optional
         Whether ``current`` may move to this model from another one.
-    flow_run : str, optional
-    progress : Progress, optional
 
     Returns
     -------

@@ -28,34 +28,22 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class VesselPreview:
-    """What adopting the present code would do to the parameter sets of one vessel that stand.
-
-    Attributes
-    ----------
-    vessel : str
-    sets : int
-        Sets that stand: those of the logs as they were read last.
-    up_to_date : int
-        Of these, made by the present code already.
-    identical : int
-        Of the others, those that would say the same, bit for bit.
-    moves : tuple of Move
-        One a parameter of each of the others.
-    new : tuple of NewSet
-        Sets that would come with no counterpart, such as those of a zigzag that was not found before.
-    gone : tuple of str
-        Sets that would have no counterpart any more.
-    failures : tuple of dict
-        What the present code cannot do that is to be done, each with the error's JSON.
-    """
+    """What adopting the present code would do to the parameter sets of one vessel that stand."""
 
     vessel: str
+    #: Sets that stand: those of the logs as they were read last.
     sets: int
+    #: Of these, made by the present code already.
     up_to_date: int
+    #: Of the others, those that would say the same, bit for bit.
     identical: int = 0
+    #: One a parameter of each of the others.
     moves: tuple[Move, ...] = ()
+    #: Sets that would come with no counterpart, such as those of a zigzag that was not found before.
     new: tuple[NewSet, ...] = ()
+    #: Sets that would have no counterpart any more.
     gone: tuple[str, ...] = ()
+    #: What the present code cannot do that is to be done, each with the error's JSON.
     failures: tuple[dict[str, Any], ...] = field(default=())
 
     def show(self) -> dict[str, Any]:
@@ -81,7 +69,6 @@ def preview_all(warehouse: Warehouse, vessels: Sequence[str] = (), progress: Pro
         Only read.
     vessels : sequence of str, optional
         Only these; all by default.
-    progress : Progress, optional
 
     Returns
     -------

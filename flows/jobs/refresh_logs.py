@@ -29,42 +29,29 @@ _MOST_LOGS, _MOST_BYTES = 60, 8 << 20
 
 @dataclass(frozen=True)
 class Refreshed:
-    """What was done.
+    """What was done."""
 
-    Attributes
-    ----------
-    logs, reread, searched : int
-        Logs in all, those read anew, and those of the others whose readings were looked through anew.
-    failed : dict of str to KempfError
-        By ingest id: logs that could not be read or looked through anew; what was read of them before stands, but is
-        out of date.
-    """
-
+    #: logs, reread, searched: Logs in all, those read anew, and those of the others whose readings were looked through
+    #: anew.
     logs: int
     reread: int
     searched: int
+    #: By ingest id: logs that could not be read or looked through anew; what was read of them before stands, but is out
+    #: of date.
     failed: dict[str, KempfError]
 
 
 @dataclass(frozen=True)
 class Stale:
-    """Logs of a vessel of which something was made with another profile or by other code than the present.
+    """Logs of a vessel of which something was made with another profile or by other code than the present."""
 
-    Attributes
-    ----------
-    profile : VesselProfile
-        The present one.
-    logs : int
-        Of hers in all.
-    unread : tuple of LogRow
-        Read with another profile or by other code.
-    unsearched : tuple of LogRow
-        Those of the others in whose readings other code has looked for zigzags.
-    """
-
+    #: The present one.
     profile: VesselProfile
+    #: Of hers in all.
     logs: int
+    #: Read with another profile or by other code.
     unread: tuple[LogRow, ...]
+    #: Those of the others in whose readings other code has looked for zigzags.
     unsearched: tuple[LogRow, ...]
 
     @property
@@ -108,10 +95,8 @@ def refresh_all(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Prog
 
     Parameters
     ----------
-    warehouse : Warehouse
     stale : mapping of str to Stale
         By vessel.
-    progress : Progress, optional
 
     Returns
     -------

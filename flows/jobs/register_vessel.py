@@ -18,7 +18,6 @@ def set_vessel(warehouse: Warehouse, vessel: str, paths: Sequence[Path]) -> bool
     ----------
     warehouse : Warehouse
         Made where there is none.
-    vessel : str
     paths : sequence of Path
         Profile files, at least one.
 

@@ -62,15 +62,12 @@ def reprocess_vessels(
 
     Parameters
     ----------
-    warehouse : Warehouse
     vessels : sequence of str
         Their logs and sets are held in memory together until they are stored: some, not a fleet.
     request : Request, optional
         Only this model and estimator; by default every one that a vessel was identified with before.
     changed_only : bool, optional
         False also builds every kept set again from the raw bytes and counts the verdicts.
-    flow_run : str, optional
-    progress : Progress, optional
 
     Returns
     -------
@@ -113,15 +110,7 @@ def reprocess_vessels(
 
 @dataclass
 class _Work:
-    """What is known of one vessel while she is brought up to date.
-
-    Attributes
-    ----------
-    left : str or None
-        Digest of the state in which nothing is left to do.
-    over : bool
-        Whether something failed after which there is nothing more to do for her.
-    """
+    """What is known of one vessel while she is brought up to date."""
 
     report: VesselReport
     new: Waiting
@@ -129,7 +118,9 @@ class _Work:
     requests: Sequence[Request] = ()
     stale: Stale | None = None
     refreshed: Refreshed | None = None
+    #: Digest of the state in which nothing is left to do.
     left: str | None = None
+    #: Whether something failed after which there is nothing more to do for her.
     over: bool = False
 
     @property

@@ -51,43 +51,30 @@ _RUDDER_HZ = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Experiment:
-    """The experiment at one level of noise.
+    """The experiment at one level of noise."""
 
-    Attributes
-    ----------
-    noise_factor : float
-        On `NOISE_M_S`, `NOISE_RAD_S` and `NOISE_RAD`.
-    time_s : ndarray, shape (n,)
-        Since the first execute.
-    true, first, last : ndarray, shape (n, 4)
-        v, r, F, V_T: as they were; as the filter has them with the first approximation; with the last iteration's
-        parameters.
-    measured : ndarray, shape (n, 2)
-        y_v and y_r.
-    course : ProcedureCourse
-        Every iteration.
-    procedure : Estimate
-        After the last one.
-    first_error, last_error, ml_error : dict of str to float
-        Errors in percent of the true parameter.
-    ml_std : dict of str to float
-        Standard errors of maximum likelihood, likewise.
-    maximum_likelihood : Estimate
-        Of the same record.
-    """
-
+    #: On `NOISE_M_S`, `NOISE_RAD_S` and `NOISE_RAD`.
     noise_factor: float
+    #: Shape (n,). Since the first execute.
     time_s: Float
+    #: true, first, last: Shape (n, 4). v, r, F, V_T: as they were; as the filter has them with the first approximation;
+    #: with the last iteration's parameters.
     true: Float
     first: Float
     last: Float
+    #: Shape (n, 2). y_v and y_r.
     measured: Float
+    #: Every iteration.
     course: ProcedureCourse
+    #: After the last one.
     procedure: Estimate
+    #: first_error, last_error, ml_error: Errors in percent of the true parameter.
     first_error: dict[str, float]
     last_error: dict[str, float]
     ml_error: dict[str, float]
+    #: Standard errors of maximum likelihood, likewise.
     ml_std: dict[str, float]
+    #: Of the same record.
     maximum_likelihood: Estimate
 
     def show(self) -> dict[str, Any]:
@@ -123,21 +110,13 @@ class Experiment:
 
 @dataclass(frozen=True, eq=False)
 class Reproduction:
-    """The experiment at every level of noise, and what is true of all.
+    """The experiment at every level of noise, and what is true of all."""
 
-    Attributes
-    ----------
-    conditions : dict of str to tuple of str
-        What holds: its value, and who stated it, "paper" or "ours".
-    truth : dict of str to float
-        The six parameters of eq. (16).
-    discrete : tuple of Value
-        The matrices of eq. (17) that belong to them; no errors.
-    experiments : tuple of Experiment
-    """
-
+    #: What holds: its value, and who stated it, "paper" or "ours".
     conditions: dict[str, tuple[str, str]]
+    #: The six parameters of eq. (16).
     truth: dict[str, float]
+    #: The matrices of eq. (17) that belong to them; no errors.
     discrete: tuple[Value, ...]
     experiments: tuple[Experiment, ...]
 
@@ -152,16 +131,7 @@ class Reproduction:
 
 
 def reproduce_paper(progress: Progress = silent) -> Reproduction:
-    """Sail the paper's zigzag at every level of noise and identify the ship from it.
-
-    Parameters
-    ----------
-    progress : Progress, optional
-
-    Returns
-    -------
-    Reproduction
-    """
+    """Sail the paper's zigzag at every level of noise and identify the ship from it."""
     experiments = []
     for done, factor in enumerate(NOISE_FACTORS):
         progress(done, len(NOISE_FACTORS), f"the zigzag with {factor:g} times the usual noise")

@@ -34,35 +34,23 @@ _FIELDS_SHOWN = 20
 
 @dataclass(frozen=True)
 class RerunVerdict:
-    """What became of one parameter set.
-
-    Attributes
-    ----------
-    vessel, parameter_set_id : str
-    verdict : str
-        One of `VERDICTS`.
-    code_changed : bool
-        Whether other code made the set.
-    known_before : bool
-        Whether an earlier call had reached the verdict.
-    differences : int
-        Fields that differ.
-    fields : tuple of dict
-        The first of these fields, as JSON content.
-    packages_changed : dict
-        Versions then and now, of those that differ.
-    error : KempfError or None
-        Why it could not be built again.
-    """
+    """What became of one parameter set."""
 
     vessel: str
     parameter_set_id: str
+    #: One of `VERDICTS`.
     verdict: str
+    #: Whether other code made the set.
     code_changed: bool
+    #: Whether an earlier call had reached the verdict.
     known_before: bool = False
+    #: Fields that differ.
     differences: int = 0
+    #: The first of these fields, as JSON content.
     fields: tuple[dict[str, Any], ...] = ()
+    #: Versions then and now, of those that differ.
     packages_changed: dict[str, list[str | None]] | None = None
+    #: Why it could not be built again.
     error: KempfError | None = None
 
     def show(self) -> dict[str, Any]:
@@ -114,18 +102,12 @@ def verify_all(
 
     Parameters
     ----------
-    warehouse : Warehouse
     vessels : sequence of str, optional
         Only theirs; all by default.
     tolerance : float, optional
         Largest relative difference that still counts as equal.
     afresh : bool, optional
         Also sets on which this code, with these packages, has reached a verdict before.
-    progress : Progress, optional
-
-    Returns
-    -------
-    Verification
 
     Raises
     ------

@@ -24,22 +24,15 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class Rerun:
-    """The verdict on one parameter set.
-
-    Attributes
-    ----------
-    parameter_set_id : str
-    verdict : str
-        ``bit-identical``, ``equal within tolerance`` or ``different``.
-    differences : list of Difference
-        Fields that differ.
-    code_changed, packages_changed : bool, dict
-        Whether the code or an effect, and which packages, are others than when the set was made.
-    """
+    """The verdict on one parameter set."""
 
     parameter_set_id: str
+    #: ``bit-identical``, ``equal within tolerance`` or ``different``.
     verdict: str
+    #: Fields that differ.
     differences: list[Difference]
+    #: code_changed, packages_changed: Dict. Whether the code or an effect, and which packages, are others than when the
+    #: set was made.
     code_changed: bool
     packages_changed: dict[str, list[str | None]]
 
@@ -59,7 +52,6 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
 
     Parameters
     ----------
-    warehouse : Warehouse
     name : str
         Its id, a beginning of it, or an alias.
     tolerance : float, optional
@@ -78,11 +70,6 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
 
 def raw_inputs(warehouse: Warehouse, stored: ParameterSet) -> tuple[dict[str, Instruments], VesselProfile]:
     """Read what a parameter set was made from again from the raw bytes.
-
-    Parameters
-    ----------
-    warehouse : Warehouse
-    stored : ParameterSet
 
     Returns
     -------
@@ -124,7 +111,6 @@ def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profil
 
     Parameters
     ----------
-    stored : ParameterSet
     instruments : mapping of str to Instruments
         Series by log, see `raw_inputs`.
     profile : VesselProfile

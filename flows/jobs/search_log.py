@@ -36,12 +36,9 @@ def search(
 
     Parameters
     ----------
-    log : Ingest
     profile : VesselProfile
         With which it was read.
-    file_name : str
     log_format : {"delimited", "mcap", "nmea"}
-    instruments : Instruments
     records : int
         Of the log.
     """

@@ -36,40 +36,25 @@ _LEAST_OF_A_MEASUREMENT = 0.02
 
 @dataclass(frozen=True, eq=False)
 class KnownShip:
-    """What a parameter set says of a ship.
-
-    Attributes
-    ----------
-    parameter_set : ParameterSet
-    hull : Hull
-    effects : ShipEffects or None
-        None where the model has none.
-    covariance : ndarray, shape (6 + p, 6 + p)
-        Of the six parameters and those of the effects; NaN where unknown.
-    spec : ModelSpec
-    speed_m_s : float
-    arm_per_m : float
-        l of eq. (16), 1/m.
-    length_m : float or None
-        Of the profile.
-    noise : NoiseLevels
-        For an estimator: of the set, and where it has none, the usual ones.
-    remarks : tuple of str
-        What a linear model about a straight course has not, or not wholly, of the effects.
-    warnings : tuple of str
-        What speaks against these numbers: the set's own, what was assumed, and the remarks.
-    """
+    """What a parameter set says of a ship."""
 
     parameter_set: ParameterSet
     hull: Hull
+    #: None where the model has none.
     effects: ShipEffects | None
+    #: Shape (6 + p, 6 + p). Of the six parameters and those of the effects; NaN where unknown.
     covariance: Float
     spec: ModelSpec
     speed_m_s: float
+    #: l of eq. (16), 1/m.
     arm_per_m: float
+    #: Of the profile.
     length_m: float | None
+    #: For an estimator: of the set, and where it has none, the usual ones.
     noise: NoiseLevels
+    #: What a linear model about a straight course has not, or not wholly, of the effects.
     remarks: tuple[str, ...]
+    #: What speaks against these numbers: the set's own, what was assumed, and the remarks.
     warnings: tuple[str, ...]
 
     @property
@@ -84,7 +69,6 @@ def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None
 
     Parameters
     ----------
-    warehouse : Warehouse
     set_id : str
         Or a unique beginning of it, or an alias.
     speed_m_s : float, optional

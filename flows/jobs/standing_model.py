@@ -94,7 +94,6 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own, search: Mapping[str, An
 
     Parameters
     ----------
-    chosen : Chosen
     spec : ModelSpec
         ``effects`` names them in order.
     own : Own

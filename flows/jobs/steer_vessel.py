@@ -34,84 +34,52 @@ from kempf.warehouse.store import Warehouse
 
 @dataclass(frozen=True)
 class SteerRequest:
-    """What is asked for.
+    """What is asked for."""
 
-    Attributes
-    ----------
-    set_id : str or None
-        Parameter set; None takes the vessel's current one.
-    wrong : str or None
-        Parameters of a second law: another set's id, or a number by which b1 and b2 are multiplied.
-    speed_m_s : float or None
-        None takes the set's.
-    settings : LawSettings
-    environment : Environment
-        Wind and stream of the simulated track.
-    leg_s, settle_s : float
-        Duration of each of the two legs; what is left out at the beginning.
-    change_rad : float
-        Change of course between the legs.
-    seed : int
-        Of wind, stream and noise.
-    """
-
+    #: Parameter set; None takes the vessel's current one.
     set_id: str | None = None
+    #: Parameters of a second law: another set's id, or a number by which b1 and b2 are multiplied.
     wrong: str | None = None
+    #: None takes the set's.
     speed_m_s: float | None = None
     settings: LawSettings = field(default_factory=LawSettings)
+    #: Wind and stream of the simulated track.
     environment: Environment = PAPER_ENVIRONMENT
+    #: leg_s, settle_s: Duration of each of the two legs; what is left out at the beginning.
     leg_s: float = 1200.0
     settle_s: float = 300.0
+    #: Change of course between the legs.
     change_rad: float = radians(10.0)
+    #: Of wind, stream and noise.
     seed: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A law and what came of it.
+    """A law and what came of it."""
 
-    Attributes
-    ----------
-    label : str
-        Whose parameters it was made from.
-    hull : Hull
-        Them.
-    law : Law
-    track : Track
-    performance : Performance
-        On the first leg, without its beginning.
-    change : CourseChangeResponse
-    loop : ClosedLoop
-        On the ship of the parameter set, without rudder rate and limit.
-    held : float
-        Share of the ships that the covariance of the set allows which it keeps stable; NaN without a covariance.
-    """
-
+    #: Whose parameters it was made from.
     label: str
+    #: Them.
     hull: Hull
     law: Law
     track: Track
+    #: On the first leg, without its beginning.
     performance: Performance
     change: CourseChangeResponse
+    #: On the ship of the parameter set, without rudder rate and limit.
     loop: ClosedLoop
+    #: Share of the ships that the covariance of the set allows which it keeps stable; NaN without a covariance.
     held: float
 
 
 @dataclass(frozen=True, eq=False)
 class Steered:
-    """What the job did.
-
-    Attributes
-    ----------
-    ship : KnownShip
-    request : SteerRequest
-    laws : tuple of Tried
-        From the set's own parameters, then from the wrong ones if any were asked for.
-    warnings : tuple of str
-    """
+    """What the job did."""
 
     ship: KnownShip
     request: SteerRequest
+    #: From the set's own parameters, then from the wrong ones if any were asked for.
     laws: tuple[Tried, ...]
     warnings: tuple[str, ...]
 
@@ -121,16 +89,6 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
 
     The ship that is steered has the parameters of the set, and of its effects what the simulator can do; what she
     really is nobody knows. Her instruments read right, so effects on measurements are in neither law nor ship.
-
-    Parameters
-    ----------
-    warehouse : Warehouse
-    vessel : str
-    request : SteerRequest, optional
-
-    Returns
-    -------
-    Steered
 
     Raises
     ------

@@ -22,15 +22,9 @@ from kempf.schemas.errors import DataRejected, UsageError
 
 @dataclass(frozen=True)
 class ShipInstruments:
-    """Noise of what the law is shown, standard deviations of one reading.
+    """Noise of what the law is shown, standard deviations of one reading."""
 
-    Attributes
-    ----------
-    velocity_m_s : float
-        Of each component of the GNSS velocity.
-    yaw_rate_rad_s, heading_rad, rudder_rad : float
-    """
-
+    #: Of each component of the GNSS velocity.
     velocity_m_s: float = 0.05
     yaw_rate_rad_s: float = radians(0.03)
     heading_rad: float = radians(0.05)

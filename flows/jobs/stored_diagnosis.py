@@ -28,7 +28,6 @@ def inputs_of_diagnosis(chosen: Chosen, spec: ModelSpec, own: Own, settings: Dia
         The model to begin from.
     own : Own
         Effects beyond the catalogue that are tried too.
-    settings : DiagnosisSettings
     """
     return {
         **inputs_of(chosen, spec, own).as_json(),
@@ -53,15 +52,12 @@ def diagnosed_with_evidence(
 
     Parameters
     ----------
-    warehouse : Warehouse
     chosen : Chosen
         Manoeuvres.
     spec : ModelSpec
         The model to begin from.
     own : Own
         Effects beyond the catalogue that are tried too.
-    settings : DiagnosisSettings, optional
-    progress : Progress, optional
     say : callable, optional
         Takes one line where a stored diagnosis has to be computed again.
     """

@@ -43,18 +43,11 @@ _STEP_S = 1.0
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A vessel's manoeuvres and the fits that lead to a model, the plain one first.
-
-    Attributes
-    ----------
-    runs : VesselRuns
-    plain : PlainFit
-    fits : tuple of PooledFit
-        With one effect more each.
-    """
+    """A vessel's manoeuvres and the fits that lead to a model, the plain one first."""
 
     runs: VesselRuns
     plain: PlainFit
+    #: With one effect more each.
     fits: tuple[PooledFit, ...]
 
 
@@ -63,9 +56,6 @@ def fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own, search: Mapping[st
 
     Parameters
     ----------
-    runs : VesselRuns
-    spec : ModelSpec
-    own : Own
     search : mapping, optional
         Settings of the search that differ from the defaults.
     """
@@ -91,13 +81,8 @@ def store_model(
 
     Parameters
     ----------
-    warehouse : Warehouse
     chosen : Chosen
         Manoeuvres.
-    spec : ModelSpec
-    own : Own
-    progress : Progress, optional
-    flow_run : str, optional
     fitted : Fitted, optional
         The model's fits, where the caller has them; else they are made here.
     search : mapping, optional
@@ -150,14 +135,10 @@ def build_model(
     ----------
     instruments : mapping of str to Instruments
         Series by log.
-    profile : VesselProfile
-    inputs : Inputs
-    vessel : str
     segment_ids : sequence of str
         In the order of the inputs' bounds.
     origin : dict
         Provenance.
-    parent : str or None
     """
     spec = ModelSpec.model_validate(dict(inputs.model_spec))
     runs = assemble(instruments, profile, list(zip(segment_ids, inputs.bounds, strict=True)), spec)
@@ -180,10 +161,8 @@ def build_single(
     ----------
     instruments : Instruments
         Series of the log.
-    profile : VesselProfile
     inputs : Inputs
         One segment.
-    vessel : str
     segment_ids : tuple of str
         Its id.
     origin : dict

@@ -18,32 +18,23 @@ FLOW = "reprocess"
 
 @dataclass
 class VesselReport:
-    """What reprocessing did for one vessel.
-
-    Attributes
-    ----------
-    vessel : str
-    logs, reread, searched, segments, new_sets, kept_sets : int
-        Logs in all, logs read anew, logs of the others in which zigzags were looked for anew, zigzags found, parameter
-        sets made and kept.
-    verified : dict of str to int
-        Verdicts on the kept sets, where everything was asked for.
-    withdrawn : str or None
-        Parameter set that ``current`` pointed to, where it no longer stands and nothing took its place.
-    failures : list of dict
-        What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
-        refused, so that the same data are refused again; ``known`` that the run before reported it already.
-    """
+    """What reprocessing did for one vessel."""
 
     vessel: str
+    #: logs, reread, searched, segments, new_sets, kept_sets: Logs in all, logs read anew, logs of the others in which
+    #: zigzags were looked for anew, zigzags found, parameter sets made and kept.
     logs: int = 0
     reread: int = 0
     searched: int = 0
     segments: int = 0
     new_sets: int = 0
     kept_sets: int = 0
+    #: Verdicts on the kept sets, where everything was asked for.
     verified: dict[str, int] = field(default_factory=dict)
+    #: Parameter set that ``current`` pointed to, where it no longer stands and nothing took its place.
     withdrawn: str | None = None
+    #: What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
+    #: refused, so that the same data are refused again; ``known`` that the run before reported it already.
     failures: list[dict[str, Any]] = field(default_factory=list)
 
     @property
@@ -69,7 +60,6 @@ class VesselReport:
         ----------
         state : str or None
             Digest of the state that the vessel was left in, where nothing is left to do in it.
-        changed_only : bool
         estimator : str or None
             What was asked for; both are part of the run's id.
         """
@@ -95,7 +85,6 @@ def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, FlowR
 
     Parameters
     ----------
-    warehouse : Warehouse
     found : sequence of (VesselReport, FlowRun)
         Each with the run of its `VesselReport.as_run`.
     """

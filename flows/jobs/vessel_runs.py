@@ -27,23 +27,15 @@ LENGTH_M = 100.0
 
 @dataclass(frozen=True, eq=False)
 class VesselRuns:
-    """What a vessel's logs hold, ready for a model.
+    """What a vessel's logs hold, ready for a model."""
 
-    Attributes
-    ----------
-    spec : ModelSpec
-        With the arm and the moment decided.
-    runs : tuple of GridRun
-        In order of time; named by their segments.
-    records : tuple of Record
-        What the runs were made of.
-    skipped : dict of str to str
-        Why a segment is no run, by its id.
-    """
-
+    #: With the arm and the moment decided.
     spec: ModelSpec
+    #: In order of time; named by their segments.
     runs: tuple[GridRun, ...]
+    #: What the runs were made of.
     records: tuple[Record, ...]
+    #: Why a segment is no run, by its id.
     skipped: dict[str, str]
 
 
@@ -72,10 +64,8 @@ def assemble(
     ----------
     instruments : mapping of str to Instruments
         Series by log.
-    profile : VesselProfile
     bounds : sequence of (str, Bounds)
         Segments with their names.
-    spec : ModelSpec
 
     Raises
     ------

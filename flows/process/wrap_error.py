@@ -8,10 +8,6 @@ from kempf.schemas.errors import KempfError
 def wrapped(error: Exception) -> KempfError:
     """Return an error of the house as it is, any other wrapped: with its kind and words, and as the cause.
 
-    Parameters
-    ----------
-    error : Exception
-
     Examples
     --------
     >>> wrapped(ZeroDivisionError("division by zero")).message

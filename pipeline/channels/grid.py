@@ -11,19 +11,13 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
 @dataclass(frozen=True, eq=False)
 class Grid:
-    """Channels of one segment on shared instants.
+    """Channels of one segment on shared instants."""
 
-    Attributes
-    ----------
-    time_utc_ns : ndarray, shape (n,)
-    step_s : float
-        Distance of the instants, s.
-    columns : dict of str to ndarray, shape (n,)
-        SI values by name; NaN where the channel has a gap.
-    """
-
+    #: Shape (n,).
     time_utc_ns: Nanoseconds
+    #: Distance of the instants, s.
     step_s: float
+    #: Shape (n,). SI values by name; NaN where the channel has a gap.
     columns: dict[str, Float]
 
     @property
@@ -55,10 +49,6 @@ def make_grid(series: dict[str, Series], start_ns: int, end_ns: int, step_s: flo
         Bounds, UTC ns, both included where the step allows.
     step_s : float
         Grid step, s.
-
-    Returns
-    -------
-    Grid
     """
     step_ns = round(step_s * SECOND_NS)
     time = np.arange(start_ns, end_ns + 1, step_ns, dtype=np.int64)

@@ -28,20 +28,13 @@ _BLOCK = 400
 
 @dataclass(frozen=True, eq=False)
 class Held:
-    """Which rows carry a new measurement, and when it was made.
+    """Which rows carry a new measurement, and when it was made."""
 
-    Attributes
-    ----------
-    rows : ndarray of int, shape (m,)
-        Rows to keep.
-    time_utc_ns : ndarray, shape (m,)
-        Instants of measurement, strictly increasing.
-    rows_per_value : int
-        Rows that one measurement is held for; 1 where nothing is held.
-    """
-
+    #: Shape (m,). Rows to keep.
     rows: NDArray[np.int64]
+    #: Shape (m,). Instants of measurement, strictly increasing.
     time_utc_ns: Nanoseconds
+    #: Rows that one measurement is held for; 1 where nothing is held.
     rows_per_value: int
 
 
@@ -59,10 +52,6 @@ def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
         Time of the rows.
     values : ndarray, shape (n, n_columns)
         The columns that one instrument delivers together.
-
-    Returns
-    -------
-    Held
 
     Examples
     --------

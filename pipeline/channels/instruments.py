@@ -33,23 +33,15 @@ _OWN_CLOCK = ("RMC", "GGA", "GLL")
 
 @dataclass(frozen=True, eq=False)
 class Instruments:
-    """The series of one log.
+    """The series of one log."""
 
-    Attributes
-    ----------
-    series : dict of str to Series
-        By canonical channel name; only channels that the log has.
-    sources : dict of str to str
-        The log's source that serves each channel.
-    notes : tuple of str
-        Choices made, one sentence each.
-    derived : frozenset of str
-        Channels that the log does not have and that were computed from others.
-    """
-
+    #: By canonical channel name; only channels that the log has.
     series: dict[str, Series]
+    #: The log's source that serves each channel.
     sources: dict[str, str]
+    #: Choices made, one sentence each.
     notes: tuple[str, ...]
+    #: Channels that the log does not have and that were computed from others.
     derived: frozenset[str] = frozenset()
 
     def get(self, channel: str) -> Series | None:
@@ -65,10 +57,6 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     readings : polars.DataFrame or polars.LazyFrame
         Of one log, sorted by record, schema `pipeline.ingest.readings.READING_SCHEMA`; of a long lazy one the columns
         of one instrument are held at a time.
-
-    Returns
-    -------
-    Instruments
     """
     frame = readings.lazy()
     there = set(frame.collect_schema().names())

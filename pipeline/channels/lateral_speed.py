@@ -12,50 +12,33 @@ from kempf.pipeline.channels.series import Float, Nanoseconds, Series
 
 @dataclass(frozen=True, eq=False)
 class LateralSpeed:
-    """The lateral speed over ground of one segment at the instants of the GNSS.
+    """The lateral speed over ground of one segment at the instants of the GNSS."""
 
-    Attributes
-    ----------
-    time_utc_ns : ndarray, shape (n,)
-        Instants of the GNSS velocity.
-    value_m_s : ndarray, shape (n,)
-        y_v of eq. (18), m/s, starboard positive; NaN where the heading has a gap.
-    std_m_s : ndarray, shape (n,)
-        Standard error from the noise of speed, course and heading, m/s.
-    forward_m_s : ndarray, shape (n,)
-        The longitudinal counterpart V_gps cos(COG - K), m/s.
-    drift_rad : ndarray, shape (n,)
-        COG - K in (-pi, pi], rad.
-    """
-
+    #: Shape (n,). Instants of the GNSS velocity.
     time_utc_ns: Nanoseconds
+    #: Shape (n,). y_v of eq. (18), m/s, starboard positive; NaN where the heading has a gap.
     value_m_s: Float
+    #: Shape (n,). Standard error from the noise of speed, course and heading, m/s.
     std_m_s: Float
+    #: Shape (n,). The longitudinal counterpart V_gps cos(COG - K), m/s.
     forward_m_s: Float
+    #: Shape (n,). COG - K in (-pi, pi], rad.
     drift_rad: Float
 
 
 @dataclass(frozen=True)
 class CurrentCheck:
-    """The check on eq. (19): what the heading-dependent part of the current does to y_v.
+    """The check on eq. (19): what the heading-dependent part of the current does to y_v."""
 
-    Attributes
-    ----------
-    current_speed_m_s, current_direction_rad : float
-        Mean current over the segment from forward GNSS speed less log speed, and where it flows to; NaN without a log.
-        On a heading that does not swing only the part along it is seen.
-    constant_m_s : float
-        V_cur sin(K_cur - K_0), the constant that V_T absorbs, m/s.
-    heading_term_m_s : float
-        Largest |V_cur cos(K_cur - K_0) psi| of the segment: what V_T does not absorb, m/s.
-    heading_term_over_noise : float
-        That term over the median standard error of y_v; well below 1 the segment lies well to the stream.
-    """
-
+    #: current_speed_m_s, current_direction_rad: Mean current over the segment from forward GNSS speed less log speed,
+    #: and where it flows to; NaN without a log. On a heading that does not swing only the part along it is seen.
     current_speed_m_s: float
     current_direction_rad: float
+    #: V_cur sin(K_cur - K_0), the constant that V_T absorbs, m/s.
     constant_m_s: float
+    #: Largest |V_cur cos(K_cur - K_0) psi| of the segment: what V_T does not absorb, m/s.
     heading_term_m_s: float
+    #: That term over the median standard error of y_v; well below 1 the segment lies well to the stream.
     heading_term_over_noise: float
 
 
@@ -82,10 +65,6 @@ def lateral_speed(
         True heading, rad, unwrapped.
     speed_std_m_s, course_std_rad, heading_std_rad : float
         Noise of one reading of each, see `noise_std`.
-
-    Returns
-    -------
-    LateralSpeed
     """
     time = course_over_ground.time_utc_ns
     speed = speed_over_ground.at(time, gap_limit_s(speed_over_ground))
@@ -106,10 +85,6 @@ def noise_std(series: Series) -> float:
 
     Third differences remove the ship's smooth motion; their median absolute deviation ignores spikes. For white noise
     var(d3) = 20 var(noise).
-
-    Parameters
-    ----------
-    series : Series
 
     Returns
     -------
@@ -138,17 +113,12 @@ def check_current(
 
     Parameters
     ----------
-    lateral : LateralSpeed
     heading : Series
         Heading, rad, unwrapped.
     speed_through_water : Series or None
         Log speed, m/s; without it the current is unknown and all results are NaN.
     base_heading_rad : float
         K_0, rad.
-
-    Returns
-    -------
-    CurrentCheck
     """
     unknown = CurrentCheck(*([float("nan")] * 5))
     if speed_through_water is None:

@@ -16,17 +16,11 @@ SECOND_NS = 1_000_000_000
 
 @dataclass(frozen=True, eq=False)
 class Series:
-    """Values of one channel at their instants of measurement.
+    """Values of one channel at their instants of measurement."""
 
-    Attributes
-    ----------
-    time_utc_ns : ndarray, shape (n,)
-        Strictly increasing UTC nanoseconds.
-    value : ndarray, shape (n,)
-        Finite values in SI; angles on the circle are unwrapped, so differences and means may be taken.
-    """
-
+    #: Shape (n,). Strictly increasing UTC nanoseconds.
     time_utc_ns: Nanoseconds
+    #: Shape (n,). Finite values in SI; angles on the circle are unwrapped, so differences and means may be taken.
     value: Float
 
     def __post_init__(self) -> None:

@@ -35,20 +35,13 @@ _PASSED = 0.2652
 
 @dataclass(frozen=True, eq=False)
 class SmoothedSpeed:
-    """A series without its noise, and what of it is left.
+    """A series without its noise, and what of it is left."""
 
-    Attributes
-    ----------
-    series : Series
-        At its own instants.
-    error_std : float
-        Standard deviation of the noise that is left, in the series' unit.
-    error_time_s : float
-        Its correlation time: that of the first-order process with as much variance and as much power at frequency 0.
-    """
-
+    #: At its own instants.
     series: Series
+    #: Standard deviation of the noise that is left, in the series' unit.
     error_std: float
+    #: Its correlation time: that of the first-order process with as much variance and as much power at frequency 0.
     error_time_s: float
 
 
@@ -57,7 +50,6 @@ def smoothed(series: Series, noise_std: float, shapes: Sequence[Float] = ()) -> 
 
     Parameters
     ----------
-    series : Series
     noise_std : float
         Standard deviation of the noise of one reading, in the series' unit.
     shapes : sequence of ndarray, shape (n,), optional

@@ -29,10 +29,6 @@ _FEWEST = 20
 def by_band(looked: Sequence[Looked]) -> dict[str, list[dict[str, Any]]]:
     """Return what each band of frequencies holds, by channel.
 
-    Parameters
-    ----------
-    looked : sequence of Looked
-
     Returns
     -------
     dict of str to list of dict

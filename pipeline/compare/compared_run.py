@@ -33,9 +33,6 @@ def compare_run(
 
     Parameters
     ----------
-    filtered : RunFilter
-    point : Point
-    horizon : Horizon
     held_out : bool
         Whether the parameters have not seen this run.
     levels_from : str, optional
@@ -43,7 +40,6 @@ def compare_run(
     own_levels : ndarray, shape (6,), optional
         Logarithms of levels fitted to this run, for the search for misfits; by default those of ``point``: a noisier
         sensor is no misfit.
-    phases : sequence of PhaseInterval, optional
     turns : sequence of Turn, optional
         Its overshoots.
 

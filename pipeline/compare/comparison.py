@@ -22,34 +22,22 @@ _DEG = float(np.rad2deg(1.0))
 
 @dataclass(frozen=True, eq=False)
 class ComparedRun:
-    """One run beside its prediction.
+    """One run beside its prediction."""
 
-    Attributes
-    ----------
-    name : str
-        Of the run.
-    held_out : bool
-        Whether the parameters have not seen it.
-    predicted : Predicted
-        At the horizon asked for.
-    free : Predicted
-        The free run, for overshoots and for the threshold.
-    free_run_error_percent : float
-        The error of the model on this run, `kempf.pipeline.predict.free_run.FreeRun.relative_error` in percent.
-    overshoots : tuple of OvershootError
-    looked : Looked
-        For `kempf.pipeline.compare.misfit.where`.
-    levels_from : str
-        Where the noise levels come from, in words.
-    """
-
+    #: Of the run.
     name: str
+    #: Whether the parameters have not seen it.
     held_out: bool
+    #: At the horizon asked for.
     predicted: Predicted
+    #: The free run, for overshoots and for the threshold.
     free: Predicted
+    #: The error of the model on this run, `kempf.pipeline.predict.free_run.FreeRun.relative_error` in percent.
     free_run_error_percent: float
     overshoots: tuple[OvershootError, ...]
+    #: For `kempf.pipeline.compare.misfit.where`.
     looked: Looked
+    #: Where the noise levels come from, in words.
     levels_from: str
 
     @property
@@ -98,12 +86,7 @@ def _ordered(found: dict[str, Any]) -> dict[str, Any]:
 
 
 def started_from(run: ComparedRun) -> dict[str, Any]:
-    """Return what a prediction began with, and what it took for wind and current.
-
-    Parameters
-    ----------
-    run : ComparedRun
-    """
+    """Return what a prediction began with, and what it took for wind and current."""
     horizon = run.predicted.horizon
     if horizon.kind == "one step":
         return {
@@ -136,10 +119,6 @@ def started_from(run: ComparedRun) -> dict[str, Any]:
 
 def summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
     """Return means over the runs, fitted and held out apart, each with the standard error over runs.
-
-    Parameters
-    ----------
-    runs : sequence of ComparedRun
 
     Returns
     -------

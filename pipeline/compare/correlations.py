@@ -29,10 +29,6 @@ _FEWEST_PAIRS = 20
 def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
     """Return auto- and cross-correlations of every channel's whitened innovations, over all runs together.
 
-    Parameters
-    ----------
-    looked : sequence of Looked
-
     Returns
     -------
     dict

@@ -45,7 +45,6 @@ def group(samples: Samples, inside: NDArray[np.bool_]) -> dict[str, Any]:
 
     Parameters
     ----------
-    samples : Samples
     inside : ndarray of bool, shape (N,)
 
     Returns

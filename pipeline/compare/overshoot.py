@@ -17,20 +17,12 @@ from kempf.pipeline.channels.series import Float
 
 @dataclass(frozen=True)
 class Turn:
-    """One overshoot as the segment has it, times from the first instant of the run.
-
-    Attributes
-    ----------
-    number : int
-    side : int
-        Where the heading went, +1 starboard.
-    execute_s, until_s : float
-        The execute, and the next one or the end.
-    overshoot_deg : float
-    """
+    """One overshoot as the segment has it, times from the first instant of the run."""
 
     number: int
+    #: Where the heading went, +1 starboard.
     side: int
+    #: execute_s, until_s: The execute, and the next one or the end.
     execute_s: float
     until_s: float
     overshoot_deg: float
@@ -38,19 +30,13 @@ class Turn:
 
 @dataclass(frozen=True)
 class OvershootError:
-    """One overshoot, measured and predicted, deg.
-
-    Attributes
-    ----------
-    number, side : int
-    measured_deg : float
-    predicted_deg, error_deg : float or None
-        Predicted, and predicted less measured; None where the predicted ship does not turn back in time.
-    """
+    """One overshoot, measured and predicted, deg."""
 
     number: int
     side: int
     measured_deg: float
+    #: predicted_deg, error_deg: Predicted, and predicted less measured; None where the predicted ship does not turn
+    #: back in time.
     predicted_deg: float | None
     error_deg: float | None
 
@@ -65,7 +51,6 @@ def compare_overshoots(
     time_s : ndarray, shape (n,)
     measured, predicted : ndarray, shape (n,)
         Heading, rad, unwrapped; the measured one NaN where there is none.
-    turns : sequence of Turn
     """
     known = np.isfinite(measured)
     found = []
@@ -111,7 +96,6 @@ def turns_of(
     ----------
     overshoots : sequence of (int, int, float, float)
         Number, side, instant of the turning point in s, overshoot in deg.
-    executes_s : sequence of float
     end_s : float
         Of the segment.
     """

@@ -29,10 +29,6 @@ def first_heading(run: GridRun) -> float:
 def run_series(run: ComparedRun) -> dict[str, Float | NDArray[np.int64]]:
     """Return a run and its prediction by column, each of shape (n,).
 
-    Parameters
-    ----------
-    run : ComparedRun
-
     Returns
     -------
     dict of str to ndarray

@@ -21,10 +21,6 @@ _FEWEST = 4
 def worst(looked: Sequence[Looked]) -> list[dict[str, Any]]:
     """Return the windows in which the model errs most, worst first, one step ahead and in the free run.
 
-    Parameters
-    ----------
-    looked : sequence of Looked
-
     Returns
     -------
     list of dict

@@ -21,12 +21,7 @@ _BINS, _WIDTH_95 = 14, 1.96
 
 
 def added_variables(diagnosis: Diagnosis) -> tuple[AddedVariable, ...]:
-    """Return one for every effect that was added; with none, for the strongest candidate.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    """
+    """Return one for every effect that was added; with none, for the strongest candidate."""
     steps = diagnosis.steps
     pairs = [(before.fit, step.chosen_from[0][0]) for before, step in pairwise(steps)]
     if not pairs:

@@ -23,17 +23,11 @@ BIC_SAVING = 6.0
 
 @dataclass(frozen=True, eq=False)
 class Unseen:
-    """How well a model predicts runs that its parameters did not see.
+    """How well a model predicts runs that its parameters did not see."""
 
-    Attributes
-    ----------
-    folds : ndarray, shape (runs,)
-        Log-likelihood of each fitted run under what the others say, to first order.
-    held : ndarray, shape (held,)
-        Log-likelihood of the held-out runs.
-    """
-
+    #: Shape (runs,). Log-likelihood of each fitted run under what the others say, to first order.
     folds: Float
+    #: Shape (held,). Log-likelihood of the held-out runs.
     held: Float
 
 
@@ -42,45 +36,31 @@ def unseen(fit: PooledFit, held: Sequence[GridRun], workers: Executor) -> Unseen
 
     Parameters
     ----------
-    fit : PooledFit
     held : sequence of GridRun
         Held out.
-    workers : Executor
     """
     return Unseen(_left_out(fit, workers), np.array(list(workers.map(lambda run: predictive(fit, run), held))))
 
 
 @dataclass(frozen=True, eq=False)
 class Confirmation:
-    """A model with one effect more, refitted.
-
-    Attributes
-    ----------
-    fit : PooledFit
-    likelihood_ratio : float
-        Twice the log-likelihood gained.
-    bic_change : float
-        Negative where the effect is worth its parameters.
-    fold_gains : ndarray, shape (runs,)
-        Log-likelihood gained in each fitted run by parameters that did not see it, to first order.
-    held_out_gains : ndarray, shape (held,)
-        The same in the held-out runs.
-    at_bound : bool
-        Whether a parameter of the effect ended at a bound.
-    unseen : Unseen
-        Of ``fit``.
-    outdone : bool
-        Whether the refit was given up, for it could not come near what another one reached; its gains are then those of
-        ``before``: none.
-    """
+    """A model with one effect more, refitted."""
 
     fit: PooledFit
+    #: Twice the log-likelihood gained.
     likelihood_ratio: float
+    #: Negative where the effect is worth its parameters.
     bic_change: float
+    #: Shape (runs,). Log-likelihood gained in each fitted run by parameters that did not see it, to first order.
     fold_gains: Float
+    #: Shape (held,). The same in the held-out runs.
     held_out_gains: Float
+    #: Whether a parameter of the effect ended at a bound.
     at_bound: bool
+    #: Of ``fit``.
     unseen: Unseen
+    #: Whether the refit was given up, for it could not come near what another one reached; its gains are then those of
+    #: ``before``: none.
     outdone: bool = False
 
     @property
@@ -108,14 +88,12 @@ def confirm(
 
     Parameters
     ----------
-    base : PooledFit
     before : Unseen
         Of ``base``, the same for all its candidates.
     candidate : Candidate
         Of the screen beside ``base``.
     held : sequence of GridRun
         Held out.
-    workers : Executor
     most_bic : float, optional
         The change of the information criterion without which it is of no use: another one did better.
     """

@@ -35,23 +35,13 @@ _SEEN = 2.0
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What a diagnosis found; `kempf.pipeline.diagnose.verdict` puts it in words.
+    """What a diagnosis found; `kempf.pipeline.diagnose.verdict` puts it in words."""
 
-    Attributes
-    ----------
-    way : tuple of PooledFit
-        The plain model, then with one given effect more after the other; the last one is diagnosed.
-    steps : tuple of Step
-        The diagnosed model first.
-    before, after : Flexible or None
-        The flexible reference beside the plain model and beside the last; None with a single run.
-    fitted, held : tuple of GridRun
-    plain : PlainFit
-    settings : DiagnosisSettings
-    """
-
+    #: The plain model, then with one given effect more after the other; the last one is diagnosed.
     way: tuple[PooledFit, ...]
+    #: The diagnosed model first.
     steps: tuple[Step, ...]
+    #: before, after: The flexible reference beside the plain model and beside the last; None with a single run.
     before: Flexible | None
     after: Flexible | None
     fitted: tuple[GridRun, ...]
@@ -83,8 +73,6 @@ def diagnose(
         Disturbances.
     effects : mapping
         Catalogue.
-    workers : Executor
-    settings : DiagnosisSettings, optional
     given : sequence of Effect, optional
         Effects that the model has already.
     announce : callable, optional

@@ -40,7 +40,6 @@ def responses(base: PooledFit, trials: Sequence[EffectTrial], workers: Executor)
     ----------
     base : PooledFit
         The fitted model; it has none of the effects.
-    trials : sequence of EffectTrial
     workers : Executor
         Share the passes; nothing depends on it.
 

@@ -51,7 +51,6 @@ def evidence_of(
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     phases : mapping of str to sequence of PhaseInterval
         By run; a run without has none.
     zigzags : mapping of str to SailedZigzag
@@ -111,12 +110,7 @@ class _Judged:
 
 
 def fitted_parameters(fit: PooledFit) -> tuple[FittedParameter, ...]:
-    """Return the parameters of hull and effects with their standard errors.
-
-    Parameters
-    ----------
-    fit : PooledFit
-    """
+    """Return the parameters of hull and effects with their standard errors."""
     names = [*HULL_PARAMETERS, *fit.model.names]
     units = [*HULL_PARAMETERS.values(), *(parameter.unit for _, parameter in fit.model.parameters)]
     values = np.concatenate([fit.hull, fit.values])

@@ -21,18 +21,12 @@ _MOST, _EARNED = 3, 8.0
 
 @dataclass(frozen=True)
 class Term:
-    """One term of a proposed formula.
+    """One term of a proposed formula."""
 
-    Attributes
-    ----------
-    target, expression : str
-        As `kempf effects try` takes them; the expression holds its coefficient.
-    gain : float
-        Log-likelihood that the formula gains with it, in runs that did not fit it, over the formula without it.
-    """
-
+    #: target, expression: As `kempf effects try` takes them; the expression holds its coefficient.
     target: str
     expression: str
+    #: Log-likelihood that the formula gains with it, in runs that did not fit it, over the formula without it.
     gain: float
 
 

@@ -45,10 +45,8 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
 
     Parameters
     ----------
-    base : PooledFit
     candidate : Candidate
         Of the screen beside ``base``.
-    workers : Executor
     wanted : float, optional
         Log-likelihood without which the fit is of no use: climbs that cannot reach it are given up, not converged.
     """
@@ -141,11 +139,8 @@ def staged(
 
     Parameters
     ----------
-    runs : sequence of GridRun
-    spec : ModelSpec
     effects : sequence of Effect
         In the order in which they were added.
-    workers : Executor
     settings : MaximumLikelihoodSettings, optional
         Of the search of single runs.
 

@@ -18,18 +18,12 @@ from kempf.pipeline.predict.run_residuals import Looked, PhaseInterval
 
 @dataclass(frozen=True, eq=False)
 class JudgedRun:
-    """One manoeuvre under one model.
+    """One manoeuvre under one model."""
 
-    Attributes
-    ----------
-    point : Point
-        Parameters of the model, with noise levels fitted to this manoeuvre, held out or not: a noisier sensor is no
-        misfit.
-    residuals : Looked
-        One step ahead and in free run.
-    """
-
+    #: Parameters of the model, with noise levels fitted to this manoeuvre, held out or not: a noisier sensor is no
+    #: misfit.
     point: Point
+    #: One step ahead and in free run.
     residuals: Looked
 
     @property
@@ -43,7 +37,6 @@ def judged_fitted(step: Step, phases: Mapping[str, Sequence[PhaseInterval]]) -> 
 
     Parameters
     ----------
-    step : Step
     phases : mapping of str to sequence of PhaseInterval
         By run; a run without has none.
     """
@@ -64,7 +57,6 @@ def judged_held_out(
 
     Parameters
     ----------
-    step : Step
     held : sequence of GridRun
         In the order of ``step.held``.
     phases : mapping of str to sequence of PhaseInterval

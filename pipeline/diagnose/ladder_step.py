@@ -20,28 +20,18 @@ from kempf.schemas.effect import Effect
 
 @dataclass(frozen=True, eq=False)
 class Step:
-    """One rung of the ladder.
-
-    Attributes
-    ----------
-    fit : PooledFit
-    added : Effect or None
-        None on the first.
-    chosen_from : tuple of (Candidate, Confirmation)
-        The set it was taken from, itself first.
-    refused : tuple of (Candidate, Confirmation)
-        What was refitted and did not stand the tests, or was clearly worse.
-    screened : tuple of Candidate
-        What the screen of this step's model says of everything else.
-    fitted, held : tuple of FreeRun
-        Free runs of the fitted and of the held-out manoeuvres.
-    """
+    """One rung of the ladder."""
 
     fit: PooledFit
+    #: None on the first.
     added: Effect | None
+    #: The set it was taken from, itself first.
     chosen_from: tuple[tuple[Candidate, Confirmation], ...]
+    #: What was refitted and did not stand the tests, or was clearly worse.
     refused: tuple[tuple[Candidate, Confirmation], ...]
+    #: What the screen of this step's model says of everything else.
     screened: tuple[Candidate, ...]
+    #: fitted, held: Free runs of the fitted and of the held-out manoeuvres.
     fitted: tuple[FreeRun, ...]
     held: tuple[FreeRun, ...]
 
@@ -80,14 +70,12 @@ def make_step(
 
     Parameters
     ----------
-    fit : PooledFit
     added : Effect or None
         None on the first rung.
     chosen_from, refused : tuple of (Candidate, Confirmation)
         See `Step`.
     held : sequence of GridRun
         Held out.
-    screened : sequence of Candidate
     workers : Executor, optional
         Free runs share it.
     """

@@ -31,18 +31,11 @@ _APPROACH_S = 5.0
 
 @dataclass(frozen=True)
 class SailedZigzag:
-    """What the segment of a manoeuvre has that its run has not.
-
-    Attributes
-    ----------
-    base_heading_deg : float
-    executes_utc_ns : tuple of int
-    overshoots : tuple of mapping
-        ``peak_utc_ns``, ``side`` and ``beyond_nominal_deg`` of each.
-    """
+    """What the segment of a manoeuvre has that its run has not."""
 
     base_heading_deg: float
     executes_utc_ns: tuple[int, ...]
+    #: ``peak_utc_ns``, ``side`` and ``beyond_nominal_deg`` of each.
     overshoots: tuple[Mapping[str, Any], ...]
 
 
@@ -64,8 +57,6 @@ def manoeuvre_evidence(
         Under the last; None where it is the first.
     states : ndarray, shape (n, 4)
         Of the last model: v, r, F and M given all measurements; NaN where the free run diverges.
-    zigzag : SailedZigzag
-    held_out : bool
     """
     run = before.residuals.filtered.run
     executes = tuple(_seconds(run, t) for t in zigzag.executes_utc_ns)

@@ -16,7 +16,6 @@ def where_left(diagnosis: Diagnosis, phases: Mapping[str, Sequence[PhaseInterval
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     phases : mapping of str to sequence of PhaseInterval
         By run; a run without has none.
 

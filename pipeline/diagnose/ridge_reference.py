@@ -70,28 +70,20 @@ TERMS: tuple[Effect, ...] = tuple(_term(t, n, text) for t in ("sway", "yaw") for
 
 @dataclass(frozen=True, eq=False)
 class Flexible:
-    """What the flexible reference finds beside a fitted model.
+    """What the flexible reference finds beside a fitted model."""
 
-    Attributes
-    ----------
-    gain : float
-        Log-likelihood that it adds in runs that did not fit it, summed over them; negative where nothing repeats.
-    gains : ndarray, shape (runs,)
-    shrinkage : float
-        Of those tried, the one that gains most.
-    formula : tuple of Term
-        The few terms that explain most of it; exploratory.
-    columns : ndarray, shape (N, len(TERMS))
-        What the terms do to the whitened innovations, of unit size, without what the fitted parameters imitate.
-    parts : tuple of slice
-        The rows of each run.
-    """
-
+    #: Log-likelihood that it adds in runs that did not fit it, summed over them; negative where nothing repeats.
     gain: float
+    #: Shape (runs,).
     gains: Float
+    #: Of those tried, the one that gains most.
     shrinkage: float
+    #: The few terms that explain most of it; exploratory.
     formula: tuple[Term, ...]
+    #: Shape (N, len(TERMS)). What the terms do to the whitened innovations, of unit size, without what the fitted
+    #: parameters imitate.
     columns: Float
+    #: The rows of each run.
     parts: tuple[slice, ...]
 
     def foreseen(self, signal: Float) -> float:
@@ -117,7 +109,6 @@ def flexible(base: PooledFit, workers: Executor) -> Flexible:
     ----------
     base : PooledFit
         At least two runs.
-    workers : Executor
     """
     columns = responses(base, [EffectTrial(effect, (_SIZE,)) for effect in TERMS], workers)
     X = np.column_stack([c if c is not None else np.zeros((2 * base.count, 1)) for c in columns])

@@ -30,53 +30,36 @@ NOT_TESTABLE = 0.999
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """One effect against the fitted model.
-
-    Attributes
-    ----------
-    effect : Effect
-    score : float
-        LM; NaN where the effect cannot be tested.
-    p_value, p_adjusted : float
-        Of the score; the second by Benjamini & Yekutieli (2001) over the catalogue.
-    change, std : ndarray, shape (p,)
-        Expected parameter change and its standard error, in the parameters' units.
-    absorption : float
-        Share of the effect's whitened trace that the fitted parameters imitate.
-    missing : tuple of str
-        Channels it needs that the runs lack.
-    measured_by : tuple of str
-        Channels of the runs that show it already; then it is not scored.
-    direction : ndarray, shape (N,)
-        S' times the change: what the effect would explain of the whitened innovations.
-    steps : tuple of float
-        Where on its grid it was tried.
-    """
+    """One effect against the fitted model."""
 
     effect: Effect
+    #: LM; NaN where the effect cannot be tested.
     score: float
+    #: p_value, p_adjusted: Of the score; the second by Benjamini & Yekutieli (2001) over the catalogue.
     p_value: float
     p_adjusted: float
+    #: change, std: Shape (p,). Expected parameter change and its standard error, in the parameters' units.
     change: Float
     std: Float
+    #: Share of the effect's whitened trace that the fitted parameters imitate.
     absorption: float
+    #: Channels it needs that the runs lack.
     missing: tuple[str, ...]
+    #: Shape (N,). S' times the change: what the effect would explain of the whitened innovations.
     direction: Float
+    #: Where on its grid it was tried.
     steps: tuple[float, ...]
+    #: Channels of the runs that show it already; then it is not scored.
     measured_by: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, eq=False)
 class Nuisance:
-    """The innovations of all runs in one column, and an orthonormal basis of what the fitted parameters span.
+    """The innovations of all runs in one column, and an orthonormal basis of what the fitted parameters span."""
 
-    Attributes
-    ----------
-    u : ndarray, shape (N,)
-    basis : ndarray, shape (N, q)
-    """
-
+    #: Shape (N,).
     u: Float
+    #: Shape (N, q).
     basis: Float
 
     def clean(self, columns: Float) -> Float:
@@ -90,7 +73,6 @@ def nuisance(lines: Sequence[Linearised], shared: int) -> Nuisance:
 
     Parameters
     ----------
-    lines : sequence of Linearised
     shared : int
         How many parameters the runs share; the others are each run's own.
     """
@@ -129,10 +111,6 @@ def screen(base: PooledFit, effects: Mapping[str, Effect], workers: Executor) ->
         Catalogue.
     workers : Executor
         Effects share it; nothing depends on it.
-
-    Returns
-    -------
-    list of Candidate
     """
     present = {effect.name for effect in base.model.effects}
     chosen = [effect for effect in effects.values() if effect.name not in present]

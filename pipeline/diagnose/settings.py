@@ -7,20 +7,13 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class DiagnosisSettings:
-    """Settings of a diagnosis; all of them are part of its identity.
+    """Settings of a diagnosis; all of them are part of its identity."""
 
-    Attributes
-    ----------
-    level : float
-        Adjusted p-value below which a candidate is refitted.
-    refits : int
-        At most, of one step.
-    most_steps : int
-        Effects added at most.
-    """
-
+    #: Adjusted p-value below which a candidate is refitted.
     level: float = 0.01
+    #: At most, of one step.
     refits: int = 6
+    #: Effects added at most.
     most_steps: int = 4
 
 

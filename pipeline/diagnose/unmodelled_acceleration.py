@@ -18,7 +18,6 @@ def unmodelled_acceleration(runs: Sequence[GridRun], states: Sequence[Float]) ->
 
     Parameters
     ----------
-    runs : sequence of GridRun
     states : sequence of ndarray, shape (n, 4)
         v, r, F and M of each, given all its measurements (`kempf.pipeline.predict.smoothed_states`); a manoeuvre
         with NaN is left out.

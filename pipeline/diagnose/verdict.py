@@ -44,12 +44,7 @@ class EffectFinding:
 
 
 def verdict(diagnosis: Diagnosis) -> Verdict:
-    """Return what the diagnosis comes to.
-
-    Parameters
-    ----------
-    diagnosis : Diagnosis
-    """
+    """Return what the diagnosis comes to."""
     if diagnosis.before is None:
         return "insufficient_data"
     if something_left(diagnosis):
@@ -95,7 +90,6 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
 
     Parameters
     ----------
-    diagnosis : Diagnosis
     candidate : Candidate
         Of the plain model's screen.
     """

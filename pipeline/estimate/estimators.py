@@ -56,15 +56,12 @@ def estimate_without_log(
 
     Parameters
     ----------
-    record : Record
-    spec : ModelSpec
     arm_per_m : float
         l of eq. (16), 1/m.
     settings : dict
         Of ``ml``, as `default_settings` gives them.
     no_log : dict
         Fields of `kempf.pipeline.estimate.no_log.identify.NoLogSettings`.
-    companions : tuple of Record
     """
     lateral = maximum_likelihood.MaximumLikelihoodSettings(**_with_tuples(settings))
     return identify_without_log(record, spec, arm_per_m, lateral, NoLogSettings(**no_log), companions)
@@ -88,18 +85,12 @@ def estimate(
     ----------
     name : str
         One of `kempf.pipeline.estimate.names.NAMES`.
-    record : Record
-    spec : ModelSpec
     arm_per_m : float
         l of eq. (16), 1/m.
     settings : dict
         As `default_settings` gives them; JSON has no tuples, so lists stand for them.
     length_m : float, optional
         Of the ship, for the step over which ``ml`` averages readings.
-
-    Returns
-    -------
-    Estimate
     """
     chosen = _ESTIMATORS[name]
     given = chosen.settings(**_with_tuples(settings))

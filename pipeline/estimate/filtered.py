@@ -26,40 +26,26 @@ _CHAIN = 5
 
 @dataclass(frozen=True, eq=False)
 class Passed:
-    """What one pass of the filter gives.
-
-    Attributes
-    ----------
-    log_likelihood : float
-    innovation, variance : ndarray, shape (n, 3)
-        Measured less predicted, NaN where not measured; and its variance.
-    predicted : ndarray, shape (n, 3)
-    states, spread : ndarray, shape (n, 9 + k)
-        Filtered states and their variances; 0 rows unless asked for.
-    """
+    """What one pass of the filter gives."""
 
     log_likelihood: float
+    #: innovation, variance: Shape (n, 3). Measured less predicted, NaN where not measured; and its variance.
     innovation: Float
     variance: Float
+    #: Shape (n, 3).
     predicted: Float
+    #: states, spread: Shape (n, 9 + k). Filtered states and their variances; 0 rows unless asked for.
     states: Float
     spread: Float
 
 
 @dataclass(frozen=True, eq=False)
 class RunFilter:
-    """A run, a model and a disturbance model, ready for parameters.
-
-    Attributes
-    ----------
-    run : GridRun
-    model : EffectModel
-    spec : ModelSpec
-        Which disturbances there are.
-    """
+    """A run, a model and a disturbance model, ready for parameters."""
 
     run: GridRun
     model: EffectModel
+    #: Which disturbances there are.
     spec: ModelSpec
 
     def present(self) -> Float:
@@ -97,7 +83,6 @@ class RunFilter:
             See `kempf.pipeline.estimate.filters.ekf.extended`; a level that is not used is taken for 0.
         values : ndarray, shape (p,)
             Parameters of the effects.
-        states : bool, optional
         withheld : ndarray of bool, shape (n,), optional
         """
         return self._filtered(hull[:, None], levels[:, None], values[:, None], states=states, withheld=withheld)[0]

@@ -20,20 +20,13 @@ _SOUND = 0.7
 
 @dataclass(frozen=True, eq=False)
 class Gated:
-    """A record without its gross errors.
+    """A record without its gross errors."""
 
-    Attributes
-    ----------
-    record : Instants
-        With NaN where a measurement was taken out.
-    taken_out : dict of str to int
-        How many, by measurement; only where there are some.
-    heavy : tuple of str
-        Measurements of which so many lie outside the gate that these are no gross errors; all of them were kept.
-    """
-
+    #: With NaN where a measurement was taken out.
     record: Instants
+    #: How many, by measurement; only where there are some.
     taken_out: dict[str, int]
+    #: Measurements of which so many lie outside the gate that these are no gross errors; all of them were kept.
     heavy: tuple[str, ...]
 
 
@@ -50,10 +43,6 @@ def gate(record: Instants, innovation: Float, variance: Float, width: float, lar
         Half width of the gate in robust standard deviations.
     largest_share : float
         A larger share outside the gate means that the model is wrong, not the measurements: nothing is taken out.
-
-    Returns
-    -------
-    Gated
     """
     measured = record.measured.copy()
     taken_out: dict[str, int] = {}

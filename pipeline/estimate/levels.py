@@ -20,16 +20,9 @@ _DECREMENT, _MAX_ITERATIONS = 1e-2, 30
 
 @dataclass(frozen=True, eq=False)
 class Levels:
-    """Noise levels of one run.
+    """Noise levels of one run."""
 
-    Attributes
-    ----------
-    levels : ndarray, shape (6,)
-        Logarithms, see `kempf.pipeline.estimate.pooled_fit.PooledFit`.
-    log_likelihood : float
-    converged : bool
-    """
-
+    #: Shape (6,). Logarithms, see `kempf.pipeline.estimate.pooled_fit.PooledFit`.
     levels: Float
     log_likelihood: float
     converged: bool
@@ -45,7 +38,6 @@ def fit_levels(filtered: RunFilter, hull: Float, values: Float, start: Float) ->
 
     Parameters
     ----------
-    filtered : RunFilter
     hull, values : ndarray, shapes (6,) and (p,)
     start : ndarray, shape (6,)
         Logarithms of the levels.

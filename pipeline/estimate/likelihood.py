@@ -28,22 +28,15 @@ INITIAL_STD = (2.0, 0.2, 0.2, 0.1, 0.01, 2.0, 2.0, 0.01)
 
 @dataclass(frozen=True, eq=False)
 class Trace:
-    """What the filter did on its way.
+    """What the filter did on its way."""
 
-    Attributes
-    ----------
-    innovation, variance : ndarray, shape (n, 3)
-        One-step prediction errors and their variances, NaN where not measured.
-    states, spread : ndarray, shape (n, 9)
-        Filtered states and their variances.
-    scores : ndarray, shape (n, 3, 12)
-        Derivative of each measurement's own log-likelihood.
-    """
-
+    #: innovation, variance: Shape (n, 3). One-step prediction errors and their variances, NaN where not measured.
     innovation: Float
     variance: Float
+    #: states, spread: Shape (n, 9). Filtered states and their variances.
     states: Float
     spread: Float
+    #: Shape (n, 3, 12). Derivative of each measurement's own log-likelihood.
     scores: Float
 
 

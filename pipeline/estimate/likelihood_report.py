@@ -59,7 +59,6 @@ def report(
         What the segment was cut to.
     objective : Likelihood
         What was climbed at last, gross errors taken out.
-    best : Search
     trace : Trace
         Of the filter at its end.
     discrete_step_s : float
@@ -213,7 +212,6 @@ def slowest_s(hull: Float, speed_m_s: float) -> float:
     Parameters
     ----------
     hull : ndarray, shape (6,)
-    speed_m_s : float
     """
     rates = speed_m_s * np.linalg.eigvals(hull[:4].reshape(2, 2)).real
     return float(1.0 / max(np.min(np.abs(rates)), 1e-12))

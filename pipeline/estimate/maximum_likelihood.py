@@ -39,43 +39,32 @@ _RACE_LONGEST = 2.0
 
 @dataclass(frozen=True)
 class MaximumLikelihoodSettings:
-    """Settings of the search; every one is part of a parameter set's identity.
+    """Settings of the search; every one is part of a parameter set's identity."""
 
-    Attributes
-    ----------
-    max_iterations : int
-        Scoring steps per start.
-    decrement : float
-        Converged when half the squared Newton decrement, the log-likelihood still to be gained, falls below this; at
-        1e-5 the estimate lies within 0.005 standard errors of the maximum.
-    starts : int
-        How many starting points are carried to the end; the best one is kept.
-    entries, coarse_instants, coarse_iterations : int
-        The most likely starting points, so many of them, race first on the record thinned to about this many instants,
-        for so many steps.
-    sigma_low, sigma_high : tuple of float
-        Bounds of the noise levels, order of `NOISE_PARAMETERS`.
-    initial_std : tuple of float
-        Standard deviations of the state (v, r, psi, F, M, c_1, c_2, b) at the first instant, wide: the data decide.
-    gate_width, gate_share, gate_rounds : float, float, int
-        Measurements farther than ``gate_width`` robust standard deviations from their prediction are gross errors and
-        are left out, unless they are more than ``gate_share`` of all; the fit and the gate take turns so many times.
-    discrete_step_s : float
-        Step of the discrete parameters (17) that are reported.
-    """
-
+    #: Scoring steps per start.
     max_iterations: int = 80
+    #: Converged when half the squared Newton decrement, the log-likelihood still to be gained, falls below this; at
+    #: 1e-5 the estimate lies within 0.005 standard errors of the maximum.
     decrement: float = 1e-5
+    #: How many starting points are carried to the end; the best one is kept.
     starts: int = 2
+    #: entries, coarse_instants, coarse_iterations: The most likely starting points, so many of them, race first on the
+    #: record thinned to about this many instants, for so many steps.
     entries: int = 2
     coarse_instants: int = 300
     coarse_iterations: int = 25
+    #: sigma_low, sigma_high: Bounds of the noise levels, order of `NOISE_PARAMETERS`.
     sigma_low: tuple[float, ...] = SIGMA_LOW
     sigma_high: tuple[float, ...] = SIGMA_HIGH
+    #: Standard deviations of the state (v, r, psi, F, M, c_1, c_2, b) at the first instant, wide: the data decide.
     initial_std: tuple[float, ...] = INITIAL_STD
+    #: gate_width, gate_share, gate_rounds: Float, int. Measurements farther than ``gate_width`` robust standard
+    #: deviations from their prediction are gross errors and are left out, unless they are more than ``gate_share`` of
+    #: all; the fit and the gate take turns so many times.
     gate_width: float = 5.0
     gate_share: float = 0.1
     gate_rounds: int = 5
+    #: Step of the discrete parameters (17) that are reported.
     discrete_step_s: float = 1.0
 
     def bind(self, record: Instants, spec: ModelSpec, arm_per_m: float) -> Likelihood:
@@ -109,12 +98,10 @@ def identify(
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Disturbance model.
     arm_per_m : float
         l of eq. (16), 1/m.
-    settings : MaximumLikelihoodSettings
     length_m : float, optional
         Of the ship, for the step over which readings are averaged; see `kempf.pipeline.estimate.record.average`.
 

@@ -38,20 +38,13 @@ _UNLIKE, _DISTURBANCES = np.log(3.0), 3
 
 @dataclass(frozen=True, eq=False)
 class Alone:
-    """One run fitted by itself.
+    """One run fitted by itself."""
 
-    Attributes
-    ----------
-    run : GridRun
-        Without its gross errors.
-    search : Search
-        Where it ended; theta as `kempf.pipeline.estimate.filters.linear_kernel` has it.
-    gross_errors : dict of str to int
-        How many were taken out, by measurement.
-    """
-
+    #: Without its gross errors.
     run: GridRun
+    #: Where it ended; theta as `kempf.pipeline.estimate.filters.linear_kernel` has it.
     search: Search[Float]
+    #: How many were taken out, by measurement.
     gross_errors: dict[str, int]
 
     @property
@@ -62,22 +55,14 @@ class Alone:
 
 @dataclass(frozen=True, eq=False)
 class PlainFit:
-    """The plain model of several runs.
-
-    Attributes
-    ----------
-    fit : PooledFit
-    alone : tuple of Alone
-        Its runs one by one.
-    left_out : dict of str to str
-        Runs that cannot be identified by themselves, with the reason.
-    statistic : float
-        Likelihood ratio of separate hulls to one.
-    """
+    """The plain model of several runs."""
 
     fit: PooledFit
+    #: Its runs one by one.
     alone: tuple[Alone, ...]
+    #: Runs that cannot be identified by themselves, with the reason.
     left_out: dict[str, str]
+    #: Likelihood ratio of separate hulls to one.
     statistic: float
 
     @property
@@ -119,12 +104,10 @@ def fit_plain(
 
     Parameters
     ----------
-    runs : sequence of GridRun
     spec : ModelSpec
         Disturbances.
     workers : Executor
         Runs share it; the sums do not depend on it.
-    settings : MaximumLikelihoodSettings, optional
 
     Raises
     ------

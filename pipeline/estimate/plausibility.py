@@ -20,10 +20,6 @@ def not_white(fit: dict[str, Any]) -> tuple[str, ...]:
     ----------
     fit : dict
         See `kempf.pipeline.estimate.one_step_fit.one_step_fit`.
-
-    Returns
-    -------
-    tuple of str
     """
     channels = fit.get("channels", {})
     return tuple(name for name, channel in channels.items() if abs(channel["lag1_autocorrelation"]) > _NOT_WHITE)

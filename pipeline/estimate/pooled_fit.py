@@ -31,55 +31,36 @@ _REACH = 5.0
 
 @dataclass(frozen=True, eq=False)
 class Linearised:
-    """One run at a point: u, J and where its columns belong.
-
-    Attributes
-    ----------
-    passed : Passed
-    u : ndarray, shape (2 m,)
-    J : ndarray, shape (2 m, c)
-    index : ndarray, shape (c,)
-        Places of the columns in `Point.vector`.
-    """
+    """One run at a point: u, J and where its columns belong."""
 
     passed: Passed
+    #: Shape (2 m,).
     u: Float
+    #: Shape (2 m, c).
     J: Float
+    #: Shape (c,). Places of the columns in `Point.vector`.
     index: list[int]
 
 
 @dataclass(frozen=True, eq=False)
 class PooledFit:
-    """A model fitted to several runs.
-
-    Attributes
-    ----------
-    model : EffectModel
-    runs : tuple of RunFilter
-    hull, values : ndarray
-        Shared parameters.
-    levels : ndarray, shape (runs, 6)
-        Logarithms of the noise levels.
-    log_likelihood : float
-    covariance : ndarray, shape (6 + p, 6 + p)
-        Of hull and effects, from the expected information with the levels unknown; NaN where a bound is active.
-    linearised : tuple of Linearised
-        At the end, by the extended filter.
-    converged : bool
-    reason : str
-        Why the search ended.
-    iterations : int
-    """
+    """A model fitted to several runs."""
 
     model: EffectModel
     runs: tuple[RunFilter, ...]
+    #: hull, values: Shared parameters.
     hull: Float
     values: Float
+    #: Shape (runs, 6). Logarithms of the noise levels.
     levels: Float
     log_likelihood: float
+    #: Shape (6 + p, 6 + p). Of hull and effects, from the expected information with the levels unknown; NaN where a
+    #: bound is active.
     covariance: Float
+    #: At the end, by the extended filter.
     linearised: tuple[Linearised, ...]
     converged: bool
+    #: Why the search ended.
     reason: str
     iterations: int
 
@@ -124,7 +105,6 @@ def fit(
         To start from, shapes (6,), (runs, 6) and (p,).
     workers : Executor
         Runs share it; sums are in the order of the runs.
-    max_iterations : int, optional
     wanted : float, optional
         Log-likelihood without which the fit is of no use: where it is out of reach the climb is given up.
     """

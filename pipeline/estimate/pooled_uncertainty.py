@@ -24,30 +24,18 @@ _STRETCHES = 12
 
 @dataclass(frozen=True, eq=False)
 class PooledUncertainty:
-    """What is known of the errors of a common fit.
+    """What is known of the errors of a common fit."""
 
-    Attributes
-    ----------
-    covariance : ndarray, shape (6 + p, 6 + p)
-        Of hull and effects; NaN where a bound is active.
-    kind : str
-        ``information`` or ``sandwich``.
-    one_step : tuple of dict
-        Of every run, see `kempf.pipeline.estimate.one_step_fit.one_step_fit`.
-    """
-
+    #: Shape (6 + p, 6 + p). Of hull and effects; NaN where a bound is active.
     covariance: Float
+    #: ``information`` or ``sandwich``.
     kind: str
+    #: Of every run, see `kempf.pipeline.estimate.one_step_fit.one_step_fit`.
     one_step: tuple[dict[str, Any], ...]
 
 
 def uncertainty_of(fit: PooledFit) -> PooledUncertainty:
-    """Return the standard errors of a common fit, the larger ones where prediction errors are not white.
-
-    Parameters
-    ----------
-    fit : PooledFit
-    """
+    """Return the standard errors of a common fit, the larger ones where prediction errors are not white."""
     passes = [line.passed for line in fit.linearised]
     steps = tuple(
         one_step_fit(filtered.run.measured, passed.innovation, passed.variance)

@@ -24,36 +24,22 @@ class Value:
 
 @dataclass(frozen=True, eq=False)
 class Estimate:
-    """Parameters of eq. (16) from one segment.
-
-    Attributes
-    ----------
-    estimator : str
-    parameters : tuple of Value
-        The six hull parameters, continuous time.
-    discrete : tuple of Value
-        The matrices of eq. (17) at ``step_s`` and the mean speed.
-    covariance : ndarray, shape (6, 6)
-        Of the hull parameters; NaN where unknown.
-    noise : tuple of Value
-    converged : bool
-    report : dict
-        Why it stopped, condition number, active bounds, weakly determined directions, starts; JSON-serialisable.
-    iterations : tuple of dict
-        Every iteration with its parameters, JSON-serialisable.
-    fit : dict
-        In-sample statistics, see `kempf.pipeline.estimate.one_step_fit`; JSON-serialisable.
-    warnings : tuple of str
-    """
+    """Parameters of eq. (16) from one segment."""
 
     estimator: str
+    #: The six hull parameters, continuous time.
     parameters: tuple[Value, ...]
+    #: The matrices of eq. (17) at ``step_s`` and the mean speed.
     discrete: tuple[Value, ...]
+    #: Shape (6, 6). Of the hull parameters; NaN where unknown.
     covariance: Float
     noise: tuple[Value, ...]
     converged: bool
+    #: Why it stopped, condition number, active bounds, weakly determined directions, starts; JSON-serialisable.
     report: dict[str, Any]
+    #: Every iteration with its parameters, JSON-serialisable.
     iterations: tuple[dict[str, Any], ...]
+    #: In-sample statistics, see `kempf.pipeline.estimate.one_step_fit`; JSON-serialisable.
     fit: dict[str, Any] = field(default_factory=dict)
     warnings: tuple[str, ...] = ()
 

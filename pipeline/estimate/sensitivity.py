@@ -25,19 +25,13 @@ _HULL_STEP, _EFFECT_STEP, _LEVEL_STEP = 1e-4, 1e-2, 1e-3
 
 @dataclass(frozen=True, eq=False)
 class Point:
-    """Where a model stands: parameters of one run.
+    """Where a model stands: parameters of one run."""
 
-    Attributes
-    ----------
-    hull : ndarray, shape (6,)
-    values : ndarray, shape (p,)
-        Of the effects.
-    levels : ndarray, shape (6,)
-        Logarithms of the noise levels.
-    """
-
+    #: Shape (6,).
     hull: Float
+    #: Shape (p,). Of the effects.
     values: Float
+    #: Shape (6,). Logarithms of the noise levels.
     levels: Float
 
     def vector(self) -> Float:
@@ -106,8 +100,6 @@ def columns(filtered: RunFilter, point: Point, base: Passed, wanted: Sequence[in
 
     Parameters
     ----------
-    filtered : RunFilter
-    point : Point
     base : Passed
         The pass there.
     wanted : sequence of int

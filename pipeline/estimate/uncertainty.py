@@ -23,20 +23,14 @@ _WEAK = 1e-4
 
 @dataclass(frozen=True, eq=False)
 class Uncertainty:
-    """What is known of the errors of an estimate.
+    """What is known of the errors of an estimate."""
 
-    Attributes
-    ----------
-    covariance : ndarray, shape (n_theta, n_theta)
-        Inverse of the information; NaN for elements that are not free, and everywhere where it is singular.
-    eigenvalues : ndarray, shape (n_free,)
-        Of the information scaled to a unit diagonal, ascending.
-    weak : tuple of (float, ndarray of shape (n_free,))
-        Eigenvalue and direction of what the data hardly determine.
-    """
-
+    #: Shape (n_theta, n_theta). Inverse of the information; NaN for elements that are not free, and everywhere where it
+    #: is singular.
     covariance: Float
+    #: Shape (n_free,). Of the information scaled to a unit diagonal, ascending.
     eigenvalues: Float
+    #: Eigenvalue and direction of what the data hardly determine.
     weak: tuple[tuple[float, Float], ...]
 
     @property
@@ -53,10 +47,6 @@ def from_information(information: Float, index: NDArray[np.intp]) -> Uncertainty
     information : ndarray, shape (n_theta, n_theta)
     index : ndarray of int, shape (n_free,)
         Elements that are free.
-
-    Returns
-    -------
-    Uncertainty
     """
     block = information[np.ix_(index, index)]
     scale = np.sqrt(np.maximum(np.diag(block), 1e-300))

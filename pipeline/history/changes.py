@@ -23,38 +23,26 @@ Kind = Literal["step", "drift"]
 
 @dataclass(frozen=True, eq=False)
 class Change:
-    """One change of the ship.
+    """One change of the ship."""
 
-    Attributes
-    ----------
-    kind : {"step", "drift"}
-    between_utc_ns : tuple of int
-        Last occasion before and first after a step; first and last of a drift.
-    interval_utc_ns : tuple of int
-        Occasions between which a step happened, with the confidence of the level; of a drift as above.
-    p_value : float
-        Of the stretch it was found in.
-    before : ndarray, shape (n_parameter,)
-        Level before a step, or at the beginning of a drift.
-    change, std : ndarray, shape (n_parameter,)
-        In the parameters' units, of a drift per year.
-    width : float
-        Simultaneous intervals of all parameters are ``change`` +- ``width`` ``std``.
-    rival : float
-        BIC of the other form, step or drift, less that of this one; under 2 the data hardly show which it was.
-    alone : tuple of (int, float, float)
-        Parameters that could have changed alone: index, change and standard error if they did.
-    """
-
+    #: One of {"step", "drift"}.
     kind: Kind
+    #: Last occasion before and first after a step; first and last of a drift.
     between_utc_ns: tuple[int, int]
+    #: Occasions between which a step happened, with the confidence of the level; of a drift as above.
     interval_utc_ns: tuple[int, int]
+    #: Of the stretch it was found in.
     p_value: float
+    #: Shape (n_parameter,). Level before a step, or at the beginning of a drift.
     before: Float
+    #: change, std: Shape (n_parameter,). In the parameters' units, of a drift per year.
     change: Float
     std: Float
+    #: Simultaneous intervals of all parameters are ``change`` +- ``width`` ``std``.
     width: float
+    #: BIC of the other form, step or drift, less that of this one; under 2 the data hardly show which it was.
     rival: float
+    #: Parameters that could have changed alone: index, change and standard error if they did.
     alone: tuple[tuple[int, float, float], ...]
 
     @property
@@ -66,47 +54,32 @@ class Change:
 
 @dataclass(frozen=True, eq=False)
 class Changes:
-    """What a history shows.
+    """What a history shows."""
 
-    Attributes
-    ----------
-    verdict : str
-        ``no change seen``, ``step``, ``steps``, ``drift``, ``step and drift``, ``steps and drift``,
-        ``not testable with these data``.
-    why : str
-        In words.
-    changes : tuple of Change
-        In the order of time.
-    p_value : float
-        Of the whole history; NaN where not testable.
-    occasion_utc_ns : ndarray, shape (n_occasion,)
-    scatter : ndarray, shape (n_parameter,)
-        Standard deviation between trials beyond their standard errors, in the parameters' units; NaN where unknown.
-    mean : ndarray, shape (n_parameter,)
-    smallest : ndarray, shape (n_parameter,)
-        Step of one parameter alone, midway, that would be seen with the power of the settings; NaN where unknown.
-    settings : ChangeSettings
-    """
-
+    #: ``no change seen``, ``step``, ``steps``, ``drift``, ``step and drift``, ``steps and drift``, ``not testable with
+    #: these data``.
     verdict: str
+    #: In words.
     why: str
+    #: In the order of time.
     changes: tuple[Change, ...]
+    #: Of the whole history; NaN where not testable.
     p_value: float
+    #: Shape (n_occasion,).
     occasion_utc_ns: Nanoseconds
+    #: Shape (n_parameter,). Standard deviation between trials beyond their standard errors, in the parameters' units;
+    #: NaN where unknown.
     scatter: Float
+    #: Shape (n_parameter,).
     mean: Float
+    #: Shape (n_parameter,). Step of one parameter alone, midway, that would be seen with the power of the settings; NaN
+    #: where unknown.
     smallest: Float
     settings: ChangeSettings
 
 
 def find_changes(history: ParameterHistory, settings: ChangeSettings | None = None) -> Changes:
-    """Say whether a ship changed, when, by how much and in which parameters.
-
-    Parameters
-    ----------
-    history : ParameterHistory
-    settings : ChangeSettings, optional
-    """
+    """Say whether a ship changed, when, by how much and in which parameters."""
     settings = settings or ChangeSettings()
     p = len(history.names)
     unknown = np.full(p, np.nan)

@@ -25,20 +25,13 @@ _ROUNDS = 3
 
 @dataclass(frozen=True, eq=False)
 class Statistics:
-    """Squared t statistics of histories; leading axes are those of the histories.
+    """Squared t statistics of histories; leading axes are those of the histories."""
 
-    Attributes
-    ----------
-    step : ndarray, shape (..., n_split, n_direction)
-        Of a step before set smallest_side, smallest_side + 1, ...
-    drift : ndarray, shape (..., n_direction)
-        Of a straight line in time.
-    scatter : ndarray, shape (..., n_direction)
-        Variance between trials beyond the sets' own.
-    """
-
+    #: Shape (..., n_split, n_direction). Of a step before set smallest_side, smallest_side + 1, ...
     step: Float
+    #: Shape (..., n_direction). Of a straight line in time.
     drift: Float
+    #: Shape (..., n_direction). Variance between trials beyond the sets' own.
     scatter: Float
 
     @property
@@ -130,7 +123,6 @@ def _steps(W: Float, B: Float, smallest_side: int) -> Float:
     ----------
     W, B : ndarray, shape (..., n_set, n_direction)
         Cumulated weights and weighted values.
-    smallest_side : int
 
     Returns
     -------

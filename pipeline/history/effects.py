@@ -16,14 +16,9 @@ _DRAWS = 400
 
 @dataclass(frozen=True, eq=False)
 class Contrast:
-    """A change along every direction, relative.
+    """A change along every direction, relative."""
 
-    Attributes
-    ----------
-    before, change, std : ndarray, shape (..., n_direction)
-        Level at the beginning, change, its standard error.
-    """
-
+    #: before, change, std: Shape (..., n_direction). Level at the beginning, change, its standard error.
     before: Float
     change: Float
     std: Float
@@ -34,7 +29,6 @@ def step_at(one: Stretch, value: Float, k: int) -> Contrast:
 
     Parameters
     ----------
-    one : Stretch
     value : ndarray, shape (..., n_set, n_parameter)
         Relative.
     k : int
@@ -67,17 +61,11 @@ def _regression(one: Stretch, value: Float, x: Float) -> Contrast:
 
 @dataclass(frozen=True, eq=False)
 class Intervals:
-    """What the simulation at the change found.
+    """What the simulation at the change found."""
 
-    Attributes
-    ----------
-    width : float
-        Simultaneous 1 - level intervals of all parameters are the change +- width standard errors.
-    splits : ndarray of int, shape (n_kept,)
-        Splits that the data do not exclude; empty for a drift.
-    """
-
+    #: Simultaneous 1 - level intervals of all parameters are the change +- width standard errors.
     width: float
+    #: Shape (n_kept,). Splits that the data do not exclude; empty for a drift.
     splits: NDArray[np.int64]
 
 
@@ -145,7 +133,6 @@ def alone(one: Stretch, found: Contrast, width: float) -> list[tuple[int, float,
 
     Parameters
     ----------
-    one : Stretch
     found : Contrast
         The change along all directions.
     width : float

@@ -18,31 +18,22 @@ from kempf.schemas.errors import DataRejected
 
 @dataclass(frozen=True, eq=False)
 class Pooled:
-    """Parameter sets taken together.
+    """Parameter sets taken together."""
 
-    Attributes
-    ----------
-    value : ndarray, shape (n_parameter,)
-        Precision-weighted mean.
-    covariance : ndarray, shape (n_parameter, n_parameter)
-        Of it, if the sets are one and their covariances true.
-    q, dof : float, int
-        Cochran's Q and its degrees of freedom, n_parameter (n_set - 1).
-    p_value : float
-        Probability of so large a Q if the sets are one and their covariances true; NaN for one set.
-    scale : float
-        sqrt(Q / dof), the Birge ratio: by how much the standard errors would have to be larger for the sets to agree;
-        NaN for one set.
-    set_p_value : ndarray, shape (n_set,)
-        Whether one set agrees with the mean of the others, Bonferroni's correction included; NaN for one set.
-    """
-
+    #: Shape (n_parameter,). Precision-weighted mean.
     value: Float
+    #: Shape (n_parameter, n_parameter). Of it, if the sets are one and their covariances true.
     covariance: Float
+    #: q, dof: Int. Cochran's Q and its degrees of freedom, n_parameter (n_set - 1).
     q: float
     dof: int
+    #: Probability of so large a Q if the sets are one and their covariances true; NaN for one set.
     p_value: float
+    #: sqrt(Q / dof), the Birge ratio: by how much the standard errors would have to be larger for the sets to agree;
+    #: NaN for one set.
     scale: float
+    #: Shape (n_set,). Whether one set agrees with the mean of the others, Bonferroni's correction included; NaN for one
+    #: set.
     set_p_value: Float
 
     def poolable(self, level: float = 0.05) -> bool | None:

@@ -22,7 +22,6 @@ def smallest_steps(one: Stretch, verdict: Verdict) -> Float:
 
     Parameters
     ----------
-    one : Stretch
     verdict : Verdict
         Its thresholds.
 

@@ -22,7 +22,6 @@ def report(history: ParameterHistory, pooled: Pooled | None, found: Changes) -> 
         What they were asked of.
     pooled : Pooled or None
         None where there is no set.
-    found : Changes
     """
     settings = found.settings
     return {

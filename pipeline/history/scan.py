@@ -16,31 +16,20 @@ YEAR_S = 365.25 * 86400.0
 
 @dataclass(frozen=True, eq=False)
 class Stretch:
-    """A history in relative numbers, with all that the statistics need.
+    """A history in relative numbers, with all that the statistics need."""
 
-    Attributes
-    ----------
-    scale : ndarray, shape (n_parameter,)
-        What a relative 1 is worth, in the parameters' units.
-    value, covariance : ndarray, shape (n_set, n_parameter), (n_set, n_parameter, n_parameter)
-        Relative.
-    years : ndarray, shape (n_set,)
-        Since the first set.
-    along : ndarray, shape (n_parameter, n_direction)
-        Principal axes, then parameters.
-    variance : ndarray, shape (n_set, n_direction)
-        The sets' own, along the directions.
-    total : ndarray, shape (n_set, n_parameter, n_parameter)
-        Relative covariance with the scatter between trials.
-    settings : ChangeSettings
-    """
-
+    #: Shape (n_parameter,). What a relative 1 is worth, in the parameters' units.
     scale: Float
+    #: value, covariance: Shape (n_set, n_parameter), (n_set, n_parameter, n_parameter). Relative.
     value: Float
     covariance: Float
+    #: Shape (n_set,). Since the first set.
     years: Float
+    #: Shape (n_parameter, n_direction). Principal axes, then parameters.
     along: Float
+    #: Shape (n_set, n_direction). The sets' own, along the directions.
     variance: Float
+    #: Shape (n_set, n_parameter, n_parameter). Relative covariance with the scatter between trials.
     total: Float
     settings: ChangeSettings
 
@@ -54,7 +43,6 @@ class Stretch:
 
         Parameters
         ----------
-        draws : int
         stream : int
             Which of the independent streams.
         """
@@ -73,7 +61,6 @@ def stretch(history: ParameterHistory, settings: ChangeSettings) -> Stretch:
     ----------
     history : ParameterHistory
         Three sets at least.
-    settings : ChangeSettings
     """
     variance = np.einsum("ijj->ij", history.covariance)
     # a parameter near zero is measured by its standard error instead
@@ -95,18 +82,12 @@ def stretch(history: ParameterHistory, settings: ChangeSettings) -> Stretch:
 
 @dataclass(frozen=True)
 class Verdict:
-    """Result of the test of one stretch.
+    """Result of the test of one stretch."""
 
-    Attributes
-    ----------
-    p_value : float
-        Probability of something so remarkable, step or drift, in a history without change; the settings' caution is
-        in it.
-    step_threshold, drift_threshold : float
-        Squared t statistics beyond which a change is reported.
-    """
-
+    #: Probability of something so remarkable, step or drift, in a history without change; the settings' caution is in
+    #: it.
     p_value: float
+    #: step_threshold, drift_threshold: Squared t statistics beyond which a change is reported.
     step_threshold: float
     drift_threshold: float
 

@@ -20,26 +20,20 @@ Mask = NDArray[np.bool_]
 class ParameterHistory:
     """Parameter vectors of one vessel, one model and one estimator, each from data of its own.
 
-    Attributes
-    ----------
-    names, units : tuple of str, length n_parameter
-    time_utc_ns : ndarray, shape (n_set,)
-        Never decreasing.
-    value : ndarray, shape (n_set, n_parameter)
-        In the units of the parameters.
-    covariance : ndarray, shape (n_set, n_parameter, n_parameter)
-        Of each set, in products of the units; positive definite.
-
     Raises
     ------
     DataRejected
         ``history_shape``, ``history_not_in_order``, ``covariance_unusable``.
     """
 
+    #: names, units: Length n_parameter.
     names: tuple[str, ...]
     units: tuple[str, ...]
+    #: Shape (n_set,). Never decreasing.
     time_utc_ns: Nanoseconds
+    #: Shape (n_set, n_parameter). In the units of the parameters.
     value: Float
+    #: Shape (n_set, n_parameter, n_parameter). Of each set, in products of the units; positive definite.
     covariance: Float
 
     def __post_init__(self) -> None:
@@ -94,7 +88,6 @@ def occasions(history: ParameterHistory, within_s: float) -> ParameterHistory:
 
     Parameters
     ----------
-    history : ParameterHistory
     within_s : float
         s; 0 merges only what begins at one instant.
     """

@@ -44,19 +44,12 @@ CODE: dict[Reason, int] = {reason: i + 1 for i, reason in enumerate(REASONS)}
 
 @dataclass(frozen=True)
 class LostStretch:
-    """A stretch of a damaged log that could not be read.
+    """A stretch of a damaged log that could not be read."""
 
-    Attributes
-    ----------
-    since_ns, until_ns : int or None
-        By the logger's clock, UTC nanoseconds; None where unknown.
-    messages : int or None
-        How many records are lost, where the file says so.
-    why : str
-    """
-
+    #: since_ns, until_ns: By the logger's clock, UTC nanoseconds; None where unknown.
     since_ns: int | None
     until_ns: int | None
+    #: How many records are lost, where the file says so.
     messages: int | None
     why: str
 
@@ -113,17 +106,11 @@ class Chained:
 
 @dataclass(frozen=True, eq=False)
 class Values:
-    """One canonical channel over some records of a log.
+    """One canonical channel over some records of a log."""
 
-    Attributes
-    ----------
-    value : ndarray of float64, shape (n,)
-        In SI; NaN where the record does not carry it or where it is no number.
-    present : ndarray of bool, shape (n,)
-        Where the record offers a value, readable or not.
-    """
-
+    #: Shape (n,). In SI; NaN where the record does not carry it or where it is no number.
     value: Float
+    #: Shape (n,). Where the record offers a value, readable or not.
     present: Flag
 
     @classmethod
@@ -139,44 +126,29 @@ class Values:
 
 @dataclass(frozen=True, eq=False)
 class Decoded:
-    """Records of one log that follow each other: all of them, or a part.
+    """Records of one log that follow each other: all of them, or a part."""
 
-    Attributes
-    ----------
-    record : ndarray of int64, shape (n,)
-        Their numbers in the log, from 0 on, ascending.
-    raw : Pieces
-        Each record as it stands in the file, shape (n,).
-    content : Pieces
-        The part that distinguishes two records (without the logger's stamp), shape (n,).
-    time_utc_ns : ndarray of int64, shape (n,)
-        `NO_TIME` where there is none.
-    source : ndarray of int64, shape (n,)
-        Index into ``source_names``; -1 where it is unknown.
-    source_names : tuple of str
-        Talker and sentence, topic, or ``row``; a later part of the same log may have more, behind these.
-    reason : ndarray of int8, shape (n,)
-        Code of the reason for which the reader refused the record, 0 for none.
-    channels : dict of str to Values
-        By name of the channel.
-    notes : list of str
-        What a person should know; of the last part.
-    lost : tuple of LostStretch
-        What of the log could not be read; of the last part.
-    ends : bool
-        Whether no record of the log comes behind these.
-    """
-
+    #: Shape (n,). Their numbers in the log, from 0 on, ascending.
     record: NDArray[np.int64]
+    #: Each record as it stands in the file, shape (n,).
     raw: Pieces
+    #: The part that distinguishes two records (without the logger's stamp), shape (n,).
     content: Pieces
+    #: Shape (n,). `NO_TIME` where there is none.
     time_utc_ns: Nanoseconds
+    #: Shape (n,). Index into ``source_names``; -1 where it is unknown.
     source: NDArray[np.int64]
+    #: Talker and sentence, topic, or ``row``; a later part of the same log may have more, behind these.
     source_names: tuple[str, ...]
+    #: Shape (n,). Code of the reason for which the reader refused the record, 0 for none.
     reason: Code
+    #: By name of the channel.
     channels: dict[str, Values]
+    #: What a person should know; of the last part.
     notes: list[str] = field(default_factory=list)
+    #: What of the log could not be read; of the last part.
     lost: tuple[LostStretch, ...] = ()
+    #: Whether no record of the log comes behind these.
     ends: bool = True
 
     def __len__(self) -> int:

@@ -35,20 +35,13 @@ _FARTHEST = 1 << 62
 
 @dataclass(frozen=True, eq=False)
 class Layout:
-    """How the lines of a file are laid out.
+    """How the lines of a file are laid out."""
 
-    Attributes
-    ----------
-    rows : Spans
-        Every line of data that is not blank, shape (n,).
-    columns : tuple of str
-        Names of the columns.
-    separator : str or None
-        One character, ``whitespace``, or None for a single column.
-    """
-
+    #: Every line of data that is not blank, shape (n,).
     rows: Spans
+    #: Names of the columns.
     columns: tuple[str, ...]
+    #: One character, ``whitespace``, or None for a single column.
     separator: str | None
 
 
@@ -63,10 +56,6 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
         The whole file, decompressed.
     source : Source
         With ``time`` and ``channels``.
-
-    Returns
-    -------
-    Decoded
 
     Raises
     ------

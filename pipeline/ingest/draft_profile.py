@@ -40,7 +40,6 @@ def draft_profile(file_name: str, columns: Sequence[str]) -> str:
 
     Parameters
     ----------
-    file_name : str
     columns : sequence of str
         Every column of the log.
     """

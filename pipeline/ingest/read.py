@@ -47,7 +47,6 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
     log : bytes or LogFile
         The file as delivered, perhaps compressed with gzip or zstd; an MCAP log is read a few megabytes at a time, any
         other one whole.
-    profile : VesselProfile
 
     Yields
     ------

@@ -101,29 +101,19 @@ class LogReadings(Protocol):
 
 @dataclass(frozen=True)
 class Readings:
-    """The readings of one log, or of a part of it.
+    """The readings of one log, or of a part of it."""
 
-    Attributes
-    ----------
-    frame : polars.DataFrame
-        Schema `READING_SCHEMA`, sorted by record; at least one non-null channel in each row.
-    rejected : polars.DataFrame
-        Schema `REJECTED_SCHEMA`, sorted by record then channel.
-    tally : Tally
-        Closes against both frames and the number of records in the file.
-    notes : tuple of str
-        What a person should know of how the file was read, one sentence each.
-    format : {"delimited", "mcap", "nmea"}
-        How the file was read.
-    lost : tuple of LostStretch
-        What of a damaged log could not be read, in the order of the file; empty for a whole one.
-    """
-
+    #: Schema `READING_SCHEMA`, sorted by record; at least one non-null channel in each row.
     frame: pl.DataFrame
+    #: Schema `REJECTED_SCHEMA`, sorted by record then channel.
     rejected: pl.DataFrame
+    #: Closes against both frames and the number of records in the file.
     tally: Tally
+    #: What a person should know of how the file was read, one sentence each.
     notes: tuple[str, ...] = ()
+    #: One of {"delimited", "mcap", "nmea"}. How the file was read.
     format: str = ""
+    #: What of a damaged log could not be read, in the order of the file; empty for a whole one.
     lost: tuple[LostStretch, ...] = ()
 
     @property

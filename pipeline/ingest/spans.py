@@ -24,17 +24,11 @@ _TRIM_STEPS = 64
 
 @dataclass(frozen=True, eq=False)
 class Spans:
-    """Stretches of a buffer, in order and without overlap.
+    """Stretches of a buffer, in order and without overlap."""
 
-    Attributes
-    ----------
-    buffer : ndarray of uint8
-        The bytes.
-    start, stop : ndarray of int64, shape (n,)
-        First byte of each stretch, and the one after its last.
-    """
-
+    #: The bytes.
     buffer: Bytes
+    #: start, stop: Shape (n,). First byte of each stretch, and the one after its last.
     start: Index
     stop: Index
 

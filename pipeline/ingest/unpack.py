@@ -29,7 +29,6 @@ def unpack(name: str, data: bytes, limit: int = LIMIT) -> tuple[bytes, list[str]
     ----------
     name : str
         Name of the file, for messages.
-    data : bytes
     limit : int
         Most bytes that are unpacked, whatever the size of the file; `allowance` may be less.
 

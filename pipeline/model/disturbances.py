@@ -15,7 +15,6 @@ def change_within(level: float, time_s: float, rate_per_s: float) -> float:
     ----------
     level : float
         Standard deviation of the process in the long run, sigma of eq. (16).
-    time_s : float
     rate_per_s : float
         mu of eq. (16).
 

@@ -25,21 +25,14 @@ _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 
 @dataclass(frozen=True)
 class SlowForces:
-    """The disturbances of the chain: standard deviations and correlation rates of its Gauss-Markov processes.
+    """The disturbances of the chain: standard deviations and correlation rates of its Gauss-Markov processes."""
 
-    Attributes
-    ----------
-    arm_per_m : float
-        l of eq. (16), 1/m.
-    force_m_s2, force_rate_per_s : float
-        sigma_F and mu_F.
-    moment_rad_s2, moment_rate_per_s : float
-        The same of M.
-    """
-
+    #: l of eq. (16), 1/m.
     arm_per_m: float
+    #: force_m_s2, force_rate_per_s: sigma_F and mu_F.
     force_m_s2: float
     force_rate_per_s: float
+    #: moment_rad_s2, moment_rate_per_s: The same of M.
     moment_rad_s2: float
     moment_rate_per_s: float
 
@@ -51,8 +44,6 @@ def lateral_steps(
 
     Parameters
     ----------
-    hull : Hull
-    forces : SlowForces
     step_s, speed_m_s : ndarray, shape (n,)
         Length of each step, s, and speed through the water over it, m/s.
     rudder_rad : ndarray, shape (n, 2)

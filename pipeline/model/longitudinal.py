@@ -24,17 +24,11 @@ N_LONGITUDINAL = 4
 
 @dataclass(frozen=True)
 class Surge:
-    """What the states do not hold of the longitudinal model.
+    """What the states do not hold of the longitudinal model."""
 
-    Attributes
-    ----------
-    time_constant_s : float
-        T, s.
-    wander_m_s_per_root_s : float
-        Root of the intensity of w: what it lets V wander in a second.
-    """
-
+    #: T, s.
     time_constant_s: float
+    #: Root of the intensity of w: what it lets V wander in a second.
     wander_m_s_per_root_s: float
 
 
@@ -43,7 +37,6 @@ def discretise_surge(surge: Surge, step_s: Float, squared_rate: Float) -> tuple[
 
     Parameters
     ----------
-    surge : Surge
     step_s : ndarray, shape (n,)
         Steps, s.
     squared_rate : ndarray, shape (n,)

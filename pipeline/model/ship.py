@@ -12,20 +12,14 @@ from kempf.pipeline.channels.series import Float
 
 @dataclass(frozen=True)
 class Hull:
-    """The six parameters of eq. (16).
+    """The six parameters of eq. (16)."""
 
-    Attributes
-    ----------
-    a11, a12, a21, a22 : float
-        Hull damping: 1/m, dimensionless, 1/m^2, 1/m.
-    b1, b2 : float
-        Rudder effectiveness: 1/m, 1/m^2; positive rudder turns to starboard, so normally b1 < 0 < b2.
-    """
-
+    #: a11, a12, a21, a22: Hull damping: 1/m, dimensionless, 1/m^2, 1/m.
     a11: float
     a12: float
     a21: float
     a22: float
+    #: b1, b2: Rudder effectiveness: 1/m, 1/m^2; positive rudder turns to starboard, so normally b1 < 0 < b2.
     b1: float
     b2: float
 
@@ -63,7 +57,6 @@ def discretise(hull: Hull, speed_m_s: float, step_s: float) -> tuple[Float, Floa
 
     Parameters
     ----------
-    hull : Hull
     speed_m_s : float
         Speed through the water, held over the step, m/s.
     step_s : float
@@ -88,7 +81,6 @@ def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float
     ----------
     A : ndarray, shape (2, 2)
     B : ndarray, shape (2, 1)
-    speed_m_s, step_s : float
 
     Returns
     -------

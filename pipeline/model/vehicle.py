@@ -20,60 +20,37 @@ class SlowDisturbance:
     ::
 
         dW/dt = -mu W + sigma sqrt(2 mu) w
-
-    Attributes
-    ----------
-    name : str
-    enters : tuple of float, one a state
-        How it enters the dynamics in continuous time, unit of the state a second for one unit of W; a force has the
-        number 1 in the row of its velocity, its moment the arm in that of the rate.
-    measured : tuple of float, one a state
-        Column of H1: what it adds to each measurement.
-    std : float
-        sigma, and its standard deviation before anything is measured.
-    rate_per_s : float
-        mu; 0 for a constant, a state with zero derivative.
     """
 
     name: str
+    #: One a state. How it enters the dynamics in continuous time, unit of the state a second for one unit of W; a force
+    #: has the number 1 in the row of its velocity, its moment the arm in that of the rate.
     enters: tuple[float, ...]
+    #: One a state. Column of H1: what it adds to each measurement.
     measured: tuple[float, ...]
+    #: sigma, and its standard deviation before anything is measured.
     std: float
+    #: mu; 0 for a constant, a state with zero derivative.
     rate_per_s: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
 class AugmentedVehicle:
-    """Vehicle and disturbances as one system for the filter (3)-(5).
+    """Vehicle and disturbances as one system for the filter (3)-(5)."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (n_state + n_disturbance, n_state + n_disturbance)
-    B : ndarray, shape (n_state + n_disturbance, n_input)
-    G : ndarray, shape (n_state + n_disturbance, n_disturbance)
-    H : ndarray, shape (n_state, n_state + n_disturbance)
-        [E H1] of eq. (10).
-    """
-
+    #: Shape (n_state + n_disturbance, n_state + n_disturbance).
     A: Float
+    #: Shape (n_state + n_disturbance, n_input).
     B: Float
+    #: Shape (n_state + n_disturbance, n_disturbance).
     G: Float
+    #: Shape (n_state, n_state + n_disturbance). [E H1] of eq. (10).
     H: Float
 
 
 @dataclass(frozen=True)
 class LinearVehicle:
     """What is known of a vehicle before A and B are.
-
-    Attributes
-    ----------
-    states, inputs : tuple of str
-        Names in the order of the columns.
-    state_std : tuple of float
-        Standard deviation of each state before anything is measured; their mean is zero.
-    step_s : float
-        Step of the discrete model.
-    disturbances : tuple of SlowDisturbance
 
     Raises
     ------
@@ -96,9 +73,12 @@ class LinearVehicle:
     ('wind', 'bias')
     """
 
+    #: states, inputs: Names in the order of the columns.
     states: tuple[str, ...]
     inputs: tuple[str, ...]
+    #: Standard deviation of each state before anything is measured; their mean is zero.
     state_std: tuple[float, ...]
+    #: Step of the discrete model.
     step_s: float
     disturbances: tuple[SlowDisturbance, ...] = ()
 

@@ -26,20 +26,14 @@ CHANNELS = ("lateral_speed", "yaw_rate", "heading")
 
 @dataclass(frozen=True, eq=False)
 class FreeRun:
-    """A free run beside what was measured.
-
-    Attributes
-    ----------
-    name : str
-    predicted, error : ndarray, shape (n, 3)
-        What would be measured, and measured less predicted; NaN where not measured. m/s, rad/s, rad.
-    constants : ndarray, shape (8,)
-        Initial v, r, psi and the constant F, M, c_1, c_2, b that were fitted.
-    """
+    """A free run beside what was measured."""
 
     name: str
+    #: predicted, error: Shape (n, 3). What would be measured, and measured less predicted; NaN where not measured. m/s,
+    #: rad/s, rad.
     predicted: Float
     error: Float
+    #: Shape (8,). Initial v, r, psi and the constant F, M, c_1, c_2, b that were fitted.
     constants: Float
 
     @property
@@ -70,7 +64,6 @@ def free_run(fit: PooledFit, run: GridRun) -> FreeRun:
 
     Parameters
     ----------
-    fit : PooledFit
     run : GridRun
         Fitted or held out.
     """

@@ -14,19 +14,13 @@ Kind = Literal["one step", "ahead", "free run"]
 
 @dataclass(frozen=True)
 class Horizon:
-    """A horizon.
+    """A horizon."""
 
-    Attributes
-    ----------
-    name : str
-        As it is asked for: ``1``, ``10s``, ``free``.
-    kind : {"one step", "ahead", "free run"}
-    seconds : float or None
-        Of ``ahead``.
-    """
-
+    #: As it is asked for: ``1``, ``10s``, ``free``.
     name: str
+    #: One of {"one step", "ahead", "free run"}.
     kind: Kind
+    #: Of ``ahead``.
     seconds: float | None = None
 
     @property
@@ -37,10 +31,6 @@ class Horizon:
 
 def horizon_of(text: str) -> Horizon:
     """Return the horizon that a text asks for.
-
-    Parameters
-    ----------
-    text : str
 
     Raises
     ------

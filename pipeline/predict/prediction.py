@@ -27,29 +27,20 @@ _TAKEN_IN = 3
 
 @dataclass(frozen=True, eq=False)
 class Predicted:
-    """A run beside its prediction.
-
-    Attributes
-    ----------
-    horizon : Horizon
-    time_s : ndarray, shape (n,)
-    predicted, error : ndarray, shape (n, 3)
-        What would be measured, and measured less predicted, columns `pipeline.predict.free_run.CHANNELS`, m/s, rad/s,
-        rad; NaN where nothing was measured or predicted.
-    std : ndarray, shape (n, 3)
-        Of the error as the model has it; NaN in a free run, whose error no disturbance model describes.
-    settling : int
-        Predictions left out because the initial state was not known yet.
-    constants : ndarray, shape (8,), or None
-        Of a free run: initial v, r, psi and the constant F, M, c_1, c_2, b.
-    """
+    """A run beside its prediction."""
 
     horizon: Horizon
+    #: Shape (n,).
     time_s: Float
+    #: predicted, error: Shape (n, 3). What would be measured, and measured less predicted, columns
+    #: `pipeline.predict.free_run.CHANNELS`, m/s, rad/s, rad; NaN where nothing was measured or predicted.
     predicted: Float
     error: Float
+    #: Shape (n, 3). Of the error as the model has it; NaN in a free run, whose error no disturbance model describes.
     std: Float
+    #: Predictions left out because the initial state was not known yet.
     settling: int
+    #: Shape (8,), or None. Of a free run: initial v, r, psi and the constant F, M, c_1, c_2, b.
     constants: Float | None = None
 
     def rms(self) -> dict[str, float]:
@@ -88,10 +79,8 @@ def predict(filtered: RunFilter, point: Point, horizon: Horizon) -> Predicted:
 
     Parameters
     ----------
-    filtered : RunFilter
     point : Point
         Parameters and noise levels; a free run asks for no levels.
-    horizon : Horizon
 
     Raises
     ------
@@ -115,7 +104,6 @@ def of_free_run(filtered: RunFilter, found: FreeRun, horizon: Horizon) -> Predic
 
     Parameters
     ----------
-    filtered : RunFilter
     found : FreeRun
         Of it.
     horizon : Horizon

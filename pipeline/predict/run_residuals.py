@@ -26,21 +26,13 @@ class PhaseInterval:
 
 @dataclass(frozen=True, eq=False)
 class Looked:
-    """One run under one model.
-
-    Attributes
-    ----------
-    filtered : RunFilter
-    passed : Passed
-        Of the fitted model, with the run's noise levels.
-    free : FreeRun
-    phases : tuple of PhaseInterval
-        None where they are not known.
-    """
+    """One run under one model."""
 
     filtered: RunFilter
+    #: Of the fitted model, with the run's noise levels.
     passed: Passed
     free: FreeRun
+    #: None where they are not known.
     phases: tuple[PhaseInterval, ...] = ()
 
     @property
@@ -79,23 +71,19 @@ def phases_s(detail: Sequence[Mapping[str, Any]], start_utc_ns: int) -> tuple[Ph
 
 @dataclass(frozen=True, eq=False)
 class Samples:
-    """The instants of all runs one after the other.
+    """The instants of all runs one after the other."""
 
-    Attributes
-    ----------
-    whitened, free_error : ndarray, shape (N, 3)
-    phase, run : ndarray of str, shape (N,)
-    lateral_speed_m_s, yaw_rate_rad_s : ndarray, shape (N,)
-        As the filter predicted them: measured ones would err with the innovations (a false alarm by construction).
-    rudder_rad, heading_rad, speed_m_s : ndarray, shape (N,)
-    """
-
+    #: whitened, free_error: Shape (N, 3).
     whitened: Float
     free_error: Float
+    #: phase, run: Shape (N,).
     phase: NDArray[np.str_]
     run: NDArray[np.str_]
+    #: lateral_speed_m_s, yaw_rate_rad_s: Shape (N,). As the filter predicted them: measured ones would err with the
+    #: innovations (a false alarm by construction).
     lateral_speed_m_s: Float
     yaw_rate_rad_s: Float
+    #: rudder_rad, heading_rad, speed_m_s: Shape (N,).
     rudder_rad: Float
     heading_rad: Float
     speed_m_s: Float

@@ -25,7 +25,6 @@ def smoothed_states(filtered: RunFilter, point: Point, free: FreeRun) -> Float:
 
     Parameters
     ----------
-    filtered : RunFilter
     point : Point
         Its parameters and noise levels.
     free : FreeRun

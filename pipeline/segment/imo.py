@@ -18,26 +18,17 @@ SLOWEST_SHARE = 0.9
 
 @dataclass(frozen=True)
 class Criterion:
-    """One criterion and how the zigzag did.
+    """One criterion and how the zigzag did."""
 
-    Attributes
-    ----------
-    name : str
-        ``10/10 first overshoot``, ``10/10 second overshoot`` or ``20/20 first overshoot``.
-    value_deg : float or None
-        Measured overshoot beyond the nominal heading; None where its peak was not reached.
-    limit_deg : float or None
-        Largest overshoot allowed; None where length or speed is missing.
-    passed : bool or None
-        None where the criterion is not applicable.
-    why : str
-        Why it is not applicable; empty where it is.
-    """
-
+    #: ``10/10 first overshoot``, ``10/10 second overshoot`` or ``20/20 first overshoot``.
     name: str
+    #: Measured overshoot beyond the nominal heading; None where its peak was not reached.
     value_deg: float | None
+    #: Largest overshoot allowed; None where length or speed is missing.
     limit_deg: float | None
+    #: None where the criterion is not applicable.
     passed: bool | None
+    #: Why it is not applicable; empty where it is.
     why: str
 
 

@@ -22,7 +22,6 @@ def lateral_summary(instruments: Instruments, zigzag: Zigzag) -> dict[str, Any]:
     ----------
     instruments : Instruments
         Series of the log.
-    zigzag : Zigzag
 
     Returns
     -------

@@ -29,24 +29,16 @@ _INSIDE = 0.6
 
 @dataclass(frozen=True)
 class Leg:
-    """The rudder held to one side.
+    """The rudder held to one side."""
 
-    Attributes
-    ----------
-    first, last : int
-        First and last held sample of the rudder series.
-    side : int
-        +1 starboard, -1 port.
-    rudder : float
-        Median of the held rudder, rad.
-    start_s, end_s : float
-        Instants of both samples, s.
-    """
-
+    #: first, last: First and last held sample of the rudder series.
     first: int
     last: int
+    #: +1 starboard, -1 port.
     side: int
+    #: Median of the held rudder, rad.
     rudder: float
+    #: start_s, end_s: Instants of both samples, s.
     start_s: float
     end_s: float
 

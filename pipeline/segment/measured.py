@@ -20,25 +20,17 @@ _WINDOW_SHARE = 0.08
 
 @dataclass(frozen=True, eq=False)
 class Signals:
-    """Heading and rudder of one log in seconds after one origin.
+    """Heading and rudder of one log in seconds after one origin."""
 
-    Attributes
-    ----------
-    origin_ns : int
-        UTC nanoseconds of second 0.
-    heading_s, heading : ndarray, shape (n_heading,)
-        Instants, s; unwrapped heading, rad.
-    rudder_s, rudder : ndarray, shape (n_rudder,)
-        Instants, s; rudder, rad, positive to starboard.
-    rudder_noise : float
-        Standard deviation of the rudder's noise, rad.
-    """
-
+    #: UTC nanoseconds of second 0.
     origin_ns: int
+    #: heading_s, heading: Shape (n_heading,). Instants, s; unwrapped heading, rad.
     heading_s: Float
     heading: Float
+    #: rudder_s, rudder: Shape (n_rudder,). Instants, s; rudder, rad, positive to starboard.
     rudder_s: Float
     rudder: Float
+    #: Standard deviation of the rudder's noise, rad.
     rudder_noise: float
 
     @classmethod

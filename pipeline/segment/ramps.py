@@ -18,25 +18,17 @@ _FIT_UP_TO = 0.7
 
 @dataclass(frozen=True)
 class Ramp:
-    """One movement of the rudder.
+    """One movement of the rudder."""
 
-    Attributes
-    ----------
-    start_s, end_s : float
-        Instants at which it leaves the angle held before and arrives at the one held after, s.
-    start_uncertainty_s : float
-        Half the interval that the samples leave open, s.
-    held_before, held_after : float
-        The two angles, rad.
-    rate : float
-        Rudder rate along the fitted line, rad/s; NaN where fewer than two samples lie on the ramp.
-    """
-
+    #: start_s, end_s: Instants at which it leaves the angle held before and arrives at the one held after, s.
     start_s: float
     end_s: float
+    #: Half the interval that the samples leave open, s.
     start_uncertainty_s: float
+    #: held_before, held_after: The two angles, rad.
     held_before: float
     held_after: float
+    #: Rudder rate along the fitted line, rad/s; NaN where fewer than two samples lie on the ramp.
     rate: float
 
 

@@ -23,56 +23,38 @@ Start = Literal["steady", "turning", "switching", "unknown"]
 
 @dataclass(frozen=True, eq=False)
 class Chain:
-    """A chain of legs with what was measured at its executes.
+    """A chain of legs with what was measured at its executes."""
 
-    Attributes
-    ----------
-    legs : list of Leg
-        The legs, alternating.
-    ramps : list of (Ramp or None)
-        The movement that begins each leg; None where the log begins with the rudder over.
-    heading : ndarray, shape (n,)
-        Heading at each execute, rad; NaN where there is none.
-    yaw_rate : ndarray, shape (n,)
-        Yaw rate at each execute, rad/s.
-    unbroken : ndarray of bool, shape (n - 1,)
-        Whether heading and rudder were recorded from each leg to the next.
-    """
-
+    #: The legs, alternating.
     legs: list[Leg]
+    #: The movement that begins each leg; None where the log begins with the rudder over.
     ramps: list[Ramp | None]
+    #: Shape (n,). Heading at each execute, rad; NaN where there is none.
     heading: Float
+    #: Shape (n,). Yaw rate at each execute, rad/s.
     yaw_rate: Float
+    #: Shape (n - 1,). Whether heading and rudder were recorded from each leg to the next.
     unbroken: list[bool]
 
 
 @dataclass(frozen=True)
 class Switching:
-    """A zigzag within a chain.
+    """A zigzag within a chain."""
 
-    Attributes
-    ----------
-    first, last : int
-        First and last leg in the chain.
-    start : {"steady", "turning", "switching", "unknown"}
-        How the first leg begins: from a steady course; from K0 with the ship still turning; at the opposite switching
-        heading, so that the log or another manoeuvre hides the approach; or unseen.
-    base_heading : float
-        K0: the heading at the first execute where it starts from K0, else the middle of both switching headings, rad.
-    centre : float
-        Middle of the switching headings, rad.
-    heading_change : float
-        Measured psi0: half the distance of the switching headings, or the only one's from K0, rad.
-    scatter : float
-        Largest difference of a switching heading from ``centre +- heading_change``, rad.
-    """
-
+    #: first, last: First and last leg in the chain.
     first: int
     last: int
+    #: One of {"steady", "turning", "switching", "unknown"}. How the first leg begins: from a steady course; from K0
+    #: with the ship still turning; at the opposite switching heading, so that the log or another manoeuvre hides the
+    #: approach; or unseen.
     start: Start
+    #: K0: the heading at the first execute where it starts from K0, else the middle of both switching headings, rad.
     base_heading: float
+    #: Middle of the switching headings, rad.
     centre: float
+    #: Measured psi0: half the distance of the switching headings, or the only one's from K0, rad.
     heading_change: float
+    #: Largest difference of a switching heading from ``centre +- heading_change``, rad.
     scatter: float
 
 

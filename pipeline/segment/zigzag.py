@@ -22,58 +22,38 @@ PhaseName = Literal["approach", "execute", "yaw_build_up", "overshoot", "counter
 
 @dataclass(frozen=True)
 class Execute:
-    """One movement of the rudder to the next leg.
+    """One movement of the rudder to the next leg."""
 
-    Attributes
-    ----------
-    time_utc_ns : int
-        When the rudder starts to leave the angle it was held at.
-    time_uncertainty_s : float
-        Half the interval that the rudder's samples leave open.
-    rudder_held_utc_ns : int
-        When the rudder arrives at the angle of the leg.
-    rudder_before_deg, rudder_after_deg : float
-        Angles held before and after.
-    heading_deg : float
-        Heading at the execute, relative to the base heading, starboard positive.
-    yaw_rate_deg_s : float
-        Yaw rate at the execute, starboard positive.
-    """
-
+    #: When the rudder starts to leave the angle it was held at.
     time_utc_ns: int
+    #: Half the interval that the rudder's samples leave open.
     time_uncertainty_s: float
+    #: When the rudder arrives at the angle of the leg.
     rudder_held_utc_ns: int
+    #: rudder_before_deg, rudder_after_deg: Angles held before and after.
     rudder_before_deg: float
     rudder_after_deg: float
+    #: Heading at the execute, relative to the base heading, starboard positive.
     heading_deg: float
+    #: Yaw rate at the execute, starboard positive.
     yaw_rate_deg_s: float
 
 
 @dataclass(frozen=True)
 class Overshoot:
-    """How far the heading went on after a switching execute.
+    """How far the heading went on after a switching execute."""
 
-    Attributes
-    ----------
-    number : int
-        1 for the overshoot after the second execute.
-    side : {"starboard", "port"}
-        Where the heading went.
-    peak_utc_ns : int
-        When the heading turned back.
-    duration_s : float
-        From the execute to the peak.
-    beyond_nominal_deg : float
-        Beyond K0 +- the nominal psi0, as it is read from the plot of a trial.
-    beyond_execute_deg : float
-        Beyond the heading at the execute, which exceeds the nominal by the helmsman's delay; so this one is smaller.
-    """
-
+    #: 1 for the overshoot after the second execute.
     number: int
+    #: One of {"starboard", "port"}. Where the heading went.
     side: Side
+    #: When the heading turned back.
     peak_utc_ns: int
+    #: From the execute to the peak.
     duration_s: float
+    #: Beyond K0 +- the nominal psi0, as it is read from the plot of a trial.
     beyond_nominal_deg: float
+    #: Beyond the heading at the execute, which exceeds the nominal by the helmsman's delay; so this one is smaller.
     beyond_execute_deg: float
 
 
@@ -89,102 +69,70 @@ class Phase:
 
 @dataclass(frozen=True)
 class SpeedConstancy:
-    """The speed from the second execute to the end.
+    """The speed from the second execute to the end."""
 
-    Attributes
-    ----------
-    approach_m_s : float or None
-        Mean before the first execute; None where no speed was recorded there.
-    mean_m_s, std_m_s : float
-        Mean and standard deviation after the second execute.
-    trend_percent : float
-        Change along the straight line laid through it, from the second execute to the end, in percent of the mean.
-    """
-
+    #: Mean before the first execute; None where no speed was recorded there.
     approach_m_s: float | None
+    #: mean_m_s, std_m_s: Mean and standard deviation after the second execute.
     mean_m_s: float
     std_m_s: float
+    #: Change along the straight line laid through it, from the second execute to the end, in percent of the mean.
     trend_percent: float
 
 
 @dataclass(frozen=True)
 class Quality:
-    """How good the zigzag is.
+    """How good the zigzag is."""
 
-    Attributes
-    ----------
-    n_legs : int
-        Legs, one an execute (one more where the log begins with the rudder over).
-    rudder_scatter_deg : float
-        Largest difference of a leg's rudder from the median of its side.
-    rudder_offset_deg : float
-        Middle of both sides' rudder: the indicator's zero error.
-    switching_scatter_deg : float
-        Largest difference of a switching heading from the symmetric ones.
-    switching_centre_deg : float
-        Middle of both switching headings, relative to the base heading.
-    start : {"steady", "turning", "switching", "unknown"}
-        How the first leg begins: from a steady course; from K0 with the ship still turning; at a switching heading, or
-        unseen, where the log or another manoeuvre hides the approach.
-    gap_s : float
-        Time within the zigzag for which heading or rudder were not recorded.
-    reasons : tuple of str
-        What a person should know before trusting it, one sentence each; empty for a good one.
-    """
-
+    #: Legs, one an execute (one more where the log begins with the rudder over).
     n_legs: int
+    #: Largest difference of a leg's rudder from the median of its side.
     rudder_scatter_deg: float
+    #: Middle of both sides' rudder: the indicator's zero error.
     rudder_offset_deg: float
+    #: Largest difference of a switching heading from the symmetric ones.
     switching_scatter_deg: float
+    #: Middle of both switching headings, relative to the base heading.
     switching_centre_deg: float
+    #: One of {"steady", "turning", "switching", "unknown"}. How the first leg begins: from a steady course; from K0
+    #: with the ship still turning; at a switching heading, or unseen, where the log or another manoeuvre hides the
+    #: approach.
     start: Start
+    #: Time within the zigzag for which heading or rudder were not recorded.
     gap_s: float
+    #: What a person should know before trusting it, one sentence each; empty for a good one.
     reasons: tuple[str, ...]
 
 
 @dataclass(frozen=True)
 class Zigzag:
-    """One zigzag manoeuvre.
+    """One zigzag manoeuvre."""
 
-    Attributes
-    ----------
-    kind : {"zigzag", "zigzag_broken_off"}
-        Whether the second overshoot was reached.
-    psi0_deg, delta0_deg : float
-        Nominal heading change and rudder, as it was most likely ordered.
-    psi0_measured_deg, delta0_measured_deg : float
-        What was measured: half the distance of the headings at the switching executes, and of the held rudder angles.
-    first_side : {"starboard", "port"}
-        Side of the first execute.
-    base_heading_deg : float
-        K0, 0 <= K0 < 360.
-    start_utc_ns, end_utc_ns : int
-        From the steady approach to the end of the last leg that belongs to the zigzag.
-    executes : tuple of Execute
-        In order. The first is the one from the approach, where ``quality.start`` is steady or turning.
-    overshoots : tuple of Overshoot
-        Those whose peak was reached.
-    phases : tuple of Phase
-        From start to end.
-    speed : SpeedConstancy or None
-        None where no speed was recorded.
-    quality : Quality
-        How good it is.
-    """
-
+    #: One of {"zigzag", "zigzag_broken_off"}. Whether the second overshoot was reached.
     kind: Kind
+    #: psi0_deg, delta0_deg: Nominal heading change and rudder, as it was most likely ordered.
     psi0_deg: float
     delta0_deg: float
+    #: psi0_measured_deg, delta0_measured_deg: What was measured: half the distance of the headings at the switching
+    #: executes, and of the held rudder angles.
     psi0_measured_deg: float
     delta0_measured_deg: float
+    #: One of {"starboard", "port"}. Side of the first execute.
     first_side: Side
+    #: K0, 0 <= K0 < 360.
     base_heading_deg: float
+    #: start_utc_ns, end_utc_ns: From the steady approach to the end of the last leg that belongs to the zigzag.
     start_utc_ns: int
     end_utc_ns: int
+    #: In order. The first is the one from the approach, where ``quality.start`` is steady or turning.
     executes: tuple[Execute, ...]
+    #: Those whose peak was reached.
     overshoots: tuple[Overshoot, ...]
+    #: From start to end.
     phases: tuple[Phase, ...]
+    #: None where no speed was recorded.
     speed: SpeedConstancy | None
+    #: How good it is.
     quality: Quality
 
     @property

@@ -71,23 +71,15 @@ DEFAULT_INSTRUMENTS: tuple[Instrument, ...] = (
 
 @dataclass(frozen=True, eq=False)
 class InstrumentRecord:
-    """What one instrument measured.
+    """What one instrument measured."""
 
-    Attributes
-    ----------
-    instrument : Instrument
-        Which, with its settings.
-    measured_utc_ns : ndarray, shape (n,)
-        Instants of measurement, strictly increasing.
-    arrival_utc_ns : ndarray, shape (n,)
-        Instants at which the messages reached the logger, not decreasing.
-    values : dict of str to ndarray, shape (n,)
-        By canonical column (`kempf.schemas.channels`), SI; angles on the circle within [0, 2 pi).
-    """
-
+    #: Which, with its settings.
     instrument: Instrument
+    #: Shape (n,). Instants of measurement, strictly increasing.
     measured_utc_ns: Nanoseconds
+    #: Shape (n,). Instants at which the messages reached the logger, not decreasing.
     arrival_utc_ns: Nanoseconds
+    #: Shape (n,). By canonical column (`kempf.schemas.channels`), SI; angles on the circle within [0, 2 pi).
     values: dict[str, Float]
 
 

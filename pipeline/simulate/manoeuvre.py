@@ -156,28 +156,18 @@ Step = SteadyCourse | CourseChange | ZigzagTest | TurningCircle | HandSteering
 
 @dataclass(frozen=True)
 class ManoeuvreRecord:
-    """What truly happened in one step of the programme.
+    """What truly happened in one step of the programme."""
 
-    Attributes
-    ----------
-    step : Step
-        As it was ordered.
-    start_s, end_s : float
-        Since the start of the trial; a zigzag with a number of legs ends at its last crossing.
-    base_heading_rad : float
-        Heading at the beginning, not wrapped; K0 of a zigzag.
-    executes_s : tuple of float
-        Instants at which the rudder was ordered over; for a zigzag one a leg.
-    crossings_s : tuple of float
-        Instants at which the heading crossed K0 +- psi0.
-    overshoots_rad : tuple of float
-        Of a zigzag, greatest heading beyond psi0 after each crossing whose turn came to its end.
-    """
-
+    #: As it was ordered.
     step: Step
+    #: start_s, end_s: Since the start of the trial; a zigzag with a number of legs ends at its last crossing.
     start_s: float
     end_s: float
+    #: Heading at the beginning, not wrapped; K0 of a zigzag.
     base_heading_rad: float
+    #: Instants at which the rudder was ordered over; for a zigzag one a leg.
     executes_s: tuple[float, ...] = ()
+    #: Instants at which the heading crossed K0 +- psi0.
     crossings_s: tuple[float, ...] = ()
+    #: Of a zigzag, greatest heading beyond psi0 after each crossing whose turn came to its end.
     overshoots_rad: tuple[float, ...] = ()

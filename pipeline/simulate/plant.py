@@ -277,10 +277,6 @@ def steer(
         The columns of `Tables`.
     crossings : ndarray
         Receives the instants of the zigzag's crossings, s since row 0.
-
-    Returns
-    -------
-    cells_done, crossings_found : int
     """
     cell_s, substeps, tick_cells = grid
     first, cells = span

@@ -35,21 +35,14 @@ _HEADING = STATE.index("psi")
 
 @dataclass(frozen=True, eq=False)
 class _Tables:
-    """What the kernel fills, one row a point of the fine grid.
+    """What the kernel fills, one row a point of the fine grid."""
 
-    Attributes
-    ----------
-    state : ndarray, shape (n, 6)
-        See `kempf.pipeline.simulate.plant.STATE`.
-    rudder, order : ndarray, shape (n,)
-        Rudder angle and order, rad.
-    forcing : ndarray, shape (n, 4)
-        Given; see `kempf.pipeline.simulate.disturbances.FORCING`.
-    """
-
+    #: Shape (n, 6). See `kempf.pipeline.simulate.plant.STATE`.
     state: Float
+    #: rudder, order: Shape (n,). Rudder angle and order, rad.
     rudder: Float
     order: Float
+    #: Shape (n, 4). Given; see `kempf.pipeline.simulate.disturbances.FORCING`.
     forcing: Float
 
 

@@ -15,27 +15,18 @@ Float = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """The true path of a trial.
+    """The true path of a trial."""
 
-    Attributes
-    ----------
-    step_s : float
-        Distance of the grid's points; the first is at 0 s.
-    state : ndarray, shape (n, 6)
-        Columns `kempf.pipeline.simulate.plant.STATE`: m/s, rad/s, rad (not wrapped), m, m, m/s.
-    slope : ndarray, shape (n, 6)
-        d(state)/dt.
-    rudder, order : ndarray, shape (n,)
-        Rudder angle and its order, rad.
-    forcing : ndarray, shape (n, 4)
-        Columns `kempf.pipeline.simulate.disturbances.FORCING`.
-    """
-
+    #: Distance of the grid's points; the first is at 0 s.
     step_s: float
+    #: Shape (n, 6). Columns `kempf.pipeline.simulate.plant.STATE`: m/s, rad/s, rad (not wrapped), m, m, m/s.
     state: Float
+    #: Shape (n, 6). d(state)/dt.
     slope: Float
+    #: rudder, order: Shape (n,). Rudder angle and its order, rad.
     rudder: Float
     order: Float
+    #: Shape (n, 4). Columns `kempf.pipeline.simulate.disturbances.FORCING`.
     forcing: Float
 
     @property
@@ -78,17 +69,11 @@ class Trajectory:
 
 @dataclass(frozen=True, eq=False)
 class Sample:
-    """The truth at some instants.
+    """The truth at some instants."""
 
-    Attributes
-    ----------
-    time_s : ndarray, shape (m,)
-        The instants.
-    state, rudder, order, forcing : ndarray
-        As in `Trajectory`, shape (m, ...); the order is the one at the cell's beginning.
-    """
-
+    #: Shape (m,). The instants.
     time_s: Float
+    #: state, rudder, order, forcing: As in `Trajectory`, shape (m, ...); the order is the one at the cell's beginning.
     state: Float
     rudder: Float
     order: Float

@@ -72,23 +72,15 @@ class TrialSettings:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What an estimator should find.
+    """What an estimator should find."""
 
-    Attributes
-    ----------
-    parameters : HullParameters
-        Of eq. (16).
-    wind_arm_per_m : float
-        l of eq. (16).
-    trajectory : Trajectory
-        The path on the fine grid.
-    manoeuvres : tuple of ManoeuvreRecord
-        One a step of the programme.
-    """
-
+    #: Of eq. (16).
     parameters: HullParameters
+    #: l of eq. (16).
     wind_arm_per_m: float
+    #: The path on the fine grid.
     trajectory: Trajectory
+    #: One a step of the programme.
     manoeuvres: tuple[ManoeuvreRecord, ...]
 
     @property
@@ -99,20 +91,13 @@ class Truth:
 
 @dataclass(frozen=True, eq=False)
 class Trial:
-    """A simulated trial.
+    """A simulated trial."""
 
-    Attributes
-    ----------
-    settings : TrialSettings
-        What it was made from.
-    truth : Truth
-        What really happened.
-    instruments : tuple of InstrumentRecord
-        What was measured, in the order of the settings.
-    """
-
+    #: What it was made from.
     settings: TrialSettings
+    #: What really happened.
     truth: Truth
+    #: What was measured, in the order of the settings.
     instruments: tuple[InstrumentRecord, ...]
 
     def record(self, name: str) -> InstrumentRecord:

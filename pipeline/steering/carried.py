@@ -20,20 +20,13 @@ _NEGLIGIBLE, _NOTHING = 1e-9, 1e-6
 
 @dataclass(frozen=True)
 class Carried:
-    """One effect in the linear model.
-
-    Attributes
-    ----------
-    effect : str
-    how : str
-        ``carried`` in the matrices or as states; ``shifts the course``: only the rudder, drift or readings of the
-        straight course are others; ``no part of a straight course``; ``left out``: it has no linear model.
-    sentence : str
-        What a user should know; empty where it is carried as it is.
-    """
+    """One effect in the linear model."""
 
     effect: str
+    #: ``carried`` in the matrices or as states; ``shifts the course``: only the rudder, drift or readings of the
+    #: straight course are others; ``no part of a straight course``; ``left out``: it has no linear model.
     how: How
+    #: What a user should know; empty where it is carried as it is.
     sentence: str
 
 
@@ -42,9 +35,6 @@ def carried(hull: Hull, effects: ShipEffects | None, speed_m_s: float, arm_per_m
 
     Parameters
     ----------
-    hull : Hull
-    effects : ShipEffects or None
-    speed_m_s : float
     arm_per_m : float, optional
         l of eq. (16), 1/m.
     """

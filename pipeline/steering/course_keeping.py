@@ -38,55 +38,37 @@ _R, _PSI, _F = 1, 2, 3
 
 @dataclass(frozen=True)
 class LawSettings:
-    """What a law is made to.
+    """What a law is made to."""
 
-    Attributes
-    ----------
-    method : {"lqr", "poles"}
-        ``lqr`` makes the sum of psi^2 + ``rudder_weight`` delta^2 least; ``poles`` places the poles.
-    rudder_weight : float
-        Of ``lqr``: cost of a squared radian of rudder beside one of heading.
-    bandwidth, damping : float
-        Of ``poles``: natural frequency of the heading in units of V sqrt(|b2|), and its damping; the third pole stays
-        where the ship has her faster one.
-    step_s : float or None
-        Time between two orders; None takes a fifth of her fastest time constant, between 0.1 and 1 s.
-    rudder_limit_rad, rudder_rate_rad_s : float
-        Largest angle and rate of the rudder.
-    """
-
+    #: One of {"lqr", "poles"}. ``lqr`` makes the sum of psi^2 + ``rudder_weight`` delta^2 least; ``poles`` places the
+    #: poles.
     method: Literal["lqr", "poles"] = "lqr"
+    #: Of ``lqr``: cost of a squared radian of rudder beside one of heading.
     rudder_weight: float = 1.0
+    #: bandwidth, damping: Of ``poles``: natural frequency of the heading in units of V sqrt(|b2|), and its damping; the
+    #: third pole stays where the ship has her faster one.
     bandwidth: float = 1.0
     damping: float = 0.8
+    #: Time between two orders; None takes a fifth of her fastest time constant, between 0.1 and 1 s.
     step_s: float | None = None
+    #: rudder_limit_rad, rudder_rate_rad_s: Largest angle and rate of the rudder.
     rudder_limit_rad: float = radians(35.0)
     rudder_rate_rad_s: float = radians(2.5)
 
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """A course-keeping law, all constants.
+    """A course-keeping law, all constants."""
 
-    Attributes
-    ----------
-    plant : StateSpace
-        What it takes the ship for: discrete, states v, r, psi, F, V_T, then those of effects.
-    gain : ndarray, shape (n_steered,)
-        k: rudder per unit of the states that the rudder moves, v, r, psi first.
-    rudder_per_force : float
-        delta_F, rad per m/s^2.
-    state_per_force : ndarray, shape (n_steered,)
-        x_F: these states per m/s^2; r and psi are 0.
-    observer : ndarray, shape (n_state, 3)
-        Steady gain of the filter, applied to the innovation of (y_v, y_r, y_psi).
-    settings : LawSettings
-    """
-
+    #: What it takes the ship for: discrete, states v, r, psi, F, V_T, then those of effects.
     plant: StateSpace
+    #: Shape (n_steered,). k: rudder per unit of the states that the rudder moves, v, r, psi first.
     gain: Float
+    #: delta_F, rad per m/s^2.
     rudder_per_force: float
+    #: Shape (n_steered,). x_F: these states per m/s^2; r and psi are 0.
     state_per_force: Float
+    #: Shape (n_state, 3). Steady gain of the filter, applied to the innovation of (y_v, y_r, y_psi).
     observer: Float
     settings: LawSettings
 
@@ -137,19 +119,12 @@ def course_law(
     ----------
     hull : Hull
         The six parameters that the ship is taken to have.
-    speed_m_s : float
     arm_per_m : float, optional
         l of eq. (16), 1/m.
     spec : ModelSpec, optional
         Correlation rates of the disturbances, which say how fast they may change.
-    noise : NoiseLevels, optional
-    settings : LawSettings, optional
     effects : ShipEffects, optional
         That the ship is taken to have.
-
-    Returns
-    -------
-    Law
 
     Raises
     ------

@@ -25,23 +25,15 @@ _STEP = 2.0**-20
 
 @dataclass(frozen=True, eq=False)
 class ShipEffects:
-    """The effects that a ship was identified with.
-
-    Attributes
-    ----------
-    model : EffectModel
-    values : ndarray, shape (p,)
-        Their parameters.
-    length_m, draught_m : float
-        Those that the effects were fitted with.
-    day : float
-        Which log the ship is as in, 0 for the first: what a change of the load goes by.
-    """
+    """The effects that a ship was identified with."""
 
     model: EffectModel
+    #: Shape (p,). Their parameters.
     values: Float
+    #: length_m, draught_m: Those that the effects were fitted with.
     length_m: float = 100.0
     draught_m: float = 1.0
+    #: Which log the ship is as in, 0 for the first: what a change of the load goes by.
     day: float = 0.0
 
     def without(self, *names: str) -> ShipEffects:
@@ -56,35 +48,24 @@ class ShipEffects:
 
 @dataclass(frozen=True, eq=False)
 class LinearMotion:
-    """The linear system.
+    """The linear system."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (5 + k, 5 + k)
-        On v, r, psi, F, M and the effects' own states.
-    B : ndarray, shape (5 + k,)
-        Of the rudder that the hull feels.
-    C : ndarray, shape (3, 5 + k)
-        Of measured lateral speed, without the current, yaw rate and heading.
-    D : ndarray, shape (3,)
-    noise : ndarray, shape (k,)
-        Intensity squared of what drives the effects' states.
-    rudder_rad, sway_m_s : float
-        With which she holds the course in calm air.
-    offsets : ndarray, shape (3,)
-        What is measured then.
-    corners : ndarray, shape (3,)
-        Share by which a derivative jumps across the course, by sway, turn and rudder; 0 where it is smooth.
-    """
-
+    #: Shape (5 + k, 5 + k). On v, r, psi, F, M and the effects' own states.
     A: Float
+    #: Shape (5 + k,). Of the rudder that the hull feels.
     B: Float
+    #: Shape (3, 5 + k). Of measured lateral speed, without the current, yaw rate and heading.
     C: Float
+    #: Shape (3,).
     D: Float
+    #: Shape (k,). Intensity squared of what drives the effects' states.
     noise: Float
+    #: rudder_rad, sway_m_s: With which she holds the course in calm air.
     rudder_rad: float
     sway_m_s: float
+    #: Shape (3,). What is measured then.
     offsets: Float
+    #: Shape (3,). Share by which a derivative jumps across the course, by sway, turn and rudder; 0 where it is smooth.
     corners: Float
 
     @property
@@ -116,8 +97,6 @@ def linear_motion(
 
     Parameters
     ----------
-    hull : Hull
-    effects : ShipEffects or None
     speed_m_s : float
         Through the water.
     arm_per_m : float, optional
@@ -138,20 +117,13 @@ def linear_motion(
 
 @dataclass(frozen=True, eq=False)
 class LinearHull:
-    """The ship of eq. (16) that moves as a ship with effects does near a straight course.
+    """The ship of eq. (16) that moves as a ship with effects does near a straight course."""
 
-    Attributes
-    ----------
-    hull : Hull
-        With the effects' own states settled, as in slow motion.
-    covariance : ndarray, shape (6, 6)
-        By the delta method from that of hull and effects.
-    settled : bool
-        Whether there are such states.
-    """
-
+    #: With the effects' own states settled, as in slow motion.
     hull: Hull
+    #: Shape (6, 6). By the delta method from that of hull and effects.
     covariance: Float
+    #: Whether there are such states.
     settled: bool
 
 
@@ -167,11 +139,8 @@ def linear_hull(hull: Hull, effects: ShipEffects | None, covariance: Float, spee
 
     Parameters
     ----------
-    hull : Hull
-    effects : ShipEffects or None
     covariance : ndarray, shape (6 + p, 6 + p)
         Of hull and effects; NaN where unknown.
-    speed_m_s : float
     """
     if effects is None:
         return LinearHull(hull, covariance, settled=False)

@@ -27,43 +27,28 @@ _SAFE = 4.0
 
 @dataclass(frozen=True)
 class Constant:
-    """A number that follows from the parameters.
-
-    Attributes
-    ----------
-    name, unit : str
-    value, std : float
-        ``std`` by the delta method; NaN where the parameters have no covariance.
-    interval_95 : tuple of float or None
-        95 % interval of Fieller for a quotient of uncertain numbers; None where the data leave it unbounded, or there
-        is no covariance.
-    """
+    """A number that follows from the parameters."""
 
     name: str
+    #: value, std: ``std`` by the delta method; NaN where the parameters have no covariance.
     value: float
     std: float
     unit: str
+    #: 95 % interval of Fieller for a quotient of uncertain numbers; None where the data leave it unbounded, or there is
+    #: no covariance.
     interval_95: tuple[float, float] | None
 
 
 @dataclass(frozen=True)
 class Nomoto:
-    """Nomoto's constants at one speed.
-
-    Attributes
-    ----------
-    speed_m_s : float
-    poles : {"real", "complex"}
-        Whether the two poles are real. Where they are complex T1 and T2 do not exist.
-    constants : dict of str to Constant
-        ``K`` 1/s, ``T3``, ``T`` s; with real poles ``T1``, ``T2`` s (T1 belongs to the slower pole and is negative for
-        a ship that is unstable on a straight course); with complex ones ``natural_frequency`` rad/s and ``damping``;
-        with a length also ``K'`` = K L/V and ``T'`` = T V/L.
-    warnings : tuple of str
-    """
+    """Nomoto's constants at one speed."""
 
     speed_m_s: float
+    #: One of {"real", "complex"}. Whether the two poles are real. Where they are complex T1 and T2 do not exist.
     poles: str
+    #: ``K`` 1/s, ``T3``, ``T`` s; with real poles ``T1``, ``T2`` s (T1 belongs to the slower pole and is negative for a
+    #: ship that is unstable on a straight course); with complex ones ``natural_frequency`` rad/s and ``damping``; with
+    #: a length also ``K'`` = K L/V and ``T'`` = T V/L.
     constants: dict[str, Constant]
     warnings: tuple[str, ...]
 
@@ -97,17 +82,12 @@ def nomoto(hull: Hull, covariance: Float, speed_m_s: float, length_m: float | No
 
     Parameters
     ----------
-    hull : Hull
     covariance : ndarray, shape (6, 6)
         Of the six parameters in the order of `Hull`; NaN where unknown.
     speed_m_s : float
         V, taken as known.
     length_m : float, optional
         For the nondimensional K' and T'.
-
-    Returns
-    -------
-    Nomoto
 
     Raises
     ------

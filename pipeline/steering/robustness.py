@@ -27,18 +27,13 @@ _STILL = ModelSpec(wind="none", current="none")
 
 @dataclass(frozen=True, eq=False)
 class SteeredShips:
-    """Ships sampled at a law's step.
+    """Ships sampled at a law's step."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (n, n_ship, n_ship)
-    B : ndarray, shape (n, n_ship, 1)
-    C : ndarray, shape (n, 3, n_ship)
-        What the instruments show.
-    """
-
+    #: Shape (n, n_ship, n_ship).
     A: Float
+    #: Shape (n, n_ship, 1).
     B: Float
+    #: Shape (n, 3, n_ship). What the instruments show.
     C: Float
 
 
@@ -47,10 +42,8 @@ def steered_ships(law: Law, ships: Float, speed_m_s: float, effects: ShipEffects
 
     Parameters
     ----------
-    law : Law
     ships : ndarray, shape (n, 6 + p)
         Parameters of hull and effects.
-    speed_m_s : float
     effects : ShipEffects, optional
         Which effects.
     """
@@ -68,37 +61,23 @@ def steered_ships(law: Law, ships: Float, speed_m_s: float, effects: ShipEffects
 
 @dataclass(frozen=True, eq=False)
 class ClosedLoop:
-    """A law on a ship.
+    """A law on a ship."""
 
-    Attributes
-    ----------
-    poles : ndarray of complex128, shape (n_ship + n_state,)
-        Of the loop over a step, the largest modulus first.
-    stable : bool
-        All of them inside the unit circle.
-    slowest_s : float
-        Time constant of the slowest pole, s; infinite where the loop is not stable.
-    least_damping : float
-        Smallest damping ratio of the poles.
-    modulus_margin : float
-        Least distance of the loop's frequency response from -1; its inverse is the largest sensitivity. 0 where the
-        loop is not stable. A textbook loop has 0.5 or more.
-    """
-
+    #: Shape (n_ship + n_state,). Of the loop over a step, the largest modulus first.
     poles: NDArray[np.complex128]
+    #: All of them inside the unit circle.
     stable: bool
+    #: Time constant of the slowest pole, s; infinite where the loop is not stable.
     slowest_s: float
+    #: Smallest damping ratio of the poles.
     least_damping: float
+    #: Least distance of the loop's frequency response from -1; its inverse is the largest sensitivity. 0 where the loop
+    #: is not stable. A textbook loop has 0.5 or more.
     modulus_margin: float
 
 
 def loop_matrices(law: Law, ships: SteeredShips) -> Float:
     """Return the matrix of the loop over one step for each of some ships.
-
-    Parameters
-    ----------
-    law : Law
-    ships : SteeredShips
 
     Returns
     -------
@@ -123,10 +102,8 @@ def closed_loop(law: Law, hull: Hull, speed_m_s: float, effects: ShipEffects | N
 
     Parameters
     ----------
-    law : Law
     hull : Hull
         The ship that it steers, which need not be the one it was made for.
-    speed_m_s : float
     effects : ShipEffects, optional
         Of the ship that it steers.
     """
@@ -174,12 +151,10 @@ def share_held(
 
     Parameters
     ----------
-    law : Law
     hull : Hull
         Estimate.
     covariance : ndarray, shape (6 + p, 6 + p)
         Of the estimate with the effects; ships are drawn from the normal distribution, within the effects' bounds.
-    speed_m_s : float
     effects : ShipEffects, optional
         Of the estimate.
     draws : int, optional

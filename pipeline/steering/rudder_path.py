@@ -21,21 +21,15 @@ _SHORTEST_S = 1e-3
 
 @dataclass(frozen=True, eq=False)
 class RudderPath:
-    """x' = A x + B u, y = C x + D u: u the reading, y what the hull feels, rad.
+    """x' = A x + B u, y = C x + D u: u the reading, y what the hull feels, rad."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (k, k)
-    B, C : ndarray, shape (k,)
-    D : float
-    states : tuple of str
-        Names; all in rad.
-    """
-
+    #: Shape (k, k).
     A: Float
+    #: B, C: Shape (k,).
     B: Float
     C: Float
     D: float
+    #: Names; all in rad.
     states: tuple[str, ...]
 
     def then(self, other: RudderPath) -> RudderPath:

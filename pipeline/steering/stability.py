@@ -29,28 +29,19 @@ _LOG2_DRAWS = 14
 
 @dataclass(frozen=True)
 class Stability:
-    """The straight-line stability of a ship.
+    """The straight-line stability of a ship."""
 
-    Attributes
-    ----------
-    verdict : str
-        ``stable`` or ``unstable`` where the data say so with 95 %, else ``cannot be determined from these data``.
-    reason : str
-        Why.
-    probability : float
-        That she is stable, from the covariance of the parameters as a normal distribution; NaN without one.
-    determinant : Value
-        C = a11 a22 - a12 a21, 1/m^2; its sign is that of the verdict.
-    real_parts : tuple of Value
-        Real parts of the two eigenvalues at the speed, 1/s, the slower one first.
-    poles : {"real", "complex"}
-    """
-
+    #: ``stable`` or ``unstable`` where the data say so with 95 %, else ``cannot be determined from these data``.
     verdict: Verdict
+    #: Why.
     reason: str
+    #: That she is stable, from the covariance of the parameters as a normal distribution; NaN without one.
     probability: float
+    #: C = a11 a22 - a12 a21, 1/m^2; its sign is that of the verdict.
     determinant: Value
+    #: Real parts of the two eigenvalues at the speed, 1/s, the slower one first.
     real_parts: tuple[Value, Value]
+    #: One of {"real", "complex"}.
     poles: str
 
 
@@ -59,15 +50,10 @@ def stability(hull: Hull, covariance: Float, speed_m_s: float) -> Stability:
 
     Parameters
     ----------
-    hull : Hull
     covariance : ndarray, shape (6, 6)
         NaN where unknown; then there is no verdict.
     speed_m_s : float
         The eigenvalues are proportional to it; the verdict does not depend on it.
-
-    Returns
-    -------
-    Stability
 
     Raises
     ------

@@ -39,19 +39,13 @@ _UNITS = {"memory_m1": "m/s", "waves_m1": "rad", "waves_m2": "rad/s"}
 
 @dataclass(frozen=True)
 class NoiseLevels:
-    """Standard deviations of the disturbances and the measurements.
+    """Standard deviations of the disturbances and the measurements."""
 
-    Attributes
-    ----------
-    wind_m_s2, current_m_s : float
-        Of the wind force and the current in the long run: sigma_F and sigma_V of eq. (16), with the correlation rates
-        of the model they are used with (`usual_levels`).
-    lateral_speed_m_s, yaw_rate_rad_s, heading_rad : float
-        Of one measurement.
-    """
-
+    #: wind_m_s2, current_m_s: Of the wind force and the current in the long run: sigma_F and sigma_V of eq. (16), with
+    #: the correlation rates of the model they are used with (`usual_levels`).
     wind_m_s2: float
     current_m_s: float
+    #: lateral_speed_m_s, yaw_rate_rad_s, heading_rad: Of one measurement.
     lateral_speed_m_s: float = 0.05
     yaw_rate_rad_s: float = 5.2e-4
     heading_rad: float = 9e-4
@@ -74,43 +68,31 @@ def usual_levels(spec: ModelSpec) -> NoiseLevels:
 
 @dataclass(frozen=True, eq=False)
 class StateSpace:
-    """x' = A x + B u + noise (continuous) or x[k+1] = A x[k] + B u[k] + noise (discrete); y = C x + D u.
+    """x' = A x + B u + noise (continuous) or x[k+1] = A x[k] + B u[k] + noise (discrete); y = C x + D u."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (n, n)
-    B : ndarray, shape (n, 1)
-    C : ndarray, shape (4, n)
-    D : ndarray, shape (4, 1)
-        Zero but for an effect that measures accelerations.
-    Q : ndarray, shape (n, n)
-        Covariance of the noise of a step; of a continuous model its intensity (covariance per second).
-    R : ndarray, shape (3, 3)
-        Covariance of one measurement of the first three outputs.
-    states, inputs, outputs : dict of str to str
-        Unit by name, in order.
-    speed_m_s, course_rad : float
-    step_s : float or None
-        None for a continuous model.
-    rudder_rad : float
-        With which she holds the course in calm air; u is counted from it.
-    offsets : ndarray, shape (4,)
-        Outputs on that course; y is counted from them.
-    """
-
+    #: Shape (n, n).
     A: Float
+    #: Shape (n, 1).
     B: Float
+    #: Shape (4, n).
     C: Float
+    #: Shape (4, 1). Zero but for an effect that measures accelerations.
     D: Float
+    #: Shape (n, n). Covariance of the noise of a step; of a continuous model its intensity (covariance per second).
     Q: Float
+    #: Shape (3, 3). Covariance of one measurement of the first three outputs.
     R: Float
+    #: states, inputs, outputs: Unit by name, in order.
     states: dict[str, str]
     inputs: dict[str, str]
     outputs: dict[str, str]
     speed_m_s: float
     course_rad: float
+    #: None for a continuous model.
     step_s: float | None
+    #: With which she holds the course in calm air; u is counted from it.
     rudder_rad: float = 0.0
+    #: Shape (4,). Outputs on that course; y is counted from them.
     offsets: Float = field(default_factory=lambda: np.zeros(len(OUTPUTS)))
 
     @property
@@ -142,7 +124,6 @@ def continuous(
 
     Parameters
     ----------
-    hull : Hull
     spec : ModelSpec
         Which disturbances, and their correlation rates.
     speed_m_s : float

@@ -35,24 +35,18 @@ class SteerableShip(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Track:
-    """What happened, one row an order.
+    """What happened, one row an order."""
 
-    Attributes
-    ----------
-    time_s : ndarray, shape (n,)
-    course_rad : ndarray, shape (n,)
-        Heading that was ordered.
-    truth : ndarray, shape (n, 8)
-        See `SteerableShip.truth`.
-    estimate : ndarray, shape (n, n_state)
-        v, r, psi (from the course at the start), F, V_T as the law sees them, then the states of effects.
-    order_rad : ndarray, shape (n,)
-    """
-
+    #: Shape (n,).
     time_s: Float
+    #: Shape (n,). Heading that was ordered.
     course_rad: Float
+    #: Shape (n, 8). See `SteerableShip.truth`.
     truth: Float
+    #: Shape (n, n_state). v, r, psi (from the course at the start), F, V_T as the law sees them, then the states of
+    #: effects.
     estimate: Float
+    #: Shape (n,).
     order_rad: Float
 
     @property
@@ -71,32 +65,22 @@ class Track:
 
 @dataclass(frozen=True)
 class Performance:
-    """How well a course was kept, over the part of a track after a settling time.
+    """How well a course was kept, over the part of a track after a settling time."""
 
-    Attributes
-    ----------
-    heading_rms_rad, heading_mean_rad, heading_max_rad : float
-        Of the heading error; the maximum of its modulus.
-    rudder_rms_rad, rudder_mean_rad : float
-        rms about the mean, and the mean: the steady rudder that meets the wind.
-    rudder_travel_rad_s : float
-        Way of the rudder per second.
-    drift_m_s : float
-        Mean speed across the course.
-    cross_track_rms_m : float
-        rms distance from the straight line that fits the track best: what the helm adds to the steady drift.
-    kept : bool
-        Whether she stayed within 90 degrees of her course in that time; else the other numbers mean little.
-    """
-
+    #: heading_rms_rad, heading_mean_rad, heading_max_rad: Of the heading error; the maximum of its modulus.
     heading_rms_rad: float
     heading_mean_rad: float
     heading_max_rad: float
+    #: rudder_rms_rad, rudder_mean_rad: rms about the mean, and the mean: the steady rudder that meets the wind.
     rudder_rms_rad: float
     rudder_mean_rad: float
+    #: Way of the rudder per second.
     rudder_travel_rad_s: float
+    #: Mean speed across the course.
     drift_m_s: float
+    #: rms distance from the straight line that fits the track best: what the helm adds to the steady drift.
     cross_track_rms_m: float
+    #: Whether she stayed within 90 degrees of her course in that time; else the other numbers mean little.
     kept: bool
 
 
@@ -107,9 +91,6 @@ def keep_course(
 
     Parameters
     ----------
-    ship : SteerableShip
-    law : Law
-    duration_s : float
     course_rad : float
         Heading to hold, near the one she has.
     changes : tuple of (float, float), optional
@@ -152,20 +133,13 @@ def keep_course(
 
 @dataclass(frozen=True)
 class CourseChangeResponse:
-    """How the last change of course went.
+    """How the last change of course went."""
 
-    Attributes
-    ----------
-    change_rad : float
-        Positive to starboard.
-    overshoot_rad : float
-        Greatest heading beyond the new course, counted in the sense of the change; 0 where she never came beyond.
-    settled_s : float or None
-        Time after which she stayed within a tenth of the change; None where the track ended before.
-    """
-
+    #: Positive to starboard.
     change_rad: float
+    #: Greatest heading beyond the new course, counted in the sense of the change; 0 where she never came beyond.
     overshoot_rad: float
+    #: Time after which she stayed within a tenth of the change; None where the track ended before.
     settled_s: float | None
 
 
@@ -188,7 +162,6 @@ def performance(track: Track, settle_s: float, until_s: float = inf) -> Performa
 
     Parameters
     ----------
-    track : Track
     settle_s : float
         Left out at the beginning, s.
     until_s : float, optional

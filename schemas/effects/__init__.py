@@ -34,10 +34,6 @@ def catalogue() -> dict[str, Effect]:
 def get(name: str) -> Effect:
     """Return an effect of the catalogue.
 
-    Parameters
-    ----------
-    name : str
-
     Raises
     ------
     NotFound
@@ -58,10 +54,6 @@ def get(name: str) -> Effect:
 
 def require_free(name: str) -> None:
     """Refuse the name of an effect of the catalogue for a user's own.
-
-    Parameters
-    ----------
-    name : str
 
     Raises
     ------

@@ -32,22 +32,15 @@ _PIECES = re.compile(rf"(?P<id>(?<![\w-])(?:{_ID})(?![\w]))|(?P<number>{_NUMBER}
 
 @dataclass(frozen=True)
 class Command:
-    """One command with the output that the document shows.
+    """One command with the output that the document shows."""
 
-    Attributes
-    ----------
-    line : str
-        What stands behind ``$ ``; of Python it may be several.
-    shown : tuple of str
-    first, last : int
-        The shown output is ``lines[first:last]`` of the document.
-    kind : {"console", "pycon"}
-    """
-
+    #: What stands behind ``$ ``; of Python it may be several.
     line: str
     shown: tuple[str, ...]
+    #: first, last: The shown output is ``lines[first:last]`` of the document.
     first: int
     last: int
+    #: One of {"console", "pycon"}.
     kind: str = "console"
 
     def typed(self, line: str) -> list[str]:
@@ -188,7 +181,6 @@ def difference(shown: tuple[str, ...], found: list[str], names: Names) -> str | 
     ----------
     shown : tuple of str
         Of the document, without its blank last lines; at most one ``...``.
-    found : list of str
     names : Names
         Learns which real id stands for which.
     """

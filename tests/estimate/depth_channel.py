@@ -74,36 +74,24 @@ class DepthChannel:
 
 @dataclass(frozen=True, eq=False)
 class DepthRecord:
-    """What happened and what was measured.
+    """What happened and what was measured."""
 
-    Attributes
-    ----------
-    time_s : ndarray, shape (n,)
-    state : ndarray, shape (n, 4)
-        Columns `DEPTH_STATE`: m/s, rad/s, rad, m.
-    planes : ndarray, shape (n,)
-        Mean plane angle of the step that follows, rad.
-    measured : ndarray, shape (n, 4)
-        The state with gyro bias and noise.
-    A : ndarray, shape (4, 4)
-        Of d(state)/dt = A state + B planes, 1/s.
-    B : ndarray, shape (4, 1)
-    """
-
+    #: Shape (n,).
     time_s: Float
+    #: Shape (n, 4). Columns `DEPTH_STATE`: m/s, rad/s, rad, m.
     state: Float
+    #: Shape (n,). Mean plane angle of the step that follows, rad.
     planes: Float
+    #: Shape (n, 4). The state with gyro bias and noise.
     measured: Float
+    #: Shape (4, 4). Of d(state)/dt = A state + B planes, 1/s.
     A: Float
+    #: Shape (4, 1).
     B: Float
 
 
 def sail_depth(settings: DepthChannel) -> DepthRecord:
     """Sail the vertical zigzag.
-
-    Parameters
-    ----------
-    settings : DepthChannel
 
     Examples
     --------

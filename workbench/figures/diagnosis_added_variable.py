@@ -19,10 +19,6 @@ def draw_added_variable(shown: Sequence[AddedVariable]) -> Any:
     ----------
     shown : sequence of AddedVariable
         At least one.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     with style():
         rows = (len(shown) + 1) // 2
@@ -57,12 +53,7 @@ def _draw(panel: Any, shown: AddedVariable) -> None:
 
 
 def describe_added_variable(shown: Sequence[AddedVariable]) -> str:
-    """Return the figure in words.
-
-    Parameters
-    ----------
-    shown : sequence of AddedVariable
-    """
+    """Return the figure in words."""
     slopes = "; ".join(f"{one.title}, slope {one.slope:.2f}" for one in shown)
     return (
         "What is left of the whitened innovations against what the effect would explain of them, both without what the "

@@ -11,16 +11,7 @@ from kempf.workbench.figures.diagnosis_style import FULL, new_figure, style
 
 
 def draw_confusion(confusion: ConfusionMap) -> Any:
-    """Draw the squared cosines.
-
-    Parameters
-    ----------
-    confusion : ConfusionMap
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw the squared cosines."""
     from matplotlib.patches import Rectangle
 
     n, alike = len(confusion.titles), confusion.squared_cosine
@@ -49,12 +40,7 @@ def draw_confusion(confusion: ConfusionMap) -> Any:
 
 
 def describe_confusion(confusion: ConfusionMap) -> str:
-    """Return the figure in words.
-
-    Parameters
-    ----------
-    confusion : ConfusionMap
-    """
+    """Return the figure in words."""
     names, alike, threshold = confusion.titles, confusion.squared_cosine, confusion.threshold
     pairs = [
         (float(alike[i, j]), names[i], names[j]) for i in range(len(names)) for j in range(i) if alike[i, j] > threshold

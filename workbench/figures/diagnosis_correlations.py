@@ -53,10 +53,6 @@ def draw_correlations(
         What the two are called.
     improved : bool
         Whether these are two.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     first, last = pairs(before), pairs(after)
     rows = list(dict.fromkeys(channel for channel, _ in last))

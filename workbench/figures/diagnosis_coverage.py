@@ -12,16 +12,7 @@ from kempf.workbench.figures.diagnosis_style import FULL, PLAIN, new_figure, sty
 
 
 def draw_coverage(manoeuvres: Sequence[ManoeuvreEvidence]) -> Any:
-    """Draw lateral speed against yaw rate, and rudder against speed.
-
-    Parameters
-    ----------
-    manoeuvres : sequence of ManoeuvreEvidence
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw lateral speed against yaw rate, and rudder against speed."""
     with style():
         figure = new_figure(3.4)
         left, right = figure.subplots(1, 2)

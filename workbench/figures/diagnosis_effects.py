@@ -17,16 +17,7 @@ _WIDEST, _WIDTH_95 = 25.0, 1.96
 
 
 def draw_effects(ranked: Sequence[EffectRow]) -> Any:
-    """Draw the effects with the highest scores, the highest on top.
-
-    Parameters
-    ----------
-    ranked : sequence of EffectRow
-
-    Returns
-    -------
-    matplotlib.figure.Figure
-    """
+    """Draw the effects with the highest scores, the highest on top."""
     from matplotlib.ticker import NullFormatter
 
     shown = [row for row in ranked if row.tested][:_SHOWN][::-1]
@@ -85,7 +76,6 @@ def describe_effects(ranked: Sequence[EffectRow], first: str) -> str:
 
     Parameters
     ----------
-    ranked : sequence of EffectRow
     first : str
         What the model is called that they are tried beside.
     """

@@ -20,13 +20,8 @@ def draw_ladder(ladder: Sequence[FittedModel], first: str) -> Any:
 
     Parameters
     ----------
-    ladder : sequence of FittedModel
     first : str
         What the first is called.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     with style():
         figure = new_figure(3.4)
@@ -107,7 +102,6 @@ def describe_ladder(ladder: Sequence[FittedModel], first: str) -> str:
 
     Parameters
     ----------
-    ladder : sequence of FittedModel
     first : str
         What the first is called.
     """

@@ -20,13 +20,8 @@ def draw_overlay(shown: ManoeuvreEvidence, first: str, last: str) -> Any:
 
     Parameters
     ----------
-    shown : ManoeuvreEvidence
     first, last : str
         What the two models are called.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     used = [i for i in _ORDER if np.isfinite(shown.measured[:, i]).any()]
     models = [(first, shown.before, PLAIN, "--")]
@@ -76,7 +71,6 @@ def describe_overlay(shown: ManoeuvreEvidence, label: str, first: str, last: str
 
     Parameters
     ----------
-    shown : ManoeuvreEvidence
     label : str
         Of the manoeuvre.
     first, last : str

@@ -28,13 +28,8 @@ def draw_strip(shown: ManoeuvreEvidence, first: str, last: str) -> Any:
 
     Parameters
     ----------
-    shown : ManoeuvreEvidence
     first, last : str
         What the two models are called.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     from matplotlib.patches import Patch
 
@@ -75,7 +70,6 @@ def describe_strip(shown: ManoeuvreEvidence, label: str, first: str, last: str) 
 
     Parameters
     ----------
-    shown : ManoeuvreEvidence
     label : str
         Of the manoeuvre.
     first, last : str

@@ -131,10 +131,8 @@ def draw_dots(panel: Any, x: Float, y: Float, label: str) -> None:
 
     Parameters
     ----------
-    panel : matplotlib.axes.Axes
     x, y : ndarray, shape (n,)
         NaN where there is none.
-    label : str
     """
     known = np.isfinite(y)
     # strokes so short that their round ends make a dot
@@ -149,7 +147,6 @@ def bytes_of(figure: Any, form: Literal["svg", "png"] = "svg") -> bytes:
 
     Parameters
     ----------
-    figure : matplotlib.figure.Figure
     form : {"svg", "png"}, optional
     """
     stream = BytesIO()

@@ -28,10 +28,6 @@ def draw_unmodelled(before: UnmodelledAcceleration, after: UnmodelledAcceleratio
         Beside the first model and beside the last; None where they are the same.
     first, last : str
         What the two models are called.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     shown = [(before, PLAIN, "o", first)] + ([(after, FULL, "s", last)] if after is not None else [])
     with style():
@@ -70,7 +66,6 @@ def describe_unmodelled(
 
     Parameters
     ----------
-    before, after : UnmodelledAcceleration
     first, last : str
         What the two models are called.
     """

@@ -34,17 +34,12 @@ def draw_zigzag(shown: ManoeuvreEvidence, psi0_deg: float, allowed: Mapping[int,
 
     Parameters
     ----------
-    shown : ManoeuvreEvidence
     psi0_deg : float
         Nominal heading deviation.
     allowed : mapping of int to float
         Of `limits`.
     first, last : str
         What the two models are called.
-
-    Returns
-    -------
-    matplotlib.figure.Figure
     """
     with style():
         figure = framed_figure(3.8, legend_in=0.25)
@@ -90,7 +85,6 @@ def describe_zigzag(shown: ManoeuvreEvidence, label: str) -> str:
 
     Parameters
     ----------
-    shown : ManoeuvreEvidence
     label : str
         Of the manoeuvre.
     """

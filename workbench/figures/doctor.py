@@ -31,7 +31,6 @@ def draw(found: ExaminedLog, path: Path) -> None:
 
     Parameters
     ----------
-    found : ExaminedLog
     path : Path
         Ending ``.png``, ``.svg`` or ``.pdf``.
     """

@@ -17,7 +17,6 @@ def draw_history(history: ParameterHistory, found: Changes, path: Path, title: s
 
     Parameters
     ----------
-    history : ParameterHistory
     found : Changes
         Of it.
     path : Path

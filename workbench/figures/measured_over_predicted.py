@@ -27,7 +27,6 @@ def measured_over_predicted(runs: Sequence[ComparedRun], title: str) -> Figure:
 
     Parameters
     ----------
-    runs : sequence of ComparedRun
     title : str
         Above the figure; names the horizon.
     """
@@ -112,10 +111,8 @@ def draw_measured_over_predicted(runs: Sequence[ComparedRun], path: Path, title:
 
     Parameters
     ----------
-    runs : sequence of ComparedRun
     path : Path
         Ending ``.png``, ``.svg`` or ``.pdf``.
-    title : str
     """
     import matplotlib as mpl
 

@@ -27,16 +27,9 @@ from kempf.workbench.report.wording import ReportWording, wording_of
 
 @dataclass(frozen=True, eq=False)
 class MadeReport:
-    """A report with what it shows.
+    """A report with what it shows."""
 
-    Attributes
-    ----------
-    diagnosis_id : str
-        Of the stored diagnosis that it shows.
-    content : ReportContent
-    html : str
-    """
-
+    #: Of the stored diagnosis that it shows.
     diagnosis_id: str
     content: ReportContent
     html: str
@@ -55,14 +48,10 @@ def make_report(
 
     Parameters
     ----------
-    warehouse : Warehouse
-    vessel : str
     spec : ModelSpec
         The model to begin from.
     own : Own
         Effects beyond the catalogue.
-    progress : Progress, optional
-    settings : DiagnosisSettings, optional
     say : callable, optional
         Takes one line where a stored diagnosis has to be computed again.
 
@@ -107,13 +96,10 @@ def content_of(
 
     Parameters
     ----------
-    vessel : str
     diagnosis : mapping
         Under the command line's keys.
-    evidence : DiagnosisEvidence
     chosen : Chosen
         The manoeuvres.
-    wording : ReportWording
     warnings : tuple of str
         About the channels of the logs.
     ship : mapping of str to str

@@ -13,27 +13,19 @@ from kempf.workbench.report.wording import ReportWording
 
 @dataclass(frozen=True)
 class EffectRow:
-    """One effect of the catalogue beside the first model.
+    """One effect of the catalogue beside the first model."""
 
-    Attributes
-    ----------
-    title, verdict, why : str
-        The verdict in the report's words.
-    set_id : str
-        Of the confusion set that the report claims it in; empty where it claims none.
-    score, p_adjusted, absorption : float
-        NaN where it cannot be tested.
-    changes : tuple of FittedParameter
-        Expected size of each of its parameters.
-    """
-
+    #: title, verdict, why: The verdict in the report's words.
     title: str
     verdict: str
     why: str
+    #: Of the confusion set that the report claims it in; empty where it claims none.
     set_id: str
+    #: score, p_adjusted, absorption: NaN where it cannot be tested.
     score: float
     p_adjusted: float
     absorption: float
+    #: Expected size of each of its parameters.
     changes: tuple[FittedParameter, ...]
 
     @property
@@ -44,26 +36,16 @@ class EffectRow:
 
 @dataclass(frozen=True)
 class ShownManoeuvre:
-    """One manoeuvre with what its segment has.
+    """One manoeuvre with what its segment has."""
 
-    Attributes
-    ----------
-    number : int
-        In order of time.
-    label : str
-        Number, angles, first side and time.
-    log : str
-        File name.
-    psi0_deg : float
-    imo : mapping
-        Criteria as the segment has them.
-    evidence : ManoeuvreEvidence
-    """
-
+    #: In order of time.
     number: int
+    #: Number, angles, first side and time.
     label: str
+    #: File name.
     log: str
     psi0_deg: float
+    #: Criteria as the segment has them.
     imo: Mapping[str, Any]
     evidence: ManoeuvreEvidence
 
@@ -75,35 +57,22 @@ class ShownManoeuvre:
 
 @dataclass(frozen=True)
 class ReportContent:
-    """All that a report shows of one vessel.
-
-    Attributes
-    ----------
-    vessel : str
-    wording : ReportWording
-        Headline, advice, titles and captions, all of one verdict.
-    effects : tuple of EffectRow
-        The highest score first, what cannot be tested last.
-    sets : tuple of mapping
-        The confusion sets that the report claims, as a diagnosis stores them.
-    manoeuvres : tuple of ShownManoeuvre
-        In order of time.
-    evidence : DiagnosisEvidence
-    warnings : tuple of str
-        About the channels of the logs.
-    ship : mapping of str to str
-    provenance : tuple of (str, str)
-        What and its value, in the order shown.
-    """
+    """All that a report shows of one vessel."""
 
     vessel: str
+    #: Headline, advice, titles and captions, all of one verdict.
     wording: ReportWording
+    #: The highest score first, what cannot be tested last.
     effects: tuple[EffectRow, ...]
+    #: The confusion sets that the report claims, as a diagnosis stores them.
     sets: tuple[Mapping[str, Any], ...]
+    #: In order of time.
     manoeuvres: tuple[ShownManoeuvre, ...]
     evidence: DiagnosisEvidence
+    #: About the channels of the logs.
     warnings: tuple[str, ...]
     ship: Mapping[str, str]
+    #: What and its value, in the order shown.
     provenance: tuple[tuple[str, str], ...]
 
 

@@ -33,14 +33,6 @@ def page(content: ReportContent) -> str:
     """Return the report as one HTML document that asks for nothing outside itself.
 
     Equal content gives equal bytes.
-
-    Parameters
-    ----------
-    content : ReportContent
-
-    Returns
-    -------
-    str
     """
     filled = [(name, words, _BLOCKS[name](content)) for name, words in content.wording.sections.items()]
     shown = [entry for entry in filled if entry[2]]

@@ -24,12 +24,7 @@ _EFFECT_VERDICTS = {
 
 @dataclass(frozen=True)
 class SectionWords:
-    """Title and lead of a section.
-
-    Attributes
-    ----------
-    title, lead : str
-    """
+    """Title and lead of a section."""
 
     title: str
     lead: str
@@ -37,27 +32,18 @@ class SectionWords:
 
 @dataclass(frozen=True)
 class ReportWording:
-    """What a report says, from its verdict.
-
-    Attributes
-    ----------
-    verdict : str
-    title, headline : str
-    findings, next_steps : tuple of str
-        Next steps with the most useful first.
-    first_model, last_model : str
-        What the first and the last model of the ladder are called.
-    sections : mapping of str to SectionWords
-        By the anchor of the section, in order.
-    """
+    """What a report says, from its verdict."""
 
     verdict: str
     title: str
     headline: str
+    #: findings, next_steps: Next steps with the most useful first.
     findings: tuple[str, ...]
     next_steps: tuple[str, ...]
+    #: first_model, last_model: What the first and the last model of the ladder are called.
     first_model: str
     last_model: str
+    #: By the anchor of the section, in order.
     sections: Mapping[str, SectionWords]
 
     @property
@@ -85,10 +71,8 @@ def wording_of(
 
     Parameters
     ----------
-    vessel : str
     content : mapping
         The diagnosis under the command line's keys.
-    evidence : DiagnosisEvidence
     included : collection of str
         Names of the effects that the vessel's current model has already.
     """

@@ -26,35 +26,23 @@ _NONE_SHARE, _OUTSIDE_SHARE = 0.125, 0.175
 
 @dataclass(frozen=True)
 class Case:
-    """One ship with one effect or none.
+    """One ship with one effect or none."""
 
-    Attributes
-    ----------
-    case_id : str
-        Name of her folder and of the vessel; tells nothing.
-    kind, effect : str
-        ``catalogue``, ``outsider`` or ``none``; name of the effect, ``none`` where there is none.
-    hull : str
-        Key of `kempf.pipeline.simulate.hulls.HULLS`.
-    noise : float
-        Factor on the noise.
-    disturbance : str
-    strength : int
-        0 small, 1 medium, 2 large.
-    formats : tuple of str
-        Of the logs, one a day.
-    seed : int
-        Of everything random in the case.
-    """
-
+    #: Name of her folder and of the vessel; tells nothing.
     case_id: str
+    #: kind, effect: ``catalogue``, ``outsider`` or ``none``; name of the effect, ``none`` where there is none.
     kind: Kind
     effect: str
+    #: Key of `kempf.pipeline.simulate.hulls.HULLS`.
     hull: str
+    #: Factor on the noise.
     noise: float
     disturbance: str
+    #: 0 small, 1 medium, 2 large.
     strength: int
+    #: Of the logs, one a day.
     formats: tuple[str, str]
+    #: Of everything random in the case.
     seed: int
 
     @property
@@ -71,7 +59,6 @@ def design(n: int, seed: int) -> tuple[Case, ...]:
     n : int
         How many; an eighth has no effect, about a sixth one outside the catalogue. Effects take turns, so that none
         has two cases more than another of its kind; every factor takes turns within every effect.
-    seed : int
     """
     n_none, n_outside = round(_NONE_SHARE * n), round(_OUTSIDE_SHARE * n)
     labels: list[tuple[Kind, str]] = [("none", "none")] * n_none

@@ -29,42 +29,28 @@ SHARES = (0.05, 0.12, 0.30)
 
 @dataclass(frozen=True)
 class HiddenEffect:
-    """What is done to a ship, or to an instrument of hers.
+    """What is done to a ship, or to an instrument of hers."""
 
-    Attributes
-    ----------
-    name, equation : str
-        Key, and what is added to eq. (16) or to the measurement.
-    unit : str
-        Of its parameter.
-    slots : tuple of (int, float, str)
-        Slots of theta, what each gets of the parameter, and what that is multiplied by, one of `scales`.
-    sign : int
-        +1 or -1 where physics has one sign or the other would throw her off, 0 where a case draws it.
-    sizes : tuple of float
-        Parameter by strength; empty where the shares of the rudder's work decide.
-    scale : str
-        What ``sizes`` are multiplied by, one of `scales`.
-    fixed : tuple of (int, float, str)
-        Further slots that the effect needs, their value and its scale.
-    most : float
-        The parameter is never greater than this.
-    parameter : str
-        Its name.
-    also : tuple of (str, float)
-        Further parameters that are multiples of it.
-    """
-
+    #: name, equation: Key, and what is added to eq. (16) or to the measurement.
     name: str
     equation: str
+    #: Of its parameter.
     unit: str
+    #: Slots of theta, what each gets of the parameter, and what that is multiplied by, one of `scales`.
     slots: tuple[Slot, ...] = ()
+    #: +1 or -1 where physics has one sign or the other would throw her off, 0 where a case draws it.
     sign: int = 1
+    #: Parameter by strength; empty where the shares of the rudder's work decide.
     sizes: tuple[float, ...] = ()
+    #: What ``sizes`` are multiplied by, one of `scales`.
     scale: str = "1"
+    #: Further slots that the effect needs, their value and its scale.
     fixed: tuple[Slot, ...] = ()
+    #: The parameter is never greater than this.
     most: float = inf
+    #: Its name.
     parameter: str = "c"
+    #: Further parameters that are multiples of it.
     also: tuple[tuple[str, float], ...] = ()
 
     @property
@@ -97,7 +83,6 @@ def theta(effect: HiddenEffect | None, c: float, hull: SimulatedHull) -> Float:
         None: all zero, eq. (16).
     c : float
         Its parameter.
-    hull : SimulatedHull
     """
     found = np.zeros(plant.N_THETA)
     if effect is None:

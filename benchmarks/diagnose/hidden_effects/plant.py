@@ -193,8 +193,6 @@ def advance(
         At the beginning and at the end of the cell.
     now : ndarray, shape (13,)
         The conditions, constant in the cell.
-    step_s : float
-    hull, theta : ndarray
     work : ndarray, shape (4, 14)
         Scratch.
     """
@@ -294,7 +292,6 @@ def voyage(
         rad/s.
     grid : (float, int)
         Length of a cell in s, cells between two orders of the autopilot.
-    hull, theta : ndarray
     forcing : ndarray, shape (n, 4)
     white : ndarray, shape (n, 2)
         Standard normal numbers that drive the waves.

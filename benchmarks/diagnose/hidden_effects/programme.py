@@ -50,7 +50,6 @@ def ship(name: str, seed: int) -> SimulatedHull:
     ----------
     name : str
         Key of `kempf.pipeline.simulate.hulls.HULLS`.
-    seed : int
     """
     hull, random = HULLS[name], stream(seed, "ship")
     p = hull.parameters
@@ -76,8 +75,6 @@ def orders(hull: SimulatedHull, seed: int, day: int) -> Float:
 
     Parameters
     ----------
-    hull : SimulatedHull
-    seed : int
     day : int
         0 or 1.
     """
@@ -99,15 +96,9 @@ def orders(hull: SimulatedHull, seed: int, day: int) -> Float:
 
 @dataclass(frozen=True)
 class Weather:
-    """What acts on a ship for a day.
+    """What acts on a ship for a day."""
 
-    Attributes
-    ----------
-    force, north, east, wind : Disturbance
-        F of eq. (16), m/s^2; the stream, m/s; the true wind, m/s.
-    wind_from_rad, wave_from_rad : float
-    """
-
+    #: force, north, east, wind: F of eq. (16), m/s^2; the stream, m/s; the true wind, m/s.
     force: Disturbance
     north: Disturbance
     east: Disturbance
@@ -132,8 +123,6 @@ def weather(hull: SimulatedHull, level: str, seed: int, day: int) -> Weather:
         Wind force goes with her rudder's force, the stream with her speed where she is slow.
     level : str
         One of `DISTURBANCES`.
-    seed : int
-    day : int
     """
     mean, std, flow, flow_std, wind = _WEATHER[level]
     random = stream(seed, f"weather {day}")

@@ -76,8 +76,6 @@ def read(
 
     Parameters
     ----------
-    hull : SimulatedHull
-    voyage : Voyage
     wind_from_rad : float
         Where the true wind comes from.
     settings : TrialSettings

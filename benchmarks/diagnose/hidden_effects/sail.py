@@ -28,31 +28,22 @@ class VoyageFailed(KempfError):
 
 @dataclass(frozen=True, eq=False)
 class Voyage:
-    """What truly happened on a day.
+    """What truly happened on a day."""
 
-    Attributes
-    ----------
-    step_s : float
-        Of the grid.
-    state, slope : ndarray, shape (n, 14)
-        Columns `benchmarks.diagnose.hidden_effects.plant.STATE`, and their rates.
-    logged, fed : ndarray, shape (n,)
-        Rudder of the log, and behind dead time, rate limit and backlash, rad.
-    forcing, conditions : ndarray, shape (n, 4) and (n, 13)
-    run : ndarray of int, shape (n,)
-        Number of the zigzag, 0 outside.
-    executes_s : tuple of tuple of float
-        By zigzag: instants of the executes and of the end.
-    """
-
+    #: Of the grid.
     step_s: float
+    #: state, slope: Shape (n, 14). Columns `benchmarks.diagnose.hidden_effects.plant.STATE`, and their rates.
     state: Float
     slope: Float
+    #: logged, fed: Shape (n,). Rudder of the log, and behind dead time, rate limit and backlash, rad.
     logged: Float
     fed: Float
+    #: forcing, conditions: Shape (n, 4) and (n, 13).
     forcing: Float
     conditions: Float
+    #: Shape (n,). Number of the zigzag, 0 outside.
     run: NDArray[np.int64]
+    #: By zigzag: instants of the executes and of the end.
     executes_s: tuple[tuple[float, ...], ...]
 
     def trajectory(self) -> Trajectory:
@@ -83,8 +74,6 @@ def voyage(
 
     Parameters
     ----------
-    hull : SimulatedHull
-    weather : Weather
     effect : HiddenEffect or None
         None: eq. (16).
     c : float
@@ -171,12 +160,8 @@ def strength_of(
 
     Parameters
     ----------
-    hull : SimulatedHull
     weathers : tuple of Weather
         One a day.
-    effect : HiddenEffect
-    strength : int
-    seed : int
     """
     sign = float(effect.sign) or (1.0 if stream(seed, "sign").random() < 0.5 else -1.0)
     if effect.sizes:
@@ -194,13 +179,10 @@ def voyages(
 
     Parameters
     ----------
-    hull : SimulatedHull
     weathers : tuple of Weather
         One a day.
-    effect : HiddenEffect or None
     strength : int
         0, 1 or 2.
-    seed : int
 
     Raises
     ------

@@ -15,20 +15,13 @@ ABSORBED = 0.999
 
 @dataclass(frozen=True)
 class Judged:
-    """One case: the truth, what was said, and what a fit with the true structure attains.
+    """One case: the truth, what was said, and what a fit with the true structure attains."""
 
-    Attributes
-    ----------
-    truth : mapping
-        Opened answer.
-    said : mapping
-        As `benchmarks.diagnose.hidden_effects.examine` wrote it.
-    oracle : mapping
-        As `benchmarks.diagnose.hidden_effects.oracle` wrote it; empty where there is none.
-    """
-
+    #: Opened answer.
     truth: Mapping[str, Any]
+    #: As `benchmarks.diagnose.hidden_effects.examine` wrote it.
     said: Mapping[str, Any]
+    #: As `benchmarks.diagnose.hidden_effects.oracle` wrote it; empty where there is none.
     oracle: Mapping[str, Any]
 
     @property

@@ -51,10 +51,6 @@ _TO: dict[str, tuple[str, Callable[[Trial], bytes]]] = {
 def logs_of(case: Case) -> tuple[dict[str, bytes], dict[str, Any]]:
     """Return the files of a case by name, and its answer as JSON content.
 
-    Parameters
-    ----------
-    case : Case
-
     Raises
     ------
     VoyageFailed
@@ -135,7 +131,6 @@ def write_case(case: Case, folder: Path, answers: Path) -> None:
 
     Parameters
     ----------
-    case : Case
     folder : Path
         Of all cases.
     answers : Path

@@ -64,7 +64,6 @@ def run(
 
     Parameters
     ----------
-    reader : Reader
     seed : int
         Of every choice; the same iterations of the same code give the same inputs.
     seconds : float
@@ -73,10 +72,6 @@ def run(
         Whichever ends first.
     before : callable, optional
         Called with every input before it is read, so that one that kills the process is known.
-
-    Returns
-    -------
-    Campaign
     """
     mutator, found = Mutator(reader, WORDS[reader], seed), Campaign(reader, seed)
     judge, folder = oracle_of(reader)

@@ -31,29 +31,20 @@ _QUARTER = 0.5 * np.pi
 
 @dataclass(frozen=True)
 class Alignment:
-    """How one channel goes with another.
+    """How one channel goes with another."""
 
-    Attributes
-    ----------
-    slope, slope_std : float
-        Change of the second for a change of 1 in the first.
-    lag_s, lag_std_s : float
-        How much later the second shows it, in the middle of the log, s.
-    rate, rate_std : float
-        By how much the lag grows in a second: how much faster the second one's clock runs, s/s.
-    left_over : float
-        Size of what does not go together over the size of the second's changes.
-    explains : float
-        Size of what this lag leaves over that a lag between the bounds of sound clocks would leave; 1 for the same.
-    """
-
+    #: slope, slope_std: Change of the second for a change of 1 in the first.
     slope: float
     slope_std: float
+    #: lag_s, lag_std_s: How much later the second shows it, in the middle of the log, s.
     lag_s: float
     lag_std_s: float
+    #: rate, rate_std: By how much the lag grows in a second: how much faster the second one's clock runs, s/s.
     rate: float
     rate_std: float
+    #: Size of what does not go together over the size of the second's changes.
     left_over: float
+    #: Size of what this lag leaves over that a lag between the bounds of sound clocks would leave; 1 for the same.
     explains: float
 
 
@@ -62,7 +53,6 @@ def edges_of(*series: Series, window_s: float = 0.0) -> Nanoseconds:
 
     Parameters
     ----------
-    *series : Series
     window_s : float, optional
         Shortest window, s; never shorter than five periods of the slowest, nor more than six hundred of them.
     """
@@ -86,7 +76,6 @@ def align(
 
     Parameters
     ----------
-    first, second : Series
     usual_s : (float, float), optional
         Lags that sound clocks may show, s.
     circle : bool, optional

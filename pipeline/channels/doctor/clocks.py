@@ -26,7 +26,6 @@ def clock_figures(
 
     Parameters
     ----------
-    found : Alignment
     lags_s : (float, float)
         Lags that the ship, the filters and the sampling explain, s.
     over : Series

@@ -22,17 +22,11 @@ _OFFSET, _DELAY, _RATE = 1, 2, 6
 
 @dataclass(frozen=True)
 class Correction:
-    """One entry of ``channels`` in a source of the profile, as it should be.
+    """One entry of ``channels`` in a source of the profile, as it should be."""
 
-    Attributes
-    ----------
-    key : str
-        Column, field of a topic, or sentence and channel.
-    mapped : ChannelMap
-        What it should say.
-    """
-
+    #: Column, field of a topic, or sentence and channel.
     key: str
+    #: What it should say.
     mapped: ChannelMap
 
     @property
@@ -84,7 +78,6 @@ def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_forma
 
     Parameters
     ----------
-    fault : Fault
     known : mapping of str to (str, ChannelMap)
         From `entries`.
     log_format : {"delimited", "mcap", "nmea"}
@@ -186,7 +179,6 @@ def put_into(source: Source | None, corrections: tuple[Correction, ...], match: 
     ----------
     source : Source or None
         As it is; None for an NMEA log that needed none.
-    corrections : tuple of Correction
     match : str
         File pattern where there is no source yet.
     """

@@ -52,18 +52,12 @@ _FEW = 400
 
 @dataclass(frozen=True)
 class ChannelFinding:
-    """One contradiction: the faults that could cause it, and what shows it.
+    """One contradiction: the faults that could cause it, and what shows it."""
 
-    Attributes
-    ----------
-    faults : tuple of Fault
-        A single one where most of the other channels confirm it; several where it is one of these. Empty: no known
-        fault explains it.
-    evidence : tuple of Outcome
-        The checks that disagree because of it, before it was corrected.
-    """
-
+    #: A single one where most of the other channels confirm it; several where it is one of these. Empty: no known fault
+    #: explains it.
     faults: tuple[Fault, ...]
+    #: The checks that disagree because of it, before it was corrected.
     evidence: tuple[Outcome, ...]
 
     @property
@@ -75,19 +69,12 @@ class ChannelFinding:
 
 @dataclass(frozen=True)
 class Examination:
-    """What the doctor found.
-
-    Attributes
-    ----------
-    findings : tuple of ChannelFinding
-    outcomes : tuple of Outcome
-        Of every check on the log as it came.
-    untested : tuple of str
-        Channels that no check could test, by name.
-    """
+    """What the doctor found."""
 
     findings: tuple[ChannelFinding, ...]
+    #: Of every check on the log as it came.
     outcomes: tuple[Outcome, ...]
+    #: Channels that no check could test, by name.
     untested: tuple[str, ...]
 
     @property
@@ -129,14 +116,6 @@ def examine(log: Log) -> Examination:
 
     What disagrees is explained by the fault whose correction makes most checks agree and none disagree that agreed
     before; faults that do so equally well are all named. What still disagrees is explained in the same way.
-
-    Parameters
-    ----------
-    log : Log
-
-    Returns
-    -------
-    Examination
 
     References
     ----------

@@ -42,33 +42,23 @@ _SELDOM = ("km/h taken for kn", "kn taken for km/h")
 
 @dataclass(frozen=True)
 class Fault:
-    """One fault of one instrument.
+    """One fault of one instrument."""
 
-    Attributes
-    ----------
-    kind : {"sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck"}
-    channels : tuple of str
-        That share the fault.
-    value : float
-        What is done about it: the factor for a unit or a scale, the angle that is added (rad) for an offset, the
-        seconds that are taken off for a latency, the rate (s/s) at which the clock runs too fast for a clock scale,
-        the seconds for which a channel is stuck.
-    name : str
-        Which fault of the kind, such as ``kn taken for m/s``.
-    std : float
-        Standard error of ``value`` where it was estimated; 0 where it is exact.
-    simplicity : int
-        Smaller is asked first: a wrong sign before a compass turned by 90 degrees and counting backwards.
-    start_utc_ns : int
-        When a channel that is stuck begins to be, UTC ns.
-    """
-
+    #: One of {"sign", "unit", "scale", "frame", "swap", "offset", "latency", "clock_scale", "stuck"}.
     kind: Kind
+    #: That share the fault.
     channels: tuple[str, ...]
+    #: What is done about it: the factor for a unit or a scale, the angle that is added (rad) for an offset, the seconds
+    #: that are taken off for a latency, the rate (s/s) at which the clock runs too fast for a clock scale, the seconds
+    #: for which a channel is stuck.
     value: float = 1.0
+    #: Which fault of the kind, such as ``kn taken for m/s``.
     name: str = ""
+    #: Standard error of ``value`` where it was estimated; 0 where it is exact.
     std: float = 0.0
+    #: Smaller is asked first: a wrong sign before a compass turned by 90 degrees and counting backwards.
     simplicity: int = 1
+    #: When a channel that is stuck begins to be, UTC ns.
     start_utc_ns: int = 0
 
     @property

@@ -37,7 +37,6 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
 
     Parameters
     ----------
-    log : Log
     thorough : bool, optional
         False: only at lags that sound clocks show, and not with the way from fix to fix.
 

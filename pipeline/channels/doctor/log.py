@@ -38,25 +38,17 @@ EARTH_M = 6_371_008.8
 
 @dataclass(frozen=True, eq=False)
 class Velocity:
-    """A velocity at its instants.
+    """A velocity at its instants."""
 
-    Attributes
-    ----------
-    channels : tuple of str
-        What gives it.
-    time_utc_ns : ndarray, shape (n,)
-    value : ndarray of complex128, shape (n,)
-        Towards north plus i times towards east (ahead plus i times to starboard for a body-fixed one), m/s.
-    direction : ndarray, shape (n,)
-        Its angle, unwrapped, rad.
-    over_s : float
-        Time over which it is a mean, s; 0 for an instrument's own.
-    """
-
+    #: What gives it.
     channels: tuple[str, str]
+    #: Shape (n,).
     time_utc_ns: Nanoseconds
+    #: Shape (n,). Towards north plus i times towards east (ahead plus i times to starboard for a body-fixed one), m/s.
     value: Complex
+    #: Shape (n,). Its angle, unwrapped, rad.
     direction: Float
+    #: Time over which it is a mean, s; 0 for an instrument's own.
     over_s: float = 0.0
 
     @property
@@ -74,20 +66,13 @@ class Velocity:
 
 @dataclass(frozen=True, eq=False)
 class Log:
-    """The channels of one log as the doctor looks at them; a correction makes another log.
+    """The channels of one log as the doctor looks at them; a correction makes another log."""
 
-    Attributes
-    ----------
-    series : mapping of str to Series
-        By canonical name; SI, angles on the circle unwrapped.
-    length_m : float or None
-        Of the ship, where it is known: how far the course may lag behind the heading in a turn.
-    units : mapping of str to str
-        The unit that each channel is said to be written in, where that is known: what it was taken for.
-    """
-
+    #: By canonical name; SI, angles on the circle unwrapped.
     series: Mapping[str, Series]
+    #: Of the ship, where it is known: how far the course may lag behind the heading in a turn.
     length_m: float | None = None
+    #: The unit that each channel is said to be written in, where that is known: what it was taken for.
     units: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod

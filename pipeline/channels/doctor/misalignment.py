@@ -35,7 +35,6 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
 
     Parameters
     ----------
-    log : Log
     thorough : bool, optional
         False: not with the way from fix to fix.
 

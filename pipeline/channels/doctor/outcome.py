@@ -18,21 +18,13 @@ DOUBTFUL = 2.0
 
 @dataclass(frozen=True)
 class Figure:
-    """One measured figure of a check and what is expected of it.
-
-    Attributes
-    ----------
-    name : str
-    value, std : float
-        With the standard error, what is unknown of current and leeway included.
-    low, high : float
-        What sound channels give, their ordinary errors included.
-    unit : str
-    """
+    """One measured figure of a check and what is expected of it."""
 
     name: str
+    #: value, std: With the standard error, what is unknown of current and leeway included.
     value: float
     std: float
+    #: low, high: What sound channels give, their ordinary errors included.
     low: float
     high: float
     unit: str = "1"
@@ -60,30 +52,20 @@ class Figure:
 
 @dataclass(frozen=True)
 class Outcome:
-    """What one check says of a log.
+    """What one check says of a log."""
 
-    Attributes
-    ----------
-    check : str
-        Its name, such as ``heading_rate``.
-    channels : tuple of str
-        That it compares.
-    state : {"agree", "disagree", "untestable"}
-    words : str
-        One sentence with the evidence.
-    figures : tuple of Figure
-    left_over : float
-        Size of what does not go together over the size of what there is; shows which of two corrections fits better.
-    suspects : tuple of Fault
-        What could have caused a disagreement.
-    """
-
+    #: Its name, such as ``heading_rate``.
     check: str
+    #: That it compares.
     channels: tuple[str, ...]
+    #: One of {"agree", "disagree", "untestable"}.
     state: State
+    #: One sentence with the evidence.
     words: str
     figures: tuple[Figure, ...] = ()
+    #: Size of what does not go together over the size of what there is; shows which of two corrections fits better.
     left_over: float = 0.0
+    #: What could have caused a disagreement.
     suspects: tuple[Fault, ...] = field(default=(), repr=False)
 
     @property

@@ -19,18 +19,12 @@ _LAGS = 30
 
 @dataclass(frozen=True, eq=False)
 class RobustLine:
-    """Coefficients of a linear fit.
+    """Coefficients of a linear fit."""
 
-    Attributes
-    ----------
-    value, std : ndarray, shape (n_columns,)
-        Coefficients and their standard errors.
-    left_over : float
-        Size of the residuals over that of the observations.
-    """
-
+    #: value, std: Shape (n_columns,). Coefficients and their standard errors.
     value: Float
     std: Float
+    #: Size of the residuals over that of the observations.
     left_over: float
 
 

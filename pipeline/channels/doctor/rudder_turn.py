@@ -39,7 +39,6 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
 
     Parameters
     ----------
-    log : Log
     thorough : bool, optional
         False: only at shifts that a sound rudder shows, and with the yaw rate alone where there is one.
 

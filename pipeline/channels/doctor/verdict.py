@@ -23,7 +23,6 @@ def as_content(
 
     Parameters
     ----------
-    examination : Examination
     known : mapping of str to (str, ChannelMap)
         Entry of the profile behind each channel, from `kempf.pipeline.channels.doctor.corrections.entries`.
     log_format : {"delimited", "mcap", "nmea"}

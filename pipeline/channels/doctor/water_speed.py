@@ -26,7 +26,6 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
 
     Parameters
     ----------
-    log : Log
     thorough : bool, optional
         False: not with the way from fix to fix.
 

@@ -22,15 +22,10 @@ from kempf.schemas.model_spec import ModelSpec
 
 @dataclass(frozen=True)
 class OutputErrorSettings(MaximumLikelihoodSettings):
-    """Those of the search for maximum likelihood, and one more.
+    """Those of the search for maximum likelihood, and one more."""
 
-    Attributes
-    ----------
-    remove_means : bool
-        Take the means off measurements and rudder first, the usual remedy against what is constant. The heading is then
-        left out where there is a yaw rate: it is the integral of what lost its mean.
-    """
-
+    #: Take the means off measurements and rudder first, the usual remedy against what is constant. The heading is then
+    #: left out where there is a yaw rate: it is the integral of what lost its mean.
     remove_means: bool = False
 
 
@@ -39,12 +34,10 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Output
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Its wind and current are left out.
     arm_per_m : float
         Without meaning here: there is no wind.
-    settings : OutputErrorSettings
 
     Returns
     -------

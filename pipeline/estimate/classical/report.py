@@ -36,15 +36,12 @@ def estimate_of(
 
     Parameters
     ----------
-    name : str
     record : Record
         At equal steps.
     hull : ndarray, shape (6,), or None
         None where the method ended at no ship.
     covariance : ndarray, shape (6, 6)
         NaN where the method has none.
-    converged : bool
-    reason : str
     report : dict
         The method's own.
     spec : ModelSpec

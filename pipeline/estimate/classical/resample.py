@@ -19,7 +19,6 @@ def even(record: Record, step_s: float | None) -> Record:
 
     Parameters
     ----------
-    record : Record
     step_s : float or None
         Step, s; None takes the period of the GNSS, but no less than a tenth of a second.
 

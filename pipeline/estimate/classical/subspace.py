@@ -28,40 +28,27 @@ _ORDER = 2
 
 @dataclass(frozen=True)
 class SubspaceSettings:
-    """Settings of the method.
+    """Settings of the method."""
 
-    Attributes
-    ----------
-    step_s : float or None
-        Common step, s; None takes the GNSS period.
-    horizon : int
-        Block rows of past and of future.
-    remove_means : bool
-        Take the means off measurements and rudder first, the usual remedy against what is constant.
-    """
-
+    #: Common step, s; None takes the GNSS period.
     step_s: float | None = None
+    #: Block rows of past and of future.
     horizon: int = 10
+    #: Take the means off measurements and rudder first, the usual remedy against what is constant.
     remove_means: bool = False
 
 
 @dataclass(frozen=True, eq=False)
 class Realisation:
-    """x+ = A x + B u, y = x + noise, found from data.
+    """x+ = A x + B u, y = x + noise, found from data."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (2, 2)
-    B : ndarray, shape (2, n_input)
-    singular : ndarray, shape (n_singular,)
-        Singular values of the weighted projection; two stand out where two states explain the data.
-    reason : str
-        Empty, or why A and B are of no use.
-    """
-
+    #: Shape (2, 2).
     A: Float
+    #: Shape (2, n_input).
     B: Float
+    #: Shape (n_singular,). Singular values of the weighted projection; two stand out where two states explain the data.
     singular: Float
+    #: Empty, or why A and B are of no use.
     reason: str = ""
 
 
@@ -70,12 +57,10 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Subspa
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Its wind and current are left out.
     arm_per_m : float
         Without meaning here.
-    settings : SubspaceSettings
 
     Returns
     -------
@@ -165,10 +150,6 @@ def realise(outputs: Float, inputs: Float, horizon: int) -> Realisation:
     inputs : ndarray, shape (n, n_input)
     horizon : int
         Block rows i of past and of future.
-
-    Returns
-    -------
-    Realisation
     """
     i, m, p = horizon, inputs.shape[1], outputs.shape[1]
     U, Y = _hankel(inputs, 2 * i), _hankel(outputs, 2 * i)

@@ -11,20 +11,13 @@ from kempf.pipeline.channels.series import Float
 
 @dataclass(frozen=True, eq=False)
 class Filtered:
-    """What the filter gives.
+    """What the filter gives."""
 
-    Attributes
-    ----------
-    predicted : ndarray, shape (n, n_state)
-        x^[k], the state before the measurement at k.
-    updated : ndarray, shape (n, n_state)
-        The state after it.
-    innovation : ndarray, shape (n, n_measurement)
-        eps[k] = Y[k] - H x^[k]; NaN where nothing was measured.
-    """
-
+    #: Shape (n, n_state). x^[k], the state before the measurement at k.
     predicted: Float
+    #: Shape (n, n_state). The state after it.
     updated: Float
+    #: Shape (n, n_measurement). eps[k] = Y[k] - H x^[k]; NaN where nothing was measured.
     innovation: Float
 
 
@@ -52,10 +45,6 @@ def run_filter(
     u : ndarray, shape (n, n_input)
     initial_mean : ndarray, shape (n_state,)
     initial_covariance : ndarray, shape (n_state, n_state)
-
-    Returns
-    -------
-    Filtered
     """
     n, n_state = Y.shape[0], A.shape[0]
     predicted, updated = np.empty((n, n_state)), np.empty((n, n_state))

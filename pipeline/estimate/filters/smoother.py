@@ -18,97 +18,61 @@ from kempf.pipeline.compiled import njit
 
 @dataclass(frozen=True, eq=False)
 class LinearSystem:
-    """x[k] = Phi[k] x[k-1] + g[k] + w[k], var w[k] = Q[k]; y[k, i] = H[k, i] x[k] + e, var e = R[k, i].
+    """x[k] = Phi[k] x[k-1] + g[k] + w[k], var w[k] = Q[k]; y[k, i] = H[k, i] x[k] + e, var e = R[k, i]."""
 
-    Attributes
-    ----------
-    Phi : ndarray, shape (n, n_state, n_state)
-        From instant k - 1 to k; the first is not used.
-    g : ndarray, shape (n, n_state)
-    Q : ndarray, shape (n, n_state, n_state)
-    Y : ndarray, shape (n, n_measurement)
-        NaN where nothing was measured.
-    H : ndarray, shape (n, n_measurement, n_state)
-    R : ndarray, shape (n, n_measurement)
-        Variances.
-    x0 : ndarray, shape (n_state,)
-        Mean at the first instant, before its measurements.
-    P0 : ndarray, shape (n_state, n_state)
-    """
-
+    #: Shape (n, n_state, n_state). From instant k - 1 to k; the first is not used.
     Phi: Float
+    #: Shape (n, n_state).
     g: Float
+    #: Shape (n, n_state, n_state).
     Q: Float
+    #: Shape (n, n_measurement). NaN where nothing was measured.
     Y: Float
+    #: Shape (n, n_measurement, n_state).
     H: Float
+    #: Shape (n, n_measurement). Variances.
     R: Float
+    #: Shape (n_state,). Mean at the first instant, before its measurements.
     x0: Float
+    #: Shape (n_state, n_state).
     P0: Float
 
 
 @dataclass(frozen=True, eq=False)
 class Smoothed:
-    """States given all measurements.
-
-    Attributes
-    ----------
-    log_likelihood : float
-    mean : ndarray, shape (n, n_state)
-    covariance : ndarray, shape (n, n_state, n_state)
-    innovation, variance : ndarray, shape (n, n_measurement)
-        One-step prediction errors and their variances; NaN where not measured.
-    """
+    """States given all measurements."""
 
     log_likelihood: float
+    #: Shape (n, n_state).
     mean: Float
+    #: Shape (n, n_state, n_state).
     covariance: Float
+    #: innovation, variance: Shape (n, n_measurement). One-step prediction errors and their variances; NaN where not
+    #: measured.
     innovation: Float
     variance: Float
 
 
 @dataclass(frozen=True, eq=False)
 class Last:
-    """The state at the last instant given all measurements, and how likely these were.
-
-    Attributes
-    ----------
-    log_likelihood : float
-    mean : ndarray, shape (n_state,)
-    covariance : ndarray, shape (n_state, n_state)
-    """
+    """The state at the last instant given all measurements, and how likely these were."""
 
     log_likelihood: float
+    #: Shape (n_state,).
     mean: Float
+    #: Shape (n_state, n_state).
     covariance: Float
 
 
 def last_state(system: LinearSystem) -> Last:
-    """Filter a record and keep what is known at its end.
-
-    Parameters
-    ----------
-    system : LinearSystem
-
-    Returns
-    -------
-    Last
-    """
+    """Filter a record and keep what is known at its end."""
     s = system
     value, mean, covariance, _, _, _ = _filter(s.Phi, s.g, s.Q, s.Y, s.H, s.R, s.x0, s.P0, 1)
     return Last(float(value), mean[0], covariance[0])
 
 
 def smooth(system: LinearSystem) -> Smoothed:
-    """Filter a record, then go back over it.
-
-    Parameters
-    ----------
-    system : LinearSystem
-
-    Returns
-    -------
-    Smoothed
-    """
+    """Filter a record, then go back over it."""
     s, n = system, system.Y.shape[0]
     value, mean, covariance, gain, innovation, variance = _filter(s.Phi, s.g, s.Q, s.Y, s.H, s.R, s.x0, s.P0, n)
     _backward(system.Phi, system.H, mean, covariance, gain, innovation, variance)

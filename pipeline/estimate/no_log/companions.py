@@ -29,21 +29,14 @@ _FEWEST_READINGS, _MARGIN_NS = 20, 5 * SECOND_NS
 
 @dataclass(frozen=True)
 class Passage:
-    """What is known of a zigzag before it is identified.
+    """What is known of a zigzag before it is identified."""
 
-    Attributes
-    ----------
-    start_utc_ns, end_utc_ns : int
-        Bounds, UTC ns.
-    heading_deg : float
-        Base heading.
-    shaft_speed_per_s : float or None
-        Median over the run; None where it was not logged.
-    """
-
+    #: start_utc_ns, end_utc_ns: Bounds, UTC ns.
     start_utc_ns: int
     end_utc_ns: int
+    #: Base heading.
     heading_deg: float
+    #: Median over the run; None where it was not logged.
     shaft_speed_per_s: float | None = None
 
     @property
@@ -80,7 +73,6 @@ def companions_of(run: Passage, others: Sequence[Passage]) -> tuple[int, ...]:
 
     Parameters
     ----------
-    run : Passage
     others : sequence of Passage
         Of the same ship, none with a log; ``run`` itself may be among them.
 

@@ -48,35 +48,25 @@ _MISFIT_SEEN = 3.0
 
 @dataclass(frozen=True)
 class NoLogSettings:
-    """What is known of the speed and the current beforehand, and when the iteration ends.
+    """What is known of the speed and the current beforehand, and when the iteration ends."""
 
-    Attributes
-    ----------
-    trial_speed_m_s, trial_speed_std_m_s : float or None
-        Speed through the water on a straight course at the shaft speed of the run, and how well it is known, m/s; None
-        where it is not. The rudder's own drag is not separated from it: leave room for that. A speed without a
-        standard deviation is taken to be known to 10 %, and counts only for a run within 25 % of it over ground: at
-        another engine setting it says nothing.
-    current_std_m_s : float
-        Of each component of the current.
-    hull_misfit : float
-        Standard deviation, over the speed, of the current along the course that a real hull shows in her lateral motion
-        where there is none, because eq. (16) is not all of her. It limits what one zigzag can tell of the speed.
-    current_drift_m_s_per_root_hour : float
-        How far the current wanders between two runs.
-    max_rounds : int
-        Fits at most.
-    tolerance : float
-        The speed stays when it moves by less than this share of its mean, root mean square over the run; what is left
-        of the mean is scaled away to first order.
-    """
-
+    #: trial_speed_m_s, trial_speed_std_m_s: Speed through the water on a straight course at the shaft speed of the run,
+    #: and how well it is known, m/s; None where it is not. The rudder's own drag is not separated from it: leave room
+    #: for that. A speed without a standard deviation is taken to be known to 10 %, and counts only for a run within 25
+    #: % of it over ground: at another engine setting it says nothing.
     trial_speed_m_s: float | None = None
     trial_speed_std_m_s: float | None = None
+    #: Of each component of the current.
     current_std_m_s: float = 2.0
+    #: Standard deviation, over the speed, of the current along the course that a real hull shows in her lateral motion
+    #: where there is none, because eq. (16) is not all of her. It limits what one zigzag can tell of the speed.
     hull_misfit: float = 0.1
+    #: How far the current wanders between two runs.
     current_drift_m_s_per_root_hour: float = 0.2
+    #: Fits at most.
     max_rounds: int = 8
+    #: The speed stays when it moves by less than this share of its mean, root mean square over the run; what is left of
+    #: the mean is scaled away to first order.
     tolerance: float = 1e-3
 
 
@@ -101,7 +91,6 @@ def identify_without_log(
         l of eq. (16), 1/m.
     settings : MaximumLikelihoodSettings
         Of the lateral fits.
-    no_log : NoLogSettings, optional
     companions : tuple of Record
         Other runs of the ship, not long before or after, with the same engine setting, best on other headings: they
         share V_0 and k, and the current but for its drift. Their parameters are not returned. One that cannot be

@@ -45,76 +45,51 @@ _LONGEST_PAUSE_S = 0.4
 
 @dataclass(frozen=True)
 class LateralFit:
-    """What the lateral fit of one run gives to the joint system.
-
-    Attributes
-    ----------
-    hull : Hull
-    forces : SlowForces
-    current_m_s, current_rate_per_s : float
-        sigma_V and mu_V of eq. (16).
-    noise : tuple of float
-        Standard deviations of y_v, y_r and y_psi.
-    """
+    """What the lateral fit of one run gives to the joint system."""
 
     hull: Hull
     forces: SlowForces
+    #: current_m_s, current_rate_per_s: sigma_V and mu_V of eq. (16).
     current_m_s: float
     current_rate_per_s: float
+    #: Standard deviations of y_v, y_r and y_psi.
     noise: tuple[float, float, float]
 
 
 @dataclass(frozen=True)
 class Priors:
-    """What is known before the first measurement, standard deviations.
+    """What is known before the first measurement, standard deviations."""
 
-    Attributes
-    ----------
-    sway_m_s, yaw_rad_s, force_m_s2, moment_rad_s2, heading_rad, bias_rad_s : float
-        Wide, but for what the model does not have: those are 0.
-    current_m_s : float
-        Of each component of the current.
-    speed_m_s : float
-        Of V at the beginning of a run, about the GNSS speed along the bow.
-    settled_m_s : tuple of (float, float)
-        Mean and standard deviation of V_0.
-    loss_m : float
-        Of k, about 0.
-    misfit_m_s : float
-        Of what the linear hull lacks and the lateral fit takes for a current along the course.
-    drift_m_s_per_root_s : float
-        What the current changes between two runs, over the root of the time between them.
-    """
-
+    #: sway_m_s, yaw_rad_s, force_m_s2, moment_rad_s2, heading_rad, bias_rad_s: Wide, but for what the model does not
+    #: have: those are 0.
     sway_m_s: float
     yaw_rad_s: float
     force_m_s2: float
     moment_rad_s2: float
     heading_rad: float
     bias_rad_s: float
+    #: Of each component of the current.
     current_m_s: float
+    #: Of V at the beginning of a run, about the GNSS speed along the bow.
     speed_m_s: float
+    #: Mean and standard deviation of V_0.
     settled_m_s: tuple[float, float]
+    #: Of k, about 0.
     loss_m: float
+    #: Of what the linear hull lacks and the lateral fit takes for a current along the course.
     misfit_m_s: float
+    #: What the current changes between two runs, over the root of the time between them.
     drift_m_s_per_root_s: float
 
 
 @dataclass(frozen=True, eq=False)
 class MotionRun:
-    """One run on the instants of its record.
-
-    Attributes
-    ----------
-    record : Record
-    along_m_s : ndarray, shape (n,)
-        GNSS speed along the bow, NaN where not measured.
-    squared_rate : ndarray, shape (n,)
-        r^2 for the loss of speed, rad^2/s^2.
-    """
+    """One run on the instants of its record."""
 
     record: Record
+    #: Shape (n,). GNSS speed along the bow, NaN where not measured.
     along_m_s: Float
+    #: Shape (n,). r^2 for the loss of speed, rad^2/s^2.
     squared_rate: Float
 
     @property
@@ -164,14 +139,9 @@ def join(runs: tuple[MotionRun, ...], fits: tuple[LateralFit, ...], priors: Prio
         Their ``record.speed_m_s`` is the speed that the lateral model takes.
     fits : tuple of LateralFit
         One a run.
-    priors : Priors
     current : {"earth", "lateral", "none"}
         See `kempf.schemas.model_spec.ModelSpec`. ``lateral``: V_T across the bow, and beside it a current along it that
         nothing but V_0 tells from the speed.
-
-    Returns
-    -------
-    LinearSystem
     """
     parts = [_lateral_half(run, fit, current) for run, fit in zip(runs, fits, strict=True)]
     for number in range(1, len(runs)):
@@ -198,8 +168,6 @@ def set_surge(
     ----------
     system : LinearSystem
         Of `join`.
-    runs : tuple of MotionRun
-    surge : Surge
     along_noise_m_s : float
         Standard deviation of y_u.
     averaged : int

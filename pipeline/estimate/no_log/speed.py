@@ -45,39 +45,28 @@ _SEARCH = {"maxiter": 40, "ftol": 1e-9, "eps": 1e-4}
 
 @dataclass(frozen=True, eq=False)
 class Speed:
-    """Speed through the water of several runs, one entry of each tuple a run.
+    """Speed through the water of several runs, one entry of each tuple a run."""
 
-    Attributes
-    ----------
-    speed_m_s, std_m_s : tuple of ndarray, shape (n,)
-        V and its standard error at the instants of the run, for the lateral parameters given.
-    runs : tuple of MotionRun
-        With the turning that was found, and without gross errors.
-    surge : Surge
-    along_noise_m_s : float
-        Standard deviation of y_u.
-    settled_m_s, loss_m : tuple of (float, float)
-        V_0 and k with their standard errors.
-    misfit_m_s : tuple of (float, float)
-        One a run: what the hull shows of a current that is none, with its standard error.
-    current_along_m_s, current_along_std_m_s, correlation : tuple of ndarray, shape (n,)
-        Current along the bow with its standard error, and the correlation of its error with that of V.
-    at_bound : tuple of str
-        Which of the longitudinal parameters ended at a bound.
-    log_likelihood : float
-    """
-
+    #: speed_m_s, std_m_s: Shape (n,). V and its standard error at the instants of the run, for the lateral parameters
+    #: given.
     speed_m_s: tuple[Float, ...]
     std_m_s: tuple[Float, ...]
+    #: With the turning that was found, and without gross errors.
     runs: tuple[MotionRun, ...]
     surge: Surge
+    #: Standard deviation of y_u.
     along_noise_m_s: float
+    #: settled_m_s, loss_m: V_0 and k with their standard errors.
     settled_m_s: tuple[float, float]
     loss_m: tuple[float, float]
+    #: One a run: what the hull shows of a current that is none, with its standard error.
     misfit_m_s: tuple[tuple[float, float], ...]
+    #: current_along_m_s, current_along_std_m_s, correlation: Shape (n,). Current along the bow with its standard error,
+    #: and the correlation of its error with that of V.
     current_along_m_s: tuple[Float, ...]
     current_along_std_m_s: tuple[Float, ...]
     correlation: tuple[Float, ...]
+    #: Which of the longitudinal parameters ended at a bound.
     at_bound: tuple[str, ...]
     log_likelihood: float
 

@@ -17,37 +17,27 @@ from kempf.pipeline.model.ship import Hull, continuous_from_discrete
 
 @dataclass(frozen=True)
 class LeastSquaresSettings:
-    """Settings of the first approximation.
+    """Settings of the first approximation."""
 
-    Attributes
-    ----------
-    step_s : float or None
-        Step of eq. (17), s; None takes the GNSS period.
-    """
-
+    #: Step of eq. (17), s; None takes the GNSS period.
     step_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
 class Regression:
-    """Solution of eq. (14).
+    """Solution of eq. (14)."""
 
-    Attributes
-    ----------
-    A : ndarray, shape (n_state, n_state)
-    B : ndarray, shape (n_state, n_input)
-    std : ndarray, shape (n_state, n_state + n_input)
-        Standard errors of [A B] as least squares sees them, blind to the noise in the regressors.
-    covariance : ndarray, shape (n_state (n_state + n_input), n_state (n_state + n_input))
-        Covariance of the rows of [A B] one after the other.
-    rank : int
-        Of the regressor matrix; below n_state + n_input the minimum-norm solution stands.
-    """
-
+    #: Shape (n_state, n_state).
     A: Float
+    #: Shape (n_state, n_input).
     B: Float
+    #: Shape (n_state, n_state + n_input). Standard errors of [A B] as least squares sees them, blind to the noise in
+    #: the regressors.
     std: Float
+    #: Shape (n_state (n_state + n_input), n_state (n_state + n_input)). Covariance of the rows of [A B] one after the
+    #: other.
     covariance: Float
+    #: Of the regressor matrix; below n_state + n_input the minimum-norm solution stands.
     rank: int
 
 
@@ -62,10 +52,6 @@ def regress(states: Float, inputs: Float, targets: Float) -> Regression:
         Input over each step.
     targets : ndarray, shape (n, n_state)
         State after each step.
-
-    Returns
-    -------
-    Regression
     """
     regressors = np.column_stack([states, inputs])
     # Columns differ by orders of magnitude (m/s against rad/s): scaled, the rank decision is about directions.

@@ -30,78 +30,52 @@ _SAME = 0.02
 
 @dataclass(frozen=True)
 class ProcedureSettings:
-    """Settings of the procedure.
+    """Settings of the procedure."""
 
-    Attributes
-    ----------
-    iterations : int
-        Passes after the first approximation; the paper shows 25.
-    tolerance : float
-        Converged when no regressor's part in the states' increments changes by more than this share of the increments,
-        root mean squares both.
-    floor : bool
-        R is never taken smaller than half the residual variance of the last regression. The residual of eq. (14) holds
-        the noise at both ends of a step: half of it is R where A is near unity and the model true, and more where it
-        is not.
-    run_on : bool
-        Make all passes although it has converged.
-    skip : int
-        Leading rows that the regressions leave out while the filter settles; the paper leaves out none.
-    """
-
+    #: Passes after the first approximation; the paper shows 25.
     iterations: int = 25
+    #: Converged when no regressor's part in the states' increments changes by more than this share of the increments,
+    #: root mean squares both.
     tolerance: float = 1e-4
+    #: R is never taken smaller than half the residual variance of the last regression. The residual of eq. (14) holds
+    #: the noise at both ends of a step: half of it is R where A is near unity and the model true, and more where it is
+    #: not.
     floor: bool = True
+    #: Make all passes although it has converged.
     run_on: bool = False
+    #: Leading rows that the regressions leave out while the filter settles; the paper leaves out none.
     skip: int = 0
 
 
 @dataclass(frozen=True, eq=False)
 class ProcedurePass:
-    """One pass.
+    """One pass."""
 
-    Attributes
-    ----------
-    regression : Regression
-        [A B] after this pass; pass 0 is the first approximation.
-    change : float
-        Against the pass before, see `ProcedureSettings.tolerance`; NaN in pass 0.
-    R : ndarray, shape (n_state, n_state)
-        That the filter of this pass used; NaN in pass 0.
-    filtered : Filtered or None
-        States, then disturbances, with [A B] of the pass *before*; None in pass 0.
-    """
-
+    #: [A B] after this pass; pass 0 is the first approximation.
     regression: Regression
+    #: Against the pass before, see `ProcedureSettings.tolerance`; NaN in pass 0.
     change: float
+    #: Shape (n_state, n_state). That the filter of this pass used; NaN in pass 0.
     R: Float
+    #: States, then disturbances, with [A B] of the pass *before*; None in pass 0.
     filtered: Filtered | None
 
 
 @dataclass(frozen=True, eq=False)
 class ProcedureCourse:
-    """How the procedure went.
+    """How the procedure went."""
 
-    Attributes
-    ----------
-    passes : tuple of ProcedurePass
-        The first approximation, then one an iteration.
-    end : {"converged", "cycling", "diverged", "still moving"}
-    reason : str
-        The same in words with its figures.
-    period : int or None
-        Passes after which a cycle repeats.
-    hidden : tuple of str
-        States and disturbances that the measurements do not determine with the [A B] of the first approximation.
-    last : Filtered or None
-        States and disturbances with the [A B] of the last pass; None where the filter does not exist.
-    """
-
+    #: The first approximation, then one an iteration.
     passes: tuple[ProcedurePass, ...]
+    #: One of {"converged", "cycling", "diverged", "still moving"}.
     end: End
+    #: The same in words with its figures.
     reason: str
+    #: Passes after which a cycle repeats.
     period: int | None
+    #: States and disturbances that the measurements do not determine with the [A B] of the first approximation.
     hidden: tuple[str, ...]
+    #: States and disturbances with the [A B] of the last pass; None where the filter does not exist.
     last: Filtered | None
 
 
@@ -112,18 +86,12 @@ def iterate(
 
     Parameters
     ----------
-    vehicle : LinearVehicle
     measured : ndarray, shape (n, n_state)
         Y of eq. (2) at equal steps; a row that holds a NaN is left out of the regression and bridged by the filter.
     inputs : ndarray, shape (n, n_input)
         Over the step that follows each row.
     R : ndarray, shape (n_state, n_state)
         Covariance of the measurement noise, as known beforehand.
-    settings : ProcedureSettings
-
-    Returns
-    -------
-    ProcedureCourse
 
     Raises
     ------
@@ -170,7 +138,6 @@ def judge(passes: list[ProcedurePass], scale: Float) -> tuple[End, str, int | No
 
     Parameters
     ----------
-    passes : list of ProcedurePass
     scale : ndarray, shape (n_state, n_state + n_input)
         Part of one unit of each element in the increments.
 

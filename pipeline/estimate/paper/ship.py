@@ -22,35 +22,26 @@ REPORTED_PERCENT: dict[str, float] = {"a11": 10.0, "a12": 10.0, "a21": 25.0, "a2
 
 @dataclass(frozen=True)
 class PaperSettings:
-    """Settings of the procedure.
+    """Settings of the procedure."""
 
-    Attributes
-    ----------
-    iterations : int
-        The paper shows 25.
-    step_s : float or None
-        Step of eq. (17), s; None takes the GNSS period.
-    force_std_m_s2, current_std_m_s : float
-        sigma_F and sigma_V of eq. (16); the paper's simulated trial has a force of 5e-3 m/s^2 and a current of 0.3 m/s.
-    wind_rate_per_s, current_rate_per_s : float or None
-        mu_F and mu_V of eq. (16), which belong to these levels; None takes those of the model specification.
-    tolerance : float
-        See `kempf.pipeline.estimate.paper.procedure.ProcedureSettings`.
-    constant : bool
-        Force and current are constants, states with zero derivative, as in the paper's simulated trial; no rates are
-        used.
-    floor, run_on : bool
-        See `kempf.pipeline.estimate.paper.procedure.ProcedureSettings`.
-    """
-
+    #: The paper shows 25.
     iterations: int = 25
+    #: Step of eq. (17), s; None takes the GNSS period.
     step_s: float | None = None
+    #: force_std_m_s2, current_std_m_s: sigma_F and sigma_V of eq. (16); the paper's simulated trial has a force of 5e-3
+    #: m/s^2 and a current of 0.3 m/s.
     force_std_m_s2: float = 5e-3
     current_std_m_s: float = 0.3
+    #: wind_rate_per_s, current_rate_per_s: mu_F and mu_V of eq. (16), which belong to these levels; None takes those of
+    #: the model specification.
     wind_rate_per_s: float | None = 1 / 300
     current_rate_per_s: float | None = 1 / 1800
+    #: See `kempf.pipeline.estimate.paper.procedure.ProcedureSettings`.
     tolerance: float = 1e-4
+    #: Force and current are constants, states with zero derivative, as in the paper's simulated trial; no rates are
+    #: used.
     constant: bool = False
+    #: floor, run_on: See `kempf.pipeline.estimate.paper.procedure.ProcedureSettings`.
     floor: bool = True
     run_on: bool = False
 
@@ -68,7 +59,6 @@ def ship(step_s: float, *disturbances: SlowDisturbance) -> LinearVehicle:
 
     Parameters
     ----------
-    step_s : float
     *disturbances : SlowDisturbance
         Made by `wind_force` and `lateral_current`.
     """
@@ -97,12 +87,10 @@ def run(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperSettin
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Correlation rates of the disturbances where the settings leave them open.
     arm_per_m : float
         l of eq. (16), 1/m.
-    settings : PaperSettings
 
     Returns
     -------
@@ -145,12 +133,10 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperS
 
     Parameters
     ----------
-    record : Record
     spec : ModelSpec
         Correlation rates of the disturbances where the settings leave them open.
     arm_per_m : float
         l of eq. (16), 1/m.
-    settings : PaperSettings
 
     Returns
     -------
@@ -162,14 +148,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: PaperS
 
 
 def estimate_of(record: Record, sampled: Sampled, course: ProcedureCourse) -> Estimate:
-    """Turn what `run` returned into the estimate of its last pass.
-
-    Parameters
-    ----------
-    record : Record
-    sampled : Sampled
-    course : ProcedureCourse
-    """
+    """Turn what `run` returned into the estimate of its last pass."""
     warnings = list(record.warnings)
     if course.hidden:
         warnings.append(f"the measurements do not determine {' and '.join(course.hidden)}: the model is not observable")

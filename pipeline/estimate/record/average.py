@@ -24,7 +24,6 @@ def step_of(records: Sequence[Record], length_m: float | None) -> float:
 
     Parameters
     ----------
-    records : sequence of Record
     length_m : float or None
         Of the ship; without it the legs of her zigzags say how fast she answers.
     """
@@ -64,7 +63,6 @@ def cell_means(time_s: Float, column: Float, step_s: float, n: int) -> tuple[Flo
     ----------
     time_s, column : ndarray, shape (m,)
         Readings, NaN where there is none.
-    step_s : float
     n : int
         Instants of the grid.
 

@@ -87,10 +87,6 @@ def check_manoeuvre(rudder: Series, heading: Series) -> tuple[str, ...]:
 def check_course(lateral: LateralSpeed) -> None:
     """Ask whether the ship goes where her bow points, give or take drift and stream, as eq. (18) needs.
 
-    Parameters
-    ----------
-    lateral : LateralSpeed
-
     Raises
     ------
     DataRejected

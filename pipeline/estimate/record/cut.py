@@ -42,10 +42,6 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     start_utc_ns, end_utc_ns : int
         Bounds of the segment, UTC ns.
 
-    Returns
-    -------
-    Record
-
     Raises
     ------
     DataRejected

@@ -22,67 +22,48 @@ _APPROACH_S = 5.0
 
 @dataclass(frozen=True)
 class ShipConstants:
-    """What the terms may ask of a ship.
-
-    Attributes
-    ----------
-    length_m, draught_m : float
-    arm_per_m : float
-        l of eq. (16).
-    """
+    """What the terms may ask of a ship."""
 
     length_m: float
     draught_m: float
+    #: l of eq. (16).
     arm_per_m: float
 
 
 @dataclass(frozen=True, eq=False)
 class GridRun:
-    """One manoeuvre.
-
-    Attributes
-    ----------
-    name : str
-    start_utc_ns : int
-        Of the first instant.
-    step_s : float
-    inputs : ndarray, shape (ROWS (n - 1) + 1, N_INPUT)
-        See `kempf.pipeline.estimate.filters.ekf.extended`.
-    rudder_between : ndarray, shape (ROWS (n - 1) + 1,)
-        What to add to the rudder at the instants of the input table, so that Simpson's rule over half a step, by which
-        the extended filter goes, gives its very integral: it turns corners between them. 0 at the ends of half steps.
-    rudder_noise : ndarray, shape (n,)
-    speed_error_std_m_s, speed_error_rate_per_s : float
-        Of the error of the speed, a first-order process; 0 where there is none.
-    measured, offset_s : ndarray, shape (n, 3)
-        Means of the readings around each instant, and how much later than it their mean time is.
-    noise_start : ndarray, shape (3,)
-        Noise level of each measurement to start from, in its unit.
-    current_row : ndarray, shape (n, 2)
-    heading_rad : ndarray, shape (n,)
-    approach_m_s, approach_per_s : float
-        Speed and shaft speed of the approach.
-    channels : frozenset of str
-        Canonical channels that the run has beyond those it must have.
-    ship : ShipConstants
-    day : int
-    """
+    """One manoeuvre."""
 
     name: str
+    #: Of the first instant.
     start_utc_ns: int
     step_s: float
+    #: Shape (ROWS (n - 1) + 1, N_INPUT). See `kempf.pipeline.estimate.filters.ekf.extended`.
     inputs: Float
+    #: Shape (ROWS (n - 1) + 1,). What to add to the rudder at the instants of the input table, so that Simpson's rule
+    #: over half a step, by which the extended filter goes, gives its very integral: it turns corners between them. 0 at
+    #: the ends of half steps.
     rudder_between: Float
+    #: Shape (n,).
     rudder_noise: Float
+    #: speed_error_std_m_s, speed_error_rate_per_s: Of the error of the speed, a first-order process; 0 where there is
+    #: none.
     speed_error_std_m_s: float
     speed_error_rate_per_s: float
+    #: measured, offset_s: Shape (n, 3). Means of the readings around each instant, and how much later than it their
+    #: mean time is.
     measured: Float
     offset_s: Float
+    #: Shape (3,). Noise level of each measurement to start from, in its unit.
     noise_start: Float
+    #: Shape (n, 2).
     current_row: Float
+    #: Shape (n,).
     heading_rad: Float
+    #: approach_m_s, approach_per_s: Speed and shaft speed of the approach.
     approach_m_s: float
     approach_per_s: float
+    #: Canonical channels that the run has beyond those it must have.
     channels: frozenset[str]
     ship: ShipConstants
     day: int
@@ -177,9 +158,6 @@ def plain_run(name: str, record: Record, spec: ModelSpec, arm_per_m: float, leng
 
     Parameters
     ----------
-    name : str
-    record : Record
-    spec : ModelSpec
     arm_per_m : float
         l of eq. (16).
     length_m : float or None
@@ -194,8 +172,6 @@ def averaged(record: Record, spec: ModelSpec, arm_per_m: float, length_m: float 
 
     Parameters
     ----------
-    record : Record
-    spec : ModelSpec
     arm_per_m : float
         l of eq. (16).
     length_m : float or None
@@ -220,19 +196,10 @@ def make_run(
 
     Parameters
     ----------
-    name : str
-    record : Record
     instruments : Instruments
         For the channels that effects ask for.
     spec : ModelSpec
         For the frame of the current.
-    ship : ShipConstants
-    step_s : float
-    day : int, optional
-
-    Returns
-    -------
-    GridRun
     """
     n = instants_of(record, step_s)
     time = step_s * np.arange(n)

@@ -29,17 +29,12 @@ _MOST_BREAKS = 250
 
 @dataclass(frozen=True, eq=False)
 class Jumps:
-    """Readings of the GNSS velocity that lie in jumps.
+    """Readings of the GNSS velocity that lie in jumps."""
 
-    Attributes
-    ----------
-    inside : ndarray of bool, shape (n,)
-    unresolved : int
-        Leaps where so much would have to go, or so little, that nothing tells which side of them is right; none is
-        taken out then.
-    """
-
+    #: Shape (n,).
     inside: NDArray[np.bool_]
+    #: Leaps where so much would have to go, or so little, that nothing tells which side of them is right; none is taken
+    #: out then.
     unresolved: int
 
 
@@ -54,10 +49,6 @@ def find_jumps(lateral: LateralSpeed) -> Jumps:
     ----------
     lateral : LateralSpeed
         Of one segment.
-
-    Returns
-    -------
-    Jumps
 
     References
     ----------

@@ -17,7 +17,6 @@ def left_out(run: GridRun, instants_s: Mapping[str, Sequence[float]]) -> GridRun
 
     Parameters
     ----------
-    run : GridRun
     instants_s : mapping of str to sequence of float
         Seconds from the beginning of the run, by measurement.
     """

@@ -16,35 +16,24 @@ MEASUREMENTS = ("lateral_speed", "yaw_rate", "heading")
 
 @dataclass(frozen=True, eq=False)
 class Instants:
-    """One segment as a likelihood takes it, every measurement at its own instant.
+    """One segment as a likelihood takes it, every measurement at its own instant."""
 
-    Attributes
-    ----------
-    time_s : ndarray, shape (n,)
-        Instants at which something was measured, the rudder was read or turned a corner.
-    speed_m_s, rudder_rad : ndarray, shape (n,)
-        Inputs, interpolated linearly; the rudder between its readings and the corners that these show, the speed after
-        its noise was taken out.
-    rudder_noise_rad_sqrt_s : ndarray, shape (n,)
-        Intensity of the error of the rudder's readings at the instants, rad s^0.5.
-    speed_error : SpeedError
-        What is left of the noise of the speed, and which rudder acts like it.
-    measured : ndarray, shape (n, 3)
-        Columns `MEASUREMENTS` in m/s, rad/s, rad; NaN where not measured at that instant. The heading is counted from
-        its first value.
-    heading_rad : ndarray, shape (n,)
-        True heading interpolated to the instants, not counted from anything; NaN in its gaps.
-    noise_start : ndarray, shape (3,)
-        Noise level of each measurement to start from, in its unit.
-    """
-
+    #: Shape (n,). Instants at which something was measured, the rudder was read or turned a corner.
     time_s: Float
+    #: speed_m_s, rudder_rad: Shape (n,). Inputs, interpolated linearly; the rudder between its readings and the corners
+    #: that these show, the speed after its noise was taken out.
     speed_m_s: Float
     rudder_rad: Float
+    #: Shape (n,). Intensity of the error of the rudder's readings at the instants, rad s^0.5.
     rudder_noise_rad_sqrt_s: Float
+    #: What is left of the noise of the speed, and which rudder acts like it.
     speed_error: SpeedError
+    #: Shape (n, 3). Columns `MEASUREMENTS` in m/s, rad/s, rad; NaN where not measured at that instant. The heading is
+    #: counted from its first value.
     measured: Float
+    #: Shape (n,). True heading interpolated to the instants, not counted from anything; NaN in its gaps.
     heading_rad: Float
+    #: Shape (3,). Noise level of each measurement to start from, in its unit.
     noise_start: Float
 
     @property
@@ -67,20 +56,12 @@ class Instants:
 
 @dataclass(frozen=True, eq=False)
 class Record(Instants):
-    """One segment as it was cut out of a log.
+    """One segment as it was cut out of a log."""
 
-    Attributes
-    ----------
-    start_utc_ns : int
-        UTC of ``time_s`` = 0.
-    rudder_period_s : float
-        Median time between readings of the rudder; in between its course is a guess, a straight line.
-    lateral : LateralSpeed
-        Eq. (18) with its standard errors.
-    warnings : tuple of str
-    """
-
+    #: UTC of ``time_s`` = 0.
     start_utc_ns: int
+    #: Median time between readings of the rudder; in between its course is a guess, a straight line.
     rudder_period_s: float
+    #: Eq. (18) with its standard errors.
     lateral: LateralSpeed
     warnings: tuple[str, ...]

@@ -27,7 +27,6 @@ def with_rudder_inflow(record: T, spec: ModelSpec) -> T:
 
     Parameters
     ----------
-    record : Instants
     spec : ModelSpec
         ``rudder_speed_exponent`` n: the force goes with V^n V_0^(2 - n), V_0 the speed of the approach.
 

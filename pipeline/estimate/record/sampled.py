@@ -16,23 +16,16 @@ _MIN_PAIRS = 30
 
 @dataclass(frozen=True, eq=False)
 class Sampled:
-    """Measurements and rudder at equal steps.
-
-    Attributes
-    ----------
-    step_s : float
-    measured : ndarray, shape (n, 2)
-        y_v of eq. (18), m/s, and y_r, rad/s; NaN across gaps.
-    rudder : ndarray, shape (n,)
-        Mean rudder of the step that follows each instant, rad: the value which, held, does what the interpolated
-        rudder does to second order. The value at the instant itself would feign a rudder lag of half a step.
-    speed_m_s : float
-        Mean speed; eq. (17) drops its variation.
-    """
+    """Measurements and rudder at equal steps."""
 
     step_s: float
+    #: Shape (n, 2). y_v of eq. (18), m/s, and y_r, rad/s; NaN across gaps.
     measured: Float
+    #: Shape (n,). Mean rudder of the step that follows each instant, rad: the value which, held, does what the
+    #: interpolated rudder does to second order. The value at the instant itself would feign a rudder lag of half a
+    #: step.
     rudder: Float
+    #: Mean speed; eq. (17) drops its variation.
     speed_m_s: float
 
 
@@ -41,13 +34,8 @@ def sample(record: Record, step_s: float | None) -> Sampled:
 
     Parameters
     ----------
-    record : Record
     step_s : float or None
         Grid step, s; None takes the period of the GNSS, but no less than a tenth of a second.
-
-    Returns
-    -------
-    Sampled
 
     Raises
     ------

@@ -22,19 +22,12 @@ _FEWEST = 20
 
 @dataclass(frozen=True, eq=False)
 class SpeedError:
-    """The error of a record's speed, a first-order process.
+    """The error of a record's speed, a first-order process."""
 
-    Attributes
-    ----------
-    gain_rad_s_m : ndarray, shape (n,)
-        Rudder that a unit of it stands for at each instant.
-    std_m_s : float
-    time_s : float
-        Correlation time; 0 where the speed is no measured one.
-    """
-
+    #: Shape (n,). Rudder that a unit of it stands for at each instant.
     gain_rad_s_m: Float
     std_m_s: float
+    #: Correlation time; 0 where the speed is no measured one.
     time_s: float
 
     def at(self, rows: Any) -> SpeedError:

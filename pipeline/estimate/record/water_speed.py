@@ -29,10 +29,6 @@ def water_speed(log: Series, heading: Series, rudder: Series) -> SmoothedSpeed:
     heading, rudder : Series
         rad.
 
-    Returns
-    -------
-    SmoothedSpeed
-
     References
     ----------
     Norrbin (1971), "Theory and observations on the use of a mathematical model for ship manoeuvring in deep and

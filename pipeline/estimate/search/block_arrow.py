@@ -22,21 +22,15 @@ _OF_ALL = 0.01
 
 @dataclass(frozen=True, eq=False)
 class Arrow:
-    """A symmetric matrix over (shared, first member's own, second member's own, ...).
+    """A symmetric matrix over (shared, first member's own, second member's own, ...)."""
 
-    Attributes
-    ----------
-    shared : ndarray, shape (n_shared, n_shared)
-    coupling : ndarray, shape (n_members, n_shared, n_own)
-        Shared rows of each member's columns.
-    own : ndarray, shape (n_members, n_own, n_own)
-    shown : tuple of (ndarray, ndarray), each of shape (n_shared + n_members n_own,)
-        Steps taken since, and by how much the score fell on each.
-    """
-
+    #: Shape (n_shared, n_shared).
     shared: Float
+    #: Shape (n_members, n_shared, n_own). Shared rows of each member's columns.
     coupling: Float
+    #: Shape (n_members, n_own, n_own).
     own: Float
+    #: Each of shape (n_shared + n_members n_own,). Steps taken since, and by how much the score fell on each.
     shown: tuple[tuple[Float, Float], ...] = ()
 
     def masked(self, free: Mask) -> Arrow:
@@ -78,7 +72,6 @@ class Arrow:
         Parameters
         ----------
         right : ndarray, shape (n_shared + n_members n_own,)
-        damping : float, optional
         """
         n, (members, _, width) = self.shared.shape[0], self.coupling.shape
         stiff = replace(

@@ -107,10 +107,7 @@ def climb_by(
 
     Parameters
     ----------
-    steps : Steps
-    objective : Objective
     start : ndarray, shape (n_theta,)
-    max_iterations : int
     decrement : float
         Converged when half the squared Newton decrement, the log-likelihood still to be gained, falls below this.
     wanted : float, optional

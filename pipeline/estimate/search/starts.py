@@ -26,7 +26,6 @@ def starting_points(record: Instants, spec: ModelSpec | None = None) -> list[tup
 
     Parameters
     ----------
-    record : Instants
     spec : ModelSpec, optional
         Its correlation rates tell what level a plausible change within minutes belongs to; without it the default ones.
 
@@ -44,11 +43,6 @@ def starting_points(record: Instants, spec: ModelSpec | None = None) -> list[tup
 
 def noise_levels(record: Instants, spec: ModelSpec) -> Float:
     """Return noise levels to start from: generous, so that a poor hull is not punished into a corner.
-
-    Parameters
-    ----------
-    record : Instants
-    spec : ModelSpec
 
     Returns
     -------

@@ -32,21 +32,14 @@ _LATEST = np.uint64(np.iinfo(np.int64).max)
 
 @dataclass(frozen=True)
 class Piece:
-    """Where the bytes of messages come from, so that they can be read again.
+    """Where the bytes of messages come from, so that they can be read again."""
 
-    Attributes
-    ----------
-    place, length : int
-        A record of the file with its head, or a stretch of records.
-    packed : bool
-        Whether it is a chunk, to be unpacked.
-    size : int
-        Bytes of the content.
-    """
-
+    #: place, length: A record of the file with its head, or a stretch of records.
     place: int
     length: int
+    #: Whether it is a chunk, to be unpacked.
     packed: bool
+    #: Bytes of the content.
     size: int
 
     def read(self, log: LogFile) -> Bytes:
@@ -57,30 +50,20 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """Some messages that follow each other in the file.
+    """Some messages that follow each other in the file."""
 
-    Attributes
-    ----------
-    content : ndarray of uint8
-        The pieces behind each other.
-    first, end : ndarray of int64, shape (m,)
-        Payloads in it; empty stretches for messages that are lost.
-    channel : ndarray of int64, shape (m,)
-        Channel ids, -1 where it is unknown.
-    log_time, publish_time : ndarray of int64, shape (m,)
-        Nanoseconds.
-    pieces : tuple of Piece
-    lost : bool
-        Whether the messages are known from their index only.
-    """
-
+    #: The pieces behind each other.
     content: Bytes
+    #: first, end: Shape (m,). Payloads in it; empty stretches for messages that are lost.
     first: Index
     end: Index
+    #: Shape (m,). Channel ids, -1 where it is unknown.
     channel: NDArray[np.int64]
+    #: log_time, publish_time: Shape (m,). Nanoseconds.
     log_time: NDArray[np.int64]
     publish_time: NDArray[np.int64]
     pieces: tuple[Piece, ...] = ()
+    #: Whether the messages are known from their index only.
     lost: bool = False
 
 
@@ -89,7 +72,6 @@ def messages_of(content: Bytes, first: Index, end: Index, piece: Piece) -> Batch
 
     Parameters
     ----------
-    content : ndarray of uint8
     first, end : ndarray of int64, shape (m,)
         Contents of the message records.
     piece : Piece
@@ -131,10 +113,8 @@ def lost_chunk(log: LogFile, place: int, length: int, why: str) -> tuple[Batch, 
 
     Parameters
     ----------
-    log : LogFile
     place, length : int
         The chunk's record, with its head.
-    why : str
     """
     channel, time = _indexed(log, place + length)
     head = head_of(log.read(place + HEAD, min(length - HEAD, 64)))

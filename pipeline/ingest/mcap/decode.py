@@ -31,28 +31,19 @@ _NAMED = 20
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """The records of some megabytes of the file, decoded and not yet checked.
+    """The records of some megabytes of the file, decoded and not yet checked."""
 
-    Attributes
-    ----------
-    batch : Batch
-        Where they stand.
-    time_ns : ndarray of int64, shape (m,)
-    topic : ndarray of int64, shape (m,)
-        Place of the topic in the order in which topics come, -1 where it is unknown.
-    reason : ndarray of int8, shape (m,)
-        Code of the reason for which a record is refused, 0 for none.
-    text : ndarray of bool, shape (m,)
-        Whether the payload is text.
-    values : dict of str to list of (record, value)
-        By canonical channel, in SI: numbers of records within the part, shape (k,), and what they carry, shape (k,).
-    """
-
+    #: Where they stand.
     batch: Batch
+    #: Shape (m,).
     time_ns: NDArray[np.int64]
+    #: Shape (m,). Place of the topic in the order in which topics come, -1 where it is unknown.
     topic: NDArray[np.int64]
+    #: Shape (m,). Code of the reason for which a record is refused, 0 for none.
     reason: NDArray[np.int8]
+    #: Shape (m,). Whether the payload is text.
     text: NDArray[np.bool_]
+    #: By canonical channel, in SI: numbers of records within the part, shape (k,), and what they carry, shape (k,).
     values: dict[str, list[tuple[NDArray[np.int64], NDArray[np.float64]]]]
 
 

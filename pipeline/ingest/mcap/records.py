@@ -122,24 +122,16 @@ class DamagedChunkError(Exception):
 
 @dataclass(frozen=True)
 class ChunkHead:
-    """What stands in front of a chunk's records.
+    """What stands in front of a chunk's records."""
 
-    Attributes
-    ----------
-    since_ns, until_ns : int
-        Earliest and latest log time; both 0 in a chunk without messages.
-    size, crc : int
-        Of the unpacked records; CRC 0 says that there is none.
-    compression : str
-    body, length : int
-        Where the packed records begin in the record's content, and their bytes.
-    """
-
+    #: since_ns, until_ns: Earliest and latest log time; both 0 in a chunk without messages.
     since_ns: int
     until_ns: int
+    #: size, crc: Of the unpacked records; CRC 0 says that there is none.
     size: int
     crc: int
     compression: str
+    #: body, length: Where the packed records begin in the record's content, and their bytes.
     body: int
     length: int
 

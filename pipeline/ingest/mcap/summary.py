@@ -39,31 +39,20 @@ SUMMARY_LIMIT = 256 << 20
 
 @dataclass
 class Summary:
-    """What the end of the file says.
+    """What the end of the file says."""
 
-    Attributes
-    ----------
-    ended : bool
-        Whether the file ends with footer and magic, as a file that was closed does.
-    stop : int
-        Where the data section ends at the latest, its last record included.
-    channels, schemas : dict by id
-    chunks : list of (int, int)
-        Where chunks stand and their bytes, ascending.
-    messages, chunk_count : int or None
-        How many the file should hold.
-    data_crc : int
-        CRC of the data section, 0 for none; `data_end` is where its record stands.
-    notes : list of str
-    """
-
+    #: Whether the file ends with footer and magic, as a file that was closed does.
     ended: bool
+    #: Where the data section ends at the latest, its last record included.
     stop: int
     channels: dict[int, McapChannel] = field(default_factory=dict)
     schemas: dict[int, Schema] = field(default_factory=dict)
+    #: Where chunks stand and their bytes, ascending.
     chunks: list[tuple[int, int]] = field(default_factory=list)
+    #: messages, chunk_count: How many the file should hold.
     messages: int | None = None
     chunk_count: int | None = None
+    #: CRC of the data section, 0 for none; `data_end` is where its record stands.
     data_crc: int = 0
     data_end: int = -1
     notes: list[str] = field(default_factory=list)
@@ -71,10 +60,6 @@ class Summary:
 
 def read_summary(log: LogFile) -> Summary:
     """Read the end of an MCAP file.
-
-    Parameters
-    ----------
-    log : LogFile
 
     Returns
     -------

@@ -28,19 +28,13 @@ _LAST = float(np.iinfo(np.int64).max)
 
 @dataclass(frozen=True, eq=False)
 class DecodedTopics:
-    """Messages of one channel.
+    """Messages of one channel."""
 
-    Attributes
-    ----------
-    good : ndarray of bool, shape (m,)
-    values : dict of str to (value, present)
-        By field, in the log's unit, shapes (m,).
-    time_ns : ndarray of int64, shape (m,), or None
-        Where the time is asked of the messages; -1 where they do not give it.
-    """
-
+    #: Shape (m,).
     good: NDArray[np.bool_]
+    #: By field, in the log's unit, shapes (m,).
     values: dict[str, tuple[NDArray[np.float64], NDArray[np.bool_]]]
+    #: Shape (m,), or None. Where the time is asked of the messages; -1 where they do not give it.
     time_ns: NDArray[np.int64] | None
 
 

@@ -36,7 +36,6 @@ def chunk_behind(log: LogFile, at: int, stop: int, end: int) -> int:
 
     Parameters
     ----------
-    log : LogFile
     at, stop : int
         Places that are looked at, the last one not.
     end : int
@@ -62,7 +61,6 @@ def believed(log: LogFile, summary: Summary) -> bool:
 
     Parameters
     ----------
-    log : LogFile
     summary : Summary
         Of that file.
     """

@@ -106,7 +106,6 @@ def walk(buffer: Bytes, start: int, stop: int) -> tuple[NDArray[np.uint8], Index
 
     Parameters
     ----------
-    buffer : ndarray of uint8
     start, stop : int
         The first record's opcode, and the end of the stretch.
 
@@ -130,7 +129,6 @@ def chunk_after(buffer: Bytes, left: int) -> int:
 
     Parameters
     ----------
-    buffer : ndarray of uint8
     left : int
         Bytes of the file from the beginning of the buffer on.
 
@@ -147,7 +145,6 @@ def heads(buffer: Bytes, first: Index, end: Index) -> tuple[Index, Index, Index,
 
     Parameters
     ----------
-    buffer : ndarray of uint8
     first, end : ndarray of int64, shape (m,)
         Contents of the message records.
 

@@ -44,19 +44,12 @@ _LONGEST = 1 << 20
 
 @dataclass(frozen=True)
 class Field:
-    """One field of a message.
-
-    Attributes
-    ----------
-    name : str
-    kind : str
-        A key of `PRIMITIVES`, ``string``, ``wstring``, or the full name of a message.
-    count : int or None
-        None for one value, -1 for a sequence, else the length of an array.
-    """
+    """One field of a message."""
 
     name: str
+    #: A key of `PRIMITIVES`, ``string``, ``wstring``, or the full name of a message.
     kind: str
+    #: None for one value, -1 for a sequence, else the length of an array.
     count: int | None
 
 
@@ -71,7 +64,6 @@ def types_of(name: str, definition: str) -> Types:
     ----------
     name : str
         Of the schema, ``package/msg/Name`` or ``package/Name``.
-    definition : str
 
     Returns
     -------

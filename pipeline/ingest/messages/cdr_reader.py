@@ -71,25 +71,16 @@ class CdrReader:
 
 @dataclass
 class CdrProgram:
-    """How to walk through one message.
+    """How to walk through one message."""
 
-    Attributes
-    ----------
-    steps : list of tuple of int
-        ``(SKIP, align, bytes)``, ``(READ, align, bytes, slot)``, ``(STRING,)``, ``(SEQUENCE, align, bytes)``,
-        ``(PICK, align, bytes, slot, index)`` before a sequence, ``(LOOP, count or -1, place behind its end)`` and
-        ``(END,)``.
-    kinds : list of str
-        numpy's name of the type of each slot, empty where the definition has no such number.
-    missing : dict of str to str
-        Wanted fields that are no number of the message, each with why.
-    closed : bool
-        Whether the program reaches the end of the message.
-    """
-
+    #: ``(SKIP, align, bytes)``, ``(READ, align, bytes, slot)``, ``(STRING,)``, ``(SEQUENCE, align, bytes)``, ``(PICK,
+    #: align, bytes, slot, index)`` before a sequence, ``(LOOP, count or -1, place behind its end)`` and ``(END,)``.
     steps: list[tuple[int, ...]] = field(default_factory=list)
+    #: numpy's name of the type of each slot, empty where the definition has no such number.
     kinds: list[str] = field(default_factory=list)
+    #: Wanted fields that are no number of the message, each with why.
     missing: dict[str, str] = field(default_factory=dict)
+    #: Whether the program reaches the end of the message.
     closed: bool = True
 
     def table(self) -> NDArray[np.int64]:

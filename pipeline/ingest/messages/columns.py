@@ -13,20 +13,13 @@ from kempf.pipeline.ingest.spans import Spans
 
 @dataclass(frozen=True, eq=False)
 class Columns:
-    """Fields of messages.
+    """Fields of messages."""
 
-    Attributes
-    ----------
-    value : ndarray of float64, shape (k, m)
-        NaN where a field is absent, or is there and is no finite number.
-    present : ndarray of bool, shape (k, m)
-        Where the message carries the field, readable or not.
-    good : ndarray of bool, shape (m,)
-        Which messages could be decoded.
-    """
-
+    #: Shape (k, m). NaN where a field is absent, or is there and is no finite number.
     value: NDArray[np.float64]
+    #: Shape (k, m). Where the message carries the field, readable or not.
     present: NDArray[np.bool_]
+    #: Shape (m,). Which messages could be decoded.
     good: NDArray[np.bool_]
 
     @classmethod
@@ -40,14 +33,9 @@ class Columns:
 
 
 class MessageReader(Protocol):
-    """Reads the fields that it was made for.
+    """Reads the fields that it was made for."""
 
-    Attributes
-    ----------
-    missing : dict of str to str
-        Fields that are no number of the messages, as far as their definition says; each with why.
-    """
-
+    #: Fields that are no number of the messages, as far as their definition says; each with why.
     missing: dict[str, str]
 
     def read(self, payloads: Spans) -> Columns:

@@ -285,7 +285,6 @@ def walk(buffer, start, stop, nodes, keys, tokens, value, good):
     nodes : ndarray of int64, shape (n, 6)
         The tree of wanted keys, its columns numbered `FIRST` to `SEEN`: children, place of the key's bytes, slot or -1,
         and the last message that had the key, -1 at first. Node 0 is the message itself.
-    keys : ndarray of uint8
     tokens : ndarray of int64, shape (m, k, 3)
         `ABSENT` at first; what was found, and its first byte and the one behind its last, of numbers and text.
     value : ndarray of float64, shape (m, k)

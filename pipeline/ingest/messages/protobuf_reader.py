@@ -153,23 +153,15 @@ def _numbers(bits: NDArray[np.uint64], kind: str) -> NDArray[np.float64]:
 
 @dataclass(frozen=True)
 class ProtoField:
-    """One field of a message.
+    """One field of a message."""
 
-    Attributes
-    ----------
-    number, kind : int
-        Field number, and number of the type.
-    type_name : str
-        Full name of the message, with a dot in front; empty for others.
-    repeated : bool
-    implicit : bool
-        Whether a field that is absent stands for zero, as those of proto3 without ``optional`` do.
-    """
-
+    #: number, kind: Field number, and number of the type.
     number: int
     kind: int
+    #: Full name of the message, with a dot in front; empty for others.
     type_name: str
     repeated: bool
+    #: Whether a field that is absent stands for zero, as those of proto3 without ``optional`` do.
     implicit: bool
 
 

@@ -34,17 +34,11 @@ _PAUSE = 3
 
 @dataclass(frozen=True, eq=False)
 class NmeaClock:
-    """Times of the sentences.
+    """Times of the sentences."""
 
-    Attributes
-    ----------
-    time_utc_ns : ndarray of int64, shape (n,)
-        `NO_TIME` where none can be given.
-    notes : list of str
-        What a person should know of how they were found.
-    """
-
+    #: Shape (n,). `NO_TIME` where none can be given.
     time_utc_ns: Nanoseconds
+    #: What a person should know of how they were found.
     notes: list[str]
 
 
@@ -74,13 +68,8 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
 
     Parameters
     ----------
-    frames : Frames
     said : dict of str to Said
         What the sentences say, by type.
-
-    Returns
-    -------
-    NmeaClock
     """
     times, late = _line_times(frames, said)
     notes = []

@@ -34,7 +34,6 @@ def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
 
     Parameters
     ----------
-    frames : Frames
     said : dict of str to Said
         What the sentences say, by type.
 
@@ -104,7 +103,6 @@ def both_rudders(frames: Frames, said: dict[str, Said]) -> list[str]:
 
     Parameters
     ----------
-    frames : Frames
     said : dict of str to Said
         What the sentences say, by type.
 

@@ -34,10 +34,6 @@ def decode(data: bytes, corrections: Corrections = _NONE) -> Decoded:
         The whole file, decompressed.
     corrections : mapping, optional
         What the profile gives another unit, sign or offset, see `kempf.pipeline.ingest.mapping.nmea_corrections`.
-
-    Returns
-    -------
-    Decoded
     """
     frames = frames_of(as_bytes(data))
     n = len(frames.lines)

@@ -29,16 +29,10 @@ _DEGREE = factor_to_si("deg", "rad", "angle")
 
 @dataclass(frozen=True, eq=False)
 class Fields:
-    """The sentences of one type, field by field.
-
-    Attributes
-    ----------
-    frames : Frames
-    record : ndarray of int64, shape (m,)
-        Their records, ascending.
-    """
+    """The sentences of one type, field by field."""
 
     frames: Frames
+    #: Shape (m,). Their records, ascending.
     record: Index
 
     @cached_property
@@ -75,19 +69,12 @@ class Fields:
 
 @dataclass(frozen=True, eq=False)
 class Said:
-    """What the sentences of one type say.
-
-    Attributes
-    ----------
-    fields : Fields
-    reason : ndarray of int8, shape (m,)
-        Code of the refusal, 0 for none.
-    values : dict of str to (ndarray, ndarray)
-        Channel -> value in SI (NaN where the text is no number) and whether it is there, each shape (m,).
-    """
+    """What the sentences of one type say."""
 
     fields: Fields
+    #: Shape (m,). Code of the refusal, 0 for none.
     reason: NDArray[np.int8]
+    #: Channel -> value in SI (NaN where the text is no number) and whether it is there, each shape (m,).
     values: dict[str, tuple[Float, Flag]] = field(default_factory=dict)
 
     @property
@@ -101,15 +88,10 @@ def read_type(frames: Frames, record: Index, name: str) -> Said:
 
     Parameters
     ----------
-    frames : Frames
     record : ndarray of int64, shape (m,)
         Records of the sentences, ascending; whole, with the right checksum.
     name : str
         Key of `kempf.schemas.nmea.SENTENCES`.
-
-    Returns
-    -------
-    Said
     """
     sentence = SENTENCES[name]
     fields = Fields(frames, record)

@@ -34,48 +34,34 @@ _STAMPED = 0.5
 
 @dataclass(frozen=True, eq=False)
 class Frames:
-    """The lines of a log, each with the sentence in it.
+    """The lines of a log, each with the sentence in it."""
 
-    Attributes
-    ----------
-    lines : Spans
-        Every line that is not blank, shape (n,).
-    body : Spans
-        What stands between ``$`` or ``!`` and ``*``; empty where there is no sentence, shape (n,).
-    comma : ndarray of int64, shape (m,)
-        Places of all commas.
-    first_comma, commas : ndarray of int64, shape (n,)
-        Index into ``comma`` of the one behind the address, and the number of fields behind the address.
-    address : ndarray of int64, shape (n,)
-        Index into ``names``; -1 where there is none.
-    names : tuple of str
-        Addresses that occur, such as GPRMC.
-    reason : ndarray of int8, shape (n,)
-        Code of the refusal, 0 for a whole sentence.
-    stamp_ns : ndarray of int64, shape (n,)
-        Time of arrival, from the text in front of the sentence or from its TAG block; `NO_TIME` where the log has none.
-    stamped : bool
-        Whether the log's lines bear stamps.
-    zoned : bool
-        Whether every stamp names its zone.
-    broken_tags : int
-        Lines whose TAG block is not that of its checksum or has no end, so that what it says was left out.
-    padded : bool
-        Whether there are fields with blanks at their ends.
-    """
-
+    #: Every line that is not blank, shape (n,).
     lines: Spans
+    #: What stands between ``$`` or ``!`` and ``*``; empty where there is no sentence, shape (n,).
     body: Spans
+    #: Shape (m,). Places of all commas.
     comma: Index
+    #: first_comma, commas: Shape (n,). Index into ``comma`` of the one behind the address, and the number of fields
+    #: behind the address.
     first_comma: Index
     commas: Index
+    #: Shape (n,). Index into ``names``; -1 where there is none.
     address: Index
+    #: Addresses that occur, such as GPRMC.
     names: tuple[str, ...]
+    #: Shape (n,). Code of the refusal, 0 for a whole sentence.
     reason: Code
+    #: Shape (n,). Time of arrival, from the text in front of the sentence or from its TAG block; `NO_TIME` where the
+    #: log has none.
     stamp_ns: Nanoseconds
+    #: Whether the log's lines bear stamps.
     stamped: bool
+    #: Whether every stamp names its zone.
     zoned: bool
+    #: Lines whose TAG block is not that of its checksum or has no end, so that what it says was left out.
     broken_tags: int
+    #: Whether there are fields with blanks at their ends.
     padded: bool
 
 
@@ -107,10 +93,6 @@ def frames_of(buffer: Bytes) -> Frames:
     ----------
     buffer : ndarray of uint8
         The whole file; lines end with line feed, carriage return, or both.
-
-    Returns
-    -------
-    Frames
     """
     blocks = []
     before = 0

@@ -32,24 +32,17 @@ _HEX[48:58], _HEX[65:71], _HEX[97:103] = np.arange(10), np.arange(10, 16), np.ar
 
 @dataclass(frozen=True, eq=False)
 class Tags:
-    """What stands between the backslashes in front of a sentence, line by line.
+    """What stands between the backslashes in front of a sentence, line by line."""
 
-    Attributes
-    ----------
-    start, behind : ndarray of int64, shape (n,)
-        Place of the first backslash (of the line's end where there is no block), and where the sentence may begin.
-    time_utc_ns : ndarray of int64, shape (n,)
-        Time of arrival, zero where it gives none.
-    timed : ndarray of bool, shape (n,)
-        Whether it gives one, under the right checksum.
-    broken : ndarray of bool, shape (n,)
-        Whether there is a block without its own checksum, or without its end.
-    """
-
+    #: start, behind: Shape (n,). Place of the first backslash (of the line's end where there is no block), and where
+    #: the sentence may begin.
     start: Index
     behind: Index
+    #: Shape (n,). Time of arrival, zero where it gives none.
     time_utc_ns: Nanoseconds
+    #: Shape (n,). Whether it gives one, under the right checksum.
     timed: Flag
+    #: Shape (n,). Whether there is a block without its own checksum, or without its end.
     broken: Flag
 
 
@@ -61,7 +54,6 @@ def checksum_right(buffer: Bytes, prefix: Bytes, first: Index, star: Index) -> F
 
     Parameters
     ----------
-    buffer : ndarray of uint8
     prefix : ndarray of uint8
         Exclusive or of the bytes up to each place.
     first, star : ndarray of int64, shape (n,)
@@ -93,11 +85,6 @@ def tags_of(buffer: Bytes, prefix: Bytes, openings: Index, strokes: Index, lines
         See `checksum_right`.
     openings, strokes : ndarray of int64
         Places of ``$`` or ``!``, and of backslashes, ascending.
-    lines : Spans
-
-    Returns
-    -------
-    Tags
     """
     n = len(lines)
     if strokes.size == 0:

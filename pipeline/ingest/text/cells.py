@@ -47,7 +47,6 @@ def words(buffer: Bytes, place: Index) -> Word:
 
     Parameters
     ----------
-    buffer : ndarray of uint8
     place : ndarray of int64, shape (n,)
         From -8 up to the size of the buffer.
 
@@ -106,15 +105,10 @@ def leading_digits(word: Word) -> Index:
 
 @dataclass(frozen=True, eq=False)
 class Cells:
-    """Texts within a buffer, without blanks at either end; in any order.
-
-    Attributes
-    ----------
-    buffer : ndarray of uint8
-    start, stop : ndarray of int64, shape (n,)
-    """
+    """Texts within a buffer, without blanks at either end; in any order."""
 
     buffer: Bytes
+    #: start, stop: Shape (n,).
     start: Index
     stop: Index
 

@@ -83,10 +83,6 @@ def compiled(text: str, variables: Mapping[str, int]) -> Program:
     variables : mapping
         Index of every variable that may stand in it.
 
-    Returns
-    -------
-    Program
-
     Raises
     ------
     UsageError

@@ -48,16 +48,11 @@ _SHOWN = ("v", "r", "delta", "V", "psi")
 
 @dataclass(frozen=True, eq=False)
 class Answer:
-    """What an expression gives.
+    """What an expression gives."""
 
-    Attributes
-    ----------
-    value : ndarray, shape (n_state,)
-    slope : ndarray, shape (n_state, 9)
-        Derivatives with respect to `STATE_SYMBOLS`.
-    """
-
+    #: Shape (n_state,).
     value: Float
+    #: Shape (n_state, 9). Derivatives with respect to `STATE_SYMBOLS`.
     slope: Float
 
 
@@ -66,9 +61,6 @@ def answer(text: str, parameters: Mapping[str, float], own_states: tuple[str, ..
 
     Parameters
     ----------
-    text : str
-    parameters : mapping of str to float
-    own_states : tuple of str, optional
     level : float, optional
         Value of those states.
 
@@ -92,7 +84,6 @@ def run(program: Program, values: Float) -> Float:
 
     Parameters
     ----------
-    program : Program
     values : ndarray, shape (n,)
         Of every variable, in the order of `kempf.schemas.symbols.SYMBOLS`, then parameters.
     """
@@ -116,10 +107,6 @@ def _filled(values: Float, state: tuple[float, ...]) -> Float:
 
 def require_ordinary(effect: Effect) -> None:
     """Refuse an effect whose terms cannot be computed at ordinary states, or do not vanish without parameters.
-
-    Parameters
-    ----------
-    effect : Effect
 
     Raises
     ------

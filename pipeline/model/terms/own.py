@@ -108,10 +108,6 @@ def from_file(text: str, where: str) -> Effect:
 def require_name(name: str) -> None:
     """Refuse what is no name of an effect.
 
-    Parameters
-    ----------
-    name : str
-
     Raises
     ------
     UsageError

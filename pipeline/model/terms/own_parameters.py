@@ -32,7 +32,6 @@ def parameters_of(terms: Mapping[str, str], names: Sequence[str]) -> tuple[Param
     ----------
     terms : mapping of str to str
         Formula by target.
-    names : sequence of str
 
     Raises
     ------

@@ -36,16 +36,9 @@ KINDS: Mapping[str, Kind] = {
 
 @dataclass(frozen=True)
 class Place:
-    """One expression of an effect and where it stands.
+    """One expression of an effect and where it stands."""
 
-    Attributes
-    ----------
-    name : str
-        As a person would say it: ``yaw``, ``m1.derivative``.
-    kind : str
-    text : str
-    """
-
+    #: As a person would say it: ``yaw``, ``m1.derivative``.
     name: str
     kind: Kind
     text: str
@@ -66,7 +59,6 @@ def allowed(kind: Kind, own_states: tuple[str, ...] = ()) -> tuple[str, ...]:
 
     Parameters
     ----------
-    kind : str
     own_states : tuple of str, optional
         States that its effect brings along.
     """
@@ -89,7 +81,6 @@ def require_in_place(place: Place, own_states: tuple[str, ...] = ()) -> None:
 
     Parameters
     ----------
-    place : Place
     own_states : tuple of str, optional
         States that its effect brings along.
 

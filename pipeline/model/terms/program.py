@@ -21,15 +21,9 @@ ABS, SIGN, SIN, COS, SQRT, EXP, LOG, TANH, MIN, MAX = 8, 9, 10, 11, 12, 13, 14, 
 
 @dataclass(frozen=True, eq=False)
 class Program:
-    """One expression, compiled.
+    """One expression, compiled."""
 
-    Attributes
-    ----------
-    code : ndarray of int64, shape (n, 2)
-        Instructions and their indices.
-    constants : ndarray, shape (m,)
-        Numbers in the expression.
-    """
-
+    #: Shape (n, 2). Instructions and their indices.
     code: NDArray[np.int64]
+    #: Shape (m,). Numbers in the expression.
     constants: Float
