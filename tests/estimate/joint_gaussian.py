@@ -1,7 +1,7 @@
 """The likelihood by brute force: the joint normal density of all measurements of a record at once.
 
-Nothing of `pipeline` is used: matrix exponentials by `scipy.linalg.expm`, process noise by Van Loan's block matrix, the
-input by adaptive quadrature of its convolution, the density by one Cholesky factor.
+Nothing of `pipeline` is used: matrix exponentials by `scipy.linalg.expm`, process noise and input by Van Loan's block
+matrices, the density by one Cholesky factor.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import quad_vec
 from scipy.linalg import cho_factor, cho_solve, expm
 
 Float = NDArray[np.float64]
@@ -83,17 +82,14 @@ def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:
     Phi = exponential[8:, 8:].T
     Q = Phi @ exponential[:8, 8:]
 
-    def integrand(s: float) -> Float:
-        u = case.rudder[k - 1] + (case.rudder[k] - case.rudder[k - 1]) * s / dt
-        result: Float = expm(A * (dt - s)) @ B * u
-        return result
-
-    g = quad_vec(integrand, 0.0, dt, epsabs=1e-14, epsrel=1e-12)[0]
+    # the rudder turns evenly from one instant to the next
+    level, slope = held_input(A, B, dt)
+    g = level * case.rudder[k - 1] + slope * (case.rudder[k] - case.rudder[k - 1]) / dt
     # the errors of rudder and speed are constant over each of the steps that the kernel takes
     size = V * (abs(a11) + abs(a22) + np.sqrt(abs(a12 * a21))) + max(case.wind_rate, case.moment_rate)
     steps = max(1, int(np.ceil(size * dt / 0.5)))
     short = dt / steps
-    held = quad_vec(lambda s: expm(A * s) @ B, 0.0, short, epsabs=1e-14, epsrel=1e-12)[0]
+    held, _ = held_input(A, B, short)
     through = expm(A * short)
     decay = np.exp(-case.error_rate * short)
     once, shaken = np.zeros((9, 9)), np.zeros((9, 9))
@@ -108,6 +104,15 @@ def step(case: Case, theta: Float, k: int) -> tuple[Float, Float, Float]:
     whole = np.linalg.matrix_power(once, steps)
     whole[:8, :8] = Phi
     return whole, np.append(g, 0.0), noise
+
+
+def held_input(A: Float, B: Float, dt: float) -> tuple[Float, Float]:
+    """What an input of one, and one that grows by one a second from nothing, do to the state over an interval."""
+    n = B.size
+    block = np.zeros((n + 2, n + 2))
+    block[:n, :n], block[:n, n], block[n, n + 1] = A, B, 1.0
+    exponential = expm(block * dt)
+    return exponential[:n, n], exponential[:n, n + 1]
 
 
 def moments(case: Case, theta: Float) -> tuple[Float, Float, Float, Float]:
