@@ -24,14 +24,8 @@ FILLING: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy",
 STEP: dict[str, Any] = {**FILLING, "forceinline": True}
 
 
-def went_in(function: Any) -> str:
-    """Return a digest of the functions that a function calls and of the constants that it and they use.
-
-    Parameters
-    ----------
-    function : callable
-        Its own source counts only by the constants in it.
-    """
+def _went_in(function: Any) -> str:
+    """Return a digest of the functions that a function calls and of the constants that it and they use."""
     digest = hashlib.sha256()
     for part in _parts(function, {function}):
         digest.update(part)
@@ -60,7 +54,7 @@ class _Whole:
         self._py_func = py_func
 
     def get_source_stamp(self) -> Any:
-        return super().get_source_stamp(), went_in(self._py_func)  # type: ignore[misc]
+        return super().get_source_stamp(), _went_in(self._py_func)  # type: ignore[misc]
 
 
 class Given(_Whole, caching.UserProvidedCacheLocator):  # type: ignore[misc, unused-ignore]

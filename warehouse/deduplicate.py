@@ -18,7 +18,7 @@ def once(found: Sequence[Segment], twins: Callable[[Segment, Segment], bool]) ->
     Parameters
     ----------
     twins : callable
-        `overlap` or `same`; is given the later choice first.
+        `_overlap` or `same`; is given the later choice first.
     """
     kept: list[Segment] = []
     left: dict[str, str] = {}
@@ -31,7 +31,7 @@ def once(found: Sequence[Segment], twins: Callable[[Segment, Segment], bool]) ->
     return kept, left
 
 
-def overlap(one: Segment, other: Segment) -> bool:
+def _overlap(one: Segment, other: Segment) -> bool:
     """Tell whether two segments share some time."""
     return one.end_utc_ns > other.start_utc_ns and other.end_utc_ns > one.start_utc_ns
 
@@ -41,7 +41,7 @@ def same(one: Segment, other: Segment) -> bool:
 
     The time alone does not decide: logs of a tank count from one stated start.
     """
-    if not overlap(one, other):
+    if not _overlap(one, other):
         return False
     late = [float(min(abs(theirs - ns) for theirs in other.executes_utc_ns)) * 1e-9 for ns in one.executes_utc_ns]
     return one.first_side == other.first_side and max(late, default=0.0) < _SAME_INSTANT_S

@@ -109,15 +109,8 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
         yield stream
 
 
-def read_yaml(path: Path, what: str) -> Any:
-    """Return what a YAML file says.
-
-    Raises
-    ------
-    UsageError
-        ``not_yaml``: it is no YAML, or has a key twice; the place is named. ``yaml_too_large``: its aliases stand for
-        more than a person writes.
-    """
+def _read_yaml(path: Path, what: str) -> Any:
+    """Return what a YAML file says."""
     data = read_bytes(path, what)
     try:
         return yaml_text.load(data)
@@ -150,7 +143,7 @@ def read_profiles(paths: Sequence[Path]) -> VesselProfile:
 
 def _completed(path: Path) -> Any:
     """Return what a profile says, in which nothing is left of the ``?`` of a draft."""
-    content = read_yaml(path, "vessel profile")
+    content = _read_yaml(path, "vessel profile")
     if _has_guess(content):
         text = read_bytes(path, "vessel profile").decode("utf-8", errors="replace")
         lines = [
@@ -187,7 +180,7 @@ def read_model(path: Path) -> ModelSpec:
         ``model_invalid``: every fault is named with its place. ``model_unknown``: it asks for a base
         that is not there.
     """
-    content = read_yaml(path, "model specification")
+    content = _read_yaml(path, "model specification")
     try:
         spec = ModelSpec.model_validate(content)
     except ValidationError as error:

@@ -88,21 +88,15 @@ def preview_all(warehouse: Warehouse, vessels: Sequence[str] = (), progress: Pro
     for done, vessel in enumerate(names):
         progress(done, len(names), f"{vessel}: what would the present code make of her?")
         try:
-            found.append(preview(warehouse, vessel))
+            found.append(_preview(warehouse, vessel))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
             found.append(VesselPreview(vessel, 0, 0, failures=(_failure(vessel, wrapped(error)),)))
     progress(len(names), len(names), "done")
     return found
 
 
-def preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
-    """Say what the present code would make of the parameter sets of one vessel that stand; nothing is stored.
-
-    Raises
-    ------
-    NotFound
-        ``no_warehouse``, ``no_vessel``.
-    """
+def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
+    """Say what the present code would make of the parameter sets of one vessel that stand; nothing is stored."""
     vessel_table.require(warehouse, vessel)
     code = code_version.fingerprint("estimate")
     stand = standing_sets(warehouse, vessel)

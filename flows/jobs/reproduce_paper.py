@@ -1,6 +1,6 @@
 """The paper's own experiment: a zigzag simulated under constant wind force and current, identified its way and ours.
 
-What the paper does not state (ship, noise, sampling, length) is chosen here, openly: see `conditions`.
+What the paper does not state (ship, noise, sampling, length) is chosen here, openly: see `_conditions`.
 """
 
 from __future__ import annotations
@@ -143,10 +143,10 @@ def reproduce_paper(progress: Progress = silent) -> Reproduction:
     discrete = tuple(
         Value(v.name, x, 0.0, v.unit) for v, x in zip(experiments[0].procedure.discrete, flat, strict=True)
     )
-    return Reproduction(conditions(), truth, discrete, tuple(experiments))
+    return Reproduction(_conditions(), truth, discrete, tuple(experiments))
 
 
-def conditions() -> dict[str, tuple[str, str]]:
+def _conditions() -> dict[str, tuple[str, str]]:
     """Return the conditions of the experiment, each with who stated it."""
     ship = HULLS[_HULL]
     noise = f"{NOISE_M_S:g} m/s, {np.rad2deg(NOISE_RAD_S):.2g} deg/s and {np.rad2deg(NOISE_RAD):.2g} deg heading"

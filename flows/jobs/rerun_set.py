@@ -88,20 +88,12 @@ def raw_inputs(warehouse: Warehouse, stored: ParameterSet) -> tuple[dict[str, In
     instruments = {}
     for ingest_id in stored.provenance["ingest_ids"]:
         row = logs.of_ingest(warehouse, str(ingest_id))
-        instruments[row.log_id] = read_again(warehouse, row, profile)
+        instruments[row.log_id] = _read_again(warehouse, row, profile)
     return instruments, profile
 
 
-def read_again(warehouse: Warehouse, row: LogRow, profile: VesselProfile) -> Instruments:
-    """Read one log again from its raw bytes.
-
-    Raises
-    ------
-    NotFound
-        ``no_raw_log``.
-    KempfError
-        ``raw_bytes_damaged``.
-    """
+def _read_again(warehouse: Warehouse, row: LogRow, profile: VesselProfile) -> Instruments:
+    """Read one log again from its raw bytes."""
     with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as readings:
         return from_readings(readings.lazy())
 

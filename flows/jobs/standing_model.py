@@ -175,7 +175,7 @@ def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
     return before
 
 
-def chain(warehouse: Warehouse, model: ParameterSet) -> list[ParameterSet]:
+def _chain(warehouse: Warehouse, model: ParameterSet) -> list[ParameterSet]:
     """Return a model and its parents, the plain one first."""
     found = [model]
     while found[0].parent is not None:
@@ -187,5 +187,5 @@ def rungs_to(warehouse: Warehouse, model: ParameterSet) -> list[dict[str, Any]]:
     """Return the rungs of the ladder that lead to a model, the plain one first, as JSON content."""
     return [
         {**one.fit["rung"], "step": step, "parameter_set_id": one.parameter_set_id}
-        for step, one in enumerate(chain(warehouse, model))
+        for step, one in enumerate(_chain(warehouse, model))
     ]

@@ -179,11 +179,11 @@ def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: KnownShip,
     )
     longest = 2.0 * request.leg_s + 2.0 * law.step_s
     steered = SteeredShip(
-        simulated_hull(ship, request.settings),
+        _simulated_hull(ship, request.settings),
         request.environment,
         longest,
         seed=request.seed,
-        gear=simulated_gear(ship),
+        gear=_simulated_gear(ship),
     )
     track = keep_course(steered, law, 2.0 * request.leg_s, 0.0, ((request.leg_s, request.change_rad),))
     change = course_change(track)
@@ -209,7 +209,7 @@ _PARTS: dict[str, Callable[[float], GearPart]] = {
 }
 
 
-def simulated_gear(ship: KnownShip) -> SteeringGear | None:
+def _simulated_gear(ship: KnownShip) -> SteeringGear | None:
     """Return what lies between the rudder's reading and the hull of a parameter set, None where nothing does."""
     if ship.effects is None:
         return None
@@ -219,7 +219,7 @@ def simulated_gear(ship: KnownShip) -> SteeringGear | None:
     return SteeringGear(parts, zero) if parts or zero != 0.0 else None
 
 
-def simulated_hull(ship: KnownShip, settings: LawSettings) -> SimulatedHull:
+def _simulated_hull(ship: KnownShip, settings: LawSettings) -> SimulatedHull:
     """Return the ship of a parameter set as the simulator takes her; without a length her speed stays constant."""
     hull = equivalent_hull(ship.hull, ship.effects, ship.speed_m_s)
     parameters = HullParameters(*(float(x) for x in hull.array()))

@@ -51,14 +51,8 @@ class Fitted:
     fits: tuple[PooledFit, ...]
 
 
-def fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own, search: Mapping[str, Any] | None = None) -> Fitted:
-    """Fit a model and every model on the way to it.
-
-    Parameters
-    ----------
-    search : mapping, optional
-        Settings of the search that differ from the defaults.
-    """
+def _fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own, search: Mapping[str, Any] | None = None) -> Fitted:
+    """Fit a model and every model on the way to it."""
     used = named(spec.effects, known_effects(own))
     chosen, _ = split(runs.runs)
     with ThreadPoolExecutor(max_workers=usable()) as workers:
@@ -105,7 +99,7 @@ def store_model(
     if fitted is None:
         runs = assembled(warehouse, chosen, spec, progress)
         progress(0, 1, f"fitting {spec.effects[-1] if spec.effects else 'the plain model'}")
-        fitted = fitted_model(runs, spec, own, search)
+        fitted = _fitted_model(runs, spec, own, search)
     profile = vessels.get(warehouse, chosen.profile_sha256)
     made = []
     for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
@@ -143,7 +137,7 @@ def build_model(
     spec = ModelSpec.model_validate(dict(inputs.model_spec))
     runs = assemble(instruments, profile, list(zip(segment_ids, inputs.bounds, strict=True)), spec)
     own = Own.from_json(inputs.settings.get("own") or {})
-    fitted = fitted_model(runs, spec, own, inputs.settings.get(SEARCH))
+    fitted = _fitted_model(runs, spec, own, inputs.settings.get(SEARCH))
     return _model_set(fitted.fits[-1], fitted, profile, inputs, vessel, segment_ids, origin, parent)
 
 
@@ -175,7 +169,7 @@ def build_single(
     """
     spec, (bounds,) = ModelSpec.model_validate(dict(inputs.model_spec)), inputs.bounds
     runs = assemble({bounds.log_id: instruments}, profile, [(segment_ids[0], bounds)], spec)
-    fitted = fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
+    fitted = _fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
     fit, (record,) = fitted.fits[-1], runs.records
     known = _known(fit)
     made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, segment_ids, origin)

@@ -76,7 +76,7 @@ class ComparedRun:
                 }
                 for turn in self.overshoots
             ],
-            "started_from": started_from(self),
+            "started_from": _started_from(self),
             "noise_levels": self.levels_from,
         }
 
@@ -85,7 +85,7 @@ def _ordered(found: dict[str, Any]) -> dict[str, Any]:
     return {name: found[name] for name in ORDER if name in found}
 
 
-def started_from(run: ComparedRun) -> dict[str, Any]:
+def _started_from(run: ComparedRun) -> dict[str, Any]:
     """Return what a prediction began with, and what it took for wind and current."""
     horizon = run.predicted.horizon
     if horizon.kind == "one step":

@@ -109,7 +109,7 @@ class _Judged:
         )
 
 
-def fitted_parameters(fit: PooledFit) -> tuple[FittedParameter, ...]:
+def _fitted_parameters(fit: PooledFit) -> tuple[FittedParameter, ...]:
     """Return the parameters of hull and effects with their standard errors."""
     names = [*HULL_PARAMETERS, *fit.model.names]
     units = [*HULL_PARAMETERS.values(), *(parameter.unit for _, parameter in fit.model.parameters)]
@@ -128,7 +128,7 @@ def _model(step: Step, first: Step) -> FittedModel:
     return FittedModel(
         effects=tuple(effect.title for effect in step.fit.model.effects),
         added="" if step is first or step.added is None else step.added.title,
-        parameters=fitted_parameters(step.fit),
+        parameters=_fitted_parameters(step.fit),
         fitted_errors=fitted,
         held_out_errors=held_out,
         fitted_error=float(np.mean(fitted)),
@@ -147,7 +147,7 @@ def _candidates(diagnosis: Diagnosis) -> dict[str, CandidateEffect]:
     refitted: dict[str, tuple[str, tuple[FittedParameter, ...]]] = {}
     for number, step in enumerate(diagnosis.steps[1:], start=1):
         for candidate, confirmation in step.chosen_from:
-            last = fitted_parameters(confirmation.fit)[-len(candidate.effect.parameters) :]
+            last = _fitted_parameters(confirmation.fit)[-len(candidate.effect.parameters) :]
             refitted[candidate.effect.name] = (f"S{number}", last)
     candidates = {}
     for candidate in diagnosis.steps[0].screened:

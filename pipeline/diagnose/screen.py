@@ -121,12 +121,12 @@ def screen(base: PooledFit, effects: Mapping[str, Effect], workers: Executor) ->
     return sorted(scored, key=lambda candidate: (-np.nan_to_num(candidate.score, nan=-1.0), candidate.effect.name))
 
 
-def missing_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
+def _missing_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
     """Return the channels that an effect needs and some of the runs lack."""
     return tuple(c for c in effect.needs if any(c not in filtered.run.channels for filtered in base.runs))
 
 
-def measuring_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
+def _measuring_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
     """Return the channels that show an effect already in every run."""
     return tuple(c for c in effect.measured_by if all(c in filtered.run.channels for filtered in base.runs))
 
@@ -149,7 +149,7 @@ def _scored(base: PooledFit, known: Nuisance, effects: Sequence[Effect], workers
 
 def _untested(base: PooledFit, effect: Effect) -> Candidate:
     unknown = np.full(len(effect.parameters), np.nan)
-    missing, measured_by = missing_channels(base, effect), measuring_channels(base, effect)
+    missing, measured_by = _missing_channels(base, effect), _measuring_channels(base, effect)
     return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, np.nan, missing, np.zeros(0), (), measured_by)
 
 

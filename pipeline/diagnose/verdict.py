@@ -47,7 +47,7 @@ def verdict(diagnosis: Diagnosis) -> Verdict:
     """Return what the diagnosis comes to."""
     if diagnosis.before is None:
         return "insufficient_data"
-    if something_left(diagnosis):
+    if _something_left(diagnosis):
         return "unexplained"
     sizes = [len(step.chosen_from) for step in diagnosis.steps[1:]]
     if not sizes:
@@ -55,7 +55,7 @@ def verdict(diagnosis: Diagnosis) -> Verdict:
     return "explained" if max(sizes) == 1 else "ambiguous"
 
 
-def something_left(diagnosis: Diagnosis) -> bool:
+def _something_left(diagnosis: Diagnosis) -> bool:
     """Tell whether something is there that the catalogue does not name.
 
     Either the flexible reference still finds what repeats itself; or the first effect goes by v, r, rudder or heading
@@ -96,12 +96,12 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
     effect = candidate.effect
     for number, step in enumerate(diagnosis.steps[1:], start=1):
         members = {c.effect.name: k for c, k in step.chosen_from}
-        if effect.name in members and something_left(diagnosis):
-            return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized(effect, members[effect.name])}")
+        if effect.name in members and _something_left(diagnosis):
+            return EffectFinding("absent", f"{NOT_EXPLAINED}: {_sized(effect, members[effect.name])}")
         if effect.name in members:
             others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
             alike = f"; these data would fit {_listed(others)} as well" if others else ""
-            return EffectFinding("present", f"step {number}: {sized(effect, members[effect.name])}{alike}")
+            return EffectFinding("present", f"step {number}: {_sized(effect, members[effect.name])}{alike}")
     untestable = _untestable(candidate)
     if untestable:
         return EffectFinding("not_testable", untestable)
@@ -137,11 +137,11 @@ def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding
     if added and (last is None or np.isnan(last.score) or last.p_adjusted >= diagnosis.settings.level):
         return EffectFinding("absent", f"no longer significant once {_listed(added)} is included")
     if refits:
-        return EffectFinding("absent", f"significant by itself; refused after the refit: {refusal(refits[-1])}")
+        return EffectFinding("absent", f"significant by itself; refused after the refit: {_refusal(refits[-1])}")
     return EffectFinding("absent", "significant by itself; not refitted, as others explain more")
 
 
-def refusal(confirmation: Confirmation) -> str:
+def _refusal(confirmation: Confirmation) -> str:
     """Say which test a refitted effect did not stand."""
     gains = np.concatenate([confirmation.fold_gains, confirmation.held_out_gains])
     if not np.isfinite(confirmation.fit.log_likelihood):
@@ -159,7 +159,7 @@ def refusal(confirmation: Confirmation) -> str:
     return "another effect is clearly better"
 
 
-def sized(effect: Effect, confirmation: Confirmation) -> str:
+def _sized(effect: Effect, confirmation: Confirmation) -> str:
     """Return an effect's size with its standard errors, in the units people use."""
     size = len(effect.parameters)
     values, std = confirmation.fit.values[-size:], confirmation.fit.std[-size:]
@@ -202,10 +202,10 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     for step in diagnosis.steps[1:]:
         (candidate, best), *others = step.chosen_from
         if what == "unexplained":
-            size = sized(candidate.effect, best)
+            size = _sized(candidate.effect, best)
             said.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
             continue
-        line = f"{candidate.effect.plain.rstrip('.')}: {sized(candidate.effect, best)}"
+        line = f"{candidate.effect.plain.rstrip('.')}: {_sized(candidate.effect, best)}"
         if others:
             line += f"; the same data would fit {_listed([c.effect.title for c, _ in others])}"
             line += f". What distinguishes them: {candidate.effect.separated_by}"
@@ -279,9 +279,9 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         "verdict": verdict(diagnosis),
         "sentences": sentences(diagnosis),
         "candidates": [_candidate(diagnosis, c, member) for c in diagnosis.steps[0].screened],
-        "sets": [] if something_left(diagnosis) else sets,
-        "stand_ins": sets if something_left(diagnosis) else [],
-        "refused": [_refit(c, k) | {"why": refusal(k)} for step in diagnosis.steps for c, k in step.refused],
+        "sets": [] if _something_left(diagnosis) else sets,
+        "stand_ins": sets if _something_left(diagnosis) else [],
+        "refused": [_refit(c, k) | {"why": _refusal(k)} for step in diagnosis.steps for c, k in step.refused],
         "ladder": [rung(number, step) for number, step in enumerate(diagnosis.steps)],
         "left_over": None
         if diagnosis.after is None or diagnosis.before is None
@@ -308,7 +308,7 @@ def _candidate(diagnosis: Diagnosis, candidate: Candidate, member: dict[str, str
     return {
         "effect": candidate.effect.name,
         "title": candidate.effect.title,
-        "set_id": None if something_left(diagnosis) else member.get(candidate.effect.name),
+        "set_id": None if _something_left(diagnosis) else member.get(candidate.effect.name),
         "score": candidate.score,
         "p_adjusted": candidate.p_adjusted,
         "expected_change": _values(candidate.effect, candidate.change, candidate.std),

@@ -78,7 +78,7 @@ def active(filtered: RunFilter) -> list[int]:
     return [*range(shared), *(shared + i for i, used in enumerate(filtered.levels_used()) if used)]
 
 
-def steps(filtered: RunFilter, point: Point) -> Float:
+def _steps(filtered: RunFilter, point: Point) -> Float:
     """Return the step of every number of `Point.vector`; away from a bound where one is near."""
     hull = _HULL_STEP * _typical(filtered, point)
     effects = []
@@ -105,7 +105,7 @@ def columns(filtered: RunFilter, point: Point, base: Passed, wanted: Sequence[in
     wanted : sequence of int
         Places in `Point.vector`.
     """
-    by = steps(filtered, point)[list(wanted)]
+    by = _steps(filtered, point)[list(wanted)]
     moved = [point.moved(index, step) for index, step in zip(wanted, by.tolist(), strict=True)]
     others = passes(filtered, moved)
     return [difference(base, other, step) for other, step in zip(others, by.tolist(), strict=True)]

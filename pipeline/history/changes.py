@@ -147,7 +147,7 @@ def _search(history: ParameterHistory, settings: ChangeSettings, level: float, f
         return [_Place("drift", first, first, last, verdict.p_value, lead)]
     k = _likeliest(one)
     left, right = (
-        _search(part(history, which), settings, level / 2, begin)
+        _search(_part(history, which), settings, level / 2, begin)
         for which, begin in ((slice(0, k), first), (slice(k, None), first + k))
     )
     return [*left, _Place("step", first, first + k, last, verdict.p_value, -lead), *right]
@@ -161,13 +161,13 @@ def _fitted(history: ParameterHistory, settings: ChangeSettings, places: list[_P
     """Fit one change on what lies between its neighbours: the other changes must not go into its size."""
     place = places[i]
     if place.kind == "drift":
-        some = part(history, slice(place.first, place.last))
+        some = _part(history, slice(place.first, place.last))
         return _drift(some, stretch(some, settings), place.p_value, place.rival)
     before = max((q.split for q in places[:i] if q.kind == "step"), default=0)
     after = min((q.split for q in places[i + 1 :] if q.kind == "step"), default=len(history))
     beside = [q for q in places if q.kind == "drift" and place.split in (q.first, q.last)]
     level, extra = _levelled(history, settings, beside, place.split)
-    some = part(level, slice(before, after))
+    some = _part(level, slice(before, after))
     one = stretch(some, settings)
     # beside a drift the sides have been made level for this very split
     k = place.split - before if beside else _likeliest(one)
@@ -188,7 +188,7 @@ def _levelled(
     """
     value, variance = history.value.copy(), np.zeros(len(history.names))
     for place in drifts:
-        some = part(history, slice(place.first, place.last))
+        some = _part(history, slice(place.first, place.last))
         one = stretch(some, settings)
         rate, p = effects.drift_of(one, one.value), len(history.names)
         ends = one.years - (one.years[-1] if place.last == split else one.years[0])
@@ -198,7 +198,7 @@ def _levelled(
     return level, np.sqrt(variance)
 
 
-def part(history: ParameterHistory, which: slice) -> ParameterHistory:
+def _part(history: ParameterHistory, which: slice) -> ParameterHistory:
     """Return some sets of a history."""
     h = history
     return ParameterHistory(h.names, h.units, h.time_utc_ns[which], h.value[which], h.covariance[which])

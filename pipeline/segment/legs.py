@@ -69,23 +69,8 @@ def noise_level(values: Float) -> float:
     return max(float(1.4826 * np.median(np.abs(np.diff(values, 2))) / np.sqrt(6.0)), resolution / 2)
 
 
-def held_legs(time_s: Float, rudder: Float, amplitude: float, offset: float, band: float) -> list[Leg]:
-    """Find the stretches over which the rudder is held near ``offset +- amplitude``.
-
-    Parameters
-    ----------
-    time_s, rudder : ndarray, shape (n,)
-        Samples, s and rad.
-    amplitude, offset : float
-        Half the distance of both held angles, and their middle, rad.
-    band : float
-        Half width of each held angle, rad; less than the amplitude.
-
-    Returns
-    -------
-    list of Leg
-        In order of time, at least two samples each.
-    """
+def _held_legs(time_s: Float, rudder: Float, amplitude: float, offset: float, band: float) -> list[Leg]:
+    """Find the stretches over which the rudder is held near ``offset +- amplitude``."""
     deviation = rudder - offset
     inside = np.flatnonzero(np.abs(np.abs(deviation) - amplitude) <= band)
     if inside.size < 2:
@@ -132,23 +117,8 @@ def _linked(before: Leg, after: Leg) -> bool:
     return before.side != after.side and after.start_s - before.end_s <= max(before.duration_s, after.duration_s)
 
 
-def chains_of(legs: list[Leg], settings: SegmentSettings, noise: float) -> list[list[Leg]]:
-    """Join legs that alternate, are held at the same angle on each side, and follow each other by one movement.
-
-    Parameters
-    ----------
-    legs : list of Leg
-        In order of time.
-    settings : SegmentSettings
-        Thresholds.
-    noise : float
-        Noise level of the rudder, rad: medians of a coarse indicator jump by its resolution.
-
-    Returns
-    -------
-    list of list of Leg
-        Chains of at least two legs.
-    """
+def _chains_of(legs: list[Leg], settings: SegmentSettings, noise: float) -> list[list[Leg]]:
+    """Join legs that alternate, are held at the same angle on each side, and follow each other by one movement."""
     chains: list[list[Leg]] = []
     current: list[Leg] = []
     for leg in legs:
@@ -207,12 +177,12 @@ def find_chains(time_s: Float, rudder: Float, settings: SegmentSettings) -> list
     steps = int(np.ceil(np.log(high / low) / np.log(_LADDER))) if high > low else -1
     chains: dict[tuple[tuple[int, int], ...], list[Leg]] = {}
     for amplitude in low * _LADDER ** np.arange(steps + 1):
-        rough = held_legs(time_s, rudder, float(amplitude), 0.0, settings.search_band * float(amplitude))
-        levels = {_levels(chain) for chain in chains_of(rough, settings, noise)}
+        rough = _held_legs(time_s, rudder, float(amplitude), 0.0, settings.search_band * float(amplitude))
+        levels = {_levels(chain) for chain in _chains_of(rough, settings, noise)}
         for starboard, port in sorted(levels):
             half, offset = (starboard - port) / 2, (starboard + port) / 2
             band = min(max(settings.held_band * half, slack), settings.search_band * half)
-            for chain in chains_of(held_legs(time_s, rudder, half, offset, band), settings, noise):
+            for chain in _chains_of(_held_legs(time_s, rudder, half, offset, band), settings, noise):
                 chains.setdefault(tuple((leg.first, leg.last) for leg in chain), chain)
     return list(chains.values())
 

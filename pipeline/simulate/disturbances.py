@@ -43,7 +43,7 @@ class Disturbance:
         if self.std == 0.0:
             return np.full(n, self.mean)
         white = random.standard_normal(n)
-        return self.mean + gauss_markov(white, self.std, float(np.exp(-self.correlation_rate_per_s * step_s)))
+        return self.mean + _gauss_markov(white, self.std, float(np.exp(-self.correlation_rate_per_s * step_s)))
 
     def scaled(self, factor: float) -> Disturbance:
         """Return the disturbance with mean and standard deviation multiplied."""
@@ -51,7 +51,7 @@ class Disturbance:
 
 
 @compiled
-def gauss_markov(white: Float, std: float, memory: float) -> Float:
+def _gauss_markov(white: Float, std: float, memory: float) -> Float:
     """Return x with x[0] = std w[0], x[k] = memory x[k-1] + std sqrt(1 - memory^2) w[k], shape (n,)."""
     x = np.empty_like(white)
     gain = std * np.sqrt(1.0 - memory * memory)

@@ -93,20 +93,10 @@ class SimulatedHull:
         return self.surge_time_lengths * self.length_m / self.trial_speed_m_s
 
 
-def from_prime(
+def _from_prime(
     length_m: float, A: tuple[tuple[float, float], tuple[float, float]], B: tuple[float, float]
 ) -> HullParameters:
-    """Return the parameters of eq. (16) from the dimensionless state and input matrices.
-
-    Parameters
-    ----------
-    length_m : float
-        L.
-    A : ((A11', A12'), (A21', A22'))
-        d(v', r')/dt' = A (v', r') + B delta with v' = v/V, r' = r L/V, t' = t V/L.
-    B : (B1', B2')
-        Rudder column, positive rudder to starboard.
-    """
+    """Return the parameters of eq. (16) from d(v', r')/dt' = A (v', r') + B delta; v' = v/V, r' = r L/V, t' = t V/L."""
     L = length_m
     return HullParameters(A[0][0] / L, A[0][1], A[1][0] / L**2, A[1][1] / L, B[0] / L, B[1] / L**2)
 
@@ -123,7 +113,7 @@ def _mariner() -> HullParameters:
         return (m33 * y - m23 * n) / determinant, (m22 * n - m32 * y) / determinant
 
     (A11, A21), (A12, A22), B = solve(Yv, Nv), solve(Yr, Nr), solve(-Yd, -Nd)
-    return from_prime(160.93, ((A11, A12), (A21, A22)), B)
+    return _from_prime(160.93, ((A11, A12), (A21, A22)), B)
 
 
 _PLAUSIBLE = "plausible, not a real ship"
@@ -148,7 +138,7 @@ HULLS: dict[str, SimulatedHull] = {
         SimulatedHull(
             "container",
             _PLAUSIBLE,
-            from_prime(220.0, ((-0.80, -0.36), (-3.6, -2.4)), (-0.17, 1.5)),
+            _from_prime(220.0, ((-0.80, -0.36), (-3.6, -2.4)), (-0.17, 1.5)),
             length_m=220.0,
             beam_m=32.2,
             draught_m=11.0,
@@ -160,7 +150,7 @@ HULLS: dict[str, SimulatedHull] = {
         SimulatedHull(
             "tanker",
             _PLAUSIBLE + "; barely stable on a straight course",
-            from_prime(320.0, ((-0.60, -0.30), (-3.0, -1.7)), (-0.12, 1.05)),
+            _from_prime(320.0, ((-0.60, -0.30), (-3.0, -1.7)), (-0.12, 1.05)),
             length_m=320.0,
             beam_m=58.0,
             draught_m=20.8,
@@ -173,7 +163,7 @@ HULLS: dict[str, SimulatedHull] = {
         SimulatedHull(
             "ferry",
             _PLAUSIBLE,
-            from_prime(140.0, ((-0.85, -0.33), (-3.6, -2.6)), (-0.20, 1.9)),
+            _from_prime(140.0, ((-0.85, -0.33), (-3.6, -2.6)), (-0.20, 1.9)),
             length_m=140.0,
             beam_m=24.0,
             draught_m=6.0,
@@ -185,7 +175,7 @@ HULLS: dict[str, SimulatedHull] = {
         SimulatedHull(
             "usv",
             _PLAUSIBLE,
-            from_prime(3.0, ((-1.0, -0.30), (-3.0, -3.2)), (-0.25, 1.8)),
+            _from_prime(3.0, ((-1.0, -0.30), (-3.0, -3.2)), (-0.25, 1.8)),
             length_m=3.0,
             beam_m=1.0,
             draught_m=0.3,

@@ -38,21 +38,10 @@ def hull_constants(hull: SimulatedHull) -> Float:
 
 
 @compiled
-def derivative(state: Float, rudder: float, forcing: Float, constants: Float, out: Float) -> None:
+def _derivative(state: Float, rudder: float, forcing: Float, constants: Float, out: Float) -> None:
     """Write d(state)/dt into ``out``: eq. (16), the speed, and the velocity over ground.
 
-    Parameters
-    ----------
-    state : ndarray, shape (6,)
-        v, r, psi, north, east, V.
-    rudder : float
-        delta, rad.
-    forcing : ndarray, shape (4,)
-        F m/s^2, current north and east m/s, V_T m/s.
-    constants : ndarray, shape (11,)
-        See `hull_constants`.
-    out : ndarray, shape (6,)
-        Result.
+    ``forcing`` is F in m/s^2, the current to north and east in m/s, and V_T in m/s; ``constants`` see `hull_constants`.
     """
     a11, a12, a21, a22, b1, b2, arm, V0, T, c, L = constants
     v, r, psi, _, _, V = state
@@ -69,7 +58,7 @@ def derivative(state: Float, rudder: float, forcing: Float, constants: Float, ou
 
 
 @compiled
-def advance(
+def _advance(
     state: Float,
     rudder: float,
     rudder_speed: float,
@@ -79,30 +68,16 @@ def advance(
     constants: Float,
     out: Float,
 ) -> None:
-    """Write the state ``step_s`` later into ``out``; fourth-order Runge-Kutta.
-
-    Parameters
-    ----------
-    state, out : ndarray, shape (6,)
-        Start and result.
-    rudder, rudder_speed : float
-        delta at the start, rad, and its constant rate over the step, rad/s.
-    forcing, forcing_slope : ndarray, shape (4,)
-        Forcing at the start and its constant rate over the step.
-    step_s : float
-        Length of the step.
-    constants : ndarray, shape (11,)
-        See `hull_constants`.
-    """
+    """Write the state ``step_s`` later into ``out``; fourth-order Runge-Kutta."""
     half = 0.5 * step_s
     k1, k2, k3, k4 = np.empty(6), np.empty(6), np.empty(6), np.empty(6)
-    derivative(state, rudder, forcing, constants, k1)
+    _derivative(state, rudder, forcing, constants, k1)
     middle = forcing + half * forcing_slope
     rudder_middle = rudder + half * rudder_speed
-    derivative(state + half * k1, rudder_middle, middle, constants, k2)
-    derivative(state + half * k2, rudder_middle, middle, constants, k3)
+    _derivative(state + half * k1, rudder_middle, middle, constants, k2)
+    _derivative(state + half * k2, rudder_middle, middle, constants, k3)
     last = forcing + step_s * forcing_slope
-    derivative(state + step_s * k3, rudder + step_s * rudder_speed, last, constants, k4)
+    _derivative(state + step_s * k3, rudder + step_s * rudder_speed, last, constants, k4)
     out[:] = state + step_s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4)
 
 
@@ -111,27 +86,15 @@ def slopes(states: Float, rudder: Float, forcing: Float, constants: Float) -> Fl
     """Return d(state)/dt at every row, shape (n, 6)."""
     out = np.empty_like(states)
     for k in range(states.shape[0]):
-        derivative(states[k], rudder[k], forcing[k], constants, out[k])
+        _derivative(states[k], rudder[k], forcing[k], constants, out[k])
     return out
 
 
 @compiled
-def autopilot_order(
+def _autopilot_order(
     heading_error: float, yaw_rate: float, integral: float, tick_s: float, gains: Float, limit: float
 ) -> tuple[float, float]:
-    """Return the rudder order of a PID course keeper and its new integral, rad and rad s.
-
-    Parameters
-    ----------
-    heading_error, yaw_rate, integral : float
-        psi - psi_order, r, and the integral of the error so far.
-    tick_s : float
-        Time since the last order.
-    gains : ndarray, shape (3,)
-        Proportional (1), rate (s) and integral (1/s).
-    limit : float
-        Largest order.
-    """
+    """Return the rudder order of a PID course keeper and its new integral, rad and rad s."""
     # far from the course the integral would only wind up
     if abs(heading_error) < 0.1:
         integral += heading_error * tick_s
@@ -140,7 +103,7 @@ def autopilot_order(
 
 
 @compiled
-def cell(
+def _cell(
     state: Float,
     rudder: float,
     order: float,
@@ -155,15 +118,6 @@ def cell(
     """Integrate up to ``length_s`` or to the first event; ``state`` is changed in place.
 
     The events: the rudder arrives at its order; the heading crosses ``target`` towards ``side`` (0: not watched).
-
-    Returns
-    -------
-    rudder : float
-        rad.
-    gone_s : float
-        Time integrated.
-    crossed : bool
-        Whether the heading reached the target.
     """
     step, speed, arrives = length_s, 0.0, False
     gap = order - rudder
@@ -172,26 +126,26 @@ def cell(
         if abs(gap) / rudder_rate <= step:
             step, arrives = abs(gap) / rudder_rate, True
     new = np.empty(6)
-    advance(state, rudder, speed, forcing, forcing_slope, step, constants, new)
+    _advance(state, rudder, speed, forcing, forcing_slope, step, constants, new)
     crossed = side != 0.0 and side * (new[2] - target) >= 0.0
     if crossed:
         low, high = 0.0, step
         for _ in range(_HALVINGS):
             middle = 0.5 * (low + high)
-            advance(state, rudder, speed, forcing, forcing_slope, middle, constants, new)
+            _advance(state, rudder, speed, forcing, forcing_slope, middle, constants, new)
             if side * (new[2] - target) >= 0.0:
                 high = middle
             else:
                 low = middle
         arrives = arrives and high == step
         step = high
-        advance(state, rudder, speed, forcing, forcing_slope, step, constants, new)
+        _advance(state, rudder, speed, forcing, forcing_slope, step, constants, new)
     state[:] = new
     return order if arrives else rudder + speed * step, step, crossed
 
 
 @compiled
-def through_cell(
+def _through_cell(
     state: Float,
     helm: Float,
     zigzag: Float,
@@ -206,18 +160,8 @@ def through_cell(
 ) -> None:
     """Integrate one cell of the grid; ``state``, ``helm`` and ``crossings`` are changed in place.
 
-    Parameters
-    ----------
-    state : ndarray, shape (6,)
-        At the cell's beginning, then at its end.
-    helm : ndarray, shape (4,)
-        Rudder, order, side (0 unless in a zigzag), number of crossings so far.
-    zigzag : ndarray, shape (5,)
-        Base heading, psi0, delta0, first side, number of legs; not read where the side is 0.
-    forcing, forcing_slope : ndarray, shape (4,)
-        At the cell's beginning, and its rate in it.
-    begin_s : float
-        Instant of the cell's beginning.
+    ``helm`` is the rudder, its order, the side (0 unless in a zigzag) and the number of crossings so far; ``zigzag`` is
+    the base heading, psi0, delta0, the first side and the number of legs, not read where the side is 0.
     """
     for part in range(substeps):
         now, end = cell_s * part / substeps, cell_s * (part + 1) / substeps
@@ -225,7 +169,7 @@ def through_cell(
             side = helm[2]
             target = zigzag[0] + side * zigzag[1] if side != 0.0 else 0.0
             here = forcing + now * forcing_slope
-            helm[0], gone, crossed = cell(
+            helm[0], gone, crossed = _cell(
                 state, helm[0], helm[1], rudder_rate, here, forcing_slope, end - now, target, side, constants
             )
             now = end if gone >= end - now else now + gone
@@ -293,12 +237,12 @@ def steer(
         row = first + k
         if kind == AUTOPILOT and k % tick_cells == 0:
             error, tick_s = state[2] - settings[0], tick_cells * cell_s
-            helm[1], integral = autopilot_order(error, state[1], integral, tick_s, settings[1:4], limit)
+            helm[1], integral = _autopilot_order(error, state[1], integral, tick_s, settings[1:4], limit)
         elif kind == ORDERS and k % tick_cells == 0:
             helm[1] = orders[k // tick_cells]
         ordered[row] = helm[1]
         slope = (forcing[row + 1] - forcing[row]) / cell_s
-        through_cell(
+        _through_cell(
             state,
             helm,
             settings,
@@ -343,7 +287,7 @@ def follow(rudder: Float, grid: tuple[float, int], first: int, constants: Float,
         states[row + 1] = states[row]
         for part in range(substeps):
             now, state = part * step_s, states[row + 1].copy()
-            advance(
+            _advance(
                 state,
                 rudder[k] + now * rate,
                 rate,

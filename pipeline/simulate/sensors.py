@@ -69,7 +69,7 @@ def _draw(random: np.random.Generator, noise: Noise, name: str, n: int) -> Float
     return noise.get(name, 0.0) * random.standard_normal(n)
 
 
-def radii_of_curvature(latitude_rad: float) -> tuple[float, float]:
+def _radii_of_curvature(latitude_rad: float) -> tuple[float, float]:
     """Return the radii of WGS 84 along the meridian and across it, m."""
     a, e2 = 6378137.0, 6.69437999014e-3
     w = 1.0 - e2 * sin(latitude_rad) ** 2
@@ -93,7 +93,7 @@ def _gnss(
     )
     # a plane that touches the ellipsoid at the start; over a trial of some miles the difference is centimetres a mile
     latitude = radians(setting.latitude_deg)
-    meridian, across = radii_of_curvature(latitude)
+    meridian, across = _radii_of_curvature(latitude)
     return {
         "latitude_rad": latitude + north / meridian,
         "longitude_rad": radians(setting.longitude_deg) + east / (across * cos(latitude)),

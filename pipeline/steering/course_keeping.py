@@ -142,7 +142,7 @@ def course_law(
         hull, lateral, speed_m_s, arm_per_m=arm_per_m, noise=noise, constant_disturbances=True, effects=effects
     )
     settled = equivalent_hull(hull, effects, speed_m_s)
-    plant = discretised(model, chosen.step_s or default_step_s(settled, speed_m_s))
+    plant = discretised(model, chosen.step_s or _default_step_s(settled, speed_m_s))
     rudder_per_force, state_per_force = _steady(model)
     steered = plant.steered
     A, B = plant.A[np.ix_(steered, steered)], plant.B[steered]
@@ -156,7 +156,7 @@ def course_law(
     return Law(plant, gain, rudder_per_force, state_per_force, observer, chosen)
 
 
-def default_step_s(hull: Hull, speed_m_s: float) -> float:
+def _default_step_s(hull: Hull, speed_m_s: float) -> float:
     """Return a fifth of the ship's fastest time constant, in tenths of a second, between 0.1 and 1 s."""
     fifth = 0.2 / max(largest_rate_per_s(hull, speed_m_s), 1e-9)
     return float(min(max(np.floor(10.0 * fifth) / 10.0, 0.1), 1.0))

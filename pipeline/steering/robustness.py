@@ -37,16 +37,8 @@ class SteeredShips:
     C: Float
 
 
-def steered_ships(law: Law, ships: Float, speed_m_s: float, effects: ShipEffects | None = None) -> SteeredShips:
-    """Sample ships at the step of a law.
-
-    Parameters
-    ----------
-    ships : ndarray, shape (n, 6 + p)
-        Parameters of hull and effects.
-    effects : ShipEffects, optional
-        Which effects.
-    """
+def _steered_ships(law: Law, ships: Float, speed_m_s: float, effects: ShipEffects | None = None) -> SteeredShips:
+    """Sample ships at the step of a law."""
     made = []
     for theta in ships:
         own = replace(effects, values=theta[6:]) if effects is not None else None
@@ -76,14 +68,8 @@ class ClosedLoop:
     modulus_margin: float
 
 
-def loop_matrices(law: Law, ships: SteeredShips) -> Float:
-    """Return the matrix of the loop over one step for each of some ships.
-
-    Returns
-    -------
-    ndarray, shape (n, n_ship + n_state, n_ship + n_state)
-        On ship and estimate before the measurement (5).
-    """
+def _loop_matrices(law: Law, ships: SteeredShips) -> Float:
+    """Return the matrix of the loop over one step for each of some ships."""
     Am, Bm, L, k = law.plant.A, law.plant.B, law.observer, law.feedback[None, :]
     corrected = np.eye(Am.shape[0]) - L @ law.plant.measured
     A, B, C = ships.A, ships.B, ships.C
@@ -108,8 +94,8 @@ def closed_loop(law: Law, hull: Hull, speed_m_s: float, effects: ShipEffects | N
         Of the ship that it steers.
     """
     theta = np.concatenate([hull.array(), effects.values if effects is not None else np.zeros(0)])
-    ship = steered_ships(law, theta[None, :], speed_m_s, effects)
-    poles = np.linalg.eigvals(loop_matrices(law, ship)[0]).astype(np.complex128)
+    ship = _steered_ships(law, theta[None, :], speed_m_s, effects)
+    poles = np.linalg.eigvals(_loop_matrices(law, ship)[0]).astype(np.complex128)
     poles = poles[np.argsort(-np.abs(poles), kind="stable")]
     stable = bool(np.abs(poles[0]) < 1.0)
     rates = np.log(np.maximum(np.abs(poles), 1e-300)) + 1j * np.angle(poles)
@@ -174,6 +160,6 @@ def share_held(
         low = np.where(effects.model.low == 0.0, 0.01 * effects.values, effects.model.low)
         drawn = np.clip(ships[:, 6:], low, effects.model.high)
         ships[:, 6:] = np.where(effects.values == 0.0, 0.0, drawn)
-    made = steered_ships(law, ships, speed_m_s, effects)
-    largest = np.max(np.abs(np.linalg.eigvals(loop_matrices(law, made))), axis=1)
+    made = _steered_ships(law, ships, speed_m_s, effects)
+    largest = np.max(np.abs(np.linalg.eigvals(_loop_matrices(law, made))), axis=1)
     return float(np.mean(largest < 1.0))

@@ -57,9 +57,9 @@ def command(
 def tell_outcomes(outcomes: Sequence[IngestOutcome], *, verbose: bool = False, notes: bool = True) -> None:
     """Print what became of some logs, then what is to be said of their channels and of how they were read."""
     for outcome in outcomes:
-        tell_outcome(outcome)
+        _tell_outcome(outcome)
     for outcome in outcomes:
-        tell_channels(outcome, named=len(outcomes) > 1)
+        _tell_channels(outcome, named=len(outcomes) > 1)
     if notes:
         said: dict[str, list[str]] = {}
         for outcome in outcomes:
@@ -68,7 +68,7 @@ def tell_outcomes(outcomes: Sequence[IngestOutcome], *, verbose: bool = False, n
         show_warnings(every if verbose else of_several(said), verbose=verbose, word="note")
 
 
-def tell_outcome(outcome: IngestOutcome) -> None:
+def _tell_outcome(outcome: IngestOutcome) -> None:
     """Print what became of one log."""
     name = one_line(Path(outcome.path).name)
     if outcome.error is not None or outcome.tally is None:
@@ -98,7 +98,7 @@ def _ledger(tally: Tally) -> str:
     return f"{said} ({reasons})" if reasons else said
 
 
-def tell_channels(outcome: IngestOutcome, *, named: bool = False) -> None:
+def _tell_channels(outcome: IngestOutcome, *, named: bool = False) -> None:
     """Print what the channel doctor found in a log, nothing where it is clean; its name before it where asked."""
     examination = outcome.examination
     if examination is None or examination.verdict not in ("faults", "failed"):

@@ -94,10 +94,10 @@ def _length(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ways: 
     good = (moved > 0.0) & (gone > 0.0)
     if np.count_nonzero(good) < _FEWEST:
         return untestable(name, channels, "one of the two stands still")
-    return length_outcome(name, channels, speed, np.log(gone[good] / moved[good]))
+    return _length_outcome(name, channels, speed, np.log(gone[good] / moved[good]))
 
 
-def length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ratios: Float) -> Outcome:
+def _length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ratios: Float) -> Outcome:
     """Judge the logarithms of the ratios of the way by the velocity to the way by the fixes, shape (n,)."""
     middle = quantile(ratios, 0.5)
     spread = 1.4826 * quantile(np.abs(ratios - middle), 0.5)

@@ -44,7 +44,7 @@ class CdrReader:
         types = types_of(name, definition)
         if full_name(name, "") not in types:
             raise NoReaderError(f"the type {name} is not defined")
-        program = program_for(types, name, wanted)
+        program = _program_for(types, name, wanted)
         self._steps, self._kinds, self._closed = program.table(), program.kinds, program.closed
         self.missing = program.missing
 
@@ -95,28 +95,8 @@ class _StopError(Exception):
     """From here on the message cannot be walked through; says why."""
 
 
-def program_for(types: Types, name: str, wanted: list[str]) -> CdrProgram:
-    """Compile the walk through a message.
-
-    Parameters
-    ----------
-    types : dict
-        See `kempf.pipeline.ingest.messages.cdr_definition.types_of`.
-    name : str
-        The message's own type.
-    wanted : list of str
-        Fields, nested ones and elements of arrays with dots: ``angular_velocity.z``, ``position_covariance.0``.
-
-    Returns
-    -------
-    CdrProgram
-        One slot a wanted field; those that the definition lacks stay empty.
-
-    Raises
-    ------
-    NoReaderError
-        A wanted field lies behind something that cannot be stepped over.
-    """
+def _program_for(types: Types, name: str, wanted: list[str]) -> CdrProgram:
+    """Compile the walk through a message."""
     program = CdrProgram(kinds=[""] * len(wanted))
     slots = {tuple(key.split(".")): slot for slot, key in enumerate(wanted)}
     reasons = {path: _no_number(types, full_name(name, ""), path) for path in slots}

@@ -84,7 +84,7 @@ def eight_digits(word: Word) -> NDArray[np.int64]:
     return ((high + low) >> np.uint64(32)).astype(np.int64)
 
 
-def last_digits(word: Word, count: Index) -> Word:
+def _last_digits(word: Word, count: Index) -> Word:
     """Keep the last ``count`` bytes of each word and put the digit zero in front of them."""
     keep = _KEEP[count]
     return (word & keep) | (_ZEROS & ~keep)
@@ -94,7 +94,7 @@ def first_digits(word: Word, count: Index) -> Word:
     """Move the first ``count`` bytes of each word to its end and put the digit zero in front of them."""
     # a shift by 64 bits is undefined: no byte at all is asked for by way of one
     shift = (8 * (8 - np.maximum(count, 1))).astype(np.uint64)
-    return last_digits(word << shift, count)
+    return _last_digits(word << shift, count)
 
 
 def leading_digits(word: Word) -> Index:
@@ -169,8 +169,8 @@ class Cells:
         good = (length >= 1) & (length <= 16)
         length = np.where(good, length, 0)
         stop = np.where(good, self.stop, 0)
-        late = last_digits(words(self.buffer, stop - 8), np.minimum(length, 8))
-        early = last_digits(words(self.buffer, np.maximum(stop - 16, -8)), np.maximum(length - 8, 0))
+        late = _last_digits(words(self.buffer, stop - 8), np.minimum(length, 8))
+        early = _last_digits(words(self.buffer, np.maximum(stop - 16, -8)), np.maximum(length - 8, 0))
         good &= all_digits(late) & all_digits(early)
         return np.where(good, eight_digits(early) * 100_000_000 + eight_digits(late), 0), good
 
@@ -201,8 +201,8 @@ class Cells:
         whole_stop = stop - decimals - (behind >= 0)
         digits = whole_stop - start
         good = single & (digits >= 1) & (digits <= 8) & (behind != 0)
-        whole = last_digits(words(buffer, whole_stop - 8), np.clip(digits, 0, 8))
-        part = last_digits(tail, decimals)
+        whole = _last_digits(words(buffer, whole_stop - 8), np.clip(digits, 0, 8))
+        part = _last_digits(tail, decimals)
         good &= all_digits(whole) & all_digits(part)
         digits_value = eight_digits(whole) * _POWER[decimals] + eight_digits(part)
         good &= digits_value <= _EXACT

@@ -55,7 +55,7 @@ def from_expression(texts: Sequence[str], name: str = "own") -> Effect:
     >>> dict(effect.terms), [p.name for p in effect.parameters]
     ({'yaw': 'c*(r*abs(r))'}, ['c'])
     """
-    require_name(name)
+    _require_name(name)
     terms = _terms([texts] if isinstance(texts, str) else texts)
     found = dict.fromkeys(n for text in terms.values() for n in names_in(text))
     unknown = [n for n in found if _UNKNOWN.fullmatch(n)]
@@ -96,7 +96,7 @@ def from_file(text: str, where: str) -> Effect:
     """
     effect = read(text, where)
     try:
-        require_name(effect.name)
+        _require_name(effect.name)
         _check_formulas(effect)
         require_ordinary(effect)
     except UsageError as error:
@@ -105,14 +105,8 @@ def from_file(text: str, where: str) -> Effect:
     return effect
 
 
-def require_name(name: str) -> None:
-    """Refuse what is no name of an effect.
-
-    Raises
-    ------
-    UsageError
-        ``effect_name``.
-    """
+def _require_name(name: str) -> None:
+    """Refuse what is no name of an effect."""
     if not (isinstance(name, str) and _NAME.fullmatch(name)):
         raise UsageError(
             "effect_name",
