@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
-from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose_refreshed
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, Own, known_effects, named
@@ -40,7 +39,6 @@ def diagnose_vessel(
     vessel: str,
     spec: ModelSpec,
     own: Own = NONE_OF_ONES_OWN,
-    settings: DiagnosisSettings = STANDARD,
     progress: Progress = silent,
 ) -> tuple[StoredDiagnosis, bool]:
     """Diagnose a vessel; what was diagnosed before from the same inputs is not computed again.
@@ -58,10 +56,10 @@ def diagnose_vessel(
         And whether it is new.
     """
     chosen = choose_refreshed(warehouse, vessel, progress)
-    found = diagnoses.find(warehouse, diagnosis_id(inputs_of_diagnosis(chosen, spec, own, settings)))
+    found = diagnoses.find(warehouse, diagnosis_id(inputs_of_diagnosis(chosen, spec, own)))
     if found is not None:
         return found, False
-    return diagnose_again(warehouse, chosen, spec, own, settings, progress), True
+    return diagnose_again(warehouse, chosen, spec, own, progress), True
 
 
 def diagnose_again(
@@ -69,27 +67,14 @@ def diagnose_again(
     chosen: Chosen,
     spec: ModelSpec,
     own: Own = NONE_OF_ONES_OWN,
-    settings: DiagnosisSettings = STANDARD,
     progress: Progress = silent,
 ) -> StoredDiagnosis:
-    """Diagnose manoeuvres and store what was found, whatever is stored of them.
+    """Diagnose manoeuvres and store what was found, what its report shows, and the model that was diagnosed.
 
-    Parameters
-    ----------
-    chosen : Chosen
-        Manoeuvres.
-    spec : ModelSpec
-        The model to begin from; its effects are taken as given.
+    Whatever is stored of them; the parameters are those of `diagnose_vessel`.
     """
-    examined = examine(warehouse, chosen, spec, own, settings, progress)
-    return _kept(warehouse, examined, spec, own, inputs_of_diagnosis(chosen, spec, own, settings))
-
-
-def _kept(
-    warehouse: Warehouse, examined: FullDiagnosis, spec: ModelSpec, own: Own, inputs: dict[str, Any]
-) -> StoredDiagnosis:
-    """Store a diagnosis, what its report shows, and the model that was diagnosed."""
-    chosen, found = examined.chosen, examined.diagnosis
+    examined = examine(warehouse, chosen, spec, own, progress=progress)
+    found, inputs = examined.diagnosis, inputs_of_diagnosis(chosen, spec, own)
     fitted = Fitted(examined.runs, found.plain, found.way)
     base, _ = store_model(warehouse, chosen, spec, own, fitted=fitted)
     phases = _phases(examined)

@@ -10,7 +10,7 @@ from typing import Any
 from kempf.flows.jobs.chosen_manoeuvres import without_log
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.no_speed_log import CAN, KEY, companions_of, estimate_of, no_log_settings
-from kempf.flows.jobs.parameter_set_of import arm_of, as_parameter_set, without_arm
+from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, as_parameter_set, without_arm
 from kempf.flows.jobs.pending import Waiting, waiting
 from kempf.flows.jobs.refresh_logs import Refreshed, refresh_logs
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, SINGLE, Own, effect_settings
@@ -23,7 +23,6 @@ from kempf.pipeline.estimate.estimators import default_settings, estimate
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, delta, logs, parameter_sets, provenance, segments, vessels
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
@@ -194,7 +193,7 @@ def _identify_log(
         used = [s.ingest_id for s in (segment, *others)]
         origin = provenance.collect(warehouse, inputs, used, job.flow_run, job.table_versions)
         try:
-            made = build(held[row.log_id], profile, inputs, row.vessel, (segment.segment_id,), origin, held)
+            made = build(held, SetRequest(inputs, profile, row.vessel, (segment.segment_id,), origin))
         except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
             return IdentifyOutcome(segment, None, error=wrapped(error))
         return IdentifyOutcome(segment, made, new=True)
@@ -256,47 +255,33 @@ def inputs_of(segment: Segment, profile_sha256: str, request: Request, companion
     )
 
 
-def build(
-    instruments: Instruments,
-    profile: VesselProfile,
-    inputs: Inputs,
-    vessel: str,
-    segment_ids: tuple[str, ...],
-    origin: dict[str, Any],
-    others: Mapping[str, Instruments] | None = None,
-) -> ParameterSet:
-    """Compute the parameter set that some inputs describe; nothing is stored.
+def build(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet:
+    """Compute the parameter set of one segment; nothing is stored.
 
     Parameters
     ----------
-    instruments : Instruments
-        Series of the log.
-    inputs : Inputs
-        One segment.
-    origin : dict
-        Provenance.
-    others : mapping of str to Instruments, optional
-        Series by log, where the inputs name companions.
+    instruments : mapping of str to Instruments
+        Series by log, those of companions too.
 
     Raises
     ------
     KempfError
         The segment cannot be identified from; the reason says why.
     """
+    inputs, profile, spec = request.inputs, request.profile, request.spec
     if len(inputs.bounds) != 1:
         raise UsageError(
             "one_segment_at_a_time",
             f"{len(inputs.bounds)} segments were given; this estimator takes one.",
             "Identify them one by one.",
         )
-    bounds, spec = inputs.bounds[0], ModelSpec.model_validate(dict(inputs.model_spec))
     if spec.effects:
-        return build_single(instruments, profile, inputs, vessel, segment_ids, origin)
-    arm = arm_of(spec, profile)
-    record = make_record(instruments, bounds.start_utc_ns, bounds.end_utc_ns)
+        return build_single(instruments, request)
+    (bounds,), arm = inputs.bounds, arm_of(spec, profile)
+    record = make_record(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
     if KEY in inputs.settings:
-        result = estimate_of(record, spec.with_arm(arm), arm or 0.0, profile, inputs, others or {})
+        result = estimate_of(record, spec.with_arm(arm), arm or 0.0, profile, inputs, instruments)
     else:
         given = (spec.with_arm(arm), arm or 0.0, dict(inputs.settings), profile.length_m)
         result = estimate(inputs.estimator, record, *given)
-    return as_parameter_set(result, inputs, vessel, segment_ids, origin, without_arm(spec, arm))
+    return as_parameter_set(result, request, without_arm(spec, arm))

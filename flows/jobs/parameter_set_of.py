@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from kempf.pipeline.estimate.result import Estimate, Value
@@ -28,35 +29,37 @@ def without_arm(spec: ModelSpec, arm: float | None) -> tuple[str, ...]:
     return (f"wind_arm_per_m is not in the profile: {acts[str(spec.with_arm(arm).moment)]}",)
 
 
-def as_parameter_set(
-    result: Estimate,
-    inputs: Inputs,
-    vessel: str,
-    segment_ids: tuple[str, ...],
-    origin: dict[str, Any],
-    warnings: tuple[str, ...] = (),
-) -> ParameterSet:
-    """Return the set that an estimate from these inputs is stored as.
+@dataclass(frozen=True, eq=False)
+class SetRequest:
+    """A parameter set to be computed: all that it is a function of but the series, and what is stored beside it."""
+
+    inputs: Inputs
+    profile: VesselProfile
+    vessel: str
+    #: In the order of the inputs' bounds.
+    segment_ids: tuple[str, ...]
+    #: Provenance.
+    origin: dict[str, Any]
+    parent: str | None = None
+
+    @property
+    def spec(self) -> ModelSpec:
+        """The model of the inputs."""
+        return ModelSpec.model_validate(dict(self.inputs.model_spec))
+
+
+def as_parameter_set(result: Estimate, request: SetRequest, warnings: tuple[str, ...] = ()) -> ParameterSet:
+    """Return the set that an estimate is stored as.
 
     Parameters
     ----------
-    origin : dict
-        Provenance.
     warnings : tuple of str, optional
         Beside the estimate's own.
     """
-    spec = ModelSpec.model_validate(dict(inputs.model_spec))
+    spec = request.spec
     return ParameterSet(
-        parameter_set_id=parameter_set_id(inputs),
-        vessel=vessel,
+        **described(request),
         model_name=spec.name,
-        model_spec=spec.model_dump(mode="json"),
-        model_sha256=spec.sha256,
-        estimator=inputs.estimator,
-        settings=dict(inputs.settings),
-        segment_ids=segment_ids,
-        log_ids=inputs.log_ids,
-        start_utc_ns=min(bounds.start_utc_ns for bounds in inputs.bounds),
         parameters=stored(result.parameters),
         discrete=stored(result.discrete),
         noise=stored(result.noise),
@@ -65,10 +68,26 @@ def as_parameter_set(
         fit=result.fit,
         iterations=list(result.iterations),
         convergence=result.report,
-        warnings=(*result.warnings, *warnings, *channel_warnings(origin)),
+        warnings=(*result.warnings, *warnings, *channel_warnings(request.origin)),
         parent=spec.parent,
-        provenance=origin,
     )
+
+
+def described(request: SetRequest) -> dict[str, Any]:
+    """Return the fields of a set that say what it was made from."""
+    spec, inputs = request.spec, request.inputs
+    return {
+        "parameter_set_id": parameter_set_id(inputs),
+        "vessel": request.vessel,
+        "model_spec": spec.model_dump(mode="json"),
+        "model_sha256": spec.sha256,
+        "estimator": inputs.estimator,
+        "settings": dict(inputs.settings),
+        "segment_ids": request.segment_ids,
+        "log_ids": inputs.log_ids,
+        "start_utc_ns": min(bounds.start_utc_ns for bounds in inputs.bounds),
+        "provenance": request.origin,
+    }
 
 
 def channel_warnings(origin: Mapping[str, Any]) -> tuple[str, ...]:

@@ -8,6 +8,7 @@ from typing import Any
 
 from kempf.flows.jobs.chosen_set import named_set
 from kempf.flows.jobs.identify_vessel import build
+from kempf.flows.jobs.parameter_set_of import SetRequest
 from kempf.flows.jobs.spool import spooled
 from kempf.flows.jobs.standing_model import POOLED, WITH_EFFECTS, Own, known_effects
 from kempf.flows.jobs.vessel_model import build_model
@@ -115,13 +116,14 @@ def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profil
     KempfError
         It can no longer be identified; the reason says why.
     """
-    inputs, origin = inputs_of(stored), dict(stored.provenance)
+    inputs = inputs_of(stored)
     if inputs.estimator not in (*NAMES, POOLED, WITH_EFFECTS):
         raise _no_estimator(stored)
+    ids, origin = stored.segment_ids, dict(stored.provenance)
+    request = SetRequest(inputs, profile, stored.vessel, ids, origin, stored.parent)
     if inputs.estimator in (POOLED, WITH_EFFECTS):
-        return build_model(instruments, profile, inputs, stored.vessel, stored.segment_ids, origin, stored.parent)
-    one = instruments[inputs.bounds[0].log_id]
-    return build(one, profile, inputs, stored.vessel, stored.segment_ids, origin, instruments)
+        return build_model(instruments, request)
+    return build(instruments, request)
 
 
 def _no_estimator(stored: ParameterSet) -> NotFound:

@@ -9,7 +9,7 @@ from typing import Any
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.standing_model import Own, inputs_of, known_effects
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
+from kempf.pipeline.diagnose.settings import STANDARD
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import code_version, diagnoses
@@ -17,23 +17,13 @@ from kempf.warehouse.diagnoses import StoredDiagnosis, diagnosis_id
 from kempf.warehouse.store import Warehouse
 
 
-def inputs_of_diagnosis(chosen: Chosen, spec: ModelSpec, own: Own, settings: DiagnosisSettings) -> dict[str, Any]:
-    """Return all that a diagnosis is a function of.
-
-    Parameters
-    ----------
-    chosen : Chosen
-        Manoeuvres.
-    spec : ModelSpec
-        The model to begin from.
-    own : Own
-        Effects beyond the catalogue that are tried too.
-    """
+def inputs_of_diagnosis(chosen: Chosen, spec: ModelSpec, own: Own) -> dict[str, Any]:
+    """Return all that a diagnosis is a function of; the model is the one to begin from."""
     return {
         **inputs_of(chosen, spec, own).as_json(),
         "estimator": "diagnosis",
         "code_version": code_version.fingerprint("diagnose"),
-        "settings": asdict(settings),
+        "settings": asdict(STANDARD),
         "own": own.as_json(),
         "catalogue": {name: effect.sha256 for name, effect in known_effects(own).items()},
     }
@@ -44,7 +34,6 @@ def diagnosed_with_evidence(
     chosen: Chosen,
     spec: ModelSpec,
     own: Own,
-    settings: DiagnosisSettings = STANDARD,
     progress: Progress = silent,
     say: Callable[[str], None] = lambda _: None,
 ) -> tuple[StoredDiagnosis, DiagnosisEvidence]:
@@ -52,8 +41,6 @@ def diagnosed_with_evidence(
 
     Parameters
     ----------
-    chosen : Chosen
-        Manoeuvres.
     spec : ModelSpec
         The model to begin from.
     own : Own
@@ -61,7 +48,7 @@ def diagnosed_with_evidence(
     say : callable, optional
         Takes one line where a stored diagnosis has to be computed again.
     """
-    name = diagnosis_id(inputs_of_diagnosis(chosen, spec, own, settings))
+    name = diagnosis_id(inputs_of_diagnosis(chosen, spec, own))
     stored, evidence = diagnoses.find(warehouse, name), diagnoses.evidence(warehouse, chosen.vessel, name)
     if stored is not None and evidence is not None:
         return stored, evidence
@@ -70,7 +57,7 @@ def diagnosed_with_evidence(
 
     if stored is not None:
         say(f"{name} was stored without the curves that a report shows; diagnosing {chosen.vessel} again")
-    made = diagnose_again(warehouse, chosen, spec, own, settings, progress)
+    made = diagnose_again(warehouse, chosen, spec, own, progress)
     evidence = diagnoses.evidence(warehouse, chosen.vessel, name)
     assert evidence is not None
     return made, evidence

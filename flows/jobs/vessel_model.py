@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
-from kempf.flows.jobs.parameter_set_of import arm_of, channel_warnings, stored, without_arm
+from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, channel_warnings, described, stored, without_arm
 from kempf.flows.jobs.standing_model import SEARCH, Own, inputs_of, known_effects, named, stored_model
 from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
@@ -32,9 +32,8 @@ from kempf.pipeline.estimate.record.left_out import instants_left_out
 from kempf.pipeline.estimate.result import discrete_values
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
-from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import parameter_sets, provenance, vessels
-from kempf.warehouse.parameter_set import Inputs, ParameterSet, parameter_set_id
+from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
 from kempf.warehouse.parameter_set import StoredValue as Stored
 from kempf.warehouse.store import Warehouse
 
@@ -105,8 +104,8 @@ def store_model(
     for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
         if name not in there:
             origin = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
-            ids = [segment.segment_id for segment in chosen.segments]
-            made.append(_model_set(fit, fitted, profile, inputs, chosen.vessel, ids, origin, parent))
+            ids = tuple(segment.segment_id for segment in chosen.segments)
+            made.append(_model_set(fit, fitted, SetRequest(inputs, profile, chosen.vessel, ids, origin, parent)))
     if keep is None:
         parameter_sets.insert(warehouse, made)
     else:
@@ -114,100 +113,69 @@ def store_model(
     return made[-1], True
 
 
-def build_model(
-    instruments: Mapping[str, Instruments],
-    profile: VesselProfile,
-    inputs: Inputs,
-    vessel: str,
-    segment_ids: Sequence[str],
-    origin: dict[str, Any],
-    parent: str | None,
-) -> ParameterSet:
-    """Compute the model that some inputs describe; nothing is stored.
+def build_model(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet:
+    """Compute the model of several manoeuvres together; nothing is stored.
 
     Parameters
     ----------
     instruments : mapping of str to Instruments
         Series by log.
-    segment_ids : sequence of str
-        In the order of the inputs' bounds.
-    origin : dict
-        Provenance.
     """
-    spec = ModelSpec.model_validate(dict(inputs.model_spec))
-    runs = assemble(instruments, profile, list(zip(segment_ids, inputs.bounds, strict=True)), spec)
-    own = Own.from_json(inputs.settings.get("own") or {})
-    fitted = _fitted_model(runs, spec, own, inputs.settings.get(SEARCH))
-    return _model_set(fitted.fits[-1], fitted, profile, inputs, vessel, segment_ids, origin, parent)
+    fitted = _fitted_request(instruments, request)
+    return _model_set(fitted.fits[-1], fitted, request)
 
 
-def build_single(
-    instruments: Instruments,
-    profile: VesselProfile,
-    inputs: Inputs,
-    vessel: str,
-    segment_ids: tuple[str, ...],
-    origin: dict[str, Any],
-) -> ParameterSet:
+def build_single(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet:
     """Compute the set of one manoeuvre whose model has effects; nothing is stored.
 
     Parameters
     ----------
-    instruments : Instruments
-        Series of the log.
-    inputs : Inputs
-        One segment.
-    segment_ids : tuple of str
-        Its id.
-    origin : dict
-        Provenance.
+    instruments : mapping of str to Instruments
+        Series by log.
 
     Raises
     ------
     KempfError
         The segment cannot be identified from, or an effect cannot be determined from it.
     """
-    spec, (bounds,) = ModelSpec.model_validate(dict(inputs.model_spec)), inputs.bounds
-    runs = assemble({bounds.log_id: instruments}, profile, [(segment_ids[0], bounds)], spec)
-    fitted = _fitted_model(runs, spec, Own.from_json(inputs.settings["own"]))
-    fit, (record,) = fitted.fits[-1], runs.records
+    fitted = _fitted_request(instruments, request)
+    fit, (record,) = fitted.fits[-1], fitted.runs.records
     known = _known(fit)
-    made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, segment_ids, origin)
+    made = _as_parameter_set(fit, known, fitted, request)
     return replace(
         made,
         noise=tuple(Stored(name, level, None, NOISE_PARAMETERS[name]) for name, level in fit.sigmas(0).items()),
         fit=known.one_step[0],
         warnings=(*record.warnings, *made.warnings),
-        parent=spec.parent,
+        parent=request.spec.parent,
     )
 
 
-def _model_set(
-    fit: PooledFit,
-    fitted: Fitted,
-    profile: VesselProfile,
-    inputs: Inputs,
-    vessel: str,
-    segment_ids: Sequence[str],
-    origin: dict[str, Any],
-    parent: str | None,
-) -> ParameterSet:
+def _fitted_request(instruments: Mapping[str, Instruments], request: SetRequest) -> Fitted:
+    spec, settings = request.spec, request.inputs.settings
+    bounds = list(zip(request.segment_ids, request.inputs.bounds, strict=True))
+    runs = assemble(instruments, request.profile, bounds, spec)
+    return _fitted_model(runs, spec, Own.from_json(settings.get("own") or {}), settings.get(SEARCH))
+
+
+def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> ParameterSet:
     """Return the set of all manoeuvres together, with what the model predicts of those held out."""
-    runs, effects = fitted.runs, inputs.model_spec["effects"]
-    if parent is None and effects:
-        raise NotFound("no_parent", f"The model {effects} has no parent.", "Make it with `kempf effects add`.")
+    runs, effects = fitted.runs, request.spec.effects
+    if request.parent is None and effects:
+        raise NotFound(
+            "no_parent", f"The model {' + '.join(effects)} has no parent.", "Make it with `kempf effects add`."
+        )
     _, left = split(runs.runs)
     step = step_of(fit, [runs.runs[i] for i in left])
     known, plain = _known(fit), fitted.plain
     if not effects:
         known = replace(known, covariance=known.covariance * plain.widened**2)
-    made = _as_parameter_set(fit, known, fitted, profile, inputs, vessel, tuple(segment_ids), origin)
+    made = _as_parameter_set(fit, known, fitted, request)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     # of the manoeuvres that the inputs name, so that a rerun says the same
-    skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in segment_ids}
+    skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in request.segment_ids}
     return replace(
         made,
-        model_name=" + ".join((inputs.model_spec["name"], *effects)),
         fit={"horizon": "free run", "rung": rung(0, step)},
         convergence={
             **made.convergence,
@@ -221,7 +189,7 @@ def _model_set(
             *(() if effects else _disagreement(plain)),
             *made.warnings,
         ),
-        parent=parent,
+        parent=request.parent,
     )
 
 
@@ -261,32 +229,15 @@ def _disagreement(plain: PlainFit) -> tuple[str, ...]:
     )
 
 
-def _as_parameter_set(
-    fit: PooledFit,
-    known: PooledUncertainty,
-    fitted: Fitted,
-    profile: VesselProfile,
-    inputs: Inputs,
-    vessel: str,
-    segment_ids: tuple[str, ...],
-    origin: dict[str, Any],
-) -> ParameterSet:
+def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, request: SetRequest) -> ParameterSet:
     """Return what every set of a fit with effects holds."""
-    spec, covariance = ModelSpec.model_validate(dict(inputs.model_spec)), known.covariance
+    spec, covariance = request.spec, known.covariance
     speed = float(np.mean([np.mean(one.run.speed_m_s) for one in fit.runs]))
     with np.errstate(invalid="ignore"):
         std = np.sqrt(np.diag(covariance))
     return ParameterSet(
-        parameter_set_id=parameter_set_id(inputs),
-        vessel=vessel,
+        **described(request),
         model_name=" + ".join((spec.name, *spec.effects)),
-        model_spec=spec.model_dump(mode="json"),
-        model_sha256=spec.sha256,
-        estimator=inputs.estimator,
-        settings=dict(inputs.settings),
-        segment_ids=segment_ids,
-        log_ids=inputs.log_ids,
-        start_utc_ns=min(bounds.start_utc_ns for bounds in inputs.bounds),
         parameters=_parameters(fit, std),
         discrete=stored(discrete_values(fit.hull, np.nan_to_num(covariance[:6, :6]), speed, _STEP_S)),
         noise=(),
@@ -311,11 +262,10 @@ def _as_parameter_set(
         warnings=(
             *(() if fit.converged else (f"not converged: {fit.reason}",)),
             *dict.fromkeys(sentence for one in known.one_step for sentence in doubts(fit.hull, std[:6], one)),
-            *without_arm(spec, arm_of(spec, profile)),
-            *channel_warnings(origin),
+            *without_arm(spec, arm_of(spec, request.profile)),
+            *channel_warnings(request.origin),
         ),
         parent=None,
-        provenance=origin,
     )
 
 

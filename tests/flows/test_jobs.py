@@ -12,6 +12,7 @@ from kempf.flows.jobs.demonstrate import demonstrate
 from kempf.flows.jobs.files import read_model, read_profiles
 from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel, inputs_of
 from kempf.flows.jobs.ingest_logs import ingest, settle_vessel
+from kempf.flows.jobs.parameter_set_of import SetRequest
 from kempf.flows.jobs.register_vessel import set_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
@@ -116,7 +117,8 @@ def test_a_set_is_a_function_of_its_inputs(stocked: Warehouse):
     (segment, _), profile = segments.current(stocked), vessels.current(stocked, "mariner")
     inputs = inputs_of(segment, profile.sha256, LEAST_SQUARES)
     instruments = from_readings(readings.read(stocked, segment.ingest_id))
-    one, two = (build(instruments, profile, inputs, "mariner", (segment.segment_id,), {}) for _ in range(2))
+    request = SetRequest(inputs, profile, "mariner", (segment.segment_id,), {})
+    one, two = (build({segment.log_id: instruments}, request) for _ in range(2))
     assert one == two
     assert len(parameter_sets.summaries(stocked)) == 0
 

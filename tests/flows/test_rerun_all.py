@@ -247,7 +247,7 @@ def test_a_vessel_that_cannot_be_previewed_stops_no_other(own: Warehouse, monkey
     def broken(*_: Any) -> Any:
         raise ZeroDivisionError("division by zero")
 
-    monkeypatch.setattr(preview_code, "preview", broken)
+    monkeypatch.setattr(preview_code, "_preview", broken)
     (failed,) = preview_all(own)
     assert "ZeroDivisionError" in failed.failures[0]["error"]["message"]
 

@@ -9,6 +9,7 @@ from benchmarks.identify.hsva import PUBLISHED
 from benchmarks.measured_ships import ordered
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, build, inputs_of
+from kempf.flows.jobs.parameter_set_of import SetRequest
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.warehouse import readings
 from tests.real_data.voyage import Voyage
@@ -43,7 +44,8 @@ def test_an_estimate_that_is_no_ship_says_so(tank: Voyage) -> None:
     profile = read_profiles(tank.ship.profiles)
     inputs = inputs_of(segment, profile.sha256, Request())
     instruments = from_readings(readings.read(tank.warehouse, segment.ingest_id))
-    made = build(instruments, profile, inputs, tank.ship.name, (segment.segment_id,), {})
+    request = SetRequest(inputs, profile, tank.ship.name, (segment.segment_id,), {})
+    made = build({segment.log_id: instruments}, request)
     values = np.array([p.value for p in made.parameters])
     plausible = bool(values[0] < 0 and values[3] < 0 and values[5] > 0)
     doubted = [w for w in made.warnings if "not converged" in w or "positive" in w or "not white" in w]

@@ -12,7 +12,6 @@ from kempf.flows.jobs.parameter_set_of import channel_warnings
 from kempf.flows.jobs.standing_model import Own, standing
 from kempf.flows.jobs.stored_diagnosis import diagnosed_with_evidence
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, FittedParameter
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
@@ -41,7 +40,6 @@ def make_report(
     spec: ModelSpec,
     own: Own,
     progress: Progress = silent,
-    settings: DiagnosisSettings = STANDARD,
     say: Callable[[str], None] = lambda _: None,
 ) -> MadeReport:
     """Make a vessel's report; a diagnosis that is stored is read, one that is not is made first.
@@ -61,7 +59,7 @@ def make_report(
         ``no_vessel``, ``no_segments``, ``no_runs``.
     """
     chosen = choose_refreshed(warehouse, vessel, progress)
-    stored, evidence = diagnosed_with_evidence(warehouse, chosen, spec, own, settings, progress, say)
+    stored, evidence = diagnosed_with_evidence(warehouse, chosen, spec, own, progress, say)
     current = standing(warehouse, vessel)
     included = () if current is None else tuple(current.model_spec["effects"])
     profile = vessels.get(warehouse, chosen.profile_sha256)
