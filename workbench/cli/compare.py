@@ -178,8 +178,8 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
         click.echo(f"  overshoot errors of {short[run['segment_id']]}: {every or '-'} deg")
     fits = [mean["fit_percent"][name] for name in there]
     parts = [f"{_CHANNELS[name]} {_plus_minus(fit)} %" for name, fit in zip(there, fits, strict=True)]
-    errors = "" if any(fit["std_error"] is None for fit in fits) else " ± 1 s.e."
-    click.echo(f"  mean fit{errors}: {', '.join(parts)}")
+    quoted_as = "" if any(fit["std_error"] is None for fit in fits) else " ± 1 s.e."
+    click.echo(f"  mean fit{quoted_as}: {', '.join(parts)}")
     turns = mean["overshoot_error_deg"]
     if turns["n"]:
         click.echo(
