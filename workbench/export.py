@@ -6,12 +6,10 @@ import csv
 import io
 import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import yaml
 
-from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
 
@@ -171,32 +169,6 @@ def as_mat(model: Linear) -> bytes:
     data = stream.getvalue()
     described = f"MATLAB 5.0 MAT-file, ship of parameter set {one.parameter_set_id}, written by Kempf"
     return described.encode("ascii", "replace")[:_MAT_DESCRIPTION].ljust(_MAT_DESCRIPTION) + data[_MAT_DESCRIPTION:]
-
-
-def write_new(path: Path, data: str | bytes, option: str) -> None:
-    """Write a file that is not there yet.
-
-    Parameters
-    ----------
-    data : str or bytes
-        Text is written as UTF-8.
-    option : str
-        Option that named the file, for the message.
-
-    Raises
-    ------
-    UsageError
-        ``cannot_write``: it is there, or cannot be written.
-    """
-    try:
-        with path.open("xb") as stream:
-            stream.write(data.encode() if isinstance(data, str) else data)
-    except OSError as error:
-        raise UsageError(
-            "cannot_write",
-            f"Writing {path} failed: {error.strerror}.",
-            f"Give another file with {option}; nothing is overwritten.",
-        ) from error
 
 
 def _parameters(ship: KnownShip) -> tuple[list[str], list[float], list[float | None], list[str]]:

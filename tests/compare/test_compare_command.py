@@ -217,6 +217,9 @@ def test_a_figure_and_the_view_of_a_notebook(place: Path, tmp_path: Path) -> Non
     done = kempf("compare", "--vessel", "mariner", "--figure", tmp_path / "f.png", "--warehouse", place)
     assert done.code == 0
     data = (tmp_path / "f.png").read_bytes()
+    again = kempf("compare", "--vessel", "mariner", "--figure", tmp_path / "f.png", "--warehouse", place, "--json")
+    refused(again, 2, "cannot_write")
+    assert (tmp_path / "f.png").read_bytes() == data
     assert data.startswith(b"\x89PNG") and len(data) > 20_000
     view = open_warehouse(place).vessel("mariner").compare(horizon="10s")
     page = view._repr_html_()

@@ -166,4 +166,7 @@ def test_wrong_requests(place: Path, tmp_path: Path) -> None:
     refused(plain, 2, "figure_without_changes")
     refused(asked(place, "--figure", tmp_path / "f.txt", "--json"), 2, "figure_format")
     refused(asked(place, "--figure", tmp_path / "no" / "f.png", "--json"), 2, "cannot_write")
+    (tmp_path / "f.png").write_bytes(b"hers")
+    refused(asked(place, "--figure", tmp_path / "f.png", "--json"), 2, "cannot_write")
+    assert (tmp_path / "f.png").read_bytes() == b"hers"
     refused(asked(place, "--occasion", "-1", "--json"), 2, "usage")

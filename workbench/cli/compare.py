@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from itertools import zip_longest
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -11,7 +12,8 @@ import click
 
 from kempf.schemas.errors import ThresholdExceeded, UsageError
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import figure_option, json_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.ranked_warnings import MOST
 from kempf.workbench.terminal import number, print_json, print_note, print_table, progress, short_ids
 
@@ -41,7 +43,7 @@ _SAMPLES = {"held_out": "held out", "fitted": "fitted"}
     help="One step, so many seconds ahead, or freely from the first instant on.",
 )
 @click.option("--where", "with_where", is_flag=True, help="Say also where the model fails.")
-@click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help="Draw measured over predicted, .png.")
+@figure_option("Draw measured over predicted")
 @click.option(
     "--fail-above",
     type=float,
@@ -73,22 +75,19 @@ def command(
 
     if fail_above is not None and not isfinite(fail_above):
         raise UsageError("threshold", f"--fail-above {fail_above} is no limit.", "Give a percentage such as 20.")
-    if figure is not None and figure.suffix not in (".png", ".svg", ".pdf"):
-        raise UsageError(
-            "figure_format", f"--figure {figure} ends in {figure.suffix!r}; expected .png, .svg or .pdf.", "Rename it."
-        )
+    wanted: list[str | None] = [*dict.fromkeys(sets)] or [None]
+    figures = require_figures(figure, len(wanted))
     warehouse = Warehouse(uri)
     with progress() as tell:
-        wanted: list[str | None] = [*dict.fromkeys(sets)] or [None]
         compared = [compare_vessel(warehouse, vessel, name, horizon, tell) for name in wanted]
     print_note(said_of_vessel(warehouse, vessel))
     documents = []
-    for k, found in enumerate(compared):
+    for found, path in zip_longest(compared, figures):
         document = found.show()
         if with_where:
             document["where"] = found.where()
-        if figure is not None:
-            _draw(found, figure if k == 0 else figure.with_stem(f"{figure.stem}-{k + 1}"))
+        if path is not None:
+            _draw(found, path)
         if fail_above is not None:
             judged = document["judged"]
             exceeded = not judged["free_run_error_percent"] <= fail_above
@@ -115,12 +114,8 @@ def _draw(found: Comparison, figure: Path) -> None:
     from kempf.workbench.figures.measured_over_predicted import draw_measured_over_predicted
 
     title = f"{found.vessel}, {found.parameter_set.parameter_set_id}: {found.horizon.words}"
-    try:
+    with writing(figure):
         draw_measured_over_predicted(found.runs, figure, title)
-    except OSError as error:
-        raise UsageError(
-            "cannot_write", f"Writing {figure} failed: {error.strerror}.", "Give another file with --figure."
-        ) from error
 
 
 def _tell_skipped(skipped: dict[str, str], *, verbose: bool) -> None:

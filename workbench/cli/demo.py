@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option
+from kempf.workbench.cli.options import folder_option, json_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
 
 if TYPE_CHECKING:
@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command("demo", cls=GivenOnce)
-@click.option(
-    "--folder",
-    type=click.Path(path_type=Path),
-    default=Path("kempf-demo"),
-    show_default=True,
-    help="Where the logs and the warehouse go.",
-)
+@folder_option("kempf-demo", "Where the logs and the warehouse go.")
 @json_option
 def command(folder: Path, as_json: bool) -> None:
     """Simulate three trial days of one ship, run the main job on the raw logs, compare with the truth.

@@ -8,14 +8,14 @@ from typing import Any
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
+from kempf.workbench.cli.options import figure_option, json_option, profile_option, warehouse_option
 from kempf.workbench.terminal import number, one_line, print_json, print_table
 
 
 @click.command("doctor", cls=GivenOnce)
 @click.argument("path", metavar="PATH|LOG", type=click.Path(path_type=Path))
 @profile_option
-@click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help="Draw what disagrees, PNG, SVG or PDF.")
+@figure_option("Draw what disagrees")
 @click.option("--all", "everything", is_flag=True, help="Show every check, not only those that disagree.")
 @warehouse_option
 @json_option
@@ -31,10 +31,9 @@ def command(
     from kempf.flows.jobs.files import read_profiles
     from kempf.schemas.profile import VesselProfile
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.new_file import require_new
+    from kempf.workbench.new_file import require_figures, writing
 
-    if figure is not None:
-        require_new(figure, "--figure")
+    require_figures(figure)
     if profiles or path.exists():
         found = examine_file(path, read_profiles(profiles) if profiles else VesselProfile())
     else:
@@ -42,7 +41,8 @@ def command(
     if figure is not None:
         from kempf.workbench.figures.doctor import draw
 
-        draw(found, figure)
+        with writing(figure):
+            draw(found, figure)
     if as_json:
         print_json({"log": found.file_name, "format": found.format, **found.content})
         return

@@ -107,9 +107,8 @@ def mcap_file(
     from kempf.flows.jobs.measured_positions import measured_positions
     from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.export import write_new
     from kempf.workbench.export_mcap import about, to_mcap
-    from kempf.workbench.new_file import require_new
+    from kempf.workbench.new_file import require_new, write_new
 
     require_new(output, "--output")
     warehouse = Warehouse(uri)
@@ -174,7 +173,7 @@ def _text(form: str, set_id: str, output: Path | None, uri: str, as_json: bool) 
 
 
 def _deliver(form: str, name: str, content: str | bytes, output: Path | None, as_json: bool) -> None:
-    from kempf.workbench.export import write_new
+    from kempf.workbench.new_file import write_new
 
     if output is not None:
         write_new(output, content, "--output")

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 from datetime import UTC, datetime
-from itertools import count
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +11,11 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
+from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.terminal import counted, number, print_json, print_note, print_table, short_ids
 
 if TYPE_CHECKING:
-    from kempf.pipeline.history.changes import Changes
-    from kempf.pipeline.history.sets import ParameterHistory
     from kempf.warehouse.history import Comparable, History
 
 
@@ -27,9 +25,7 @@ if TYPE_CHECKING:
 @click.option("--as-of", metavar="TIME", help="What was known at this time, ISO 8601; without a zone it is UTC.")
 @click.option("--all", "superseded", is_flag=True, help="Also sets that a newer profile or code superseded.")
 @click.option("--changes", is_flag=True, help="Say whether the ship changed, when, by how much and in what.")
-@click.option(
-    "--figure", type=click.Path(path_type=Path), metavar="FILE", help="With --changes: draw it, .png or .svg."
-)
+@figure_option("With --changes: draw it")
 @click.option(
     "--occasion",
     "occasion_h",
@@ -72,11 +68,12 @@ def command(
     if not changes:
         _show(histories, as_json=as_json)
         return
-    figures = count()
+    kinds = {name: history.comparable(warehouse, name, instant) for name in histories}
+    # each kind of sets has a figure of its own
+    figures = iter(require_figures(figure, sum(map(len, kinds.values()))))
     documents: list[dict[str, Any]] = []
     for name, found in histories.items():
-        kinds = history.comparable(warehouse, name, instant)
-        examined = [_examine(kind, occasion_h, _beside(figure, next(figures)), name) for kind in kinds]
+        examined = [_examine(kind, occasion_h, next(figures, None), name) for kind in kinds[name]]
         documents.append({"vessel": name, "history": _rows(name, found), "changes": examined})
     if as_json:
         print_json(documents if len(documents) > 1 else documents[0])
@@ -117,11 +114,6 @@ def _show(histories: dict[str, History], *, as_json: bool) -> None:
     print_table([*head, "start UTC", "parameter", "value", "std", "unit", "estimator", "model", "set"], rows)
 
 
-def _beside(figure: Path | None, k: int) -> Path | None:
-    """Return where the figure of the kth kind of sets goes: each has one of its own."""
-    return figure if figure is None or k == 0 else figure.with_stem(f"{figure.stem}-{k + 1}")
-
-
 def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: str) -> dict[str, Any]:
     """Put the sets of one model and estimator to the tests."""
     import numpy as np
@@ -143,7 +135,11 @@ def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: s
         left_out["with a covariance that is none"] = int(np.sum(~good))
     found = find_changes(history, replace(ChangeSettings(), occasion_s=3600.0 * occasion_h))
     if figure is not None and len(history):
-        _draw(history, found, figure, f"{vessel}, model {kind.model}, estimator {kind.estimator}: {found.verdict}")
+        from kempf.workbench.figures.history import draw_history
+
+        title = f"{vessel}, model {kind.model}, estimator {kind.estimator}: {found.verdict}"
+        with writing(figure):
+            draw_history(history, found, figure, title)
     return {
         "model": kind.model,
         "model_sha256": kind.model_sha256,
@@ -153,21 +149,6 @@ def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: s
         **report(history, pool(history.value, history.covariance) if len(history) else None, found),
         "figure": str(figure) if figure is not None and len(history) else None,
     }
-
-
-def _draw(history: ParameterHistory, found: Changes, figure: Path, title: str) -> None:
-    from kempf.workbench.figures.history import draw_history
-
-    if figure.suffix not in (".png", ".svg", ".pdf"):
-        raise UsageError(
-            "figure_format", f"--figure {figure} ends in {figure.suffix!r}; expected .png, .svg or .pdf.", "Rename it."
-        )
-    try:
-        draw_history(history, found, figure, title)
-    except OSError as error:
-        raise UsageError(
-            "cannot_write", f"Writing {figure} failed: {error.strerror}.", "Give another file with --figure."
-        ) from error
 
 
 def _tell(one: dict[str, Any]) -> None:

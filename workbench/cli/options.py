@@ -73,3 +73,16 @@ def output_option(help_text: str = "Write here instead of to stdout.", *, requir
         metavar="FILE",
         help=help_text,
     )
+
+
+def figure_option(what: str) -> Callable[[F], F]:
+    """Add ``--figure``: a file that is not there yet, or None."""
+    help_text = f"{what}: .png, .svg or .pdf."
+    return click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help=help_text)
+
+
+def folder_option(default: str, help_text: str) -> Callable[[F], F]:
+    """Add ``--folder`` with its default."""
+    return click.option(
+        "--folder", type=click.Path(path_type=Path), default=Path(default), show_default=True, help=help_text
+    )

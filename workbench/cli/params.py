@@ -137,7 +137,8 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.export import as_text, write_new
+    from kempf.workbench.export import as_text
+    from kempf.workbench.new_file import write_new
 
     one = named_set(Warehouse(uri), set_id)
     print_note(said_of_sets([one]))

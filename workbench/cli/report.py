@@ -38,8 +38,7 @@ def command(
     from kempf.flows.jobs.standing_model import Own
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import chosen_model, read_effect_files
-    from kempf.workbench.export import write_new
-    from kempf.workbench.new_file import require_new
+    from kempf.workbench.new_file import require_new, write_new
     from kempf.workbench.report.build import make_report
 
     path = _called_after(vessel) if output is None else output

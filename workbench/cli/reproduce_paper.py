@@ -9,7 +9,7 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option
+from kempf.workbench.cli.options import folder_option, json_option
 from kempf.workbench.terminal import number, print_json, print_table, progress
 
 if TYPE_CHECKING:
@@ -17,13 +17,7 @@ if TYPE_CHECKING:
 
 
 @click.command("reproduce-paper", cls=GivenOnce)
-@click.option(
-    "--folder",
-    type=click.Path(path_type=Path),
-    default=Path("kempf-paper"),
-    show_default=True,
-    help="Where the figures go.",
-)
+@folder_option("kempf-paper", "Where the figures go.")
 @json_option
 def command(folder: Path, as_json: bool) -> None:
     """Repeat the experiment of the paper that the method comes from: its three figures, its accuracy beside ours.

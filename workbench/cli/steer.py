@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import figure_option, json_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.terminal import number, print_json, print_table
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.steer_vessel import Steered, Tried
-
-_FIGURES = (".png", ".svg", ".pdf")
 
 
 @click.command("steer", cls=GivenOnce)
@@ -33,7 +31,7 @@ _FIGURES = (".png", ".svg", ".pdf")
 @click.option("--speed", type=float, metavar="M/S", help="Speed through the water; default: that of the trial.")
 @click.option("--minutes", type=float, default=20.0, show_default=True, help="Of each of the two legs of the track.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of weather and noise.")
-@click.option("--figure", type=click.Path(path_type=Path), metavar="FILE", help="Draw the tracks: .png, .svg or .pdf.")
+@figure_option("Draw the tracks")
 @verbose_option
 @warehouse_option
 @json_option
@@ -60,8 +58,7 @@ def command(
     from kempf.pipeline.steering.course_keeping import LawSettings
     from kempf.warehouse.store import Warehouse
 
-    if figure is not None:
-        _check_figure(figure)
+    require_figures(figure, code="cannot_write")
     request = SteerRequest(set_id, wrong, speed, LawSettings(method=method), leg_s=60.0 * minutes, seed=seed)
     done = steer_vessel(Warehouse(uri), vessel, request)
     if figure is not None:
@@ -72,27 +69,13 @@ def command(
         _tell(done, figure, verbose=verbose)
 
 
-def _check_figure(figure: Path) -> None:
-    if figure.suffix not in _FIGURES or figure.exists():
-        raise UsageError(
-            "cannot_write",
-            f"A figure cannot be written to {figure}: "
-            + ("it is there already." if figure.exists() else f"expected a name that ends with {', '.join(_FIGURES)}."),
-            "Give another file with --figure; nothing is overwritten.",
-        )
-
-
 def _draw(done: Steered, figure: Path) -> None:
     from kempf.workbench.figures.course_keeping import draw_course_keeping
 
     labels = ["from the set", "from wrong parameters"]
     tracks = [(label, one.track) for label, one in zip(labels, done.laws, strict=False)]
-    try:
+    with writing(figure):
         draw_course_keeping(tracks, figure, f"{done.ship.parameter_set.vessel} at {number(done.ship.speed_m_s)} m/s")
-    except OSError as error:
-        raise UsageError(
-            "cannot_write", f"Writing {figure} failed: {error.strerror}.", "Give another file with --figure."
-        ) from error
 
 
 def _show(done: Steered, figure: Path | None) -> dict[str, Any]:
