@@ -14,7 +14,7 @@ MOST = 3
 #: what a warning is about, the gravest first; what none of them matches comes before the last
 _GRAVEST = (
     "not converge|did not end|diverged",
-    "is positive|is negative|not physical|wrong way|not observable",
+    "not physical|unusual for a hull|wrong way|not observable",
     "at a bound|not determined|hardly determine",
     "linear model|simulated ship",
     "^channels|disagree|cannot be|could not|no zigzag|contradict",

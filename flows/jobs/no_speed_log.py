@@ -99,7 +99,7 @@ def estimate_of(
             refused.append(error.code)
     result = estimate_without_log(record, spec, arm_per_m, settings, no_log, tuple(beside))
     if refused:
-        said = f"{len(refused)} of {len(inputs.companions)} companion runs cannot be used: {', '.join(refused)}"
+        said = f"{len(refused)} of {len(inputs.companions)} other manoeuvres cannot be used: {', '.join(refused)}"
         result.report["speed"]["companions_refused"] = refused
         return replace(result, warnings=(*result.warnings, said))
     return result

@@ -86,7 +86,7 @@ def preview_all(warehouse: Warehouse, vessels: Sequence[str] = (), progress: Pro
     names = sorted(set(vessels)) or vessel_table.names(warehouse)
     found = []
     for done, vessel in enumerate(names):
-        progress(done, len(names), f"{vessel}: what would the present code make of her?")
+        progress(done, len(names), f"{vessel}: comparing with the present code")
         try:
             found.append(_preview(warehouse, vessel))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it

@@ -46,9 +46,10 @@ class ComparedRun:
         return HELD_OUT if self.held_out else FITTED
 
     def show(self) -> dict[str, Any]:
-        """Return the run as JSON content; overshoots in deg, ``rms`` in SI and once more as people read it."""
+        """Return the run as JSON content; overshoots in deg, ``rms`` in SI, ``rms_display`` in display units."""
         one = self.predicted
         rms = one.rms()
+        display = {name: {"value": UNITS[name][1] * rms[name], "unit": UNITS[name][0]} for name in ORDER if name in rms}
         return {
             "segment_id": self.name,
             "held_out": self.held_out,
@@ -56,9 +57,8 @@ class ComparedRun:
             "fit_percent": _ordered(one.fit_percent()),
             "rms": _ordered(rms),
             "rms_unit": {name: _SI[name] for name in ORDER if name in rms},
-            "rms_told": {
-                name: {"value": UNITS[name][1] * rms[name], "unit": UNITS[name][0]} for name in ORDER if name in rms
-            },
+            "rms_display": display,
+            "rms_told": display,  # as it was called up to 0.1
             "n": _ordered(one.count()),
             "left_out_settling": one.settling,
             "inside_95_percent": {
@@ -123,7 +123,7 @@ def summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
     Returns
     -------
     dict
-        ``fitted`` and ``held_out``, None where there is no such run: ``runs``, ``fit_percent`` and ``rms_told`` by
+        ``fitted`` and ``held_out``, None where there is no such run: ``runs``, ``fit_percent`` and ``rms_display`` by
         channel, ``inside_95_percent`` by channel over all runs, ``overshoot_error_deg`` with ``mean``, ``std_error``,
         ``mean_size``, ``n`` and ``not_predicted``, and ``free_run_error_percent``.
     """
@@ -145,15 +145,17 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
         if counts:
             k, n = (sum(column) for column in zip(*counts, strict=True))
             covered[name] = {"share": k / n, "inside": k, "of": n}
+    display = {
+        name: {**_mean([UNITS[name][1] * one[name] for one in rms if name in one]), "unit": UNITS[name][0]}
+        for name in there
+    }
     errors = [turn.error_deg for run in runs for turn in run.overshoots]
     known = [e for e in errors if e is not None]
     return {
         "runs": len(runs),
         "fit_percent": {name: _mean([fit[name] for fit in fits if name in fit]) for name in there},
-        "rms_told": {
-            name: {**_mean([UNITS[name][1] * one[name] for one in rms if name in one]), "unit": UNITS[name][0]}
-            for name in there
-        },
+        "rms_display": display,
+        "rms_told": display,  # as it was called up to 0.1
         "inside_95_percent": covered,
         "overshoot_error_deg": {
             **_mean(known),

@@ -1,4 +1,4 @@
-"""Where a model fails: by phase of the manoeuvre, side, what the ship did, run and frequency; the worst stretches.
+"""Where a model fails: by phase of the manoeuvre, side, what the ship did, run and frequency; the worst windows.
 
 Never fitted and held-out runs in one call: what was fitted says less of the model.
 """

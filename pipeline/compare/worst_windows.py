@@ -1,4 +1,4 @@
-"""The worst stretches: windows of time one can jump to."""
+"""The worst windows of time."""
 
 from __future__ import annotations
 

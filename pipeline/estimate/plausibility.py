@@ -49,15 +49,15 @@ def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
         cure = "a zigzag of other angles or more legs, or several pooled, would determine them"
         found.append(f"not determined, error as large as the value ({cure}): {', '.join(vague)}")
     if a11 > 0:
-        found.append("a11 is positive: sway would feed itself, no hull does; something acts that the model lacks")
+        found.append("a11 > 0: sway unstable by itself, not physical; an unmodelled force is likely")
     if a22 > 0:
-        found.append("a22 is positive: yaw would feed itself, no hull does; something acts that the model lacks")
+        found.append("a22 > 0: yaw unstable by itself, not physical; an unmodelled moment is likely")
     if a21 > 0:
-        found.append("a21 is positive: drifting turns the bow into the flow, few hulls do; something acts unmodelled")
+        found.append("a21 > 0: unusual for a hull; an unmodelled force is likely")
     if b2 < 0:
-        found.append("b2 is negative: the rudder turns the ship the wrong way; check the sign of the rudder channel")
+        found.append("b2 < 0: the rudder turns the ship the wrong way; check the sign of the rudder channel")
     elif b1 > 0:
-        found.append("b1 is positive: the rudder pushes the stern the wrong way; sway and yaw are hardly distinguished")
+        found.append("b1 > 0: the rudder pushes the stern the wrong way; sway and yaw are hardly distinguished")
     unlike_noise = not_white(fit)
     for name, channel in fit.get("channels", {}).items():
         lag, inside = channel["lag1_autocorrelation"], channel["inside_95_percent"]

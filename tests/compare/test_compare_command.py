@@ -136,7 +136,7 @@ def test_where_it_fails_is_told_by_sample(place: Path) -> None:
     assert told.code == 0
     assert "horizon: one step" in told.out
     assert "fitted: 1 manoeuvre" in told.out and "held out: no manoeuvre" in told.out
-    assert "where it fails, fitted manoeuvres" in told.out and "worst stretches" in told.out
+    assert "where it fails, fitted manoeuvres" in told.out and "worst windows" in told.out
 
 
 def test_a_manoeuvre_is_one_line_of_the_table_and_all_overshoots_are_verbose(place: Path, document: dict) -> None:

@@ -75,7 +75,7 @@ def test_what_is_told_of_runs_keeps_the_samples_apart() -> None:
     assert [one["held_out"] for one in shown] == [False, False, True]
     assert [one["sample"] for one in shown] == ["fitted", "fitted", "held_out"]
     assert list(shown[0]["fit_percent"]) == ["yaw_rate", "heading", "lateral_speed"]
-    assert shown[0]["rms_told"]["yaw_rate"]["value"] == pytest.approx(np.rad2deg(shown[0]["rms"]["yaw_rate"]))
+    assert shown[0]["rms_display"]["yaw_rate"]["value"] == pytest.approx(np.rad2deg(shown[0]["rms"]["yaw_rate"]))
     told = summary(runs)
     assert (told["fitted"]["runs"], told["held_out"]["runs"]) == (2, 1)
     fits = [one["fit_percent"]["heading"] for one in shown]

@@ -85,7 +85,7 @@ def test_a_rudder_that_answers_2_s_late_shows_while_it_moves_and_against_the_rud
     assert cross["p_adjusted"] < 1e-6
     # b2 is positive, and the late rudder's yaw acceleration is missing while it moves to starboard
     assert cross["largest"] < 0.0 and cross["largest_lag_s"] <= 6.0
-    # the worst stretches lie where the rudder moves
+    # the worst windows lie where the rudder moves
     first = [w for w in found["worst"] if w["measure"] == "one step"]
     assert first and all(w["p_value"] < 0.01 for w in first)
 

@@ -24,7 +24,7 @@ def test_a_plausible_ship_with_white_errors_raises_no_doubt() -> None:
     assert doubts(GOOD, SURE, {}) == ()
 
 
-WRONG = [(0, "a11 is positive"), (2, "a21 is positive"), (3, "a22 is positive"), (4, "b1 is positive")]
+WRONG = [(0, "a11 > 0"), (2, "a21 > 0"), (3, "a22 > 0"), (4, "b1 > 0")]
 
 
 @pytest.mark.parametrize(("index", "word"), WRONG)

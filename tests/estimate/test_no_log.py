@@ -241,7 +241,7 @@ def test_a_drift_that_no_linear_hull_has_is_not_taken_for_a_current() -> None:
     speed = wary.report["speed"]
     assert abs(speed["mean_m_s"] - truth) < 3.0 * speed["std_m_s"]
     assert speed["hull_misfit_m_s"][0] > 0.5
-    assert any("eq. (16) lacks" in warning for warning in wary.warnings)
+    assert any("unmodelled hull force" in warning for warning in wary.warnings)
     trusting = identify_without_log(bent, SPEC, arm, SETTINGS, NoLogSettings(hull_misfit=0.0)).report["speed"]
     assert abs(trusting["mean_m_s"] - truth) > 5.0 * trusting["std_m_s"]
 
@@ -313,7 +313,7 @@ def test_a_companion_that_fails_stops_nothing(monkeypatch: pytest.MonkeyPatch) -
     monkeypatch.setattr(maximum_likelihood, "identify", failing)
     estimate = identify_without_log(record, SPEC, trial.truth.wind_arm_per_m, SETTINGS, None, (other,))
     assert estimate.hull == found().hull
-    assert "1 of 1 companion runs left out: no_ship_explains_it" in estimate.warnings
+    assert "1 of 1 other manoeuvres left out: no_ship_explains_it" in estimate.warnings
 
 
 def test_the_rudder_in_the_race_follows_the_speed_that_is_found() -> None:

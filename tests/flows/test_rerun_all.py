@@ -221,7 +221,7 @@ def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeyp
     assert other not in {move.parameter_set_id for move in found}
     monkeypatch.setattr(preview_code, "preview_all", lambda *_: [VesselPreview("mariner", 2, 0, 1, found)])
     shown = kempf("rerun", "--all", "--preview", "--fail-above", 1.6, "--warehouse", own.uri)
-    assert shown.code == 0 and "1 would say the same bit for bit, 1 would move" in shown.out
+    assert shown.code == 0 and "1 bit-identical, 1 would change" in shown.out
     rows = [line.split() for line in shown.out.splitlines()]
     assert next(row for row in rows if row[:1] == ["mariner"])[:3] == ["mariner", "a12", "-1.5"], "the largest first"
 

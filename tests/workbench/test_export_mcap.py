@@ -75,7 +75,7 @@ def test_predictions_are_those_of_compare(topics: dict, _filled: Path):
                 error = (error + 180.0) % 360.0 - 180.0
             assert np.sort(left) == pytest.approx(np.sort(error), abs=1e-9)
             assert len(kept) == run["n"][name]
-            assert np.sqrt(np.mean(error**2)) == pytest.approx(run["rms_told"][name]["value"], rel=1e-9)
+            assert np.sqrt(np.mean(error**2)) == pytest.approx(run["rms_display"][name]["value"], rel=1e-9)
 
 
 def test_intervals_hold_what_they_promise(topics: dict):

@@ -19,13 +19,13 @@ WARNINGS = (
     "only 80 % of heading lie in their 95 % prediction interval",
     "the wind is taken to act without a moment",
     "not converged: the iterations allowed ran out",
-    "b2 is negative: check the sign of the rudder channel",
+    "b2 < 0: the rudder turns the ship the wrong way; check the sign of the rudder channel",
 )
 
 
 def test_the_gravest_come_first_and_those_alike_are_one() -> None:
     told = ranked(WARNINGS)
-    assert [one[:10] for one in told] == ["not conver", "b2 is nega", "only 80 % ", "the wind i", "4 gross er"]
+    assert [one[:10] for one in told] == ["not conver", "b2 < 0: th", "only 80 % ", "the wind i", "4 gross er"]
     assert told[-1].endswith("left out (likewise yaw_rate)")
 
 

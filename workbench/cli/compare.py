@@ -158,13 +158,13 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
     there = [name for name in _CHANNELS if name in mean["fit_percent"]]
     head = ["manoeuvre", "zigzag", "start UTC"]
     for name in there:
-        head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_told'][name]['unit']}"]
+        head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_display'][name]['unit']}"]
     head += ["largest overshoot error deg"]
     rows, short = [], short_ids(run["segment_id"] for run in runs)
     for run in runs:
         row = [short[run["segment_id"]], f"{run['psi0_deg']:g}/{run['delta0_deg']:g}", run["start"][:16]]
         for name in there:
-            row += [_percent(run["fit_percent"].get(name)), number(run["rms_told"].get(name, {}).get("value"), 3)]
+            row += [_percent(run["fit_percent"].get(name)), number(run["rms_display"].get(name, {}).get("value"), 3)]
         errors = [error for error in run["overshoot_error_deg"] if error is not None]
         rows.append([*row, _signed(max(errors, key=abs, default=None))])
     print_table(head, rows, f"{title}: {len(runs)} manoeuvre{'s' if len(runs) > 1 else ''}")
@@ -221,7 +221,7 @@ def _tell_where(title: str, where: dict[str, Any]) -> None:
         [w["start"][:19], w["end"][11:19], short[w["run"]], _CHANNELS[w["channel"]], w["measure"], _size(w)]
         for w in where["worst"]
     ]
-    print_table(["start UTC", "end", "manoeuvre", "channel", "horizon", "error"], rows, "  worst stretches")
+    print_table(["start UTC", "end", "manoeuvre", "channel", "horizon", "error"], rows, "  worst windows")
 
 
 def _tell_correlation(channel: str, correlations: dict[str, Any]) -> None:

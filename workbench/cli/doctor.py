@@ -64,7 +64,7 @@ def tell(name: str, content: dict[str, Any], *, everything: bool) -> None:
             for line in fault["profile"]:
                 click.echo(f"   profile: {line}")
             if not fault["profile"]:
-                click.echo(f"   profile: no line corrects it ({fault['words']}): correct it where the log is recorded")
+                click.echo(f"   profile: no entry corrects it ({fault['words']}): correct it at the recorder")
     if content.get("why"):
         click.echo(one_line(content["why"])[:600])
     if everything:
@@ -88,4 +88,4 @@ def _table(content: dict[str, Any]) -> None:
         for check in content["checks"] for f in check["figures"]
     ]  # fmt: skip
     rows += [[c["check"], c["state"], c["words"], "", "", "", ""] for c in content["checks"] if not c["figures"]]
-    print_table(["check", "says", "figure", "value", "std", "expected", "unit"], rows)
+    print_table(["check", "result", "figure", "value", "1 s.e.", "expected", "unit"], rows)

@@ -132,7 +132,7 @@ def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: s
     history = ParameterHistory(kind.names, kind.units, time[good], value[good], covariance[good])
     left_out = dict(kind.left_out)
     if not bool(np.all(good)):
-        left_out["with a covariance that is none"] = int(np.sum(~good))
+        left_out["covariance not positive definite"] = int(np.sum(~good))
     found = find_changes(history, replace(ChangeSettings(), occasion_s=3600.0 * occasion_h))
     if figure is not None and len(history):
         from kempf.workbench.figures.history import draw_history

@@ -87,15 +87,15 @@ def _by_parameter(moves: Sequence[Move]) -> list[dict[str, Any]]:
 def _tell(found: Sequence[VesselPreview], lines: Sequence[dict[str, Any]]) -> None:
     counts = _counts(found)
     if counts["sets"] == counts["up_to_date"] and not counts["new"] and not counts["failures"]:
-        click.echo(f"All {counts['sets']} parameter sets that stand were made by this code: it would move none.")
+        click.echo(f"All {counts['sets']} current parameter sets were made by this code.")
         return
     click.echo(
-        f"{counts['sets']} parameter sets stand: {counts['up_to_date']} were made by this code, {counts['identical']} "
-        f"would say the same bit for bit, {counts['moved']} would move, {counts['gone']} would go without a successor, "
+        f"{counts['sets']} current parameter sets: {counts['up_to_date']} made by this code, {counts['identical']} "
+        f"bit-identical, {counts['moved']} would change, {counts['gone']} would be withdrawn without replacement, "
         f"{counts['new']} would be new."
     )
     if lines:
-        head = ["vessel", "parameter", "largest move in std errors", "median", "std ratio", "before", "after", "unit"]
+        head = ["vessel", "parameter", "largest change in s.e.", "median", "s.e. ratio", "before", "after", "unit"]
         head += ["sets", "estimator", "model", "parameter set"]
         rows = [
             [

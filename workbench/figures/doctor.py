@@ -20,7 +20,7 @@ _TURNS = {
     "heading": "heading",
     "rate": "integral of the yaw rate",
     "course": "course",
-    "earth": "course of the velocities",
+    "earth": "direction of the velocity components",
 }
 #: Points of a line in the figure, at most.
 _POINTS = 2000
@@ -43,7 +43,7 @@ def draw(found: ExaminedLog, path: Path) -> None:
     corrected = found.log
     for finding in found.examination.findings:
         corrected = finding.faults[0].corrected(corrected) if finding.faults else corrected
-    sides = [("as it came", found.log)] + ([("corrected", corrected)] if corrected is not found.log else [])
+    sides = [("as logged", found.log)] + ([("corrected", corrected)] if corrected is not found.log else [])
     height = 0.24 * max(len(rows), 1) + 1.0
     sheet = plt.figure(figsize=(12, height + 7.5), layout="constrained")
     upper, lower = np.asarray(sheet.subfigures(2, 1, height_ratios=[height, 7.5]))
@@ -68,13 +68,13 @@ def _forest(panel: Axes, rows: list[tuple[Any, Figure]]) -> None:
         at = float(np.clip(value, -4.0, 4.0))
         panel.errorbar(at, -k, xerr=min(4.0 * std, 8.0), fmt="o" if at == value else ">" if at > 0 else "<", ms=4,
                        color=_COLOURS[figure.state], lw=1)  # fmt: skip
-        panel.text(4.3, -k, f"{figure.value:.3g} +- {figure.std:.1g} {figure.unit}", va="center", fontsize=7)
+        panel.text(4.3, -k, f"{figure.value:.3g} ± {figure.std:.1g} {figure.unit}", va="center", fontsize=7)
         del outcome
     panel.axvspan(-1.0, 1.0, color="0.92", lw=0)
     panel.set_yticks([-k for k in range(len(rows))], [f"{o.check}: {f.name}" for o, f in rows], fontsize=7)
     panel.set_xlim(-4.2, 6.0)
     panel.set_xticks([-1, 1], ["expected from", "to"])
-    panel.set_title("figures with 4 standard errors; grey: what sound channels give", fontsize=9)
+    panel.set_title("values with bars of 4 s.e. (numbers: ± 1 s.e.); grey: expected range", fontsize=9)
 
 
 def _band(figure: Figure) -> tuple[float, float]:
@@ -125,7 +125,7 @@ def _rudder(panel: Axes, log: Log) -> None:
 
 def _speeds(panel: Axes, log: Log) -> None:
     origin = _origin(log)
-    for kind, label in (("track", "from fix to fix"), ("course", "over ground"), ("earth", "of the velocities")):
+    for kind, label in (("track", "between fixes"), ("course", "over ground"), ("earth", "velocity components")):
         velocity = log.velocity(kind)
         if velocity is not None:
             _line(panel, origin, velocity.time_utc_ns, np.abs(velocity.value), label)

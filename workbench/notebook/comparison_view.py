@@ -39,8 +39,8 @@ class ComparisonView:
                 "sample": run["sample"],
                 "channel": channel,
                 "fit_percent": fit,
-                "rms": run["rms_told"][channel]["value"],
-                "unit": run["rms_told"][channel]["unit"],
+                "rms": run["rms_display"][channel]["value"],
+                "unit": run["rms_display"][channel]["unit"],
                 "n": run["n"][channel],
             }
             for run in self.document["runs"]

@@ -60,15 +60,14 @@ def clock_outcome(
     """
     channels = (*sides[0], *sides[1])
     if found.left_over > _TOGETHER:
-        return untestable(name, channels, "the two motions do not go together, so neither is late")
+        return untestable(name, channels, "the two motions are not correlated, so no lag can be determined")
     lag, growth = figures
     far = max(lag.low - lag.value, lag.value - lag.high)
     if far > _SHORT_S and found.explains > _NO_BETTER:
-        return untestable(name, channels, "no lag fits much better than that of sound clocks")
+        return untestable(name, channels, "no lag fits clearly better than the usual one")
     words = (
-        f"{' and '.join(sides[1])} {'lags' if lag.value >= 0 else 'leads'} {' and '.join(sides[0])} by "
-        f"{abs(lag.value):.2f} +- {lag.std:.2g} s in the middle of the log, and by {growth.value:.2g} +- "
-        f"{growth.std:.1g} s more every second"
+        f"lag of {' and '.join(sides[1])} behind {' and '.join(sides[0])}: {lag.value:.2f} ± {lag.std:.2g} s in the "
+        f"middle of the log, growing by {growth.value:.2g} ± {growth.std:.1g} s per second (1 s.e.)"
     )
     first, second = sides
     suspects = (

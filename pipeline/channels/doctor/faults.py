@@ -56,6 +56,8 @@ class Fault:
     name: str = ""
     #: Standard error of ``value`` where it was estimated; 0 where it is exact.
     std: float = 0.0
+    #: What ``std`` is, in words, where it is no standard error.
+    spread: str = "1 s.e."
     #: Smaller is asked first: a wrong sign before a compass turned by 90 degrees and counting backwards.
     simplicity: int = 1
     #: When a channel that is stuck begins to be, UTC ns.

@@ -70,21 +70,21 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorou
     direction = Series(velocity.time_utc_ns[way], velocity.direction[way])
     turned = max(swing(heading.value), swing(direction.value)) if len(direction) else 0.0
     if turned < _LEAST_TURN:
-        return [untestable(name, channels, "the ship hardly turned while she made way") for name in names]
+        return [untestable(name, channels, "the ship hardly turned while under way") for name in names]
     speed = quantile(np.abs(velocity.value[way]), 0.5)
     if velocity.blurred(heading):
-        return [untestable(name, channels, "the fixes are too coarse to show the turns") for name in names]
+        return [untestable(name, channels, "the position fixes are too coarse to resolve the turns") for name in names]
     own = _own_lag(log, heading, speed)
     late = 1.0 + heading.period_s + direction.period_s
     # the antenna may be ahead of the point about which she turns: then the course leads
     honest = (-late - _LEADS * own, late + own)
     both = align(heading, direction, honest, circle=True, longest_s=LONGEST_S if thorough else 0.0)
     if both is None:
-        return [untestable(name, channels, "too little of it overlaps") for name in names]
+        return [untestable(name, channels, "the channels hardly overlap in time") for name in names]
     std = float(np.hypot(both.slope_std, 0.5 * stream_std(speed) / speed))
     low, high = _BODY_SLOPES if kind == "body" else SLOPES
-    figure = Figure("turned by the velocity for 1 turned by the heading", both.slope, std, low, high)
-    words = f"the {_WORDS[kind]} turns {both.slope:.2f} +- {std:.2g} times as far as the heading"
+    figure = Figure("change of direction of the velocity over change of heading", both.slope, std, low, high)
+    words = f"the {_WORDS[kind]} changes by {both.slope:.2f} ± {std:.2g} (1 s.e.) times the change of heading"
     state = figure.state
     if both.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
         state = "untestable"  # a slope through noise
@@ -97,9 +97,9 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorou
 
 _WORDS = {
     "course": "course over ground",
-    "earth": "earth-fixed velocity",
-    "body": "body-fixed velocity",
-    "track": "way from fix to fix",
+    "earth": "direction of the earth-fixed velocity",
+    "body": "direction of the body-fixed velocity",
+    "track": "bearing between position fixes",
 }
 
 

@@ -47,13 +47,13 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     found = align(heading, turned, (-late, late), longest_s=LONGEST_S if thorough else 0.0)
     if found is None or swing(heading.value) == 0.0:
         # of a compass that repeats itself the check of standstills decides
-        return [untestable(name, _CHANNELS, "the heading does not change, or the two hardly overlap") for name in names]
+        return [untestable(name, _CHANNELS, "the heading is constant, or the two hardly overlap") for name in names]
     return [_turning(found), *([_clocks(log, found, (-late, late))] if thorough else [])]
 
 
 def _turning(found: Alignment) -> Outcome:
-    figure = Figure("turned by the rate for 1 turned by the heading", found.slope, found.slope_std, *SLOPES)
-    words = f"the yaw rate adds up to {found.slope:.3g} +- {found.slope_std:.2g} times what the heading turns"
+    figure = Figure("integrated yaw rate over change of heading", found.slope, found.slope_std, *SLOPES)
+    words = f"the integrated yaw rate is {found.slope:.3g} ± {found.slope_std:.2g} (1 s.e.) times the change of heading"
     suspects = [
         Fault("sign", ("yaw_rate",)),
         Fault("sign", ("heading",)),

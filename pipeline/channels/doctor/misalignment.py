@@ -52,10 +52,10 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
 def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
     name, channels = f"legs_{kind}", ("heading", *velocity.channels)
     if velocity.blurred(heading):
-        return untestable(name, channels, "the fixes are too coarse to show the turns")
+        return untestable(name, channels, "the position fixes are too coarse to resolve the turns")
     seen = _seen_from_the_bow(kind, heading, velocity)
     if seen is None:
-        return untestable(name, channels, "too few readings while she made way")
+        return untestable(name, channels, "too few readings under way")
     relative, bow, rate, duration = seen
     speed = quantile(np.abs(relative), 0.5)
     fast = max(quantile(np.abs(rate), 0.95), 1e-6)
@@ -66,15 +66,14 @@ def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
     ahead, across = fitted.value[:2]
     way = float(np.hypot(ahead, across))
     if way < 0.3 * speed or fitted.left_over > _TOGETHER:
-        return untestable(name, channels, "heading and velocity do not go together")
+        return untestable(name, channels, "heading and direction of the velocity are not correlated")
     angle = float(np.arctan2(across, ahead))
     # of A's standard errors, the part across A
     own = float(np.hypot(fitted.std[1] * ahead / way, fitted.std[0] * across / way)) / way
     std = float(np.hypot(own, _LEEWAY_RAD))
-    figure = Figure(
-        "angle from the bow", float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg"
-    )
-    words = f"she goes {figure.value:+.1f} +- {figure.std:.1f} deg off her bow with stream and drift taken out"
+    what = "angle of the velocity from the bow" if kind == "body" else "course minus heading"
+    figure = Figure(what, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg")
+    words = f"{what} is {figure.value:+.1f} ± {figure.std:.1f} deg (1 s.e.) with current and drift removed"
     suspects = [Fault("offset", ("heading",), angle, "turned", std)]
     if kind == "course":
         suspects.append(Fault("offset", channels[2:], -angle, "turned", std))

@@ -47,28 +47,28 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         if best is None or left < best[0]:
             best = (left, float(shift))
     if best is None or best[0] > 0.75:
-        return [untestable(name, _CHANNELS, "order and angle do not go together")]
+        return [untestable(name, _CHANNELS, "rudder order and rudder angle are not correlated")]
     put = order.at(angle.time_utc_ns - round(best[1] * SECOND_NS), gap_limit_s(order))
     found = fit(np.column_stack([put, np.ones_like(put)]), angle.value)
     if found is None:
-        return [untestable(name, _CHANNELS, "too little of it overlaps")]
+        return [untestable(name, _CHANNELS, "the channels hardly overlap in time")]
     slope, offset = float(found.value[0]), float(found.value[1])
     # the rudder on its way between two orders is neither lag nor fault
     slope_std = float(np.hypot(found.std[0], 0.05 * abs(slope)))
     figures = (
-        Figure("rudder angle for 1 ordered", slope, slope_std, *_SLOPES),
+        Figure("rudder angle over rudder order", slope, slope_std, *_SLOPES),
         Figure(
-            "rudder angle where none is ordered",
+            "rudder angle at zero order",
             np.rad2deg(offset),
             np.rad2deg(found.std[1]) + 0.5,
             *_OFFSETS_DEG,
             "deg",
         ),
-        Figure("lag of the angle", best[1], 0.5, *_LAGS_S, "s"),
+        Figure("lag of the rudder angle behind the order", best[1], 0.5, *_LAGS_S, "s"),
     )
     words = (
-        f"the rudder comes to {slope:.2f} +- {slope_std:.1g} times the order and {figures[1].value:+.1f} deg, "
-        f"{best[1]:.1f} s after it"
+        f"the rudder angle is {slope:.2f} ± {slope_std:.1g} (1 s.e.) times the order {figures[1].value:+.1f} deg and "
+        f"lags by {best[1]:.1f} s"
     )
     suspects = [
         *(Fault("sign", (one,)) for one in _CHANNELS),
@@ -81,8 +81,8 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         ]
     # half the gear's usual time is left where a clock is set right
     suspects += [
-        Fault("latency", ("rudder_angle",), best[1] - 1.0, "late", 1.0),
-        Fault("latency", ("rudder_order",), 1.0 - best[1], "early", 1.0),
+        Fault("latency", ("rudder_angle",), best[1] - 1.0, "late", 1.0, spread="assumed"),
+        Fault("latency", ("rudder_order",), 1.0 - best[1], "early", 1.0, spread="assumed"),
     ]
     state = worst([figure.state for figure in figures])
     return [Outcome(name, _CHANNELS, state, words, figures, min(best[0], 1.0), tuple(suspects))]

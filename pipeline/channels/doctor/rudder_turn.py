@@ -81,20 +81,20 @@ def _compare(
     if moved < _FAINT_RUDDER and swung > max(_SWING * moved, 4.0 * _LEAST_TURN) and moved > 0.0:
         # no ship turns so far on so little rudder
         figure = Figure(
-            "rudder's range", np.rad2deg(moved), 0.1 * np.rad2deg(moved), np.rad2deg(_FAINT_RUDDER), 180.0, "deg"
+            "rudder angle range", np.rad2deg(moved), 0.1 * np.rad2deg(moved), np.rad2deg(_FAINT_RUDDER), 180.0, "deg"
         )
-        words = f"the rudder moves within {figure.value:.2g} deg while she turns through {np.rad2deg(swung):.0f} deg"
+        words = f"the rudder moves by {figure.value:.2g} deg only, while she turns through {np.rad2deg(swung):.0f} deg"
         suspects = (Fault("unit", channels[:1], 180.0 / np.pi, "rad taken for deg"),)
         return [Outcome(name, channels, "disagree", words, (figure,), 1.0, suspects)]
     if moved < _LEAST_RUDDER or swung < _LEAST_TURN:
-        return [untestable(name, channels, "the rudder was hardly used, or she hardly turned")]
+        return [untestable(name, channels, "the rudder was hardly used, or the ship hardly turned")]
     edges = edges_of(rudder, angle, rate, window_s=_window(rudder))
     if edges.size < _FEWEST:
-        return [untestable(name, channels, "too short to distinguish her answer from chance")]
+        return [untestable(name, channels, "too short to determine the yaw response")]
     shifts = _SHIFTS if thorough else np.array([USUAL_S[0], 0.5 * (USUAL_S[0] + USUAL_S[1]), USUAL_S[1]])
     answered = _best(edges, rudder, angle, rate, _makes_way(log, edges), shifts)
     if answered is None:
-        return [untestable(name, channels, "too little of it overlaps")]
+        return [untestable(name, channels, "the channels hardly overlap in time")]
     found, shift, explains = answered
     answer = _judged(name, channels, found, explains)
     return [answer, _clock(f"{name}_clock", channels, found, shift, explains)] if thorough else [answer]
@@ -184,15 +184,15 @@ def _mean_squares(put: Float, turn: Float, long: Float, observed: Float) -> Floa
 def _clock(name: str, channels: tuple[str, ...], found: RobustLine, shift: float, explains: float) -> Outcome:
     """Judge the shift of the rudder at which she answers best."""
     if explains < _CLOCKED or abs(found.value[0]) < SURE * found.std[0]:
-        return untestable(name, channels, "her answer to the rudder is too faint to show when it was put over")
-    figure = Figure("time of the rudder behind that of her answer", shift, _SHIFT_STD_S, *USUAL_S, "s")
-    when = "before" if shift > 0 else "after"
-    words = f"she turns as if the rudder had been put over {abs(shift):.0f} s {when} the log says"
+        return untestable(name, channels, "the yaw response is too weak to determine the rudder's delay")
+    figure = Figure("delay of the rudder channel behind the yaw response", shift, _SHIFT_STD_S, *USUAL_S, "s")
+    when = "earlier" if shift > 0 else "later"
+    words = f"the yaw response fits best with the rudder put over {abs(shift):.0f} s {when} than logged"
     middle = 0.5 * (USUAL_S[0] + USUAL_S[1])
-    late, std = shift - middle, 0.5 * (USUAL_S[1] - USUAL_S[0])
+    late, std, half = shift - middle, 0.5 * (USUAL_S[1] - USUAL_S[0]), "half the usual range"
     suspects = (
-        Fault("latency", channels[:1], late, "late" if late > 0 else "early", std),
-        Fault("latency", channels[1:], -late, "early" if late > 0 else "late", std),
+        Fault("latency", channels[:1], late, "late" if late > 0 else "early", std, spread=half),
+        Fault("latency", channels[1:], -late, "early" if late > 0 else "late", std, spread=half),
     )
     return Outcome(name, channels, figure.state, words, (figure,), min(1.0 - explains, 1.0), suspects)
 
@@ -200,13 +200,14 @@ def _clock(name: str, channels: tuple[str, ...], found: RobustLine, shift: float
 def _judged(name: str, channels: tuple[str, ...], found: RobustLine, explains: float) -> Outcome:
     answer, std = float(found.value[0]), float(found.std[0])
     if explains < _EXPLAINS or abs(answer) < SURE * std:
-        return untestable(name, channels, "her answer to the rudder is lost in what else turns her")
+        why = "the yaw response to the rudder cannot be distinguished from other yaw motion"
+        return untestable(name, channels, why)
     neutral = -float(found.value[2]) / answer
     neutral_std = float(np.hypot(found.std[2] / abs(answer), np.deg2rad(_NEUTRAL_STD_DEG)))
     figures = (
-        Figure("yaw acceleration for 1 rad of rudder", answer, std, 0.0, np.inf, "1/s^2"),
+        Figure("yaw acceleration per rad of rudder", answer, std, 0.0, np.inf, "1/s^2"),
         Figure(
-            "rudder on a straight course",
+            "neutral rudder angle",
             np.rad2deg(neutral),
             np.rad2deg(neutral_std),
             -_NEUTRAL_DEG,
@@ -215,8 +216,8 @@ def _judged(name: str, channels: tuple[str, ...], found: RobustLine, explains: f
         ),
     )
     words = (
-        f"a radian of rudder turns her by {answer:.2g} +- {std:.1g} 1/s^2, and she goes straight with the rudder at "
-        f"{figures[1].value:.0f} +- {figures[1].std:.0f} deg"
+        f"yaw acceleration per rad of rudder {answer:.2g} ± {std:.1g} 1/s^2; "
+        f"neutral rudder angle {figures[1].value:.0f} ± {figures[1].std:.0f} deg (1 s.e.)"
     )
     sign = [Fault("sign", (one,)) for one in channels]
     if channels[1] == "heading":

@@ -54,13 +54,13 @@ def _judged(channel: str, other: str, found: tuple[Series, float] | None, in_all
     if found is None and in_all < 2.0 * _TURN_RAD:
         return untestable(name, channels, "the ship hardly turned")
     turned = 0.0 if found is None else found[1]
-    figure = Figure("turned while it repeats itself", float(np.rad2deg(turned)), 0.1, 0.0, _TURN_DEG, "deg")
+    figure = Figure("turn while the channel is constant", float(np.rad2deg(turned)), 0.1, 0.0, _TURN_DEG, "deg")
     if found is None:
-        return Outcome(name, channels, "agree", f"{channel} does not repeat itself while the ship turns", (figure,))
+        return Outcome(name, channels, "agree", f"{channel} is never constant while the ship turns", (figure,))
     start, end = int(found[0].time_utc_ns[0]), int(found[0].time_utc_ns[-1])
     words = (
-        f"{channel} repeats itself for {(end - start) / SECOND_NS:.0f} s, in which the ship turns by "
-        f"{figure.value:.0f} deg by the {other}"
+        f"{channel} is constant for {(end - start) / SECOND_NS:.0f} s, during which the ship turns by "
+        f"{figure.value:.0f} deg according to {other}"
     )
     fault = Fault("stuck", (channel,), (end - start) / SECOND_NS, start_utc_ns=start)
     return Outcome(name, channels, "disagree", words, (figure,), 1.0, (fault,))

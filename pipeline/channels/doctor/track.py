@@ -12,7 +12,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
 #: Ratios of the two ways that are no fault, and angles between them, deg.
 RATIOS, _ANGLES_DEG = (0.85, 1.18), (-6.0, 6.0)
-#: Share of the way that may point elsewhere.
+#: Circular variance of the angles between them that is no fault.
 _ASTRAY = 0.15
 #: Windows: so many at most, over each other by three quarters; the way within each, in noises of a fix; so many at
 #: least.
@@ -42,7 +42,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         pair = VELOCITIES[kind]
         speed = pair[:1] if kind == "course" else pair
         if ways is None:
-            why = "she hardly made way between the fixes"
+            why = "the distance between the position fixes is too short"
             found += [untestable(f"{what}_{kind}", channels, why) for what in ("path", "bearing")]
             continue
         length_channels = channels if kind == "body" else ("latitude", "longitude", *speed)
@@ -93,7 +93,7 @@ def _length(name: str, channels: tuple[str, ...], speed: tuple[str, ...], ways: 
     moved, gone = np.abs(ways[0]), np.abs(ways[1])
     good = (moved > 0.0) & (gone > 0.0)
     if np.count_nonzero(good) < _FEWEST:
-        return untestable(name, channels, "one of the two stands still")
+        return untestable(name, channels, "position constant, or speed zero")
     return _length_outcome(name, channels, speed, np.log(gone[good] / moved[good]))
 
 
@@ -104,8 +104,9 @@ def _length_outcome(name: str, channels: tuple[str, ...], speed: tuple[str, ...]
     ratio = float(np.exp(middle))
     # the windows overlap: a quarter of them is independent
     std = ratio * spread / np.sqrt(max(ratios.size / 4.0, 1.0))
-    figure = Figure("way by the velocity over way by the fixes", ratio, max(std, 1e-4 * ratio), *RATIOS)
-    words = f"{' and '.join(speed)} add up to {ratio:.3g} +- {std:.1g} times the way between the fixes"
+    figure = Figure("integrated speed over distance between fixes", ratio, max(std, 1e-4 * ratio), *RATIOS)
+    what = "velocity" if len(speed) > 1 else speed[0].replace("_", " ")
+    words = f"integrated {what} is {ratio:.3g} ± {std:.1g} (1 s.e.) times the distance between fixes"
     suspects = [
         *unit_faults(speed, "m/s"),
         *unit_faults(("latitude", "longitude"), "rad"),
@@ -121,24 +122,24 @@ def _direction(kind: str, channels: tuple[str, ...], ways: tuple[Complex, Comple
     unit = turn / np.maximum(np.abs(turn), 1e-300)
     mean = complex(np.mean(unit))
     angle = float(np.angle(mean))
-    # what points elsewhere than the mean, of the whole
+    # the circular variance
     astray = 1.0 - abs(mean)
     off = np.angle(unit * np.exp(-1j * angle))
     own = 1.4826 * quantile(np.abs(off), 0.5) / np.sqrt(max(off.size / 4.0, 1.0))
     std = float(np.hypot(own, one_sided))
     figures = (
         Figure(
-            "bearing of the fixes' way from the velocity's",
+            "bearing between fixes minus direction of the velocity",
             np.rad2deg(angle),
             max(np.rad2deg(std), 0.1),
             *_ANGLES_DEG,
             "deg",
         ),
-        Figure("share that points elsewhere", astray, 0.02, 0.0, _ASTRAY),
+        Figure("circular variance of that difference", astray, 0.02, 0.0, _ASTRAY),
     )
     words = (
-        f"the way between the fixes bears {figures[0].value:+.1f} +- {figures[0].std:.1g} deg off the velocity, and "
-        f"{astray:.2f} of it points elsewhere"
+        f"bearing between fixes minus direction of the velocity is {figures[0].value:+.1f} ± {figures[0].std:.1g} deg "
+        f"(1 s.e.), with a circular variance of {astray:.2f}"
     )
     pair = VELOCITIES[kind]
     positions = ("latitude", "longitude")
@@ -170,5 +171,5 @@ def _without_course(log: Log, track: tuple[Nanoseconds, Complex]) -> list[Outcom
     channels = ("latitude", "longitude", "speed_over_ground")
     ways = _ways(track, speed.time_utc_ns, speed.value.astype(np.complex128))
     if ways is None:
-        return [untestable("path_course", channels, "she hardly made way between the fixes")]
+        return [untestable("path_course", channels, "the distance between the position fixes is too short")]
     return [_length("path_course", channels, ("speed_over_ground",), ways)]

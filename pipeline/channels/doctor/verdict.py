@@ -13,7 +13,7 @@ from kempf.pipeline.channels.doctor.outcome import Figure, Outcome
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.profile import ChannelMap
 
-_FRAMES = {"body-fixed": "earth-fixed ones are expected", "earth-fixed": "body-fixed ones are expected"}
+_FRAMES = {"body-fixed": "earth-fixed components are expected", "earth-fixed": "body-fixed components are expected"}
 
 
 def as_content(
@@ -102,21 +102,20 @@ def words(fault: Fault) -> str:
     >>> words(Fault("unit", ("speed_over_ground",), 0.514, "kn taken for m/s"))
     'speed_over_ground is in kn, taken for m/s'
     >>> words(Fault("latency", ("heading",), 2.5, "late", 0.04))
-    'heading is 2.50 +- 0.04 s late'
+    'heading is 2.50 ± 0.04 s (1 s.e.) late'
     """
     return _WORDS[fault.kind](listed(fault.channels), fault)
 
 
 def _of_offset(names: str, fault: Fault) -> str:
     if fault.name.startswith("counted"):
-        return f"{names} is {fault.name}"
-    angle = f"{fault.value * 180.0 / pi:+.1f} +- {fault.std * 180.0 / pi:.1g} deg"
-    return f"{names} is turned: {angle} are to be added"
+        return f"{names} is {fault.name.replace('counted', 'measured')}"
+    return f"{names} has an offset: add {fault.value * 180.0 / pi:+.1f} ± {fault.std * 180.0 / pi:.1g} deg (1 s.e.)"
 
 
 def _of_clock(names: str, fault: Fault) -> str:
-    pace = "fast" if fault.value > 0 else "slow"
-    return f"the clock of {names} runs {abs(fault.value) * 1e3:.3g} +- {fault.std * 1e3:.1g} s in 1000 s too {pace}"
+    pace = "gains" if fault.value > 0 else "loses"
+    return f"the clock of {names} {pace} {abs(fault.value) * 1e3:.3g} ± {fault.std * 1e3:.1g} s in 1000 s (1 s.e.)"
 
 
 _WORDS: dict[str, Callable[[str, Fault], str]] = {
@@ -125,10 +124,11 @@ _WORDS: dict[str, Callable[[str, Fault], str]] = {
     "swap": lambda names, _: f"{names} are swapped",
     "frame": lambda names, fault: f"{names} are {fault.name} where {_FRAMES[fault.name]}",
     "latency": lambda names, fault: (
-        f"{names} is {abs(fault.value):.2f} +- {fault.std:.1g} s {'late' if fault.value > 0 else 'early'}"
+        f"{names} is {abs(fault.value):.2f} ± {fault.std:.1g} s ({fault.spread}) "
+        f"{'late' if fault.value > 0 else 'early'}"
     ),
-    "scale": lambda names, fault: f"{names} is to be multiplied by {fault.value:.4g} +- {fault.std:.1g}",
-    "stuck": lambda names, _: f"{names} stands still",
+    "scale": lambda names, fault: f"{names} has to be multiplied by {fault.value:.4g} ± {fault.std:.1g} (1 s.e.)",
+    "stuck": lambda names, _: f"{names} is stuck",
     "offset": _of_offset,
     "clock_scale": _of_clock,
 }

@@ -52,7 +52,7 @@ def _compare(kind: str, water: Series, velocity: Velocity) -> Outcome:
     fast = quantile(np.abs(water.value), 0.98)
     good = way & np.isfinite(own) & (np.abs(np.nan_to_num(own)) > 0.4 * fast)
     if np.count_nonzero(good) < _FEWEST or not float(np.median(np.abs(own[good]))) > 0.0:
-        return untestable(name, channels, "one of the two stands still, or they hardly overlap")
+        return untestable(name, channels, "speed too low, or the two hardly overlap in time")
     own, over, direction = _by_sector(own[good], velocity.value[good])
     # U = k w + the stream along the way; on several courses the stream can be separated from k
     columns = np.column_stack([own, np.cos(direction), np.sin(direction)])
@@ -60,12 +60,12 @@ def _compare(kind: str, water: Series, velocity: Velocity) -> Outcome:
     prior = np.array([np.inf, *[STREAM_STD_M_S] * 2])
     fitted = posterior(columns, over, np.full(over.shape, _SECTOR_STD * speed), prior)
     if fitted.value[0] == 0.0:
-        return untestable(name, channels, "one of the two stands still")
+        return untestable(name, channels, "one of the two speeds is zero")
     slope = float(fitted.value[0])
     ratio = 1.0 / slope
     std = abs(ratio) * float(np.hypot(fitted.std[0] / slope, _ZERO_M_S / speed))
-    figure = Figure("speed through the water over that over ground, the stream taken out", ratio, std, *_RATIOS)
-    words = f"the log reads {ratio:.2f} +- {std:.2g} times the speed over ground, the stream taken out"
+    figure = Figure("speed through the water over speed over ground, current removed", ratio, std, *_RATIOS)
+    words = f"speed through the water is {ratio:.2f} ± {std:.2g} (1 s.e.) times the speed over ground, current removed"
     suspects = [
         Fault("sign", ("speed_through_water",)),
         *unit_faults(("speed_through_water",), "m/s"),

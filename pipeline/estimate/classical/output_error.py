@@ -49,7 +49,7 @@ def identify(record: Record, spec: ModelSpec, arm_per_m: float, settings: Output
     found = maximum_likelihood.identify(used, still, arm_per_m, settings)
     if not disturbed(spec):
         return replace(found, estimator="output-error")
-    unknown = "output-error knows nothing of wind and current: what they do is taken for the ship's own, or for noise"
+    unknown = "output-error does not model wind and current; they bias the parameters"
     return replace(found, estimator="output-error", warnings=(unknown, *found.warnings))
 
 

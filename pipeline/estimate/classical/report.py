@@ -54,7 +54,7 @@ def estimate_of(
     step, speed = step_of(record), record.mean_speed_m_s
     said = [*record.warnings]
     if disturbed(spec):
-        said.append(f"{name} knows nothing of {blind_to}: what they do is taken for the ship's own, or for noise")
+        said.append(f"{name} does not model {blind_to}; they bias the parameters")
     if not converged:
         said.append(f"not converged: {reason}")
     said += warnings

@@ -168,7 +168,7 @@ def _first_fits(
         else:
             reasons.append("not_converged")
     kept.sort(key=lambda pair: pair[0].start_utc_ns)
-    said = (f"{len(reasons)} of {len(companions)} companion runs left out: {', '.join(reasons)}",) if reasons else ()
+    said = (f"{len(reasons)} of {len(companions)} other manoeuvres left out: {', '.join(reasons)}",) if reasons else ()
     return [r for r, _ in kept], tuple(e for _, e in kept), said
 
 
@@ -182,7 +182,7 @@ def _known(no_log: NoLogSettings, record: Record) -> tuple[NoLogSettings, tuple[
             "trial_speed",
             f"The trial speed is {speed} m/s with a standard deviation of {std} m/s; expected positive numbers, and no "
             "standard deviation without a speed.",
-            "Say at which speed she goes on a straight course at this shaft speed, and how well it is known.",
+            "Give the speed on a straight course at this shaft speed, and its standard deviation.",
         )
     if std is not None:
         return no_log, ()
@@ -329,18 +329,18 @@ def _speed_report(
 
 
 def _warnings(speed: Speed, own: int, mean: float, std: float, current: str, *, converged: bool) -> list[str]:
-    said = [f"no water log: speed {mean:.2f} m/s, standard error {std:.2g} m/s, estimated from GNSS and the turning"]
+    said = [f"no water log: speed {mean:.2f} m/s, standard error {std:.2g} m/s, estimated from GNSS and the turns"]
     if current == "none":
         said.append("the model has no current: the GNSS speed along the bow is the speed through the water")
     if std > _POORLY_KNOWN * mean:
         said.append(
             f"the speed through the water is known to {100 * std / mean:.0f} % only, and every parameter with it: "
-            "sail a run on the opposite heading, or state the trial speed and how well it is known"
+            "sail a manoeuvre on the opposite heading, or state the trial speed and how well it is known"
         )
     if _contradicts(speed, own):
         said.append(
-            f"her lateral motion shows {speed.misfit_m_s[own][0]:.2f} m/s of current along the course that the GNSS "
-            "along the bow does not: the hull does something that eq. (16) lacks, and the speed is less certain for it"
+            f"the lateral motion implies {speed.misfit_m_s[own][0]:.2f} m/s more current along the course than the "
+            "GNSS speed along the bow: unmodelled hull force; the speed is less certain"
         )
     if not converged:
         said.append("not converged: the speed through the water still moved when the rounds allowed ran out")

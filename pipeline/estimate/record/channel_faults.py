@@ -34,7 +34,7 @@ CODES = {
 FARTHEST_RAD = float(np.deg2rad(45.0))
 _NEXT_STEPS = {
     "heading_stuck": "Identification needs a working heading: repair the compass or map another one, and repeat the "
-    "manoeuvre; where it stands still for a while only, identify the part before or after.",
+    "manoeuvre; where it is stuck only for a while, identify the part before or after.",
     "course_not_along_heading": "Check unit, sign and offset of heading and course, and whether she went astern{line}.",
     "speed_negative": "Write {line} if she went ahead, or choose a segment ahead.",
 }
