@@ -119,8 +119,8 @@ def _require_name(alias: str) -> None:
         )
 
 
-def withdraw(warehouse: Warehouse, vessel: str, alias: str = CURRENT) -> bool:
-    """Let an alias of a vessel point to nothing.
+def withdraw(warehouse: Warehouse, vessel: str) -> bool:
+    """Let ``current`` of a vessel point to nothing.
 
     Returns
     -------
@@ -131,9 +131,9 @@ def withdraw(warehouse: Warehouse, vessel: str, alias: str = CURRENT) -> bool:
 
     def attempt() -> bool:
         with delta.ensured(warehouse, "aliases") as table:
-            if delta.rows(table, "aliases", {"vessel_key": key, "alias": alias}).height == 0:
+            if delta.rows(table, "aliases", {"vessel_key": key, "alias": CURRENT}).height == 0:
                 return False
-            delta.replace(table, "aliases", [], f"vessel_key = {quoted(key)} AND alias = {quoted(alias)}")
+            delta.replace(table, "aliases", [], f"vessel_key = {quoted(key)} AND alias = {quoted(CURRENT)}")
             return True
 
     return with_retry(attempt)

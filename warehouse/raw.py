@@ -96,12 +96,6 @@ def opened(warehouse: Warehouse, name: str) -> Iterator[LogFile]:
         yield log
 
 
-def get(warehouse: Warehouse, name: str) -> bytes:
-    """Return the bytes of a log as delivered; raises what `opened` raises."""
-    with opened(warehouse, name) as log:
-        return log.whole()
-
-
 def _place(name: str) -> tuple[str, ...]:
     is_hash = len(name) == 64 and set(name) <= set("0123456789abcdef")
     return ("raw", name[:2], name) if is_hash else ("raw", "none")

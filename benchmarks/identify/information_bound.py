@@ -15,7 +15,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.model.discretise import R, V
+from kempf.pipeline.model.chain import R, V
 from kempf.schemas.model_spec import ModelSpec
 
 _HULL = 6

@@ -25,7 +25,7 @@ from kempf.pipeline.estimate.paper.procedure import ProcedureCourse, ProcedureSe
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.sampled import Sampled, sample
-from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discretise
+from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discrete_from_continuous
 from kempf.pipeline.model.vehicle import LinearVehicle
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.instruments import Instrument
@@ -134,7 +134,7 @@ def errors(sailed: Sailed, A: Float, B: Float) -> Float:
 def attenuated(sailed: Sailed, noise: float) -> Float:
     """What the theory predicts for a regression on noisy regressors, [A B] M (M + R)^-1; errors in percent."""
     s = sailed.sampled
-    A, B = discretise(sailed.truth, s.speed_m_s, s.step_s)
+    A, B = discrete_from_continuous(sailed.truth, s.speed_m_s, s.step_s)
     Z = np.column_stack([sailed.states, s.rudder])[:-1]
     M = Z.T @ Z / Z.shape[0]
     lateral = VELOCITY_NOISE**2 + (s.speed_m_s * HEADING_NOISE) ** 2
@@ -146,7 +146,7 @@ def attenuated(sailed: Sailed, noise: float) -> Float:
 def undisturbed(sailed: Sailed) -> Float:
     """Eq. (14) on the measurements with the *true* disturbances taken off; errors in percent."""
     s = sailed.sampled
-    A, _ = discretise(sailed.truth, s.speed_m_s, s.step_s)
+    A, _ = discrete_from_continuous(sailed.truth, s.speed_m_s, s.step_s)
     entering = vehicle(sailed, 0.0).entering(A)[:, 0]
     clean = s.measured - np.outer(sailed.currents, [1.0, 0.0])
     found = regress(clean[:-1], s.rudder[:-1, None], clean[1:] - np.outer(sailed.forces[:-1], entering))

@@ -29,7 +29,7 @@ from kempf.pipeline.estimate.paper.ship import (
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.sampled import Sampled
 from kempf.pipeline.estimate.result import Estimate, Value
-from kempf.pipeline.model.ship import Hull, discretise
+from kempf.pipeline.model.ship import Hull, discrete_from_continuous
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.instruments import Instrument
@@ -138,7 +138,7 @@ def reproduce_paper(progress: Progress = silent) -> Reproduction:
         experiments.append(_experiment(factor))
     ship = HULLS[_HULL]
     truth = {name: float(getattr(ship.parameters, name)) for name in HULL_PARAMETERS}
-    A, B = discretise(Hull(**truth), ship.trial_speed_m_s, 1.0 / _RATE_HZ)
+    A, B = discrete_from_continuous(Hull(**truth), ship.trial_speed_m_s, 1.0 / _RATE_HZ)
     flat = [float(x) for x in (*A.ravel(), *B.ravel())]
     discrete = tuple(
         Value(v.name, x, 0.0, v.unit) for v, x in zip(experiments[0].procedure.discrete, flat, strict=True)

@@ -24,7 +24,7 @@ from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate, Value, discrete_values, hull_values
 from kempf.pipeline.estimate.search.climb import Pass, Search, free
 from kempf.pipeline.estimate.uncertainty import from_information, sandwich
-from kempf.pipeline.model.discretise import F, M
+from kempf.pipeline.model.chain import F, M
 from kempf.pipeline.model.disturbances import change_within
 from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.model.ship import Hull, discretise
+from kempf.pipeline.model.ship import Hull, discrete_from_continuous
 from kempf.schemas.model_spec import HULL_PARAMETERS
 
 
@@ -74,7 +74,7 @@ def discrete_values(hull: Float, covariance: Float, speed_m_s: float, step_s: fl
     """
 
     def flat(parameters: Float) -> Float:
-        A, B = discretise(Hull(*parameters), speed_m_s, step_s)
+        A, B = discrete_from_continuous(Hull(*parameters), speed_m_s, step_s)
         return np.concatenate([A.ravel(), B.ravel()])
 
     centre = flat(hull)

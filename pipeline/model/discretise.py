@@ -11,10 +11,8 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.compiled import STEP, njit
+from kempf.pipeline.model.chain import N_CHAIN, PSI, F, M, R, V
 
-#: rows and columns of the chain
-V, R, PSI, F, M = 0, 1, 2, 3, 4
-N_CHAIN = 5
 _N_A = 4  # a11, a12, a21, a22
 _ORDER = 16  # Taylor terms: 0.5^17 / 17! is below the last bit of a double
 _SETTLED = 1e-16

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from kempf.pipeline.compiled import FILLING, njit
 from kempf.pipeline.model.batch import each
+from kempf.pipeline.model.chain import N_CHAIN, PSI, F, M, R, V
 from kempf.pipeline.model.terms.evaluation import evaluate
 from kempf.schemas.symbols import SYMBOLS
 
@@ -19,8 +20,7 @@ SHIP, CHANNEL, PARAMETER = SYMBOLS.index("a11"), SYMBOLS.index("U"), len(SYMBOLS
 N_INPUT = 2 + PARAMETER - CHANNEL + 1
 SPEED_ERROR_GAIN = N_INPUT - 1
 #: states before those of effects, and after
-N_BEFORE, N_AFTER, MOST_EXTRA = 6, 3, 4
-V, R, PSI, F, M, E = 0, 1, 2, 3, 4, 5
+E, N_BEFORE, N_AFTER, MOST_EXTRA = N_CHAIN, N_CHAIN + 1, 3, 4
 #: what a program is added to
 ON_SPEED, ON_RUDDER, ON_SWAY, ON_YAW, ON_EXTRA, ON_LATERAL, ON_YAW_RATE, ON_HEADING = 0, 1, 2, 3, 4, 5, 6, 7
 ON_NOISE, ON_INITIAL = 8, 9

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.chain import CHAIN, N_CHAIN
 from kempf.pipeline.model.ship import Hull
 
-#: rows and columns of the chain
-SWAY, YAW, HEADING, FORCE, MOMENT = 0, 1, 2, 3, 4
-N_CHAIN = 5
+SWAY, YAW, HEADING, FORCE, MOMENT = CHAIN
 #: Taylor terms; 1 / 19! is below the last bit of a double for |A| h up to 1
 _ORDER = 18
 _SETTLED = 1e-18

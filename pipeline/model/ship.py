@@ -5,9 +5,9 @@ from __future__ import annotations
 from dataclasses import astuple, dataclass
 
 import numpy as np
-from scipy.linalg import expm
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.zero_order_hold import zero_order_hold
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ def mariner_like(length_m: float) -> Hull:
     return Hull(m.a11 / L, m.a12, m.a21 / L**2, m.a22 / L, m.b1 / L, m.b2 / L**2)
 
 
-def discretise(hull: Hull, speed_m_s: float, step_s: float) -> tuple[Float, Float]:
+def discrete_from_continuous(hull: Hull, speed_m_s: float, step_s: float) -> tuple[Float, Float]:
     """Return the matrices of eq. (17) for a rudder held over the step.
 
     Parameters
@@ -67,11 +67,7 @@ def discretise(hull: Hull, speed_m_s: float, step_s: float) -> tuple[Float, Floa
     A : ndarray, shape (2, 2)
     B : ndarray, shape (2, 1)
     """
-    A, B = hull.continuous(speed_m_s)
-    block = np.zeros((3, 3))
-    block[:2, :2], block[:2, 2:] = A * step_s, B * step_s
-    exponential = expm(block)
-    return exponential[:2, :2], exponential[:2, 2:]
+    return zero_order_hold(*hull.continuous(speed_m_s), step_s)
 
 
 def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float) -> Hull | None:
@@ -91,7 +87,7 @@ def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float
     Examples
     --------
     >>> hull = mariner_like(150.0)
-    >>> A, B = discretise(hull, 9.0, 1.0)
+    >>> A, B = discrete_from_continuous(hull, 9.0, 1.0)
     >>> back = continuous_from_discrete(A, B, 9.0, 1.0)
     >>> bool(np.allclose(back.array(), hull.array(), rtol=1e-9))
     True
@@ -110,9 +106,7 @@ def continuous_from_discrete(A: Float, B: Float, speed_m_s: float, step_s: float
     factor = angle / s if s > 1e-8 * abs(m) else 1.0 / m
     generator = 0.5 * np.log(determinant) * np.eye(2) + factor * N
     # B = integral of e^{A_c t} over the step times B_c: the same integral, undone
-    block = np.zeros((4, 4))
-    block[:2, :2], block[:2, 2:] = generator, np.eye(2)
-    integral = expm(block)[:2, 2:]
+    integral = zero_order_hold(generator, np.eye(2), 1.0)[1]
     if not np.all(np.isfinite(generator)) or np.linalg.cond(integral) > 1e12:
         return None
     inputs = np.linalg.solve(integral, B) / step_s

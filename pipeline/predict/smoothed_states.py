@@ -15,9 +15,10 @@ from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.filters.smoother import LinearSystem, smooth
 from kempf.pipeline.estimate.likelihood import INITIAL_STD
 from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.model.chain import CHAIN
 from kempf.pipeline.predict.free_run import FreeRun
 
-_V, _R, _PSI, _F, _M, _C1, _C2, _B = range(8)
+_V, _R, _PSI, _F, _M, _C1, _C2, _B = *CHAIN, 5, 6, 7
 
 
 def smoothed_states(filtered: RunFilter, point: Point, free: FreeRun) -> Float:

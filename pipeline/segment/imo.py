@@ -32,8 +32,8 @@ class Criterion:
     why: str
 
 
-def first_overshoot_limit(length_m: float, speed_m_s: float) -> float:
-    """Return the limit of the first overshoot of a 10/10 zigzag, deg.
+def overshoot_limits(length_m: float, speed_m_s: float) -> tuple[float, float]:
+    """Return the limits of the first and the second overshoot of a 10/10 zigzag, deg.
 
     Parameters
     ----------
@@ -44,40 +44,20 @@ def first_overshoot_limit(length_m: float, speed_m_s: float) -> float:
 
     Returns
     -------
-    float
+    first : float
         10 deg below ``L/V = 10 s``, 20 deg from 30 s, ``5 + L/V / 2`` between.
+    second : float
+        25 deg below, 40 deg from 30 s, ``17.5 + 0.75 L/V`` between.
 
     Examples
     --------
-    >>> first_overshoot_limit(160.0, 8.0)
-    15.0
+    >>> overshoot_limits(160.0, 8.0)
+    (15.0, 32.5)
     """
     ratio = length_m / speed_m_s
-    return 10.0 if ratio < 10.0 else 20.0 if ratio >= 30.0 else 5.0 + 0.5 * ratio
-
-
-def second_overshoot_limit(length_m: float, speed_m_s: float) -> float:
-    """Return the limit of the second overshoot of a 10/10 zigzag, deg.
-
-    Parameters
-    ----------
-    length_m : float
-        Length between perpendiculars.
-    speed_m_s : float
-        Test speed.
-
-    Returns
-    -------
-    float
-        25 deg below ``L/V = 10 s``, 40 deg from 30 s, ``17.5 + 0.75 L/V`` between.
-
-    Examples
-    --------
-    >>> second_overshoot_limit(160.0, 8.0)
-    32.5
-    """
-    ratio = length_m / speed_m_s
-    return 25.0 if ratio < 10.0 else 40.0 if ratio >= 30.0 else 17.5 + 0.75 * ratio
+    if ratio < 10.0:
+        return 10.0, 25.0
+    return (20.0, 40.0) if ratio >= 30.0 else (5.0 + 0.5 * ratio, 17.5 + 0.75 * ratio)
 
 
 def judge(zigzag: Zigzag, length_m: float | None, trial_speed_m_s: float | None) -> tuple[Criterion, ...]:
@@ -112,7 +92,7 @@ def judge(zigzag: Zigzag, length_m: float | None, trial_speed_m_s: float | None)
         if not length_m or not speed:
             why = f"the {'length' if not length_m else 'speed'} of the ship is not known"
             return tuple(Criterion(name, _overshoot(zigzag, k), None, None, why) for k, name in enumerate(names))
-        limits = (first_overshoot_limit(length_m, speed), second_overshoot_limit(length_m, speed))
+        limits = overshoot_limits(length_m, speed)
     elif angles != (20.0, 20.0):
         why = f"the standard knows 10/10 and 20/20 zigzags, this is a {angles[0]:g}/{angles[1]:g} one"
         return (Criterion("overshoot", _overshoot(zigzag, 0), None, None, why),)

@@ -37,11 +37,6 @@ class HullParameters:
     b1: float
     b2: float
 
-    @property
-    def stability(self) -> float:
-        """Determinant a11 a22 - a12 a21, 1/m^2; positive for a ship that is stable on a straight course."""
-        return self.a11 * self.a22 - self.a12 * self.a21
-
 
 @dataclass(frozen=True)
 class SimulatedHull:

@@ -15,7 +15,6 @@ from kempf.pipeline.simulate.random_streams import stream
 from kempf.pipeline.simulate.trial import Trial
 from kempf.schemas.units import factor_to_si
 
-Float = NDArray[np.float64]
 Nanoseconds = NDArray[np.int64]
 
 _MILLISECOND_NS = 1_000_000

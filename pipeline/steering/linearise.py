@@ -13,7 +13,8 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model import dynamics
 from kempf.pipeline.model.batch import ONE
-from kempf.pipeline.model.dynamics import N_BEFORE, N_INPUT, PARAMETER, PSI, RDOT, SHIP, VDOT, E, R, V
+from kempf.pipeline.model.chain import PSI, R, V
+from kempf.pipeline.model.dynamics import N_BEFORE, N_INPUT, PARAMETER, RDOT, SHIP, VDOT, E
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.model.terms.program import DEPTH
 from kempf.pipeline.steering.motion import LinearMotion, ShipEffects

@@ -12,14 +12,12 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.chain import N_CHAIN, PSI, F, M, R, V
 from kempf.pipeline.model.ship import Hull
 
 if TYPE_CHECKING:
     from kempf.pipeline.model.effect_model import EffectModel
 
-#: v, r, psi, F and M come before the states of effects, in the filter's order
-V, R, PSI, F, M = 0, 1, 2, 3, 4
-N_BEFORE = 5
 _STEP = 2.0**-20
 
 
@@ -71,10 +69,10 @@ class LinearMotion:
     @property
     def own_states(self) -> list[int]:
         """Which of the effects' states take part: they are moved by something, and something goes by them."""
-        own = range(N_BEFORE, self.A.shape[0])
+        own = range(N_CHAIN, self.A.shape[0])
         goes_by = self.A != 0.0
         seen = _reached([i for i in own if goes_by[[V, R], i].any() or self.C[:, i].any()], goes_by, own)
-        driven = [i for i in own if goes_by[i, [V, R]].any() or self.B[i] != 0.0 or self.noise[i - N_BEFORE] > 0.0]
+        driven = [i for i in own if goes_by[i, [V, R]].any() or self.B[i] != 0.0 or self.noise[i - N_CHAIN] > 0.0]
         return sorted(set(seen) & set(_reached(driven, goes_by.T, own)))
 
 
@@ -108,11 +106,11 @@ def linear_motion(
         from kempf.pipeline.steering.linearise import motion_with_effects
 
         return motion_with_effects(hull, effects, speed_m_s, arm_per_m, course_rad)
-    A, B = np.zeros((N_BEFORE, N_BEFORE)), np.zeros(N_BEFORE)
+    A, B = np.zeros((N_CHAIN, N_CHAIN)), np.zeros(N_CHAIN)
     own, by_rudder = hull.continuous(speed_m_s)
     A[:2, :2], B[:2] = own, by_rudder[:, 0]
     A[V, F], A[R, F], A[R, M], A[PSI, R] = 1.0, arm_per_m, 1.0, 1.0
-    return LinearMotion(A, B, np.eye(3, N_BEFORE), np.zeros(3), np.zeros(0), 0.0, 0.0, np.zeros(3), np.zeros(3))
+    return LinearMotion(A, B, np.eye(3, N_CHAIN), np.zeros(3), np.zeros(0), 0.0, 0.0, np.zeros(3), np.zeros(3))
 
 
 @dataclass(frozen=True, eq=False)

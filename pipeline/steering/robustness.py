@@ -11,10 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import expm
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
+from kempf.pipeline.model.zero_order_hold import zero_order_hold
 from kempf.pipeline.steering.course_keeping import Law
 from kempf.pipeline.steering.motion import ShipEffects
 from kempf.pipeline.steering.state_space import continuous
@@ -43,12 +43,8 @@ def _steered_ships(law: Law, ships: Float, speed_m_s: float, effects: ShipEffect
     for theta in ships:
         own = replace(effects, values=theta[6:]) if effects is not None else None
         made.append(continuous(Hull(*theta[:6].tolist()), _STILL, speed_m_s, effects=own))
-    n = len(made[0].states)
-    block = np.zeros((len(made), n + 1, n + 1))
-    block[:, :n, :n] = [one.A for one in made]
-    block[:, :n, n:] = [one.B for one in made]
-    both = expm(block * law.step_s)
-    return SteeredShips(both[:, :n, :n], both[:, :n, n:], np.array([one.measured for one in made]))
+    held = zero_order_hold(np.array([one.A for one in made]), np.array([one.B for one in made]), law.step_s)
+    return SteeredShips(*held, np.array([one.measured for one in made]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,7 +127,6 @@ def share_held(
     *,
     effects: ShipEffects | None = None,
     draws: int = 400,
-    seed: int = 0,
 ) -> float:
     """Return the share of the ships that the data allow which the law keeps stable; NaN without a covariance.
 
@@ -144,16 +139,14 @@ def share_held(
     effects : ShipEffects, optional
         Of the estimate.
     draws : int, optional
-        How many.
-    seed : int, optional
-        Of the draws.
+        How many; always the same ones.
     """
     if not np.all(np.isfinite(covariance)):
         return float("nan")
     centre = np.concatenate([hull.array(), effects.values if effects is not None else np.zeros(0)])
     scale = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     values, vectors = np.linalg.eigh(covariance / np.outer(scale, scale))
-    normal = np.random.default_rng(seed).standard_normal((draws, centre.size))
+    normal = np.random.default_rng(0).standard_normal((draws, centre.size))
     ships = centre + normal @ (vectors * np.sqrt(np.maximum(values, 0.0))).T * scale
     if effects is not None:
         # a lag of nothing has no state: what is there stays there, and what is not stays away

@@ -17,9 +17,11 @@ import numpy as np
 from scipy.linalg import expm
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.chain import N_CHAIN, PSI, F, R, V
 from kempf.pipeline.model.disturbances import level_of_change
 from kempf.pipeline.model.ship import Hull
-from kempf.pipeline.steering.motion import N_BEFORE, PSI, F, R, ShipEffects, V, linear_motion
+from kempf.pipeline.model.zero_order_hold import zero_order_hold
+from kempf.pipeline.steering.motion import ShipEffects, linear_motion
 from kempf.pipeline.steering.nomoto import require_numbers
 from kempf.pipeline.steering.rudder_path import rudder_path
 from kempf.schemas.errors import UsageError
@@ -179,7 +181,7 @@ def continuous(
         Q[i, i] = 2.0 * mu * (levels.wind_m_s2 if name == "F" else levels.current_m_s) ** 2
         if name != "F":
             C[0, i] = C[3, i] = across[name]
-    Q[own, own] = [motion.noise[i - N_BEFORE] for i in moved]
+    Q[own, own] = [motion.noise[i - N_CHAIN] for i in moved]
     R_ = np.diag(np.square([levels.lateral_speed_m_s, levels.yaw_rate_rad_s, levels.heading_rad]))
     D = np.zeros((len(OUTPUTS), 1))
     D[:N_MEASURED, 0] = motion.D * path.D
@@ -190,7 +192,7 @@ def continuous(
 
 def _names(effects: ShipEffects | None, moved: list[int]) -> list[str]:
     every = [f"{e.name}_{state.name}" for e in (effects.model.effects if effects else ()) for state in e.states]
-    return [every[i - N_BEFORE] for i in moved]
+    return [every[i - N_CHAIN] for i in moved]
 
 
 def discretised(model: StateSpace, step_s: float) -> StateSpace:
@@ -215,12 +217,8 @@ def discretised(model: StateSpace, step_s: float) -> StateSpace:
             "continuous model and more than 0 s.",
             "Give a step in seconds.",
         )
-    n = model.A.shape[0]
-    held = np.zeros((n + 1, n + 1))
-    held[:n, :n], held[:n, n:] = model.A * step_s, model.B * step_s
-    both = expm(held)
-    A = both[:n, :n]
-    return replace(model, A=A, B=both[:n, n:], Q=_noise_of_a_step(model.A, model.Q, step_s), step_s=step_s)
+    A, B = zero_order_hold(model.A, model.B, step_s)
+    return replace(model, A=A, B=B, Q=_noise_of_a_step(model.A, model.Q, step_s), step_s=step_s)
 
 
 def _noise_of_a_step(A: Float, Q: Float, step_s: float) -> Float:

@@ -7,7 +7,7 @@ import pytest
 
 from kempf.pipeline.estimate.paper.least_squares import Regression, regress, whole_pairs
 from kempf.pipeline.estimate.record.sampled import Sampled
-from kempf.pipeline.model.ship import continuous_from_discrete, discretise, mariner_like
+from kempf.pipeline.model.ship import continuous_from_discrete, discrete_from_continuous, mariner_like
 
 
 def stacked(found: Regression) -> np.ndarray:
@@ -53,7 +53,7 @@ def test_nothing_measured_but_zero_gives_zero() -> None:
 @pytest.mark.parametrize("step_s", [0.5, 2.0])
 def test_exact_recovery_without_noise_and_disturbance(step_s: float) -> None:
     hull, V = mariner_like(120.0), 6.0
-    A, B = discretise(hull, V, step_s)
+    A, B = discrete_from_continuous(hull, V, step_s)
     u = 0.3 * np.sign(np.sin(0.05 * np.arange(400)))[:, None]
     x = np.zeros((400, 2))
     for k in range(399):

@@ -18,7 +18,7 @@ from benchmarks.baselines.step import exact_step, innovations
 from kempf.pipeline.estimate.classical import subspace
 from kempf.pipeline.estimate.classical.resample import even, step_of, without_means
 from kempf.pipeline.estimate.result import Estimate
-from kempf.pipeline.model.ship import Hull, discretise, mariner_like
+from kempf.pipeline.model.ship import Hull, discrete_from_continuous, mariner_like
 from kempf.pipeline.simulate.disturbances import CALM
 from kempf.pipeline.simulate.trial import PAPER_ENVIRONMENT, Trial
 from kempf.schemas.errors import DataRejected
@@ -139,7 +139,7 @@ def test_the_step_is_exact(length: float, speed: float, span: float) -> None:
     hull = mariner_like(length)
     A, g = np.empty((2, 2)), np.empty(2)
     assert exact_step(hull.array(), speed, span, 0.1, -0.3, A, g)
-    expected, held = discretise(hull, speed, span)
+    expected, held = discrete_from_continuous(hull, speed, span)
     np.testing.assert_allclose(A, expected, rtol=1e-12, atol=1e-15)
     F, b = hull.continuous(speed)
     ramp = solve_ivp(
@@ -158,7 +158,7 @@ def test_a_hull_that_answers_absurdly_fast_is_refused() -> None:
 def test_innovations_of_the_true_predictor_are_the_noise_that_made_the_record() -> None:
     random, n, step, speed = np.random.default_rng(5), 300, 1.0, 8.0
     hull = mariner_like(140.0)
-    A, B = discretise(hull, speed, step)
+    A, B = discrete_from_continuous(hull, speed, step)
     K = np.array([[0.2, 1.0], [0.0005, 0.3]])
     u = np.full(n, 0.2)
     e = random.standard_normal((n, 2)) * [0.05, 5e-4]
@@ -172,7 +172,7 @@ def test_innovations_of_the_true_predictor_are_the_noise_that_made_the_record() 
 
 
 def _driven(n: int, hull: Hull, seed: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    A, B = discretise(hull, 8.0, 1.0)
+    A, B = discrete_from_continuous(hull, 8.0, 1.0)
     u = np.random.default_rng(seed).uniform(-0.3, 0.3, (n, 1))
     x = np.zeros((n, 2))
     for k in range(n - 1):
@@ -204,7 +204,7 @@ def test_the_bank_weighs_by_the_joint_gaussian() -> None:
     value = np.empty(1)
     multiple_models.bank_log_likelihood(hull.array()[None], process, noise, 1.0, np.full(n, speed), u, y, value)
     F, b = hull.continuous(speed)
-    A, B = discretise(hull, speed, 1.0)
+    A, B = discrete_from_continuous(hull, speed, 1.0)
     Q = 0.5 * (A @ np.diag(process) @ A.T + np.diag(process))
     mean, own = np.zeros((n, 2)), [np.diag([4.0, 0.04])]
     for k in range(1, n):

@@ -12,7 +12,7 @@ from scipy.integrate import solve_ivp
 from scipy.linalg import logm
 from scipy.signal import cont2discrete
 
-from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discretise, mariner_like
+from kempf.pipeline.model.ship import Hull, continuous_from_discrete, discrete_from_continuous, mariner_like
 
 PARTICULARS = st.tuples(st.floats(1.5, 400.0), st.floats(0.5, 15.0), st.floats(0.02, 1.0))
 PRIME = st.tuples(
@@ -39,7 +39,7 @@ def test_round_trip_through_the_discrete_form(
     # the step in times the ship needs for her length: stable and unstable hulls alike
     step_s = ship_lengths * length_m / speed_m_s
     hull = scaled(prime, length_m)
-    back = continuous_from_discrete(*discretise(hull, speed_m_s, step_s), speed_m_s, step_s)
+    back = continuous_from_discrete(*discrete_from_continuous(hull, speed_m_s, step_s), speed_m_s, step_s)
     assert back is not None
     unit = np.array([1 / length_m, 1.0, length_m**-2, 1 / length_m, 1 / length_m, length_m**-2])
     np.testing.assert_allclose(back.array() / unit, hull.array() / unit, rtol=1e-9, atol=1e-9)
@@ -55,7 +55,7 @@ def test_discrete_form_is_the_zero_order_hold(
     A = np.array([[hull.a11 * V, hull.a12 * V], [hull.a21 * V, hull.a22 * V]])
     B = np.array([[hull.b1 * V**2], [hull.b2 * V**2]])
     expected = cont2discrete((A, B, np.eye(2), np.zeros((2, 1))), step_s)
-    found = discretise(hull, V, step_s)
+    found = discrete_from_continuous(hull, V, step_s)
     np.testing.assert_allclose(found[0], expected[0], rtol=1e-9, atol=1e-12)
     np.testing.assert_allclose(found[1], expected[1], rtol=1e-9, atol=1e-12)
 
@@ -71,7 +71,7 @@ def test_discrete_step_is_the_solution_of_the_differential_equation() -> None:
         ]
 
     path = solve_ivp(slope, (0.0, step_s), start, rtol=1e-11, atol=1e-13)
-    A, B = discretise(hull, V, step_s)
+    A, B = discrete_from_continuous(hull, V, step_s)
     np.testing.assert_allclose(A @ start + B[:, 0] * delta, path.y[:, -1], rtol=1e-8)
 
 
@@ -97,7 +97,7 @@ def test_circling_eigenvalues_have_a_ship() -> None:
     assert hull is not None
     assert hull.a12 * 5.0 * 0.5 == pytest.approx(angle)
     assert hull.a11 * 5.0 * 0.5 == pytest.approx(np.log(0.9))
-    again_A, again_B = discretise(hull, 5.0, 0.5)
+    again_A, again_B = discrete_from_continuous(hull, 5.0, 0.5)
     np.testing.assert_allclose(again_A, A, atol=1e-12)
     np.testing.assert_allclose(again_B[:, 0], [0.1, 0.01], atol=1e-12)
 
@@ -105,7 +105,10 @@ def test_circling_eigenvalues_have_a_ship() -> None:
 def test_the_scaled_mariner_keeps_her_shape() -> None:
     short, long = mariner_like(10.0), mariner_like(200.0)
     # the same ship in her own time: L/V steps give the same eigenvalues
-    small, large = discretise(short, 2.0, 10.0 / 2.0)[0], discretise(long, 8.0, 200.0 / 8.0)[0]
+    small, large = (
+        discrete_from_continuous(short, 2.0, 10.0 / 2.0)[0],
+        discrete_from_continuous(long, 8.0, 200.0 / 8.0)[0],
+    )
     np.testing.assert_allclose(np.sort(np.linalg.eigvals(small)), np.sort(np.linalg.eigvals(large)), rtol=1e-12)
 
 

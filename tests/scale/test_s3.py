@@ -22,7 +22,7 @@ from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import seen
 from tests.scale.conftest import Bucket
-from tests.warehouse.samples import START_NS, inputs, parameter_set
+from tests.warehouse.samples import START_NS, inputs, parameter_set, raw_bytes
 from tests.workbench.driving import kempf
 
 QUICK = Request(estimator="least-squares")
@@ -49,7 +49,7 @@ def test_a_bucket_says_what_a_folder_says(stored: Warehouse, ferry: Ship, tmp_pa
     assert {name: len(rows) for name, rows in there.items()} == {name: len(rows) for name, rows in here.items()}
     assert there == here and len(there["readings"]) > 1000
     (row,) = logs.current(stored)
-    assert raw.get(stored, row.log_id) == ferry.csv
+    assert raw_bytes(stored, row.log_id) == ferry.csv
     fields = {f.name: f.metadata.get("unit") for f in delta.ensure_table(stored, "readings").schema().fields}
     assert fields["heading_rad"] == "rad"
 
@@ -102,9 +102,9 @@ def test_a_damaged_object_is_told_and_mended(stored: Warehouse, ferry: Ship) -> 
     (row,) = logs.current(stored)
     stored.write_bytes(ferry.csv[:-1], "raw", row.log_id[:2], row.log_id)
     with pytest.raises(KempfError, match="is damaged"):
-        raw.get(stored, row.log_id)
+        raw_bytes(stored, row.log_id)
     raw.put(stored, LogFile(ferry.csv))
-    assert raw.get(stored, row.log_id) == ferry.csv
+    assert raw_bytes(stored, row.log_id) == ferry.csv
 
 
 def test_what_cannot_be_reached_is_one_clear_error_that_may_pass(bucket: Bucket) -> None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import pytest
 
 from kempf.pipeline.segment.find import find_manoeuvres
-from kempf.pipeline.segment.imo import first_overshoot_limit, judge, second_overshoot_limit
+from kempf.pipeline.segment.imo import judge, overshoot_limits
 from kempf.pipeline.segment.zigzag import SpeedConstancy, Zigzag
 from tests.segment.nomoto import Instruments, Ship, measure
 
@@ -31,8 +31,7 @@ def zigzag(psi0: float, delta0: float, legs: int = 5) -> Zigzag:
     ],
 )
 def test_limits_of_the_resolution(ratio: float, first: float, second: float) -> None:
-    assert first_overshoot_limit(8.0 * ratio, 8.0) == pytest.approx(first)
-    assert second_overshoot_limit(8.0 * ratio, 8.0) == pytest.approx(second)
+    assert overshoot_limits(8.0 * ratio, 8.0) == pytest.approx((first, second))
 
 
 def test_ten_ten_and_twenty_twenty() -> None:

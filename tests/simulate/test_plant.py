@@ -114,7 +114,7 @@ def test_the_speed_falls_in_the_turn_and_recovers() -> None:
 def test_hulls_are_stable_and_signed_like_ships(name: str) -> None:
     hull = HULLS[name]
     p = hull.parameters
-    assert p.stability > 0 and p.a11 < 0 and p.a22 < 0
+    assert p.a11 * p.a22 > p.a12 * p.a21 and p.a11 < 0 and p.a22 < 0
     assert p.b1 < 0 < p.b2, "positive rudder turns to starboard and pushes the stern to port"
     assert hull.source
 

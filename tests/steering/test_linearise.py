@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from kempf.flows.jobs.steered_ship import SteeredShip
+from kempf.pipeline.model.chain import N_CHAIN
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.effects import RUDDER_COURSES
 from kempf.pipeline.model.terms.own import from_expression
@@ -17,7 +18,7 @@ from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.steering_gear import DeadTime, Lag, Play, RateLimit, SteeringGear
 from kempf.pipeline.steering.carried import carried, sentences
 from kempf.pipeline.steering.course_keeping import LawSettings, course_law
-from kempf.pipeline.steering.motion import N_BEFORE, ShipEffects, equivalent_hull, linear_hull, linear_motion
+from kempf.pipeline.steering.motion import ShipEffects, equivalent_hull, linear_hull, linear_motion
 from kempf.pipeline.steering.robustness import closed_loop, share_held
 from kempf.pipeline.steering.state_space import continuous, discretised
 from kempf.pipeline.steering.track import course_change, keep_course
@@ -204,4 +205,4 @@ def test_a_ship_with_an_idle_gear_sails_as_one_without() -> None:
         for gear in (None, SteeringGear())
     ]
     assert tracks[0].truth == pytest.approx(tracks[1].truth, abs=1e-3)
-    assert linear_motion(HULL, None, V).A.shape == (N_BEFORE, N_BEFORE)
+    assert linear_motion(HULL, None, V).A.shape == (N_CHAIN, N_CHAIN)

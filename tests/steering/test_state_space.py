@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from kempf.pipeline.model.ship import discretise
+from kempf.pipeline.model.ship import discrete_from_continuous
 from kempf.pipeline.steering.state_space import NoiseLevels, continuous, discretised
 from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import ModelSpec
@@ -37,7 +37,7 @@ def test_states_follow_the_specification(wind, current, states):
 
 def test_ship_part_is_eq_17():
     sampled = discretised(continuous(HULL, ModelSpec(), V, arm_per_m=ARM), 0.7)
-    A, B = discretise(HULL, V, 0.7)
+    A, B = discrete_from_continuous(HULL, V, 0.7)
     assert sampled.A[:2, :2] == pytest.approx(A, rel=1e-12) and sampled.B[:2] == pytest.approx(B, rel=1e-12)
 
 

@@ -9,10 +9,12 @@ import polars as pl
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
 from kempf.schemas.profile import VesselProfile
+from kempf.warehouse import raw
 from kempf.warehouse.deposit import Delivery
 from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, StoredValue, parameter_set_id
 from kempf.warehouse.segments import Segment, segment_id
+from kempf.warehouse.store import Warehouse
 
 START_NS = 1_746_258_421_147_000_001
 CODE = "0123456789abcdef"
@@ -122,3 +124,9 @@ def parameter_set(vessel: str = "aurora", made_of: Inputs | None = None, **chang
         "provenance": {"inputs": made_of.as_json(), "packages": {"numpy": "2.4.6"}, "flow_run": None},
     }
     return ParameterSet(**{**values, **changes})
+
+
+def raw_bytes(warehouse: Warehouse, name: str) -> bytes:
+    """The bytes of a log as delivered."""
+    with raw.opened(warehouse, name) as log:
+        return log.whole()

@@ -16,7 +16,7 @@ from kempf.warehouse import delta, logs, raw, readings, vessels
 from kempf.warehouse.deposit import deposit, held
 from kempf.warehouse.keys import ingest_id
 from kempf.warehouse.store import Warehouse
-from tests.warehouse.samples import CODE, delivery
+from tests.warehouse.samples import CODE, delivery, raw_bytes
 from tests.warehouse.samples import readings as some_readings
 
 
@@ -39,7 +39,7 @@ def test_what_went_in_comes_out(warehouse: Warehouse) -> None:
     assert row.tally == given.readings.tally
     assert row.notes == ("one note",)
     assert row.end_utc_ns - row.start_utc_ns == 2_000_000_000
-    assert raw.get(warehouse, row.log_id) == b"log one"
+    assert raw_bytes(warehouse, row.log_id) == b"log one"
     assert vessels.current(warehouse, "aurora") == given.profile
 
 
@@ -150,7 +150,7 @@ def test_a_damaged_raw_copy_is_mended_by_the_same_deposit(warehouse: Warehouse) 
     assert warehouse.folder is not None
     (warehouse.folder / "raw" / done.log_id[:2] / done.log_id).write_bytes(b"rot")
     assert deposit(warehouse, [delivery()])[0].outcome == "unchanged"
-    assert raw.get(warehouse, done.log_id) == b"log one"
+    assert raw_bytes(warehouse, done.log_id) == b"log one"
 
 
 def test_readings_that_no_row_stands_for_are_not_found(warehouse: Warehouse) -> None:

@@ -9,6 +9,7 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import DataRejected, KempfError, NotFound
 from kempf.warehouse import raw
 from kempf.warehouse.store import Warehouse
+from tests.warehouse.samples import raw_bytes
 
 
 def place(warehouse: Warehouse, name: str):
@@ -20,7 +21,7 @@ def place(warehouse: Warehouse, name: str):
 def test_bytes_come_back_as_they_were(warehouse: Warehouse, data: bytes) -> None:
     name = raw.put(warehouse, LogFile(data))
     assert name == hashlib.sha256(data).hexdigest()
-    assert raw.get(warehouse, name) == data
+    assert raw_bytes(warehouse, name) == data
 
 
 def test_putting_twice_writes_once(warehouse: Warehouse) -> None:
@@ -34,18 +35,18 @@ def test_damage_is_found_and_mended(warehouse: Warehouse) -> None:
     name = raw.put(warehouse, LogFile(b"log"))
     place(warehouse, name).write_bytes(b"lo")
     with pytest.raises(KempfError) as caught:
-        raw.get(warehouse, name)
+        raw_bytes(warehouse, name)
     assert caught.value.code == "raw_bytes_damaged"
     assert caught.value.details["log_id"] == name
     raw.put(warehouse, LogFile(b"log"))
-    assert raw.get(warehouse, name) == b"log"
+    assert raw_bytes(warehouse, name) == b"log"
 
 
 @pytest.mark.parametrize("name", ["0" * 64, "../../etc/passwd", "", "..", "A" * 64, "a/b", "x\x00"])
 def test_what_is_not_there_is_not_found(warehouse: Warehouse, name: str) -> None:
     raw.put(warehouse, LogFile(b"log"))
     with pytest.raises(NotFound) as caught:
-        raw.get(warehouse, name)
+        raw_bytes(warehouse, name)
     assert caught.value.code == "no_raw_log"
 
 

@@ -24,7 +24,7 @@ from kempf.warehouse import (
 )
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.store import MARKER, Warehouse
-from tests.warehouse.samples import delivery
+from tests.warehouse.samples import delivery, raw_bytes
 
 READERS = {
     "vessels": vessels.names,
@@ -35,7 +35,7 @@ READERS = {
     "history": lambda w: history.of_vessel(w, "aurora"),
     "aliases": lambda w: aliases.of_vessel(w, "aurora"),
     "runs": runs.all_runs,
-    "raw": lambda w: raw.get(w, "a" * 64),
+    "raw": lambda w: raw_bytes(w, "a" * 64),
     "ingest": lambda w: logs.of_ingest(w, "x"),
     "compact": compaction.compact,
 }

@@ -12,7 +12,7 @@ import pytest
 import yaml
 from scipy.io import loadmat
 
-from kempf.pipeline.model.ship import Hull, discretise
+from kempf.pipeline.model.ship import Hull, discrete_from_continuous
 from tests.workbench.driving import HULL, kempf, one_of, refused
 
 
@@ -63,7 +63,7 @@ def test_control_module_runs_and_is_the_model(filled: Path, tmp_path: Path):
     assert smooth.output_labels == ["lateral_speed", "yaw_rate", "heading", "cross_track_speed"]
     assert set(made["UNITS"]) == {*smooth.state_labels, *smooth.input_labels, *smooth.output_labels}
     V = made["SPEED_M_S"]
-    A, B = discretise(hull(filled), V, 0.5)
+    A, B = discrete_from_continuous(hull(filled), V, 0.5)
     assert sampled.A[:2, :2] == pytest.approx(A) and sampled.B[:2] == pytest.approx(B)
     again = control.c2d(smooth, 0.5)
     assert np.allclose(again.A, sampled.A, rtol=1e-9) and np.allclose(again.B, sampled.B, rtol=1e-9)

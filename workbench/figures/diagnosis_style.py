@@ -22,7 +22,6 @@ INK, FAINT, BAND = "#0b0c0e", "#8b8c8e", "#dbdcde"
 PLAIN, FULL, LIMIT = "#d55e00", "#0072b2", "#cc79a7"
 #: one after the other, for sets of effects
 SET_COLOURS = (FULL, "#e69f00", "#009e73", LIMIT, "#56b4e9", PLAIN)
-OTHER = "0.72"
 #: tints behind a curve by phase of the manoeuvre
 PHASE_COLOURS = {
     "execute": "#f6c7a8",
@@ -96,12 +95,12 @@ def style() -> Iterator[None]:
         yield
 
 
-def new_figure(height_in: float, width_in: float = WIDTH_IN) -> Any:
+def new_figure(height_in: float) -> Any:
     """Return an empty figure that no global state knows."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(width_in, height_in), layout="constrained")
+    figure = Figure(figsize=(WIDTH_IN, height_in), layout="constrained")
     FigureCanvasAgg(figure)
     return figure
 

@@ -13,7 +13,7 @@ from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, Velocity, fastest_turn
 from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable
-from kempf.pipeline.channels.doctor.robust_regression import quantile, swing
+from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
 from kempf.pipeline.channels.series import Series
 
 #: Components of a stream that is not known, one standard deviation: four of these are faster than any that ships are
@@ -68,7 +68,7 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorou
     channels = ("heading", *velocity.channels)
     way = velocity.under_way
     direction = Series(velocity.time_utc_ns[way], velocity.direction[way])
-    turned = max(swing(heading.value), swing(direction.value)) if len(direction) else 0.0
+    turned = max(reach(heading.value), reach(direction.value)) if len(direction) else 0.0
     if turned < _LEAST_TURN:
         return [untestable(name, channels, "the ship hardly turned while under way") for name in names]
     speed = quantile(np.abs(velocity.value[way]), 0.5)

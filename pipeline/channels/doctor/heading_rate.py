@@ -9,7 +9,7 @@ from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
 from kempf.pipeline.channels.doctor.faults import UNITS, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable
-from kempf.pipeline.channels.doctor.robust_regression import swing
+from kempf.pipeline.channels.doctor.robust_regression import reach
 
 #: Slopes that are no fault: rate-of-turn indicators are allowed 5 % (IMO A.526(13)), and the filters of many do worse.
 SLOPES = (0.8, 1.25)
@@ -42,10 +42,10 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     heading, turned = log.series["heading"], integral(log.series["yaw_rate"])
     late = 1.0 + heading.period_s + turned.period_s
     names = ("heading_rate", "heading_rate_clock") if thorough else ("heading_rate",)
-    if max(swing(heading.value), swing(turned.value)) < _LEAST_TURN:
+    if max(reach(heading.value), reach(turned.value)) < _LEAST_TURN:
         return [untestable(name, _CHANNELS, "the ship hardly turned") for name in names]
     found = align(heading, turned, (-late, late), longest_s=LONGEST_S if thorough else 0.0)
-    if found is None or swing(heading.value) == 0.0:
+    if found is None or reach(heading.value) == 0.0:
         # of a compass that repeats itself the check of standstills decides
         return [untestable(name, _CHANNELS, "the heading is constant, or the two hardly overlap") for name in names]
     return [_turning(found), *([_clocks(log, found, (-late, late))] if thorough else [])]

@@ -34,7 +34,7 @@ def quantile(values: Float, share: float) -> float:
     return float(np.partition(values, place)[place])
 
 
-def swing(values: Float) -> float:
+def reach(values: Float) -> float:
     """Return how far values range, one in a hundred at either end left out."""
     low, high = round(0.01 * (values.size - 1)), round(0.99 * (values.size - 1))
     ordered = np.partition(values, (low, high))

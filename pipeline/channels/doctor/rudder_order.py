@@ -7,7 +7,7 @@ import numpy as np
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable, worst
-from kempf.pipeline.channels.doctor.robust_regression import fit, swing
+from kempf.pipeline.channels.doctor.robust_regression import fit, reach
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS
 
@@ -35,7 +35,7 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         return []
     name = "rudder_order_angle"
     order, angle = (log.series[one] for one in _CHANNELS)
-    if max(swing(order.value), swing(angle.value)) < _LEAST:
+    if max(reach(order.value), reach(angle.value)) < _LEAST:
         return [untestable(name, _CHANNELS, "the rudder was hardly used")]
     best: tuple[float, float] | None = None
     for shift in _SHIFTS:

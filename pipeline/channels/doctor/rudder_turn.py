@@ -12,7 +12,7 @@ from kempf.pipeline.channels.doctor.align import edges_of
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log, integral, turning
 from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable, worst
-from kempf.pipeline.channels.doctor.robust_regression import RobustLine, fit, quantile, swing
+from kempf.pipeline.channels.doctor.robust_regression import RobustLine, fit, quantile, reach
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
@@ -77,7 +77,7 @@ def _compare(
 ) -> list[Outcome]:
     rudder = log.series[channels[0]]
     angle, rate = turned
-    moved, swung = swing(rudder.value), swing(angle.value)
+    moved, swung = reach(rudder.value), reach(angle.value)
     if moved < _FAINT_RUDDER and swung > max(_SWING * moved, 4.0 * _LEAST_TURN) and moved > 0.0:
         # no ship turns so far on so little rudder
         figure = Figure(

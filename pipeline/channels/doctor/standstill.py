@@ -9,7 +9,7 @@ import numpy as np
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
-from kempf.pipeline.channels.doctor.robust_regression import swing
+from kempf.pipeline.channels.doctor.robust_regression import reach
 from kempf.pipeline.channels.series import SECOND_NS, Series
 
 #: A channel stands still when it repeats itself so long, in so many readings, while the ship turns so far.
@@ -41,11 +41,11 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         assert velocity is not None
         course = Series(velocity.time_utc_ns, velocity.direction)
         found = _heading_turns(heading, course, way, _COURSE * _TURN_RAD)
-        return [_judged("heading", "course_over_ground", found, swing(course.value))]
+        return [_judged("heading", "course_over_ground", found, reach(course.value))]
     turn = integral(rate)
     return [
-        _judged("heading", "yaw_rate", _heading_turns(heading, turn, way, _TURN_RAD, _BIAS_RAD_S), swing(turn.value)),
-        _judged("yaw_rate", "heading", _rate_turns(rate, heading, way), swing(heading.value)),
+        _judged("heading", "yaw_rate", _heading_turns(heading, turn, way, _TURN_RAD, _BIAS_RAD_S), reach(turn.value)),
+        _judged("yaw_rate", "heading", _rate_turns(rate, heading, way), reach(heading.value)),
     ]
 
 
@@ -83,7 +83,7 @@ def _heading_turns(
     heading: Series, turn: Series, way: Series | None, least: float, bias_rad_s: float = 0.0
 ) -> tuple[Series, float] | None:
     """Return the longest standstill of a heading and how far the ship turns in it, rad; None where there is none."""
-    if swing(heading.value) < _DEAD_RAD and len(turn) > _LEAST_READINGS and _turned(turn, bias_rad_s) > 5.0 * _DEAD_RAD:
+    if reach(heading.value) < _DEAD_RAD and len(turn) > _LEAST_READINGS and _turned(turn, bias_rad_s) > 5.0 * _DEAD_RAD:
         along = np.interp(heading.time_utc_ns, turn.time_utc_ns, turn.value)
         if np.ptp(heading.value) == 0.0 or abs(float(np.corrcoef(along, heading.value)[0, 1])) < _UNLIKE:
             return heading, _turned(turn, bias_rad_s)
@@ -98,8 +98,8 @@ def _turned(turn: Series, bias_rad_s: float) -> float:
     """Return how far a direction turns beyond what a bias of its rate makes of it, rad."""
     seconds = turn.seconds_since(int(turn.time_utc_ns[0]))
     straight = np.polynomial.polynomial.polyfit(seconds, turn.value, 1)
-    bent = swing(turn.value - np.polynomial.polynomial.polyval(seconds, straight)) if bias_rad_s else 0.0
-    return max(bent, swing(turn.value) - bias_rad_s * float(seconds[-1]))
+    bent = reach(turn.value - np.polynomial.polynomial.polyval(seconds, straight)) if bias_rad_s else 0.0
+    return max(bent, reach(turn.value) - bias_rad_s * float(seconds[-1]))
 
 
 def _rate_turns(rate: Series, heading: Series, way: Series | None) -> tuple[Series, float] | None:
@@ -112,7 +112,7 @@ def _rate_turns(rate: Series, heading: Series, way: Series | None) -> tuple[Seri
         if len(meanwhile) < 2:
             continue
         # a steady turn repeats its rate, and the heading turns with it; a coarse rate is right within a step
-        missed = swing(meanwhile.value - still.value[0] * meanwhile.seconds_since(start))
+        missed = reach(meanwhile.value - still.value[0] * meanwhile.seconds_since(start))
         missed -= rounding * (end - start) / SECOND_NS if np.isfinite(rounding) else 0.0
         if missed > _TURN_RAD:
             return still, missed

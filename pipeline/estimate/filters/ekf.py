@@ -27,6 +27,7 @@ from kempf.pipeline.estimate.filters.ekf_covariance import (
     take_in,
 )
 from kempf.pipeline.model.batch import each
+from kempf.pipeline.model.chain import PSI, F, M, R, V
 from kempf.pipeline.model.dynamics import (
     N_AFTER,
     N_BEFORE,
@@ -34,16 +35,11 @@ from kempf.pipeline.model.dynamics import (
     ON_LATERAL,
     ON_NOISE,
     PARAMETER,
-    PSI,
     RDOT,
     SHIP,
     SPEED,
     VDOT,
     E,
-    F,
-    M,
-    R,
-    V,
     add_programs,
     dynamics,
 )

@@ -16,7 +16,8 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import STEP, njit
-from kempf.pipeline.model.discretise import N_CHAIN, PSI, M, R, V, discretise, rates, room_for_a_step
+from kempf.pipeline.model.chain import N_CHAIN, PSI, M, R, V
+from kempf.pipeline.model.discretise import discretise, rates, room_for_a_step
 
 #: theta = (a11, a12, a21, a22, b1, b2, log sigma_F, sigma_M, sigma_V, sigma_v, sigma_r, sigma_psi); the second half
 #: are logarithms, in the order of `kempf.schemas.model_spec.NOISE_PARAMETERS`

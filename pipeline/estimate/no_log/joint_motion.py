@@ -20,7 +20,8 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.smoother import LinearSystem
 from kempf.pipeline.estimate.record.record import Record
-from kempf.pipeline.model.lateral_steps import HEADING, N_CHAIN, SWAY, YAW, SlowForces, lateral_steps
+from kempf.pipeline.model.chain import N_CHAIN
+from kempf.pipeline.model.lateral_steps import HEADING, SWAY, YAW, SlowForces, lateral_steps
 from kempf.pipeline.model.longitudinal import (
     LOSS,
     N_LONGITUDINAL,

@@ -88,11 +88,9 @@ def free(objective: Objective[C], theta: Float, score: Float) -> Mask:
     return objective.active & ~pressed
 
 
-def climb(
-    objective: Objective[Float], start: Float, max_iterations: int, decrement: float, wanted: float = -np.inf
-) -> Search[Float]:
+def climb(objective: Objective[Float], start: Float, max_iterations: int, decrement: float) -> Search[Float]:
     """Climb from one start, the information a matrix; see `climb_by`."""
-    return climb_by(DenseSteps(), objective, start, max_iterations, decrement, wanted)
+    return climb_by(DenseSteps(), objective, start, max_iterations, decrement)
 
 
 def climb_by(

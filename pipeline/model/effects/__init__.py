@@ -1,7 +1,7 @@
 """What effects do to the rudder's course before it reaches the hull: the part of the catalogue that no formula can say.
 
-Each maps (time in s, rudder in rad, the effect's parameters) to the rudder in rad that the hull feels; the times are
-evenly spaced, and the first parameter is the size, with 0 for an unchanged course.
+A file has one effect, and maps times in s (evenly spaced, at least two), the rudder in rad (linear between them) and
+the size of the effect to the rudder in rad that the hull feels, shape (n,) as both.
 """
 
 from __future__ import annotations
@@ -14,10 +14,21 @@ from kempf.schemas.effect import RudderCourse
 
 __all__ = ["RUDDER_COURSES"]
 
+
+def _where_present(course: Callable[[Float, Float, float], Float]) -> Callable[[Float, Float, Float], Float]:
+    """Return what an effect does, given its parameters; of the size 0 it is absent, and one instant has no course."""
+
+    def felt(time_s: Float, rudder_rad: Float, values: Float) -> Float:
+        size = float(values[0])
+        return course(time_s, rudder_rad, size) if size > 0.0 and time_s.size > 1 else rudder_rad
+
+    return felt
+
+
 #: by the name that an effect gives as its ``rudder_course``
 RUDDER_COURSES: Mapping[RudderCourse, Callable[[Float, Float, Float], Float]] = {
-    "backlash": backlash.rudder_course,
-    "dead_time": dead_time.rudder_course,
-    "rate_limit": rate_limit.rudder_course,
-    "rudder_lag": rudder_lag.rudder_course,
+    "backlash": _where_present(backlash.rudder_course),
+    "dead_time": _where_present(dead_time.rudder_course),
+    "rate_limit": _where_present(rate_limit.rudder_course),
+    "rudder_lag": _where_present(rudder_lag.rudder_course),
 }

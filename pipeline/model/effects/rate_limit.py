@@ -13,25 +13,12 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import njit
 
 
-def rudder_course(time_s: Float, rudder_rad: Float, values: Float) -> Float:
+def rudder_course(time_s: Float, rudder_rad: Float, slowness: float) -> Float:
     """Return the rudder that follows its reading at a limited rate, and was there at the first instant.
 
-    Parameters
-    ----------
-    time_s, rudder_rad : ndarray, shape (n,)
-        Evenly spaced; the rudder is linear between them.
-    values : ndarray, shape (1,)
-        Time for one radian, s/rad.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        What the hull feels, rad.
+    ``slowness``: time for one radian, s/rad.
     """
-    slowness, step = float(values[0]), float(time_s[1] - time_s[0]) if time_s.size > 1 else 0.0
-    if not slowness > 0.0 or step == 0.0:
-        return rudder_rad
-    chased: Float = _chased(np.ascontiguousarray(rudder_rad), step / slowness)
+    chased: Float = _chased(np.ascontiguousarray(rudder_rad), float(time_s[1] - time_s[0]) / slowness)
     return chased
 
 

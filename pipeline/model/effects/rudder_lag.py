@@ -12,25 +12,12 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compiled import njit
 
 
-def rudder_course(time_s: Float, rudder_rad: Float, values: Float) -> Float:
+def rudder_course(time_s: Float, rudder_rad: Float, tau: float) -> Float:
     """Return the response of a first-order lag to the rudder, which stood still before the first instant.
 
-    Parameters
-    ----------
-    time_s, rudder_rad : ndarray, shape (n,)
-        Evenly spaced; the rudder is linear between them.
-    values : ndarray, shape (1,)
-        Time constant, s.
-
-    Returns
-    -------
-    ndarray, shape (n,)
-        What the hull feels, rad.
+    ``tau``: time constant, s.
     """
-    tau, step = float(values[0]), float(time_s[1] - time_s[0]) if time_s.size > 1 else 0.0
-    if not tau > 0.0 or step == 0.0:
-        return rudder_rad
-    followed: Float = _followed(np.ascontiguousarray(rudder_rad), step / tau)
+    followed: Float = _followed(np.ascontiguousarray(rudder_rad), float(time_s[1] - time_s[0]) / tau)
     return followed
 
 
