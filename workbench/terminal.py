@@ -141,7 +141,7 @@ def number(value: float | None, digits: int = 4) -> str:
 
 
 @contextmanager
-def progress() -> Iterator[Progress]:
+def progress_bar() -> Iterator[Progress]:
     """Give a `Progress` that draws a bar on stderr where that is a terminal, and nothing elsewhere."""
     if not sys.stderr.isatty():
         yield silent
@@ -154,7 +154,11 @@ def progress() -> Iterator[Progress]:
     with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task("", total=None)
 
-        def tell(done: int, total: int, what: str) -> None:
+        def update(done: int, total: int, what: str) -> None:
             bar.update(task, completed=done, total=total, description=what)
 
-        yield tell
+        yield update
+
+
+#: the earlier name, for export and rerun
+progress = progress_bar

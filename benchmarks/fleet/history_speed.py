@@ -173,8 +173,8 @@ def _asked_anew(folder: Path, vessels: int, times: int) -> dict[str, float]:
     command += ["--vessels", str(vessels), "--times", str(times)]
     where = Path(__file__).parents[2]
     done = subprocess.run(command, capture_output=True, text=True, check=True, cwd=where, env=dict(os.environ))
-    told: dict[str, float] = json.loads(done.stdout)
-    return told
+    output: dict[str, float] = json.loads(done.stdout)
+    return output
 
 
 def rivals(rows: pl.DataFrame, folder: Path) -> dict[str, Callable[[str], list[tuple[Any, ...]]]]:

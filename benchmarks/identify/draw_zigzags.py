@@ -45,8 +45,8 @@ def draw(axes, name: str) -> None:  # type: ignore[no-untyped-def]
     for zigzag in found:
         seconds = log.heading.seconds_since(origin)
         mark(axes, zigzag, origin=origin, zero_deg=float(np.rad2deg(zero)), heading=heading, seconds=seconds)
-    told = ", ".join(f"{z.kind} {z.psi0_deg:g}/{z.delta0_deg:g} {z.first_side} ({z.quality.start})" for z in found)
-    axes.set_title(f"{name}: {told or 'none'}", fontsize=8)
+    listed = ", ".join(f"{z.kind} {z.psi0_deg:g}/{z.delta0_deg:g} {z.first_side} ({z.quality.start})" for z in found)
+    axes.set_title(f"{name}: {listed or 'none'}", fontsize=8)
     low, high = np.percentile(heading, [1, 99])
     axes.set_ylim(max(low, -110) - 45, min(high, 200) + 20)
     axes.grid(lw=0.3)

@@ -117,7 +117,7 @@ def page(ways: list[Trained], chosen: tuple[float, float], grid: list[list[str]]
         )
     scale = plausibility.scale(LENGTH_M)
     cells = [f"{p * s:.2f} ± {e * s:.2f}" for p, e, s in zip(best.fit.hull, best.fit.std, scale, strict=True)]
-    told = ", ".join(f"{n} {c}" for n, c in zip(HULL_PARAMETERS, cells, strict=True))
+    listed = ", ".join(f"{n} {c}" for n, c in zip(HULL_PARAMETERS, cells, strict=True))
     tank = read_model(_TANK)
     agrees = chosen == (tank.moment_correlation_rate_per_s, tank.rudder_speed_exponent)
     by_run = [
@@ -142,7 +142,7 @@ def page(ways: list[Trained], chosen: tuple[float, float], grid: list[list[str]]
             rows,
         ),
         "",
-        f"Parameters of the first row, nondimensional: {told}.",
+        f"Parameters of the first row, nondimensional: {listed}.",
         "",
         "## What was chosen, and on what",
         "",

@@ -52,10 +52,10 @@ def size_per_s(value: Float, speed_m_s: Float) -> float:
 def odd(one: ParameterSet) -> list[str]:
     """Say what is odd, in a few words each; an empty list for a plausible set."""
     value, std = values(one)
-    told = signs(value)
+    wrong_signs = signs(value)
     loose = [p.name for p, v, s in zip(one.parameters, value, std, strict=True) if not s < abs(v)]
     if loose:
-        told.append(f"error as large as the value: {', '.join(loose)}")
+        wrong_signs.append(f"error as large as the value: {', '.join(loose)}")
     colours = {
         name: channel["lag1_autocorrelation"]
         for name, channel in one.fit.get("channels", {}).items()
@@ -63,5 +63,5 @@ def odd(one: ParameterSet) -> list[str]:
     }
     if colours:
         listed = ", ".join(f"{name.replace('_', ' ')} {lag1:.2f}" for name, lag1 in colours.items())
-        told.append(f"innovations not white (lag 1: {listed})")
-    return told
+        wrong_signs.append(f"innovations not white (lag 1: {listed})")
+    return wrong_signs

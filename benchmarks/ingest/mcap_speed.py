@@ -134,8 +134,8 @@ def child(name: str, path: Path, passes: int = 3) -> dict[str, float]:
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=Path(__file__).parents[2])
     if done.returncode:
         raise RuntimeError(done.stderr)
-    told: dict[str, float] = json.loads(done.stdout)
-    return told
+    output: dict[str, float] = json.loads(done.stdout)
+    return output
 
 
 def measure(folder: Path, large_bytes: int) -> dict[str, dict[str, float]]:

@@ -170,8 +170,8 @@ def _child(folder: Path, *arguments: str) -> dict[str, float]:
     done = subprocess.run(command, capture_output=True, text=True, check=False, cwd=where, env=setting)
     if done.returncode:
         raise RuntimeError(done.stderr)
-    told: dict[str, float] = json.loads(done.stdout)
-    return told
+    output: dict[str, float] = json.loads(done.stdout)
+    return output
 
 
 def measure(folder: Path, runs: int) -> list[Timing]:

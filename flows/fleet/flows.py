@@ -143,7 +143,7 @@ def reprocess_batch(
         changed_only=changed_only,
         flow_run=run,
         code=code,
-        tell=lambda vessel, status: log.info("%s: %s", vessel, status),
+        progress=lambda vessel, status: log.info("%s: %s", vessel, status),
     )
 
 
@@ -155,7 +155,7 @@ class _Run:
     changed_only: bool
     run: str | None
 
-    def do(self, batches: Sequence[list[str]], tell: Callable[[int], None]) -> list[dict[str, Any]]:
+    def do(self, batches: Sequence[list[str]], progress: Callable[[int], None]) -> list[dict[str, Any]]:
         """Run batches as tasks, report how many vessels are done; those of a lost batch are reported as failed."""
         code = responsible_code()
         futures: dict[Any, list[str]] = {
@@ -167,7 +167,7 @@ class _Run:
                 reports += future.result()
             except Exception as error:  # noqa: BLE001 - a worker that died must not take the others' work with it
                 reports += plan.lost(futures[future], error)
-            tell(len(reports))
+            progress(len(reports))
         return reports
 
 
@@ -203,12 +203,12 @@ def reprocess(
     shown = create_progress_artifact(_percent(len(todo.kept), todo.vessels), "kempf-progress", _PROGRESS)
     assert isinstance(shown, UUID)  # it is a coroutine only where a loop runs
 
-    def tell(done: int) -> None:
+    def progress(done: int) -> None:
         update_progress_artifact(shown, _percent(len(todo.kept) + done, todo.vessels))
 
     reports = {report["vessel"]: report for report in todo.kept}
     if todo.due:
-        reports |= {report["vessel"]: report for report in one.do(todo.batches(workers()), tell)}
+        reports |= {report["vessel"]: report for report in one.do(todo.batches(workers()), progress)}
     # each alone: a vessel that takes her worker down takes no other with her
     for report in one.do([[name] for name in plan.to_try_again(reports.values())], lambda done: None):
         reports[report["vessel"]] = plan.together(reports[report["vessel"]], report)

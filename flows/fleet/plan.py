@@ -122,7 +122,7 @@ def do_batch(
     changed_only: bool,
     flow_run: str | None = None,
     code: Sequence[str] | None = None,
-    tell: Callable[[str, str], None] = lambda vessel, status: None,
+    progress: Callable[[str, str], None] = lambda vessel, status: None,
 ) -> list[Report]:
     """Bring a batch of vessels up to date, in common commits; one that fails is reported, the others are done.
 
@@ -130,7 +130,7 @@ def do_batch(
     ----------
     code : sequence of str, optional
         `responsible_code` of the machine that asks; where it is not that of this one, nothing is done.
-    tell : callable, optional
+    progress : callable, optional
         Called with name and status of every vessel once they are done.
 
     Returns
@@ -146,7 +146,7 @@ def do_batch(
         for report in reports:
             report.fail(report.vessel, wrapped(error))
     for report in reports:
-        tell(report.vessel, report.status)
+        progress(report.vessel, report.status)
     return [report.show() for report in reports]
 
 

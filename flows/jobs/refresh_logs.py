@@ -105,17 +105,17 @@ def refresh_all(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Prog
     """
     done, steps = count(), sum(len(hers.rows) for hers in stale.values())
 
-    def tell(what: str) -> None:
+    def begin(what: str) -> None:
         progress(next(done), steps, what)
 
     profiles = {vessel: hers.profile for vessel, hers in stale.items()}
-    failed = _read_anew(warehouse, [row for hers in stale.values() for row in hers.unread], profiles, tell)
-    failed |= _search_anew(warehouse, [row for hers in stale.values() for row in hers.unsearched], tell)
+    failed = _read_anew(warehouse, [row for hers in stale.values() for row in hers.unread], profiles, begin)
+    failed |= _search_anew(warehouse, [row for hers in stale.values() for row in hers.unsearched], begin)
     return {vessel: _refreshed(hers, failed) for vessel, hers in stale.items()}
 
 
 def _read_anew(
-    warehouse: Warehouse, rows: Sequence[LogRow], profiles: Mapping[str, VesselProfile], tell: Callable[[str], None]
+    warehouse: Warehouse, rows: Sequence[LogRow], profiles: Mapping[str, VesselProfile], begin: Callable[[str], None]
 ) -> dict[str, KempfError]:
     """Read logs anew and store them; return those that failed, by ingest id."""
     if not rows:
@@ -129,7 +129,7 @@ def _read_anew(
         read: dict[str, ReadLog] = {}
         with ExitStack() as until_stored:
             for row in chunk:
-                tell(f"reading {row.file_name}")
+                begin(f"reading {row.file_name}")
                 profile = profiles[row.vessel]
                 try:
                     log = until_stored.enter_context(raw.opened(warehouse, row.log_id))
@@ -141,7 +141,7 @@ def _read_anew(
     return failed
 
 
-def _search_anew(warehouse: Warehouse, rows: Sequence[LogRow], tell: Callable[[str], None]) -> dict[str, KempfError]:
+def _search_anew(warehouse: Warehouse, rows: Sequence[LogRow], begin: Callable[[str], None]) -> dict[str, KempfError]:
     """Look through stored readings anew and store what is found; return the logs that failed, by ingest id."""
     if not rows:
         return {}
@@ -151,7 +151,7 @@ def _search_anew(warehouse: Warehouse, rows: Sequence[LogRow], tell: Callable[[s
     for chunk in _chunks(rows):
         found: dict[str, SearchedLog] = {}
         for row in chunk:
-            tell(f"looking for zigzags in {row.file_name}")
+            begin(f"looking for zigzags in {row.file_name}")
             try:
                 found[row.ingest_id] = search_again(warehouse, row)
             except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it

@@ -25,7 +25,7 @@ from kempf.pipeline.diagnose.ladder_step import rung, step_of
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
 from kempf.pipeline.estimate.plain_fit import LEVEL, PlainFit
-from kempf.pipeline.estimate.plausibility import doubts
+from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncertainty_of
 from kempf.pipeline.estimate.record.left_out import instants_left_out
@@ -261,7 +261,9 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
         },
         warnings=(
             *(() if fit.converged else (f"not converged: {fit.reason}",)),
-            *dict.fromkeys(sentence for one in known.one_step for sentence in doubts(fit.hull, std[:6], one)),
+            *dict.fromkeys(
+                sentence for one in known.one_step for sentence in plausibility_warnings(fit.hull, std[:6], one)
+            ),
             *without_arm(spec, arm_of(spec, request.profile)),
             *channel_warnings(request.origin),
         ),

@@ -16,7 +16,7 @@ from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unsee
 from kempf.pipeline.diagnose.confusion_sets import WINDOW, shortlist, undecided
 from kempf.pipeline.diagnose.forward_selection import is_ship, staged
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
-from kempf.pipeline.diagnose.ridge_reference import Flexible, flexible
+from kempf.pipeline.diagnose.ridge_reference import RidgeReference, ridge_reference_of
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
@@ -42,8 +42,8 @@ class Diagnosis:
     #: The diagnosed model first.
     steps: tuple[Step, ...]
     #: before, after: The flexible reference beside the plain model and beside the last; None with a single run.
-    before: Flexible | None
-    after: Flexible | None
+    before: RidgeReference | None
+    after: RidgeReference | None
     fitted: tuple[GridRun, ...]
     held: tuple[GridRun, ...]
     plain: PlainFit
@@ -85,7 +85,7 @@ def diagnose(
     held = [runs[i] for i in left]
     announce(f"screening {len(effects)} effects")
     steps = [make_step(base, None, (), (), held, screen(base, effects, workers), workers)]
-    before = flexible(base, workers) if len(chosen) > 1 else None
+    before = ridge_reference_of(base, workers) if len(chosen) > 1 else None
     while len(steps) <= settings.most_steps:
         last = steps[-1]
         tried: list[tuple[Candidate, Confirmation]] = []
@@ -118,7 +118,7 @@ def diagnose(
             announce(f"step {len(steps) - 1}: {idle.title} is no longer significant")
             steps = _without(idle, steps, held, effects, workers)
     announce("measuring what is left")
-    after = flexible(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
+    after = ridge_reference_of(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
     fitted = tuple(filtered.run for filtered in base.runs)
     return Diagnosis(tuple(fits), tuple(steps), before, after, fitted, tuple(held), plain, settings)
 

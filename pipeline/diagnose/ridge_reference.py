@@ -69,7 +69,7 @@ TERMS: tuple[Effect, ...] = tuple(_term(t, n, text) for t in ("sway", "yaw") for
 
 
 @dataclass(frozen=True, eq=False)
-class Flexible:
+class RidgeReference:
     """What the flexible reference finds beside a fitted model."""
 
     #: Log-likelihood that it adds in runs that did not fit it, summed over them; negative where nothing repeats.
@@ -102,7 +102,7 @@ class Flexible:
         return bool(np.mean(self.gains > 0.0) > 0.5)
 
 
-def flexible(base: PooledFit, workers: Executor) -> Flexible:
+def ridge_reference_of(base: PooledFit, workers: Executor) -> RidgeReference:
     """Measure what a smooth force could still explain.
 
     Parameters
@@ -116,7 +116,7 @@ def flexible(base: PooledFit, workers: Executor) -> Flexible:
     return _cross_validated(known, X, [line.u.size for line in base.linearised])
 
 
-def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> Flexible:
+def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> RidgeReference:
     clean = known.clean(X)
     norm = np.linalg.norm(clean, axis=0)
     kept = norm > 1e-6 * max(float(norm.max(initial=0.0)), 1e-300)
@@ -127,7 +127,7 @@ def _cross_validated(known: Nuisance, X: Float, sizes: list[int]) -> Flexible:
     tried = {shrinkage: _gains(Z, known.u, parts, shrinkage) for shrinkage in _SHRINKAGE}
     best = max(tried, key=lambda shrinkage: float(np.sum(tried[shrinkage])))
     formula = search(clean * kept, known.u, list(parts), TERMS)
-    return Flexible(float(np.sum(tried[best])), tried[best], best, formula, Z, parts)
+    return RidgeReference(float(np.sum(tried[best])), tried[best], best, formula, Z, parts)
 
 
 def _penalty(Z: Float, shrinkage: float) -> Float:

@@ -19,7 +19,7 @@ from kempf.pipeline.estimate.filters.linear_kernel import (
 )
 from kempf.pipeline.estimate.likelihood import Likelihood, Trace
 from kempf.pipeline.estimate.one_step_fit import one_step_fit
-from kempf.pipeline.estimate.plausibility import doubts, not_white
+from kempf.pipeline.estimate.plausibility import not_white, plausibility_warnings
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate, Value, discrete_values, hull_values
 from kempf.pipeline.estimate.search.climb import Pass, Search, free
@@ -130,7 +130,7 @@ def report(
         },
         iterations=tuple(_iteration(count, one) for count, one in enumerate(best.passes)),
         fit=fit,
-        warnings=(*warnings, *doubts(theta[:6], np.sqrt(np.diag(hull_covariance)), fit)),
+        warnings=(*warnings, *plausibility_warnings(theta[:6], np.sqrt(np.diag(hull_covariance)), fit)),
     )
 
 

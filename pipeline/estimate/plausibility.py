@@ -25,7 +25,7 @@ def not_white(fit: dict[str, Any]) -> tuple[str, ...]:
     return tuple(name for name, channel in channels.items() if abs(channel["lag1_autocorrelation"]) > _NOT_WHITE)
 
 
-def doubts(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
+def plausibility_warnings(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:
     """Name what is implausible about an estimate.
 
     Parameters

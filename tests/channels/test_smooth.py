@@ -21,8 +21,8 @@ def test_most_of_the_noise_goes_and_the_speed_stays() -> None:
     # fewer readings leave more
     for period_s, share in ((0.2, 0.35), (1.0, 0.5), (2.0, 0.65)):
         read, truth = slow(period_s)
-        told = smoothed(read, noise_std(read))
-        found = told.series
+        smooth = smoothed(read, noise_std(read))
+        found = smooth.series
         np.testing.assert_array_equal(found.time_utc_ns, read.time_utc_ns)
         assert np.std(found.value - truth) < share * 0.05
         assert abs(np.mean(found.value - truth)) < 0.2 * 0.05

@@ -132,11 +132,11 @@ def test_where_it_fails_is_told_by_sample(place: Path) -> None:
     found = document["where"]["fitted"]
     assert {"by_phase", "by_side", "by_bin", "by_run", "by_band", "correlations", "worst"} <= set(found)
     assert {"approach", "execute", "overshoot", "counter_rudder"} <= set(found["by_phase"])
-    told = kempf("compare", "--vessel", "mariner", "--where", "--horizon", "1", "--warehouse", place)
-    assert told.code == 0
-    assert "horizon: one step" in told.out
-    assert "fitted: 1 manoeuvre" in told.out and "held out: no manoeuvre" in told.out
-    assert "where it fails, fitted manoeuvres" in told.out and "worst windows" in told.out
+    output = kempf("compare", "--vessel", "mariner", "--where", "--horizon", "1", "--warehouse", place)
+    assert output.code == 0
+    assert "horizon: one step" in output.out
+    assert "fitted: 1 manoeuvre" in output.out and "held out: no manoeuvre" in output.out
+    assert "where it fails, fitted manoeuvres" in output.out and "worst windows" in output.out
 
 
 def test_a_manoeuvre_is_one_line_of_the_table_and_all_overshoots_are_verbose(place: Path, document: dict) -> None:
@@ -165,8 +165,8 @@ def test_several_sets_are_all_compared(own: Path, document: dict) -> None:
     both = asked(own, "--set", first, "--set", second, "--set", first)
     assert [one["parameter_set_id"] for one in both] == [first, second]
     assert both[0] == asked(own, "--set", first), "one alone keeps its form"
-    told = kempf("compare", "--vessel", "mariner", "--set", first, "--set", second, "--warehouse", own)
-    assert first in told.out and second in told.out
+    output = kempf("compare", "--vessel", "mariner", "--set", first, "--set", second, "--warehouse", own)
+    assert first in output.out and second in output.out
     done = kempf(
         "compare", "--vessel", "mariner", "--set", first, "--set", second, "--fail-above", 0, "--warehouse", own
     )

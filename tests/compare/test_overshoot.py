@@ -76,12 +76,12 @@ def test_what_is_told_of_runs_keeps_the_samples_apart() -> None:
     assert [one["sample"] for one in shown] == ["fitted", "fitted", "held_out"]
     assert list(shown[0]["fit_percent"]) == ["yaw_rate", "heading", "lateral_speed"]
     assert shown[0]["rms_display"]["yaw_rate"]["value"] == pytest.approx(np.rad2deg(shown[0]["rms"]["yaw_rate"]))
-    told = summary(runs)
-    assert (told["fitted"]["runs"], told["held_out"]["runs"]) == (2, 1)
+    means = summary(runs)
+    assert (means["fitted"]["runs"], means["held_out"]["runs"]) == (2, 1)
     fits = [one["fit_percent"]["heading"] for one in shown]
-    assert told["fitted"]["fit_percent"]["heading"]["mean"] == pytest.approx(np.mean(fits[:2]))
-    assert told["fitted"]["fit_percent"]["heading"]["std_error"] == pytest.approx(abs(fits[0] - fits[1]) / 2.0)
-    assert told["held_out"]["fit_percent"]["heading"] == {"mean": fits[2], "std_error": None}
+    assert means["fitted"]["fit_percent"]["heading"]["mean"] == pytest.approx(np.mean(fits[:2]))
+    assert means["fitted"]["fit_percent"]["heading"]["std_error"] == pytest.approx(abs(fits[0] - fits[1]) / 2.0)
+    assert means["held_out"]["fit_percent"]["heading"] == {"mean": fits[2], "std_error": None}
     assert judged(runs) == ("held_out", runs[2].free_run_error_percent)
     assert judged(runs[:2])[0] == "fitted"
     free = runs[2].free.fit_percent()

@@ -51,9 +51,9 @@ def test_nothing_is_claimed_of_a_ship_without_an_effect(calm: tuple[Sailed, Diag
     assert verdict(found) == "adequate"
     assert len(found.steps) == 1
     assert len(found.fitted) == 3 and len(found.held) == 1
-    told = as_json(found)
-    assert told["sets"] == [] and {c["verdict"] for c in told["candidates"]} <= {"absent", "not_testable"}
-    assert told["ladder"][0]["held_out_error"] < 0.1
+    shown = as_json(found)
+    assert shown["sets"] == [] and {c["verdict"] for c in shown["candidates"]} <= {"absent", "not_testable"}
+    assert shown["ladder"][0]["held_out_error"] < 0.1
     (said,) = sentences(found)
     assert said == "No effect of the catalogue improves the prediction of manoeuvres that were not fitted."
 
@@ -102,11 +102,11 @@ def test_a_drag_is_in_the_named_set(dragged: tuple[Sailed, Diagnosis]) -> None:
 def test_an_effect_that_no_catalogue_names_is_not_given_a_wrong_name() -> None:
     found = sailed("kick_at_executes").diagnosis(("yaw_quadratic", "gyro_bias"))
     assert verdict(found) == "unexplained"
-    told = as_json(found)
-    assert any(said.startswith("None of the known effects explains") for said in told["sentences"])
-    assert all(one["verdict"] != "present" for one in told["candidates"])
-    assert told["left_over"]["gain_after"] > 12.0 and len(told["left_over"]["runs"]) == 3
-    assert "{" not in "".join(told["sentences"])
+    shown = as_json(found)
+    assert any(said.startswith("None of the known effects explains") for said in shown["sentences"])
+    assert all(one["verdict"] != "present" for one in shown["candidates"])
+    assert shown["left_over"]["gain_after"] > 12.0 and len(shown["left_over"]["runs"]) == 3
+    assert "{" not in "".join(shown["sentences"])
 
 
 def test_a_small_rest_of_a_strong_effect_is_no_sign_of_another(late: tuple[Sailed, Diagnosis]) -> None:
@@ -153,8 +153,8 @@ def test_what_the_reference_should_see_and_does_not_is_no_effect(
 
 def test_what_the_logs_lack_or_zigzags_cannot_tell_is_not_testable(calm: tuple[Sailed, Diagnosis]) -> None:
     _, found = calm
-    told = {one.effect.name: finding(found, one) for one in found.steps[0].screened}
-    assert told["heading_misalignment"].verdict in ("absent", "not_testable")
+    findings = {one.effect.name: finding(found, one) for one in found.steps[0].screened}
+    assert findings["heading_misalignment"].verdict in ("absent", "not_testable")
     lacking = replace(found.steps[0].screened[0], missing=("water_depth",))
     said = finding(found, lacking)
     assert said.verdict == "not_testable" and "water_depth" in said.why

@@ -29,5 +29,5 @@ def test_noise_proposes_nothing():
     random = np.random.default_rng(2)
     X = random.normal(0.0, 1.0, (4000, len(TERMS)))
     parts = [slice(1000 * k, 1000 * (k + 1)) for k in range(4)]
-    told = [search(X, random.normal(0.0, 1.0, 4000), parts, TERMS) for _ in range(5)]
-    assert sum(bool(one) for one in told) <= 1
+    formulas = [search(X, random.normal(0.0, 1.0, 4000), parts, TERMS) for _ in range(5)]
+    assert sum(bool(one) for one in formulas) <= 1

@@ -161,8 +161,8 @@ def follow(text: str, folder: Path, *before: str) -> int:
             commands += 1
             found, code = sessions[step.kind].run(names.resolved(step.line))
             assert code == 0, (step.line, found)
-            told = difference(step.shown, found, names)
-            assert told is None, f"{step.line}\n{told}\nrenew it with python -m benchmarks.documents.refresh_documents"
+            why = difference(step.shown, found, names)
+            assert why is None, f"{step.line}\n{why}\nrenew it with python -m benchmarks.documents.refresh_documents"
     finally:
         for session in sessions.values():
             session.close()

@@ -17,7 +17,7 @@ def test_the_examples_run_to_their_output(tmp_path: Path) -> None:
 
 def test_the_keys_of_where_are_those_of_the_code() -> None:
     source = (ROOT / "pipeline" / "compare" / "misfit.py").read_text(encoding="utf-8")
-    told = set(re.findall(r"^\| `(\w+)` \|", TEXT.partition("## Where it fails")[2], flags=re.MULTILINE))
-    assert told == {"by_phase", "by_side", "by_bin", "by_run", "by_band", "correlations", "worst", "stands_out"}
-    for key in told:
+    documented = set(re.findall(r"^\| `(\w+)` \|", TEXT.partition("## Where it fails")[2], flags=re.MULTILINE))
+    assert documented == {"by_phase", "by_side", "by_bin", "by_run", "by_band", "correlations", "worst", "stands_out"}
+    for key in documented:
         assert f'"{key}"' in source

@@ -33,9 +33,9 @@ def test_the_thresholds_are_those_of_the_code() -> None:
 def test_every_verdict_is_told() -> None:
     section = TEXT.partition("## The verdicts")[2].partition("\n## ")[0]
     whole, _, single = section.partition("Each effect has a verdict")
-    told = [set(re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)) for part in (whole, single)]
+    documented = [set(re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)) for part in (whole, single)]
     of_an_effect = get_args(import_module("typing").get_type_hints(EffectFinding)["verdict"])
-    assert told == [set(get_args(Verdict)), set(of_an_effect)]
+    assert documented == [set(get_args(Verdict)), set(of_an_effect)]
 
 
 def test_the_reference_has_as_many_terms_as_are_told() -> None:

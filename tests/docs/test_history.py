@@ -19,15 +19,15 @@ def test_the_example_runs_to_its_output(tmp_path: Path) -> None:
 
 
 def test_every_setting_is_told_with_its_value() -> None:
-    told = dict(re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", TEXT, flags=re.MULTILINE))
-    assert {name: float(value) for name, value in told.items()} == {
+    documented = dict(re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", TEXT, flags=re.MULTILINE))
+    assert {name: float(value) for name, value in documented.items()} == {
         field.name: float(getattr(ChangeSettings(), field.name)) for field in fields(ChangeSettings)
     }
 
 
 def test_the_verdicts_are_those_of_the_code() -> None:
     source = (ROOT / "pipeline" / "history" / "changes.py").read_text(encoding="utf-8")
-    told = re.findall(r"``([a-z ]+)``", source.partition("verdict : str")[2].partition("why : str")[0])
+    documented = re.findall(r"``([a-z ]+)``", source.partition("verdict : str")[2].partition("why : str")[0])
     table = TEXT.partition("| verdict |")[2].partition("\n\n")[0]
-    assert set(told) == set(re.findall(r"`([a-z ]+)`", table))
-    assert len(told) == 7
+    assert set(documented) == set(re.findall(r"`([a-z ]+)`", table))
+    assert len(documented) == 7

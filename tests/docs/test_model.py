@@ -32,10 +32,10 @@ def test_every_key_is_told() -> None:
         assert f"| `{key}` |" in TEXT, key
 
 
-@pytest.mark.parametrize(("key", "told"), [("name", "`plain`"), ("base", "`sway-yaw-16`"), ("wind", "`force`")])
-def test_defaults_are_as_told(key: str, told: str) -> None:
-    assert f"| `{key}` | {told} |" in TEXT
-    assert told.strip("`") == getattr(ModelSpec(), key)
+@pytest.mark.parametrize(("key", "documented"), [("name", "`plain`"), ("base", "`sway-yaw-16`"), ("wind", "`force`")])
+def test_defaults_are_as_told(key: str, documented: str) -> None:
+    assert f"| `{key}` | {documented} |" in TEXT
+    assert documented.strip("`") == getattr(ModelSpec(), key)
 
 
 def test_rates_are_as_told() -> None:

@@ -17,8 +17,8 @@ def test_the_page_shows_what_its_command_prints(tmp_path: Path) -> None:
             commands += 1
             found, code = shell.run(names.resolved(step.line))
             assert code == 0, found
-            told = difference(step.shown, found, names)
-            assert told is None, f"$ {step.line}\n{told}\nrenew it with python -m benchmarks.documents.draw_paper"
+            wrong = difference(step.shown, found, names)
+            assert wrong is None, f"$ {step.line}\n{wrong}\nrenew it with python -m benchmarks.documents.draw_paper"
     finally:
         shell.close()
     assert commands == 1

@@ -46,8 +46,8 @@ def test_commands_run_and_the_program_on_what_they_wrote(
         commands += 1
         program, *arguments = shlex.split(step.line)
         assert program == "kempf"
-        told = kempf(*(name if argument == "ID" else argument for argument in arguments))
-        assert told.code == 0, (step.line, told)
+        output = kempf(*(name if argument == "ID" else argument for argument in arguments))
+        assert output.code == 0, (step.line, output)
     assert commands == sum(isinstance(step, Command) for step in steps(TEXT)) >= 6
     assert {p.name for p in tmp_path.iterdir()} >= {
         "ship.py",

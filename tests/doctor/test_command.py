@@ -29,10 +29,10 @@ LINE = "rudder: {channel: rudder_angle, unit: deg}"
 
 
 def test_a_file_and_its_figure(folder: Path) -> None:
-    told = kempf("doctor", folder / "made.csv", "--profile", folder / "wrong.yaml", "--figure", folder / "a.png")
-    assert told.code == 0
-    assert "rudder_angle has the wrong sign" in told.out
-    assert LINE in told.out
+    output = kempf("doctor", folder / "made.csv", "--profile", folder / "wrong.yaml", "--figure", folder / "a.png")
+    assert output.code == 0
+    assert "rudder_angle has the wrong sign" in output.out
+    assert LINE in output.out
     assert (folder / "a.png").stat().st_size > 10_000
     again = kempf("doctor", folder / "made.csv", "--profile", folder / "wrong.yaml", "--figure", folder / "a.png")
     assert again.code == 2
@@ -43,8 +43,8 @@ def test_a_file_and_its_figure(folder: Path) -> None:
 
 def test_every_ingest_and_every_list(folder: Path) -> None:
     place = folder / "warehouse"
-    told = kempf("ingest", folder / "made.csv", "--profile", folder / "wrong.yaml", "--warehouse", place)
-    assert "channels: rudder_angle has the wrong sign" in told.out
+    output = kempf("ingest", folder / "made.csv", "--profile", folder / "wrong.yaml", "--warehouse", place)
+    assert "channels: rudder_angle has the wrong sign" in output.out
     (log,) = kempf("logs", "list", "--warehouse", place, "--json").json
     assert log["channels"] == {"verdict": "faults", "findings": ["rudder_angle has the wrong sign"]}
     shown = kempf("logs", "show", log["log_id"][:10], "--warehouse", place)

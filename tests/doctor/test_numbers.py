@@ -48,9 +48,9 @@ def test_align_finds_lag_growth_and_slope(lag_s: float, rate: float, slope: floa
 
     random = np.random.Generator(np.random.PCG64(4))
     first = Series(np.rint(t * SECOND_NS).astype(np.int64), motion(t) + 1e-3 * random.standard_normal(t.size))
-    told = t + lag_s + rate * (t - 750.0)
+    stamps = t + lag_s + rate * (t - 750.0)
     noisy = slope * motion(t) + 1e-3 * random.standard_normal(t.size)
-    second = Series(np.rint(told * SECOND_NS).astype(np.int64), noisy)
+    second = Series(np.rint(stamps * SECOND_NS).astype(np.int64), noisy)
     found = align(first, second)
     assert found is not None
     assert found.slope == pytest.approx(slope, abs=0.02)

@@ -289,13 +289,13 @@ def test_half_a_trial_speed_is_refused(speed: float | None, std: float | None) -
 
 def test_a_trial_speed_of_unknown_worth_counts_little_and_only_near_it() -> None:
     trial, _ = sailed(0.6)
-    told = trial.settings.hull.trial_speed_m_s
-    near = found(NoLogSettings(told), current="lateral")
-    assert near.report["speed"]["settings"]["trial_speed_std_m_s"] == pytest.approx(0.1 * told)
-    vague, sure = found(current="lateral"), found(NoLogSettings(told, 0.1), current="lateral")
+    trial_speed = trial.settings.hull.trial_speed_m_s
+    near = found(NoLogSettings(trial_speed), current="lateral")
+    assert near.report["speed"]["settings"]["trial_speed_std_m_s"] == pytest.approx(0.1 * trial_speed)
+    vague, sure = found(current="lateral"), found(NoLogSettings(trial_speed, 0.1), current="lateral")
     assert sure.report["speed"]["std_m_s"] < near.report["speed"]["std_m_s"] < vague.report["speed"]["std_m_s"]
     assert any("known to 10 %" in warning for warning in near.warnings)
-    far = found(NoLogSettings(2.0 * told), current="lateral")
+    far = found(NoLogSettings(2.0 * trial_speed), current="lateral")
     assert far.report["speed"]["settings"]["trial_speed_m_s"] is None
     assert far.report["speed"]["mean_m_s"] == vague.report["speed"]["mean_m_s"]
     assert any("is not used" in warning for warning in far.warnings)

@@ -61,47 +61,47 @@ def late(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Late]:
 
 
 @pytest.fixture(scope="module")
-def told(late: Late) -> dict[str, Any]:
+def diagnosed(late: Late) -> dict[str, Any]:
     return dict(late.json("diagnose", "--vessel", VESSEL))
 
 
-def test_the_command_tells_under_the_keys_that_people_script_against(late: Late, told: dict[str, Any]) -> None:
+def test_the_command_tells_under_the_keys_that_people_script_against(late: Late, diagnosed: dict[str, Any]) -> None:
     keys = {"vessel", "parameter_set_id", "verdict", "candidates", "sets", "where", "ladder"}
-    assert keys <= set(told)
-    assert told["vessel"] == VESSEL and told["verdict"] == "explained"
+    assert keys <= set(diagnosed)
+    assert diagnosed["vessel"] == VESSEL and diagnosed["verdict"] == "explained"
     wanted = ("effect", "set_id", "score", "p_adjusted", "expected_change", "absorption", "verdict", "why")
-    assert {c["effect"] for c in told["candidates"]} == set(SOME)
-    assert all(set(wanted) <= set(c) for c in told["candidates"])
-    lag = next(c for c in told["candidates"] if c["effect"] == "rudder_lag")
+    assert {c["effect"] for c in diagnosed["candidates"]} == set(SOME)
+    assert all(set(wanted) <= set(c) for c in diagnosed["candidates"])
+    lag = next(c for c in diagnosed["candidates"] if c["effect"] == "rudder_lag")
     assert set(lag["expected_change"]["tau"]) == {"value", "std", "unit"} and lag["verdict"] == "present"
-    (only,) = told["sets"]
+    (only,) = diagnosed["sets"]
     assert {"set_id", "effects", "separated_by"} <= set(only) and only["effects"] == ["rudder_lag"]
     assert only["set_id"] == lag["set_id"]
-    rungs = told["ladder"]
+    rungs = diagnosed["ladder"]
     assert [one["added"] for one in rungs] == [None, "rudder_lag"]
     assert {"step", "added", "in_sample_error", "held_out_error", "disturbance_intensity"} <= set(rungs[0])
     assert rungs[1]["held_out_error"] < 0.8 * rungs[0]["held_out_error"]
     found = rungs[1]["effects"]["rudder_lag.tau"]
     assert abs(found["value"] - late.tau_s) < 3.0 * found["std"]
-    where = told["where"]
+    where = diagnosed["where"]
     assert {"by_phase", "by_side", "by_bin", "by_run", "by_band"} <= set(where)
     assert where["sample"] == "held_out" and where["beside"] == ["rudder_lag"]
-    assert set(where["by_run"]) == set(told["held_out"]) and "execute" in where["by_phase"]
-    assert parameter_sets.get(late.warehouse, told["parameter_set_id"]).model_spec["effects"] == []
+    assert set(where["by_run"]) == set(diagnosed["held_out"]) and "execute" in where["by_phase"]
+    assert parameter_sets.get(late.warehouse, diagnosed["parameter_set_id"]).model_spec["effects"] == []
 
 
-def test_what_was_diagnosed_is_not_computed_again(late: Late, told: dict[str, Any]) -> None:
+def test_what_was_diagnosed_is_not_computed_again(late: Late, diagnosed: dict[str, Any]) -> None:
     found, new = diagnose_vessel(late.warehouse, VESSEL, PLAIN)
-    assert not new and found.diagnosis_id == told["diagnosis_id"]
-    assert found.show() == told
+    assert not new and found.diagnosis_id == diagnosed["diagnosis_id"]
+    assert found.show() == diagnosed
     text = late.kempf("diagnose", "--vessel", VESSEL)
     assert text.code == 0 and f"{VESSEL}: explained" in text.out and "next: kempf effects add rudder_lag" in text.out
 
 
-def test_the_summary_of_the_fleet_has_a_row_an_effect_and_vessel(told: dict[str, Any]) -> None:
+def test_the_summary_of_the_fleet_has_a_row_an_effect_and_vessel(diagnosed: dict[str, Any]) -> None:
     failed = {"vessel": "lost", "verdict": "failed", "error": {"code": "no_segments", "message": "No zigzag."}}
-    fine = {"vessel": "sound", "verdict": "adequate", "sets": [], "ladder": told["ladder"][:1]}
-    rows = summary([told, failed, fine])
+    fine = {"vessel": "sound", "verdict": "adequate", "sets": [], "ladder": diagnosed["ladder"][:1]}
+    rows = summary([diagnosed, failed, fine])
     assert [(r["vessel"], r["verdict"], r["effects"]) for r in rows] == [
         (VESSEL, "explained", "rudder_lag"),
         ("lost", "failed", ""),
@@ -111,16 +111,16 @@ def test_the_summary_of_the_fleet_has_a_row_an_effect_and_vessel(told: dict[str,
     assert rows[1]["note"] == "No zigzag." and rows[2]["held_out_before"] == rows[2]["held_out_after"]
 
 
-def test_an_effect_is_added_gone_back_from_and_built_again(late: Late, told: dict[str, Any]) -> None:
+def test_an_effect_is_added_gone_back_from_and_built_again(late: Late, diagnosed: dict[str, Any]) -> None:
     refused(late.kempf("ladder", "--vessel", VESSEL, "--json"), 4, "no_model")
     added = late.json("effects", "add", "rudder_lag", "--vessel", VESSEL)
     made = added["set"]
     assert added["after"]["held_out_error"] < 0.8 * added["before"]["held_out_error"]
     # the diagnosis and the model by hand end at the same numbers
     for key in ("in_sample_error", "held_out_error", "log_likelihood", "hull", "effects"):
-        assert added["after"][key] == told["ladder"][1][key], key
+        assert added["after"][key] == diagnosed["ladder"][1][key], key
     stored = parameter_sets.get(late.warehouse, made["parameter_set_id"])
-    assert stored.parent == told["parameter_set_id"] and stored.estimator == "ml-pooled"
+    assert stored.parent == diagnosed["parameter_set_id"] and stored.estimator == "ml-pooled"
     assert len(stored.parameters) == 7 and len(stored.covariance) == 7
     assert aliases.of_vessel(late.warehouse, VESSEL)["current"] == stored.parameter_set_id
     again = rerun(late.warehouse, stored.parameter_set_id)
@@ -138,8 +138,8 @@ def test_an_effect_is_added_gone_back_from_and_built_again(late: Late, told: dic
     assert "rudder_lag" in late.kempf("ladder", "--vessel", VESSEL).out
 
 
-def test_a_model_with_effects_is_a_parameter_set_like_any_other(late: Late, told: dict[str, Any]) -> None:
-    plain_set = told["parameter_set_id"]
+def test_a_model_with_effects_is_a_parameter_set_like_any_other(late: Late, diagnosed: dict[str, Any]) -> None:
+    plain_set = diagnosed["parameter_set_id"]
     name = aliases.of_vessel(late.warehouse, VESSEL)["current"]
     listed = {one["parameter_set_id"]: one for one in late.json("params", "list", "--vessel", VESSEL)}
     assert listed[name]["aliases"] == ["current"] and listed[name]["model_name"] == "plain + rudder_lag"
@@ -159,7 +159,7 @@ def test_a_model_with_effects_is_a_parameter_set_like_any_other(late: Late, told
     assert all(one["parameter_set_ids"] == [] for one in changes)
 
 
-def test_reprocessing_keeps_the_model_that_she_stands_at(late: Late, told: dict[str, Any]) -> None:
+def test_reprocessing_keeps_the_model_that_she_stands_at(late: Late, diagnosed: dict[str, Any]) -> None:
     before = parameter_sets.summaries(late.warehouse, VESSEL)["parameter_set_id"].to_list()
     report = reprocess_vessel(late.warehouse, VESSEL)
     assert report.status == "unchanged" and report.kept_sets == 1, report
@@ -167,7 +167,7 @@ def test_reprocessing_keeps_the_model_that_she_stands_at(late: Late, told: dict[
     assert aliases.of_vessel(late.warehouse, VESSEL)["current"] in before
 
 
-def test_a_vessel_that_fails_does_not_stop_the_fleet(late: Late, told: dict[str, Any]) -> None:
+def test_a_vessel_that_fails_does_not_stop_the_fleet(late: Late, diagnosed: dict[str, Any]) -> None:
     with disable_run_logger():
         found = diagnose_batch.fn(late.warehouse.uri, ["nobody", VESSEL], PLAIN.model_dump(mode="json"))
     assert [one["verdict"] for one in found] == ["failed", "explained"]
@@ -192,7 +192,7 @@ def test_a_slip_in_a_formula_is_told_before_anything_is_read(late: Late, formula
     assert len(error["message"]) > 10 and len(error["next_step"]) > 5 and "Traceback" not in ran.err
 
 
-def test_a_formula_of_ones_own_is_tried_and_nothing_is_stored(late: Late, told: dict[str, Any]) -> None:
+def test_a_formula_of_ones_own_is_tried_and_nothing_is_stored(late: Late, diagnosed: dict[str, Any]) -> None:
     before = len(parameter_sets.summaries(late.warehouse, VESSEL))
     tried = late.json("effects", "try", "yaw: c*r*abs(r)", "--vessel", VESSEL)
     assert tried["formula"] == "yaw: c*r*abs(r)" and len(tried["candidates"]) == 1

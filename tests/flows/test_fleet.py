@@ -39,10 +39,10 @@ def fleet(mariner: Ship, ferry: Ship, tmp_path_factory: pytest.TempPathFactory) 
     (folder / "tramp.nmea").write_bytes(b"".join(mariner.lines)[:-1])  # other bytes, so another log
     place = str(folder / "w")
     for name in ("mariner", "ferry"):
-        told = ingest([str(folder / name / f"{name}.csv.gz")], place, None, [str(folder / name / "profile.yaml")])
-        assert [one["outcome"] for one in told] == ["new"]
-    told = ingest([str(folder / "tramp.nmea"), str(folder / "none")], place, "tramp")
-    assert [one["outcome"] for one in told] == ["new", "failed"]
+        outcomes = ingest([str(folder / name / f"{name}.csv.gz")], place, None, [str(folder / name / "profile.yaml")])
+        assert [one["outcome"] for one in outcomes] == ["new"]
+    outcomes = ingest([str(folder / "tramp.nmea"), str(folder / "none")], place, "tramp")
+    assert [one["outcome"] for one in outcomes] == ["new", "failed"]
     reports = reprocess(place)
     assert [(r["vessel"], r["status"], r["new_sets"]) for r in reports] == [(name, "changed", 1) for name in FLEET]
     return Warehouse(place)
@@ -134,8 +134,8 @@ def test_a_damaged_raw_copy_is_reported_and_the_others_are_done(own: Warehouse):
         vessels.register(own, name, profile)
     reports = {r["vessel"]: r for r in reports_of(own.uri, changed_only=False)}
     assert {n: r["status"] for n, r in reports.items()} == {"ferry": "changed", "mariner": "failed", "tramp": "changed"}
-    told = {row["vessel"]: row["failures"] for row in tables_of("kempf-reprocess")[0]}
-    assert (told["ferry"], told["tramp"]) == ("", "") and "is damaged" in told["mariner"]
+    failures = {row["vessel"]: row["failures"] for row in tables_of("kempf-reprocess")[0]}
+    assert (failures["ferry"], failures["tramp"]) == ("", "") and "is damaged" in failures["mariner"]
     codes = {failure["error"]["code"] for failure in reports["mariner"]["failures"]}
     assert codes == {"raw_bytes_damaged"}
     assert reports["mariner"]["failures"][0]["error"]["next_step"]
@@ -191,9 +191,9 @@ def test_a_fleet_of_none(tmp_path: Path):
 def test_the_command_runs_the_flow_and_prints_one_document(own: Warehouse):
     from tests.workbench.driving import kempf
 
-    told = kempf("reprocess", "--warehouse", own.uri, "--json")
-    assert told.code == 0, told
-    assert [r["vessel"] for r in told.json] == list(FLEET)
+    output = kempf("reprocess", "--warehouse", own.uri, "--json")
+    assert output.code == 0, output
+    assert [r["vessel"] for r in output.json] == list(FLEET)
     damage(own, "ferry")
     failed = kempf("reprocess", "--vessel", "ferry", "--vessel", "tramp", "--everything", "--warehouse", own.uri)
     assert failed.code == 3

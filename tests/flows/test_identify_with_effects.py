@@ -70,8 +70,8 @@ def test_a_set_names_its_model_and_plain_identification_leaves_current_where_it_
     pooled = identified[-1]["parameter_set_id"]
     again = run(place, "identify", "--vessel", VESSEL, "--model", pooled[:12])
     assert [one["parameter_set_id"] for one in again] == [one["parameter_set_id"] for one in identified]
-    told = kempf("identify", "--vessel", VESSEL, "--model", pooled[:12], "--warehouse", place / "w")
-    assert f"2 zigzags pooled, 1 held out: {pooled}" in told.out
+    output = kempf("identify", "--vessel", VESSEL, "--model", pooled[:12], "--warehouse", place / "w")
+    assert f"2 zigzags pooled, 1 held out: {pooled}" in output.out
     run(place, "identify", "--vessel", VESSEL)
     warehouse = Warehouse(str(place / "w"))
     assert aliases.of_vessel(warehouse, VESSEL) == {"current": pooled}
@@ -83,8 +83,8 @@ def test_a_set_names_its_model_and_plain_identification_leaves_current_where_it_
 def test_one_error_of_a_model(place: Path, identified: list[dict[str, Any]]) -> None:
     rung = run(place, "ladder", "--vessel", VESSEL)[-1]
     compared = run(place, "compare", "--vessel", VESSEL)
-    told = {sample: one["free_run_error_percent"]["mean"] for sample, one in compared["summary"].items() if one}
-    assert told == {"fitted": 100.0 * rung["in_sample_error"], "held_out": 100.0 * rung["held_out_error"]}
+    errors = {sample: one["free_run_error_percent"]["mean"] for sample, one in compared["summary"].items() if one}
+    assert errors == {"fitted": 100.0 * rung["in_sample_error"], "held_out": 100.0 * rung["held_out_error"]}
     assert compared["judged"] == {"sample": "held_out", "free_run_error_percent": 100.0 * rung["held_out_error"]}
 
 

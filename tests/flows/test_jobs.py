@@ -44,12 +44,12 @@ def stocked(harbour: Path, tmp_path: Path) -> Warehouse:
 def test_progress_is_told_from_the_first_to_the_last(harbour: Path, tmp_path: Path):
     told: list[tuple[int, int, str]] = []
 
-    def tell(done: int, total: int, what: str) -> None:
+    def progress(done: int, total: int, what: str) -> None:
         told.append((done, total, what))
 
     paths = [harbour / "mariner.csv.gz", harbour / "none"]
-    ingest(fresh(tmp_path / "w"), paths, given=loaded(harbour), progress=tell)
-    identify_vessel(fresh(tmp_path / "w"), "mariner", LEAST_SQUARES, progress=tell)
+    ingest(fresh(tmp_path / "w"), paths, given=loaded(harbour), progress=progress)
+    identify_vessel(fresh(tmp_path / "w"), "mariner", LEAST_SQUARES, progress=progress)
     assert told == [
         (0, 2, "reading mariner.csv.gz"),
         (1, 2, "reading none"),
@@ -207,8 +207,8 @@ def test_nothing_to_identify_from(tmp_path: Path):
 
 def test_an_unforeseen_error_keeps_its_cause():
     error = KeyError("x")
-    told = wrapped(error)
-    assert (told.code, told.exit_code, told.__cause__) == ("internal", 1, error)
+    wrapped_error = wrapped(error)
+    assert (wrapped_error.code, wrapped_error.exit_code, wrapped_error.__cause__) == ("internal", 1, error)
     known = KempfError("a", "b", "c")
     assert wrapped(known) is known
 

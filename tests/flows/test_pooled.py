@@ -67,8 +67,8 @@ def test_reprocessing_keeps_the_pool_and_the_command_lists_it_last(days: Warehou
     assert report.status == "unchanged" and report.kept_sets == 4
     listed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri), "--json").json
     assert [one["estimator"] for one in listed] == ["ml", "ml", "ml", POOLED]
-    told = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri))
-    assert "2 zigzags pooled" in told.out and "not in it: 1 zigzag broken off" in told.out
+    output = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri))
+    assert "2 zigzags pooled" in output.out and "not in it: 1 zigzag broken off" in output.out
     assert len(parameter_sets.summaries(days, "mariner")) == 4
 
 

@@ -108,9 +108,9 @@ def test_what_differs_and_what_cannot_be_built_is_told(own: Warehouse):
     csv = next(row for row in logs.current(own) if row.format == "delimited")
     assert own.folder is not None
     (own.folder / "raw" / csv.log_id[:2] / csv.log_id).unlink()
-    told = kempf("rerun", "--all", "--warehouse", own.uri, "--json")
-    assert told.code == 3 and told.json["verdicts"] == {**NONE, "bit-identical": 1, "failed": 1}
-    assert {f["error"]["code"] for f in told.json["not_identical"]} == {"no_raw_log"}
+    output = kempf("rerun", "--all", "--warehouse", own.uri, "--json")
+    assert output.code == 3 and output.json["verdicts"] == {**NONE, "bit-identical": 1, "failed": 1}
+    assert {f["error"]["code"] for f in output.json["not_identical"]} == {"no_raw_log"}
     assert len(runs.all_runs(own, "rerun")) == 1, "what failed is tried again"
 
 
@@ -120,9 +120,9 @@ def test_a_set_that_was_tampered_with_is_different(own: Warehouse):
     row["parameters"][0]["value"] *= 1.001
     with delta.ensured(own, "parameter_sets") as table:
         delta.replace(table, "parameter_sets", [row], f"parameter_set_id = '{name}'")
-    told = kempf("rerun", "--all", "--verify", "--warehouse", own.uri)
-    assert told.code == 5, told
-    assert f"mariner, {name}: different in parameters.a11.value" in told.out
+    output = kempf("rerun", "--all", "--verify", "--warehouse", own.uri)
+    assert output.code == 5, output
+    assert f"mariner, {name}: different in parameters.a11.value" in output.out
 
 
 def test_an_old_set_is_built_again_after_compaction_and_vacuum(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
@@ -206,17 +206,17 @@ def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeyp
     monkeypatch.setattr("kempf.flows.jobs.identify_vessel.build", moved)
     assert own.folder is not None
     before = tree(own.folder)
-    told = kempf("rerun", "--all", "--preview", "--fail-above", 1.4, "--warehouse", own.uri, "--json")
+    output = kempf("rerun", "--all", "--preview", "--fail-above", 1.4, "--warehouse", own.uri, "--json")
     assert tree(own.folder) == before
-    assert told.code == 5
-    assert [told.json[k] for k in ("sets", "identical", "moved", "new", "gone")] == [2, 1, 1, 0, 0]
-    found = tuple(Move(**move) for move in told.json["moves"])
+    assert output.code == 5
+    assert [output.json[k] for k in ("sets", "identical", "moved", "new", "gone")] == [2, 1, 1, 0, 0]
+    found = tuple(Move(**move) for move in output.json["moves"])
     assert [m.parameter for m in found][:3] == ["a12", "a11", "b2"], "the largest first"
     for move in found:
         stored = {e.name: e for e in parameter_sets.get(own, move.parameter_set_id).parameters}[move.parameter]
         assert (move.before, move.std, move.std_ratio) == (stored.value, stored.std, 1.0)
         assert move.in_std == pytest.approx(steps.get(move.parameter, 0.0), rel=1e-9)
-    first = told.json["parameters"][0]
+    first = output.json["parameters"][0]
     assert (first["vessel"], first["parameter"], first["sets"]) == ("mariner", "a12", 1)
     assert other not in {move.parameter_set_id for move in found}
     monkeypatch.setattr(preview_code, "preview_all", lambda *_: [VesselPreview("mariner", 2, 0, 1, found)])

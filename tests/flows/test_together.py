@@ -77,9 +77,9 @@ def test_one_that_fails_at_any_step_takes_no_other_with_her(own: Warehouse, monk
 
     with monkeypatch.context() as patched:
         patched.setattr(job, step, failing)
-        told = reprocess_vessels(own, FLEET, QUICK)
-    assert [(r.status, r.new_sets) for r in told][::2] == [("changed", 1)] * 2
-    assert told[1].status == "failed" and step in told[1].failures[0]["error"]["message"]
+        reports = reprocess_vessels(own, FLEET, QUICK)
+    assert [(r.status, r.new_sets) for r in reports][::2] == [("changed", 1)] * 2
+    assert reports[1].status == "failed" and step in reports[1].failures[0]["error"]["message"]
     assert {one.vessel: one.status for one in runs.all_runs(own)}["ferry"] == "failed"
     again = reprocess_vessel(own, "ferry", QUICK)
     assert (again.failures, again.new_sets + again.kept_sets) == ([], 1)
@@ -102,9 +102,9 @@ def test_a_set_that_cannot_be_stored_is_told_of_its_vessel_alone(own: Warehouse,
 
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(parameter_sets, "insert", late)
-        told = reprocess_vessels(own, FLEET, QUICK)
-    assert [(r.status, r.new_sets) for r in told] == [("changed", 1), ("failed", 0), ("changed", 1)]
-    assert [f["error"]["code"] for f in told[1].failures] == ["parameter_set_differs"]
+        reports = reprocess_vessels(own, FLEET, QUICK)
+    assert [(r.status, r.new_sets) for r in reports] == [("changed", 1), ("failed", 0), ("changed", 1)]
+    assert [f["error"]["code"] for f in reports[1].failures] == ["parameter_set_differs"]
     assert parameter_sets.summaries(own).height == 3
 
 
@@ -120,8 +120,8 @@ def test_what_was_identified_is_kept_where_it_is_interrupted(own: Warehouse, mon
         patched.setattr(job, "identify_segments", interrupted)
         reprocess_vessels(own, FLEET, QUICK)
     assert parameter_sets.summaries(own)["vessel"].to_list() == ["cutter", "ferry"]
-    told = reprocess_vessels(own, FLEET, QUICK)
-    assert [(r.new_sets, r.kept_sets) for r in told] == [(0, 1), (0, 1), (1, 0)]
+    reports = reprocess_vessels(own, FLEET, QUICK)
+    assert [(r.new_sets, r.kept_sets) for r in reports] == [(0, 1), (0, 1), (1, 0)]
 
 
 def test_current_stays_with_the_first_of_two_models_that_wait_together(own: Warehouse) -> None:

@@ -64,7 +64,7 @@ def folder(trials: tuple[Trial, ...], tmp_path_factory: pytest.TempPathFactory) 
 
 
 @pytest.fixture(scope="module")
-def told(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Warehouse, Any]:
+def filled(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Warehouse, Any]:
     """The warehouse that the command line filled, and what `kempf identify` said."""
     at = tmp_path_factory.mktemp("w") / "w"
     paths = [folder / "run0.csv.gz", folder / "run1.csv.gz"]
@@ -76,8 +76,8 @@ def told(folder: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[Wareho
 
 
 @pytest.fixture(scope="module")
-def made(told: tuple[Warehouse, Any]) -> tuple[ParameterSet, ...]:
-    warehouse, _ = told
+def made(filled: tuple[Warehouse, Any]) -> tuple[ParameterSet, ...]:
+    warehouse, _ = filled
     found = identify_vessel(warehouse, "mariner")
     assert not any(o.new for o in found), "the same request computes nothing again"
     return tuple(parameter_sets.get(warehouse, o.parameter_set.parameter_set_id) for o in found if o.parameter_set)
@@ -100,7 +100,7 @@ def test_the_speed_and_the_parameters_lie_within_their_errors(
             assert p.std is not None and abs(p.value - getattr(trial.truth.parameters, p.name)) < 3.5 * p.std
 
 
-def test_the_set_says_that_there_was_no_log(told: tuple[Warehouse, Any], made: tuple[ParameterSet, ...]) -> None:
+def test_the_set_says_that_there_was_no_log(filled: tuple[Warehouse, Any], made: tuple[ParameterSet, ...]) -> None:
     for one in made:
         assert one.estimator == "ml" and one.convergence["converged"]
         assert any(w.startswith("no water log: speed") for w in one.warnings)
@@ -108,12 +108,12 @@ def test_the_set_says_that_there_was_no_log(told: tuple[Warehouse, Any], made: t
         settings = one.convergence["speed"]["settings"]
         assert settings["trial_speed_std_m_s"] == pytest.approx(0.1 * settings["trial_speed_m_s"])
         assert one.settings[KEY]["hull_misfit"] == NoLogSettings().hull_misfit
-    shown = {s["parameter_set_id"] for s in told[1]["segments"]} if "segments" in told[1] else None
+    shown = {s["parameter_set_id"] for s in filled[1]["segments"]} if "segments" in filled[1] else None
     assert shown is None or shown == {one.parameter_set_id for one in made}
 
 
-def test_the_other_run_of_the_day_is_an_input(told: tuple[Warehouse, Any], made: tuple[ParameterSet, ...]) -> None:
-    warehouse, _ = told
+def test_the_other_run_of_the_day_is_an_input(filled: tuple[Warehouse, Any], made: tuple[ParameterSet, ...]) -> None:
+    warehouse, _ = filled
     first, second = segments.current(warehouse, "mariner")
     for one, own, other in zip(made, (first, second), (second, first), strict=True):
         inputs = one.provenance["inputs"]
@@ -128,20 +128,20 @@ def test_the_other_run_of_the_day_is_an_input(told: tuple[Warehouse, Any], made:
         assert one.parameter_set_id != parameter_set_id(inputs_of(own, profile, Request(), [moved]))
 
 
-def test_a_rerun_builds_the_same_bits(told: tuple[Warehouse, Any], made: tuple[ParameterSet, ...]) -> None:
-    done = kempf("rerun", made[0].parameter_set_id, "--warehouse", told[0].uri, "--json")
+def test_a_rerun_builds_the_same_bits(filled: tuple[Warehouse, Any], made: tuple[ParameterSet, ...]) -> None:
+    done = kempf("rerun", made[0].parameter_set_id, "--warehouse", filled[0].uri, "--json")
     assert done.code == 0, done
     assert done.json["verdict"] == "bit-identical"
 
 
-def test_nothing_is_pooled_with_the_speed_over_ground(told: tuple[Warehouse, Any]) -> None:
-    warehouse, _ = told
+def test_nothing_is_pooled_with_the_speed_over_ground(filled: tuple[Warehouse, Any]) -> None:
+    warehouse, _ = filled
     assert pool_vessel(warehouse, "mariner", Request(), identify_vessel(warehouse, "mariner")) is None
     assert all(without_log(segment) for segment in segments.current(warehouse, "mariner"))
 
 
-def test_other_settings_of_the_speed_make_another_set(told: tuple[Warehouse, Any]) -> None:
-    one, _ = segments.current(told[0], "mariner")
+def test_other_settings_of_the_speed_make_another_set(filled: tuple[Warehouse, Any]) -> None:
+    one, _ = segments.current(filled[0], "mariner")
     wished = Request(no_log=(("trial_speed_m_s", 7.7), ("trial_speed_std_m_s", 0.1)))
     names = {parameter_set_id(inputs_of(one, "p", request)) for request in (Request(), wished)}
     assert len(names) == 2

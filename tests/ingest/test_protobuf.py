@@ -104,9 +104,9 @@ def test_every_number_is_what_was_written(syntax):
     found = ProtobufReader("yard.Part", schema, paths).read(spans([m.SerializeToString() for m in messages]))
     assert found.good.all()
     for slot, path in enumerate(paths):
-        told = [expected(message, path) for message in messages]
-        assert found.present[slot].tolist() == [number is not None for number in told], path
-        np.testing.assert_array_equal(found.value[slot], [np.nan if n is None else n for n in told])
+        wanted = [expected(message, path) for message in messages]
+        assert found.present[slot].tolist() == [number is not None for number in wanted], path
+        np.testing.assert_array_equal(found.value[slot], [np.nan if n is None else n for n in wanted])
 
 
 def test_a_message_that_comes_in_two_parts_is_merged_and_the_last_number_counts():
@@ -157,8 +157,8 @@ def test_any_bytes_are_read_as_the_library_reads_them_or_refused(tail, seed, cut
         except Exception:  # noqa: BLE001, S112 - text that is no UTF-8, or groups: nothing that a number depends on
             continue
         for slot, path in enumerate(paths):
-            told = expected(read, path)
-            np.testing.assert_equal(found.value[slot, i], np.nan if told is None else told)
+            wanted = expected(read, path)
+            np.testing.assert_equal(found.value[slot, i], np.nan if wanted is None else wanted)
 
 
 def test_what_is_no_number_is_named_with_why():

@@ -133,8 +133,8 @@ def test_the_document_has_the_table_that_the_command_prints() -> None:
 
 @each
 def test_its_content_is_json_and_its_digest_pins_it(effect: Effect) -> None:
-    told = json.loads(json.dumps(effect.as_json(), allow_nan=False))
-    assert told["sha256"] == effect.sha256 == get(effect.name).sha256
+    shown = json.loads(json.dumps(effect.as_json(), allow_nan=False))
+    assert shown["sha256"] == effect.sha256 == get(effect.name).sha256
     assert changed(effect, plain="Other words.").sha256 == effect.sha256
     first = effect.parameters[0]
     wider = changed(effect, parameters=(first.model_copy(update={"high": 2.0 * first.high}), *effect.parameters[1:]))
@@ -221,16 +221,16 @@ def test_sensor_effects_follow_from_eq_18() -> None:
 
 def test_waves_have_the_spread_and_the_frequency_that_are_asked_for() -> None:
     effect, L = ALL["waves"], 80.0
-    told = {"c": 0.02, "k": 1.3}
+    values = {"c": 0.02, "k": 1.3}
     w = 1.3 * np.sqrt(9.81 / L)
     first, second = effect.states
-    A = np.array([[0.0, 1.0], [at(second.derivative, told, L=L, m1=1.0), at(second.derivative, told, L=L, m2=1.0)]])
-    q = at(second.noise, told, L=L)
-    stationary = np.diag([at(first.initial_std, told, L=L) ** 2, at(second.initial_std, told, L=L) ** 2])
+    A = np.array([[0.0, 1.0], [at(second.derivative, values, L=L, m1=1.0), at(second.derivative, values, L=L, m2=1.0)]])
+    q = at(second.noise, values, L=L)
+    stationary = np.diag([at(first.initial_std, values, L=L) ** 2, at(second.initial_std, values, L=L) ** 2])
     assert A @ stationary + stationary @ A.T + np.diag([0.0, q**2]) == pytest.approx(np.zeros((2, 2)), abs=1e-15)
     assert stationary[0, 0] == pytest.approx(0.02**2)
     assert np.abs(np.linalg.eigvals(A)) == pytest.approx([w, w])
-    assert at(first.derivative, told, m2=0.3) == 0.3
+    assert at(first.derivative, values, m2=0.3) == 0.3
 
 
 def test_what_stands_for_eq_16_scales_it() -> None:
@@ -245,8 +245,8 @@ def test_what_stands_for_eq_16_scales_it() -> None:
     power = ALL["speed_exponent"].terms["yaw"]
     assert at(power, {"c": 1.0}, delta=0.2, **ship) == pytest.approx(6e-5 * 0.2 * (36.0 * 7.0 / 6.0 - 36.0))
     wash = ALL["propeller_wash"].terms["yaw"]
-    told = {"n": 1.8, "n0": 2.0, "delta": 0.2}
-    assert at(wash, {"c": 1.0}, **told, **ship) == pytest.approx(6e-5 * 0.2 * ((7.0 * 0.9) ** 2 - 36.0))
+    values = {"n": 1.8, "n0": 2.0, "delta": 0.2}
+    assert at(wash, {"c": 1.0}, **values, **ship) == pytest.approx(6e-5 * 0.2 * ((7.0 * 0.9) ** 2 - 36.0))
 
 
 def test_wind_from_starboard_pushes_to_port_and_turns_the_bow_away() -> None:
@@ -259,8 +259,8 @@ def test_wind_from_starboard_pushes_to_port_and_turns_the_bow_away() -> None:
 
 def test_a_turn_takes_speed_away() -> None:
     effect = ALL["speed_loss"]
-    told = {"V": 7.0, "L": 100.0, "delta": 0.3, "v": -0.6, "r": 0.02}
-    assert at(effect.states[0].derivative, typical(effect), **told) > 0.0
+    values = {"V": 7.0, "L": 100.0, "delta": 0.3, "v": -0.6, "r": 0.02}
+    assert at(effect.states[0].derivative, typical(effect), **values) > 0.0
     assert at(effect.terms["speed"], typical(effect), m1=1.0) == -1.0
 
 
@@ -333,7 +333,7 @@ def test_the_catalogue_is_read_without_anything_heavy() -> None:
 
 
 @pytest.mark.parametrize(
-    ("content", "told"),
+    ("content", "message"),
     [
         ("x = (", "expected keys"),
         ("x: 1", "name: Field required; plain: Field required"),
@@ -342,9 +342,9 @@ def test_the_catalogue_is_read_without_anything_heavy() -> None:
         (GOOD.format(name="zz_wrong", target="roll"), "'roll'"),
     ],
 )
-def test_a_wrong_file_in_the_folder_is_one_clear_error(folder: Path, content: str, told: str) -> None:
+def test_a_wrong_file_in_the_folder_is_one_clear_error(folder: Path, content: str, message: str) -> None:
     (folder / "zz_wrong.yaml").write_text(content, encoding="utf-8")
-    with pytest.raises(KempfError, match=re.escape(told)) as caught:
+    with pytest.raises(KempfError, match=re.escape(message)) as caught:
         catalogue()
     assert caught.value.code == "catalogue_invalid"
     assert "zz_wrong.yaml" in caught.value.message

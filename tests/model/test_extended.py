@@ -117,8 +117,9 @@ def test_a_free_run_with_drag_is_that_of_another_integrator():
     def slope(t: float, x: np.ndarray) -> list[float]:
         return drag(x, np.interp(t, run.time_s, run.speed_m_s), np.interp(t, run.time_s, run.rudder_rad), 1.7)
 
-    told = solve_ivp(slope, (0.0, run.time_s[-1]), start[:3], t_eval=run.time_s, rtol=1e-10, atol=1e-12, max_step=0.25)
-    assert found == pytest.approx(told.y.T, abs=2e-5)
+    span = (0.0, run.time_s[-1])
+    solution = solve_ivp(slope, span, start[:3], t_eval=run.time_s, rtol=1e-10, atol=1e-12, max_step=0.25)
+    assert found == pytest.approx(solution.y.T, abs=2e-5)
     plain = RunFilter(run, EffectModel(), SPEC).free(HULL, np.zeros(0), start)
     assert np.max(np.abs(plain - found)) > 0.05  # the term is no rounding
 
@@ -161,10 +162,10 @@ def test_an_effect_with_a_state_of_its_own_remembers():
         dv, dr, dpsi = drag(x[:3], speed, rudder, 0.0)
         return [dv - 0.02 * x[3], dr, dpsi, (x[0] - x[3]) / 20.0]
 
-    told = solve_ivp(
+    solution = solve_ivp(
         slope, (0.0, run.time_s[-1]), [*start[:3], 0.0], t_eval=run.time_s, rtol=1e-10, atol=1e-12, max_step=0.25
     )
-    assert found == pytest.approx(told.y.T[:, :3], abs=2e-5)
+    assert found == pytest.approx(solution.y.T[:, :3], abs=2e-5)
 
 
 def test_effects_are_absent_at_nothing_and_named_once():

@@ -74,7 +74,7 @@ def test_numbers_that_make_are_told_from_numbers_that_shape(text: str, makers: l
 
 
 @pytest.mark.parametrize(
-    ("text", "code", "told"),
+    ("text", "code", "message"),
     [
         ("yaw: c1*r + c2*v + c3*V + c4*delta + c5*r**3 + c6*v**3 + c7*r*r", "effect_numbers", "7 unknown numbers"),
         ("yaw: c*k*r", "effect_no_effect", "but what another number"),
@@ -101,10 +101,10 @@ def test_numbers_that_make_are_told_from_numbers_that_shape(text: str, makers: l
         (";".join(["yaw: r"] * 9), "expression_invalid", "9 formulas"),
     ],
 )
-def test_own_expressions_that_are_refused(text: str, code: str, told: str) -> None:
+def test_own_expressions_that_are_refused(text: str, code: str, message: str) -> None:
     with pytest.raises(UsageError) as caught:
         from_expression([text])
-    assert (caught.value.code, told in caught.value.message) == (code, True), caught.value.message
+    assert (caught.value.code, message in caught.value.message) == (code, True), caught.value.message
     assert caught.value.next_step
 
 
@@ -152,7 +152,7 @@ def test_a_user_s_own_effect_bears_no_name_of_the_catalogue() -> None:
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "message"),
     [
         (("name: mine", "name: My effect"), "cannot be called"),
         (("plain: My own drag.", ""), "plain: Field required"),
@@ -183,13 +183,13 @@ def test_a_user_s_own_effect_bears_no_name_of_the_catalogue() -> None:
         (("terms:", "group: colour\nterms:"), "group: Input should be 'hull'"),
     ],
 )
-def test_a_wrong_effect_file_is_one_clear_error_with_file_and_key(change: tuple[str, str], told: str) -> None:
+def test_a_wrong_effect_file_is_one_clear_error_with_file_and_key(change: tuple[str, str], message: str) -> None:
     assert change[0] in FILE
     with pytest.raises(UsageError) as caught:
         from_file(FILE.replace(*change), "mine.yaml")
     assert caught.value.code == "effect_file_invalid"
     assert caught.value.message.startswith("mine.yaml is not a valid effect file: ")
-    assert told in caught.value.message
+    assert message in caught.value.message
 
 
 @pytest.mark.parametrize(

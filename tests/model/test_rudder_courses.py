@@ -67,8 +67,8 @@ def test_lag_is_the_exact_response_to_a_ramp() -> None:
 def test_lag_does_not_depend_on_the_step() -> None:
     course = RUDDER_COURSES["rudder_lag"]
     fine, coarse = zigzag(0.025), zigzag(0.1)
-    told = np.array([1.5])
-    assert np.allclose(course(*fine, told)[::4], course(coarse[0], fine[1][::4], told), atol=1e-12)
+    values = np.array([1.5])
+    assert np.allclose(course(*fine, values)[::4], course(coarse[0], fine[1][::4], values), atol=1e-12)
 
 
 def test_dead_time_shifts() -> None:

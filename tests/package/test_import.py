@@ -48,8 +48,8 @@ def test_opening_a_warehouse_imports_neither_kernels_nor_tables() -> None:
 def test_import_kempf_takes_no_time() -> None:
     def microseconds() -> int:
         command = [sys.executable, "-X", "importtime", "-c", "import kempf"]
-        told = subprocess.run(command, check=True, capture_output=True, text=True).stderr
-        (found,) = re.findall(r"\|\s+(\d+) \| kempf$", told, flags=re.MULTILINE)
+        output = subprocess.run(command, check=True, capture_output=True, text=True).stderr
+        (found,) = re.findall(r"\|\s+(\d+) \| kempf$", output, flags=re.MULTILINE)
         return int(found)
 
     # the best of three: others may be at work on the machine

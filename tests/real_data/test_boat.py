@@ -10,8 +10,8 @@ from tests.real_data.voyage import Voyage
 
 
 def test_one_30_30_and_no_zigzag_in_the_turning_circle(boat: Voyage) -> None:
-    told = {name: [(s.kind, s.psi0_deg, s.delta0_deg) for s in o.segments] for name, o in boat.outcomes.items()}
-    assert told == {"turnningdata_xy.csv": [], "zigzag_30_inter_xy.csv": [("zigzag", 30.0, 30.0)]}
+    zigzags = {name: [(s.kind, s.psi0_deg, s.delta0_deg) for s in o.segments] for name, o in boat.outcomes.items()}
+    assert zigzags == {"turnningdata_xy.csv": [], "zigzag_30_inter_xy.csv": [("zigzag", 30.0, 30.0)]}
 
 
 def test_no_row_is_lost(boat: Voyage) -> None:
@@ -44,8 +44,8 @@ def test_parameters_are_stored_with_what_speaks_against_them(boat: Voyage) -> No
     left_out = stored.convergence["gross_errors"].get("lateral_speed", 0)
     lateral = stored.fit["channels"]["lateral_speed"]
     assert lateral["settling"] < 20
-    told = "\n".join(stored.warnings)
-    before = re.search(r"^(\d+) gross errors of lateral_speed left out before the fit", told, re.MULTILINE)
+    warnings = "\n".join(stored.warnings)
+    before = re.search(r"^(\d+) gross errors of lateral_speed left out before the fit", warnings, re.MULTILINE)
     assert before is not None
     assert lateral["n"] + lateral["settling"] + left_out + int(before[1]) == 420
     assert int(before[1]) >= 10

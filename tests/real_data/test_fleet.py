@@ -42,8 +42,8 @@ def test_the_zigzags_that_were_sailed_and_nothing_else(fleet: list[Voyage]) -> N
     for voyage in fleet:
         for name, outcome in voyage.outcomes.items():
             ordered = sorted(outcome.segments, key=lambda s: s.start_utc_ns)
-            told = [(s.kind, s.psi0_deg, s.delta0_deg, s.first_side, len(s.executes_utc_ns)) for s in ordered]
-            assert told == (EKATERINA if voyage.ship.name == "ekaterina" else USUAL), (voyage.ship.name, name)
+            zigzags = [(s.kind, s.psi0_deg, s.delta0_deg, s.first_side, len(s.executes_utc_ns)) for s in ordered]
+            assert zigzags == (EKATERINA if voyage.ship.name == "ekaterina" else USUAL), (voyage.ship.name, name)
 
 
 def test_executes_against_an_independent_estimate(fleet: list[Voyage]) -> None:

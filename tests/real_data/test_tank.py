@@ -19,8 +19,8 @@ def test_every_run_is_one_zigzag_with_the_angles_of_its_name(tank: Voyage) -> No
     assert len(tank.outcomes) == 13
     for name, outcome in tank.outcomes.items():
         run = ordered(name)
-        told = [(s.kind, s.delta0_deg, s.psi0_deg, s.first_side) for s in outcome.segments]
-        assert told == [("zigzag", run.rudder_deg, run.heading_deg, run.side)], name
+        zigzags = [(s.kind, s.delta0_deg, s.psi0_deg, s.first_side) for s in outcome.segments]
+        assert zigzags == [("zigzag", run.rudder_deg, run.heading_deg, run.side)], name
 
 
 def test_nothing_is_lost(tank: Voyage) -> None:

@@ -44,14 +44,14 @@ def deployed(place: Warehouse, server: Server, tmp_path_factory: pytest.TempPath
     assert {"PREFECT_API_URL", "KEMPF_WAREHOUSE", "DO_NOT_TRACK"} <= set(exported)
     env = environment(**server.settings, KEMPF_WAREHOUSE=place.uri)
     for beginning in ("prefect work-pool create", "prefect --no-prompt deploy --"):
-        done = tell(documented(beginning), env)
+        done = ran(documented(beginning), env)
         assert done.returncode == 0, done
     log = tmp_path_factory.mktemp("worker") / "log"
     with running(documented("prefect worker start"), env, log):
         yield env
 
 
-def tell(command: list[str], env: dict[str, str]) -> subprocess.CompletedProcess[str]:
+def ran(command: list[str], env: dict[str, str]) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, env=env, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
 
 
@@ -75,7 +75,7 @@ def test_a_run_as_documented_reports_the_failed_and_does_the_rest(
     whole = kept.read_bytes()
     kept.write_bytes(whole[:-10])
     try:
-        done = tell(documented("prefect --no-prompt deployment run reprocess/nightly --watch"), deployed)
+        done = ran(documented("prefect --no-prompt deployment run reprocess/nightly --watch"), deployed)
     finally:
         kept.write_bytes(whole)
     assert done.returncode == 1, done
@@ -83,8 +83,8 @@ def test_a_run_as_documented_reports_the_failed_and_does_the_rest(
     assert failed.state.message == f"3 vessels: 2 changed, 1 failed; look at {damaged}"
     stood = {run.vessel: run.status for run in runs.all_runs(place, "reprocess")}
     assert stood == {**dict.fromkeys(sound, "changed"), damaged: "failed"}
-    told = tell(documented("prefect artifact inspect kempf-fleet"), deployed)
-    assert "3 vessels: 2 changed, 1 failed" in told.stdout and "Ingest the original file again" in told.stdout
+    output = ran(documented("prefect artifact inspect kempf-fleet"), deployed)
+    assert "3 vessels: 2 changed, 1 failed" in output.stdout and "Ingest the original file again" in output.stdout
 
 
 def test_a_cancelled_run_goes_on_where_it_stopped(deployed: dict[str, str], place: Warehouse, on_server: None) -> None:
@@ -121,8 +121,8 @@ def raw_file(warehouse: Warehouse, vessel: str) -> Path:
 
 def finished(warehouse: Warehouse, before: dict[Any, Any]) -> set[Any]:
     """The vessels whose last run has left another state than before."""
-    told = {run.vessel: run.message.get("state") for run in runs.all_runs(warehouse, "reprocess")}
-    return {vessel for vessel, state in told.items() if state and state != before.get(vessel)}
+    states = {run.vessel: run.message.get("state") for run in runs.all_runs(warehouse, "reprocess")}
+    return {vessel for vessel, state in states.items() if state and state != before.get(vessel)}
 
 
 def let_go(pipe: Path) -> bool:

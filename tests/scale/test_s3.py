@@ -64,9 +64,9 @@ def test_the_command_line_reaches_it_by_the_environment(
 ) -> None:
     for name, value in bucket.settings.items():
         monkeypatch.setenv(name, value)
-    told = kempf("segments", "--warehouse", stored.uri, "--json")
-    assert told.code == 0, told
-    assert [one["segment_id"] for one in told.json] == [one.segment_id for one in segments.current(stored)]
+    output = kempf("segments", "--warehouse", stored.uri, "--json")
+    assert output.code == 0, output
+    assert [one["segment_id"] for one in output.json] == [one.segment_id for one in segments.current(stored)]
     assert kempf("params", "list", "--warehouse", stored.uri).code == 0
     assert kempf("vessels", "list", "--warehouse", f"{bucket.uri}/nothing-here", "--json").code == 4
 

@@ -104,8 +104,8 @@ def test_turning_circle_is_none() -> None:
 @pytest.mark.parametrize("name", CALM)
 def test_trial_day_holds_a_20_20_and_a_10_10(name: str) -> None:
     log, found = zigzags(name)
-    told = [(z.kind, z.psi0_deg, z.delta0_deg, z.first_side, len(z.executes)) for z in found]
-    assert told == [("zigzag", 20, 20, "starboard", 7), ("zigzag", 10, 10, "port", 6)]
+    printed = [(z.kind, z.psi0_deg, z.delta0_deg, z.first_side, len(z.executes)) for z in found]
+    assert printed == [("zigzag", 20, 20, "starboard", 7), ("zigzag", 10, 10, "port", 6)]
     for zigzag in found:
         assert len(zigzag.overshoots) == len(zigzag.executes) - 1
         assert zigzag.quality.switching_scatter_deg < 0.8

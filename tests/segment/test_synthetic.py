@@ -73,8 +73,8 @@ def test_executes_within_a_second(period_s: float, noise: float, step: float, ra
     assert len(found) == 1
     assert len(found[0].executes) == len(executes)
     assert np.max(np.abs(errors(found[0], executes))) < 1.0
-    told = np.array([e.time_uncertainty_s for e in found[0].executes])
-    assert np.all((told > 0) & (told <= period_s))
+    uncertainty = np.array([e.time_uncertainty_s for e in found[0].executes])
+    assert np.all((uncertainty > 0) & (uncertainty <= period_s))
 
 
 @pytest.mark.parametrize("scale", [0.15, 1.0, 5.0])

@@ -65,8 +65,8 @@ def test_memory_is_a_state_that_has_settled_in_slow_motion() -> None:
     rate = V / LENGTH
     assert model.A[0, 3] == pytest.approx(0.3 * rate) and model.A[0, 0] == pytest.approx(HULL.a11 * V - 0.3 * rate)
     assert model.A[3] == pytest.approx([rate / 3.0, 0.0, 0.0, -rate / 3.0])
-    told = linear_hull(HULL, flow, np.eye(7), V)
-    assert told.settled and told.hull.array() == pytest.approx(HULL.array())
+    result = linear_hull(HULL, flow, np.eye(7), V)
+    assert result.settled and result.hull.array() == pytest.approx(HULL.array())
 
 
 def test_what_is_measured_has_its_effects() -> None:
@@ -128,20 +128,20 @@ def test_the_page_says_what_comes_of_each_effect() -> None:
     rows = re.findall(
         r"^\| (carried|shifts the course|left out)[^|]*\| (`[^|]+) \|$", PAGE.read_text(), flags=re.MULTILINE
     )
-    told = {name: how for how, names in rows for name in re.findall(r"`(\w+)`", names)}
+    documented = {name: how for how, names in rows for name in re.findall(r"`(\w+)`", names)}
     assert len(rows) == 3
     for name, one in catalogue.catalogue().items():
         found = carried(HULL, having(**{name: tuple(p.steps[0] for p in one.parameters)}), V)[0]
-        assert told.get(name, "no part of a straight course") == found.how, name
+        assert documented.get(name, "no part of a straight course") == found.how, name
 
 
 def test_errors_are_those_of_draws() -> None:
     effect = own("rudder: c*delta; yaw: k*r", 0.2, -0.01)
     covariance = np.diag([*np.diag(covariance_of(HULL)), 0.02**2, 0.002**2]) * 0.01
-    told = linear_hull(HULL, effect, covariance, V)
+    result = linear_hull(HULL, effect, covariance, V)
     draws = np.random.default_rng(0).multivariate_normal([*HULL.array(), 0.2, -0.01], covariance, 4000)
     drawn = [(p[3] + p[7] / V, p[5] * (1.0 + p[6])) for p in draws]
-    assert np.sqrt(np.diag(told.covariance))[[3, 5]] == pytest.approx(np.std(drawn, axis=0), rel=0.05)
+    assert np.sqrt(np.diag(result.covariance))[[3, 5]] == pytest.approx(np.std(drawn, axis=0), rel=0.05)
     # what does not act on the hull takes part in nothing, known or not
     blind = np.full((7, 7), np.nan)
     blind[:6, :6] = covariance_of(HULL)

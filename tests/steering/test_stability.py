@@ -22,22 +22,22 @@ def less_stable(share: float) -> Hull:
 @pytest.mark.parametrize("name", HULLS)
 def test_real_parts_are_the_eigenvalues(name):
     hull, V = hull_of(name), 5.0
-    told = stability(hull, covariance_of(hull), V)
+    result = stability(hull, covariance_of(hull), V)
     exact = np.sort(np.real(np.linalg.eigvals(hull.continuous(V)[0])))[::-1]
-    assert [v.value for v in told.real_parts] == pytest.approx(exact, rel=1e-9)
-    assert told.determinant.value == pytest.approx(hull.a11 * hull.a22 - hull.a12 * hull.a21)
+    assert [v.value for v in result.real_parts] == pytest.approx(exact, rel=1e-9)
+    assert result.determinant.value == pytest.approx(hull.a11 * hull.a22 - hull.a12 * hull.a21)
 
 
 def test_standard_errors_and_probability_are_those_of_draws():
     hull, V = less_stable(0.4), 7.5
     covariance = covariance_of(hull, np.full(6, 0.02))
-    told = stability(hull, covariance, V)
+    result = stability(hull, covariance, V)
     drawn = draws_of(hull, covariance, 20000)
     matrices = drawn[:, :4].reshape(-1, 2, 2) * V
     parts = np.sort(np.real(np.linalg.eigvals(matrices)), axis=1)[:, ::-1]
-    assert [v.std for v in told.real_parts] == pytest.approx(np.std(parts, axis=0), rel=0.05)
-    assert told.determinant.std == pytest.approx(np.std(np.linalg.det(drawn[:, :4].reshape(-1, 2, 2))), rel=0.03)
-    assert told.probability == pytest.approx(np.mean(parts[:, 0] < 0), abs=0.01)
+    assert [v.std for v in result.real_parts] == pytest.approx(np.std(parts, axis=0), rel=0.05)
+    assert result.determinant.std == pytest.approx(np.std(np.linalg.det(drawn[:, :4].reshape(-1, 2, 2))), rel=0.03)
+    assert result.probability == pytest.approx(np.mean(parts[:, 0] < 0), abs=0.01)
 
 
 def test_verdicts():
@@ -45,8 +45,8 @@ def test_verdicts():
     assert stability(stable, covariance_of(stable), 7.7).verdict == "stable"
     assert stability(unstable, covariance_of(unstable), 7.5).verdict == "unstable"
     near = less_stable(0.1)
-    told = stability(near, covariance_of(near), 7.5)
-    assert told.verdict == "cannot be determined from these data" and "too near to zero" in told.reason
+    result = stability(near, covariance_of(near), 7.5)
+    assert result.verdict == "cannot be determined from these data" and "too near to zero" in result.reason
     blind = stability(stable, np.full((6, 6), np.nan), 7.7)
     assert blind.verdict == "cannot be determined from these data" and np.isnan(blind.probability)
 

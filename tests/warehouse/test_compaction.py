@@ -49,12 +49,12 @@ def lived_in(warehouse: Warehouse) -> list[dict[str, int]]:
             segments.replace(warehouse, {("aurora", stored.ingest_id): found})
             examinations.replace(warehouse, [examination("aurora", stored.log_id, stored.ingest_id, f"{start}")])
         asked = inputs(stored.log_id, START_NS + i)
-        told = collect(warehouse, asked, [stored.ingest_id])
-        made = parameter_set("aurora", asked, provenance=told)
+        collected = collect(warehouse, asked, [stored.ingest_id])
+        made = parameter_set("aurora", asked, provenance=collected)
         parameter_sets.insert(warehouse, [made])
         aliases.point(warehouse, "aurora", made.parameter_set_id)
         runs.record_all(warehouse, [runs.FlowRun("run-1", "reprocess", "aurora", f"round {i}")])
-        pins.append(told["table_versions"])
+        pins.append(collected["table_versions"])
     return pins
 
 
@@ -136,8 +136,8 @@ def test_work_that_began_before_keeps_the_versions_it_began_with(
     monkeypatch.setattr(compaction, "datetime", AtThatTime)  # so that what is kept goes back to when the work began
     compaction.vacuum(warehouse, 0.0)
     asked = inputs(stored.log_id)
-    told = collect(warehouse, asked, [stored.ingest_id], table_versions=began_with)
-    parameter_sets.insert(warehouse, [parameter_set("aurora", asked, provenance=told)])
+    collected = collect(warehouse, asked, [stored.ingest_id], table_versions=began_with)
+    parameter_sets.insert(warehouse, [parameter_set("aurora", asked, provenance=collected)])
     assert content(warehouse, began_with) == then
 
 

@@ -108,8 +108,8 @@ def test_a_clock_that_jumps_back(mariner: Ship, tmp_path: Path):
     assert 0 < outcome["rejected_by_reason"]["clock_back"] <= 20
     assert outcome["records"]["rejected"] == sum(outcome["rejected_by_reason"].values())
     assert len(outcome["segments"]) == 1
-    told = kempf("logs", "rejected", "day.nmea", "--warehouse", tmp_path / "w", "--json").json
-    assert {row["reason"] for row in told["rows"]} == {"clock_back"}
+    output = kempf("logs", "rejected", "day.nmea", "--warehouse", tmp_path / "w", "--json").json
+    assert {row["reason"] for row in output["rows"]} == {"clock_back"}
 
 
 def test_a_clock_that_was_never_set(mariner: Ship, own: Path, tmp_path: Path):
@@ -153,9 +153,9 @@ def test_latitude_95(mariner: Ship, tmp_path: Path):
     outcome = one(take_in(tmp_path / "w", tmp_path / "day.csv", "--profile", profile))
     assert outcome["rejected_by_reason"] == {"out_of_range": 10}
     assert (outcome["records"]["rejected"], outcome["values"]["rejected"]) == (0, 10)
-    told = kempf("logs", "rejected", "day.csv", "--warehouse", tmp_path / "w", "--json").json
-    assert {(row["channel"], row["reason"]) for row in told["rows"]} == {("latitude", "out_of_range")}
-    assert all("95.0" in row["raw"] for row in told["rows"])
+    output = kempf("logs", "rejected", "day.csv", "--warehouse", tmp_path / "w", "--json").json
+    assert {(row["channel"], row["reason"]) for row in output["rows"]} == {("latitude", "out_of_range")}
+    assert all("95.0" in row["raw"] for row in output["rows"])
 
 
 def test_the_same_bytes_for_another_vessel(own: Path, logs: Path, tmp_path: Path):
@@ -173,12 +173,12 @@ def test_one_bad_log_among_good_ones(ferry: Ship, tmp_path: Path):
     (folder / "later.nmea").touch()
     paths = [folder / name for name in ("ferry.nmea.gz", "bad.nmea", "ferry.csv.gz", "later.nmea", "ferry.mcap")]
     asked = ("ingest", *paths, "--profile", folder / "profile.yaml", "--warehouse")
-    told = kempf(*asked, tmp_path / "w", "--json")
-    assert told.code == 3
-    assert [o["outcome"] for o in told.json] == ["new", "failed", "new", "failed", "new"]
-    failed = [o["error"]["code"] for o in told.json if o["outcome"] == "failed"]
+    output = kempf(*asked, tmp_path / "w", "--json")
+    assert output.code == 3
+    assert [o["outcome"] for o in output.json] == ["new", "failed", "new", "failed", "new"]
+    failed = [o["error"]["code"] for o in output.json if o["outcome"] == "failed"]
     assert failed == ["unknown_format", "empty_log"]
-    assert [o["log_id"] is None for o in told.json] == [False, True, False, True, False]
+    assert [o["log_id"] is None for o in output.json] == [False, True, False, True, False]
     assert len(kempf("segments", "--warehouse", tmp_path / "w", "--json").json) == 3
     human = kempf(*asked, tmp_path / "other")
     assert human.code == 3
@@ -189,9 +189,9 @@ def test_the_worst_fault_gives_the_exit_code(mariner: Ship, tmp_path: Path):
     folder = mariner.write(tmp_path / "logs")
     (folder / "bad.nmea").touch()
     paths = (folder / "gone", folder / "bad.nmea", folder / "mariner.nmea.gz")
-    told = kempf("ingest", *paths, "--vessel", "mariner", "--warehouse", tmp_path / "w", "--json")
-    assert told.code == 4
-    assert [o["outcome"] for o in told.json] == ["failed", "failed", "new"]
+    output = kempf("ingest", *paths, "--vessel", "mariner", "--warehouse", tmp_path / "w", "--json")
+    assert output.code == 4
+    assert [o["outcome"] for o in output.json] == ["failed", "failed", "new"]
 
 
 def test_a_fault_of_our_own_on_one_log_stops_no_other(mariner: Ship, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -206,17 +206,17 @@ def test_a_fault_of_our_own_on_one_log_stops_no_other(mariner: Ship, tmp_path: P
     monkeypatch.setattr(ingest_logs, "spooled", read)
     folder = mariner.write(tmp_path / "logs")
     paths = [folder / name for name in ("mariner.mcap", "mariner.nmea.gz")]
-    told = kempf("ingest", *paths, "--profile", folder / "profile.yaml", "--warehouse", tmp_path / "w", "--json")
-    assert told.code == 1
-    assert [o["outcome"] for o in told.json] == ["failed", "new"]
-    assert told.json[0]["error"]["code"] == "internal"
+    output = kempf("ingest", *paths, "--profile", folder / "profile.yaml", "--warehouse", tmp_path / "w", "--json")
+    assert output.code == 1
+    assert [o["outcome"] for o in output.json] == ["failed", "new"]
+    assert output.json[0]["error"]["code"] == "internal"
 
 
 def test_the_second_time_changes_nothing(own: Path, logs: Path):
     before, at = tree(own), versions(own)
-    told = kempf("ingest", *sorted(logs.glob("*gz")), "--vessel", "mariner", "--warehouse", own, "--json")
-    assert [o["outcome"] for o in told.json] == ["unchanged", "unchanged"]
-    assert all(o["segments"] for o in told.json)
+    output = kempf("ingest", *sorted(logs.glob("*gz")), "--vessel", "mariner", "--warehouse", own, "--json")
+    assert [o["outcome"] for o in output.json] == ["unchanged", "unchanged"]
+    assert all(o["segments"] for o in output.json)
     assert (tree(own), versions(own)) == (before, at)
 
 
@@ -224,15 +224,15 @@ def test_the_same_log_twice_in_one_command(mariner: Ship, tmp_path: Path):
     folder = mariner.write(tmp_path / "logs")
     (folder / "copy.nmea.gz").write_bytes(mariner.nmea)
     paths = [folder / name for name in ("mariner.nmea.gz", "mariner.nmea.gz", "copy.nmea.gz")]
-    told = kempf("ingest", *paths, "--vessel", "mariner", "--warehouse", tmp_path / "w", "--json")
-    assert [o["outcome"] for o in told.json] == ["new", "unchanged", "unchanged"]
+    output = kempf("ingest", *paths, "--vessel", "mariner", "--warehouse", tmp_path / "w", "--json")
+    assert [o["outcome"] for o in output.json] == ["new", "unchanged", "unchanged"]
     assert len(kempf("segments", "--warehouse", tmp_path / "w", "--json").json) == 1
 
 
 def test_another_profile_reads_the_log_anew(own: Path, logs: Path, tmp_path: Path):
     (tmp_path / "p.yaml").write_text("wind_arm_per_m: 0.001\n")
-    told = take_in(own, logs / "mariner.nmea.gz", "--profile", tmp_path / "p.yaml")
-    (outcome,) = told.json
+    output = take_in(own, logs / "mariner.nmea.gz", "--profile", tmp_path / "p.yaml")
+    (outcome,) = output.json
     assert outcome["outcome"] == "reread" and len(outcome["segments"]) == 1
     assert len(kempf("segments", "--warehouse", own, "--json").json) == 2
     assert len(kempf("logs", "list", "--warehouse", own, "--json").json) == 2

@@ -149,9 +149,9 @@ def test_a_disk_that_is_full(logs: Path, tmp_path: Path):
         pytest.skip("no /dev/full here")
     (tmp_path / "w").symlink_to("/dev/full")  # opens, and takes not one byte
     asked = ("--profile", logs / "profile.yaml", "--warehouse", tmp_path / "w", "--json")
-    told = kempf("ingest", logs / "mariner.csv.gz", *asked)
-    assert told.code in (1, 2)
-    assert set(told.json) == {"error"}
+    output = kempf("ingest", logs / "mariner.csv.gz", *asked)
+    assert output.code in (1, 2)
+    assert set(output.json) == {"error"}
 
 
 @pytest.mark.parametrize("time", ["yesterday", "2025-13-01", "12:00", "", "0001-01-01T00:00:00+23:00", "nan"])
@@ -161,7 +161,7 @@ def test_a_time_that_is_none(filled: Path, time: str):
 
 
 @pytest.mark.parametrize(
-    ("text", "code", "told"),
+    ("text", "code", "message"),
     [
         ("vessel: [unclosed", "not_yaml", "line 1"),
         ("\tvessel: x", "not_yaml", "line 1"),
@@ -193,14 +193,14 @@ def test_a_time_that_is_none(filled: Path, time: str):
         ("sources: [{match: '*', time: {column: t, start: 2025-05-03T06:00:00}}]", "profile_invalid", "start"),
     ],
 )
-def test_a_profile_that_is_none(logs: Path, own: Path, tmp_path: Path, text: str, code: str, told: str):
+def test_a_profile_that_is_none(logs: Path, own: Path, tmp_path: Path, text: str, code: str, message: str):
     profile = tmp_path / "profile.yaml"
     profile.write_text(text, encoding="utf-8")
     before = tree(own)
     for arguments in (("ingest", logs / "mariner.mcap", "--vessel", "mariner"), ("vessels", "set", "mariner")):
         ran = kempf(*arguments, "--profile", profile, "--warehouse", own, "--json")
         error = refused(ran, 2, code or ran.json["error"]["code"])
-        assert told in error["message"]
+        assert message in error["message"]
         assert "profile.yaml" in error["message"] or not code
         assert len(error["message"]) < 2000
     assert tree(own) == before
@@ -213,8 +213,8 @@ def test_aliases_that_a_person_writes_are_fine(tmp_path: Path):
         "vessel: x\nsources:\n  - match: '*.csv'\n    time: {column: t}\n    channels: &all\n"
         "      h: {channel: heading, unit: deg}\n  - match: '*.txt'\n    channels: *all\n"
     )
-    told = kempf("vessels", "set", "x", "--profile", profile, "--warehouse", tmp_path / "w", "--json")
-    assert told.json == {"vessel": "x", "changed": True}
+    output = kempf("vessels", "set", "x", "--profile", profile, "--warehouse", tmp_path / "w", "--json")
+    assert output.json == {"vessel": "x", "changed": True}
 
 
 def test_profiles_that_disagree(logs: Path, own: Path, tmp_path: Path):
@@ -243,7 +243,7 @@ def test_nobody_says_whose_the_log_is(logs: Path, tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("text", "code", "told"),
+    ("text", "code", "message"),
     [
         ("nmae: x", "model_invalid", "nmae"),
         ("- name: x", "model_invalid", "model"),
@@ -257,11 +257,11 @@ def test_nobody_says_whose_the_log_is(logs: Path, tmp_path: Path):
         (BOMB, "yaml_too_large", "100000"),
     ],
 )
-def test_a_model_that_is_none(filled: Path, tmp_path: Path, text: str, code: str, told: str):
+def test_a_model_that_is_none(filled: Path, tmp_path: Path, text: str, code: str, message: str):
     model = tmp_path / "model.yaml"
     model.write_text(text)
     asked = ("--vessel", "mariner", "--model", model, "--warehouse", filled, "--json")
-    assert told in refused(kempf("identify", *asked), 2, code)["message"]
+    assert message in refused(kempf("identify", *asked), 2, code)["message"]
 
 
 def test_files_that_are_not_there(filled: Path, logs: Path):

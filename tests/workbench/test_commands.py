@@ -26,37 +26,38 @@ def test_every_command_has_help_and_a_summary():
     assert whole.code == 0
     for name in COMMANDS:
         assert f"\n  {name} " in whole.out
-        told = kempf(name, "--help")
-        assert told.code == 0
-        assert told.out.startswith(f"Usage: kempf {name} ")
+        output = kempf(name, "--help")
+        assert output.code == 0
+        assert output.out.startswith(f"Usage: kempf {name} ")
 
 
 def test_without_a_command_the_help_is_shown_and_it_is_a_usage_error():
     for arguments in ((), ("params",), ("vessels",)):
-        told = kempf(*arguments)
-        assert (told.code, told.out) == (2, "")
-        assert told.err.startswith("Usage: kempf")
-        assert "error" not in told.err.split("Commands:")[0].replace("internal error", "")
+        output = kempf(*arguments)
+        assert (output.code, output.out) == (2, "")
+        assert output.err.startswith("Usage: kempf")
+        assert "error" not in output.err.split("Commands:")[0].replace("internal error", "")
 
 
 def test_ingest_tells_every_log_with_its_ledger(logs: Path, tmp_path: Path):
-    told = kempf("ingest", *sorted(logs.glob("mariner.*")), "--profile", logs / "profile.yaml", "--warehouse", tmp_path)
-    assert told.code == 0
-    lines = [line for line in told.out.splitlines() if line.startswith("mariner.")]
+    paths = sorted(logs.glob("mariner.*"))
+    output = kempf("ingest", *paths, "--profile", logs / "profile.yaml", "--warehouse", tmp_path)
+    assert output.code == 0
+    lines = [line for line in output.out.splitlines() if line.startswith("mariner.")]
     assert len(lines) == 3
     assert all(": new, " in line and "1 zigzag: 20/20 to starboard" in line for line in lines)
-    assert "rejected (" in told.out and "next: kempf segments" in told.out
+    assert "rejected (" in output.out and "next: kempf segments" in output.out
 
 
 def test_ingest_json_closes_both_ledgers(filled: Path, logs: Path):
     profile = logs / "profile.yaml"
-    told = kempf("ingest", *sorted(logs.glob("*gz")), "--profile", profile, "--warehouse", filled, "--json").json
-    assert [one["outcome"] for one in told] == ["unchanged", "unchanged"]
-    for one in told:
+    output = kempf("ingest", *sorted(logs.glob("*gz")), "--profile", profile, "--warehouse", filled, "--json").json
+    assert [one["outcome"] for one in output] == ["unchanged", "unchanged"]
+    for one in output:
         for ledger in (one["records"], one["values"]):
             assert ledger["read"] == ledger["kept"] + ledger["rejected"] > 0
         assert one["segments"]
-    nmea = told[1]
+    nmea = output[1]
     assert sum(nmea["rejected_by_reason"].values()) == nmea["records"]["rejected"] + nmea["values"]["rejected"] > 0
 
 
@@ -70,23 +71,23 @@ def test_segments(filled: Path):
         assert one["executes"] == sorted(one["executes"])
         assert len(one["overshoots_deg"]) >= 1
     assert kempf("segments", "--vessel", "mariner", "--warehouse", filled, "--json").json == found
-    told = kempf("segments", "--warehouse", filled)
-    assert told.code == 0
-    assert all(one["segment_id"][:12] in told.out for one in found), "the beginning tells them apart"
+    output = kempf("segments", "--warehouse", filled)
+    assert output.code == 0
+    assert all(one["segment_id"][:12] in output.out for one in found), "the beginning tells them apart"
 
 
 def test_reprocess_of_one_vessel(filled: Path):
     before = versions(filled)
-    told = kempf("reprocess", "--vessel", "mariner", "--vessel", "mariner", "--warehouse", filled.parent / "none")
-    assert told.code == 4  # before anything is done
+    output = kempf("reprocess", "--vessel", "mariner", "--vessel", "mariner", "--warehouse", filled.parent / "none")
+    assert output.code == 4  # before anything is done
     assert versions(filled) == before
 
 
 def test_reprocess_of_one_vessel_changes_nothing_but_the_runs(own: Path):
     before = versions(own)
-    told = kempf("reprocess", "--vessel", "mariner", "--warehouse", own, "--json")
-    assert told.code == 0
-    (report,) = told.json
+    output = kempf("reprocess", "--vessel", "mariner", "--warehouse", own, "--json")
+    assert output.code == 0
+    (report,) = output.json
     assert (report["status"], report["logs"], report["reread"], report["kept_sets"]) == ("unchanged", 2, 0, 4)
     after = versions(own)
     assert {name: v for name, v in after.items() if name != "runs"} == before
@@ -131,8 +132,8 @@ def test_the_history_of_several_vessels_shows_them_all(own: Path, ferry: Ship, t
 
 
 def test_a_second_vessel_is_not_dropped(filled: Path):
-    told = kempf("segments", "--vessel", "mariner", "--vessel", "ferry", "--warehouse", filled, "--json")
-    assert "--vessel is given 2 times" in refused(told, 2, "usage")["message"]
+    output = kempf("segments", "--vessel", "mariner", "--vessel", "ferry", "--warehouse", filled, "--json")
+    assert "--vessel is given 2 times" in refused(output, 2, "usage")["message"]
 
 
 def test_what_is_counted_of_a_log_adds_up(mariner: Ship, tmp_path: Path):
@@ -145,8 +146,8 @@ def test_what_is_counted_of_a_log_adds_up(mariner: Ship, tmp_path: Path):
     folder = mariner.write(tmp_path / "logs")
     (tmp_path / "day.csv").write_bytes(b"".join([header, *rows[:5000], b"broken\n", *rows[5000:]]))
     asked = ("--profile", folder / "profile.yaml", "--warehouse", tmp_path / "w")
-    told = kempf("ingest", tmp_path / "day.csv", *asked).out
-    assert re.search(r"(\d+) records read = (\d+) kept \+ (\d+) rejected; (\d+) values in the kept ones = ", told)
+    output = kempf("ingest", tmp_path / "day.csv", *asked).out
+    assert re.search(r"(\d+) records read = (\d+) kept \+ (\d+) rejected; (\d+) values in the kept ones = ", output)
     (one,) = kempf("logs", "list", "--warehouse", tmp_path / "w", "--json").json
     for what in ("records", "values"):
         assert one[f"{what}_read"] == one[f"{what}_kept"] + one[f"{what}_rejected"] > one[f"{what}_kept"]
@@ -159,10 +160,10 @@ def test_logs_and_what_was_refused_in_them(filled: Path):
     assert [one["format"] for one in listed] == ["nmea", "delimited"]
     assert "mariner.nmea.gz" in kempf("logs", "list", "--vessel", "mariner", "--warehouse", filled).out
     for name in (listed[0]["log_id"], listed[0]["log_id"][:8], listed[0]["file_name"], listed[0]["ingest_id"]):
-        told = kempf("logs", "rejected", name, "--limit", "3", "--warehouse", filled, "--json").json
-        assert told["rejected"] == sum(listed[0]["rejected_by_reason"].values())
-        assert told["shown"] == len(told["rows"]) == 3
-        assert all(row["reason"] and row["raw"] for row in told["rows"])
+        output = kempf("logs", "rejected", name, "--limit", "3", "--warehouse", filled, "--json").json
+        assert output["rejected"] == sum(listed[0]["rejected_by_reason"].values())
+        assert output["shown"] == len(output["rows"]) == 3
+        assert all(row["reason"] and row["raw"] for row in output["rows"])
     assert "more, see --limit" in kempf("logs", "rejected", name, "--limit", "1", "--warehouse", filled).out
     refused(kempf("logs", "rejected", "nothing", "--warehouse", filled, "--json"), 4, "no_log")
     refused(kempf("logs", "rejected", "", "--warehouse", filled, "--json"), 4, "no_log")
@@ -171,9 +172,9 @@ def test_logs_and_what_was_refused_in_them(filled: Path):
 
 @pytest.mark.parametrize("shell", ["bash", "zsh", "fish"])
 def test_completion(shell: str):
-    told = kempf("completion", shell)
-    assert told.code == 0
-    assert "_KEMPF_COMPLETE" in told.out
+    output = kempf("completion", shell)
+    assert output.code == 0
+    assert "_KEMPF_COMPLETE" in output.out
     refused(kempf("completion", "tcsh", "--json"), 2, "usage")
 
 
@@ -225,11 +226,11 @@ def test_the_demonstration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert "Zigzags found" in human.out and "2 of 2 parameter sets bit-identical" in human.out
     assert human.out.count("error in std") == 2
     at = versions(tmp_path / "demo" / "warehouse")
-    told = kempf("demo", "--folder", tmp_path / "demo", "--json").json
-    assert set(told) == {"folder", "vessel", "truth", "ingested", "parameter_sets", "reruns"}
-    assert list(told["truth"]) == HULL
-    assert [o["outcome"] for o in told["ingested"]] == ["unchanged"]
-    assert {r["verdict"] for r in told["reruns"]} == {"bit-identical"}
+    output = kempf("demo", "--folder", tmp_path / "demo", "--json").json
+    assert set(output) == {"folder", "vessel", "truth", "ingested", "parameter_sets", "reruns"}
+    assert list(output["truth"]) == HULL
+    assert [o["outcome"] for o in output["ingested"]] == ["unchanged"]
+    assert {r["verdict"] for r in output["reruns"]} == {"bit-identical"}
     assert versions(tmp_path / "demo" / "warehouse") == at
 
 
@@ -240,8 +241,8 @@ def test_a_fault_of_our_own_is_told_as_one(filled: Path, monkeypatch: pytest.Mon
         raise ZeroDivisionError("division by zero")
 
     monkeypatch.setattr(logs, "current", broken)
-    told = kempf("segments", "--warehouse", filled, "--json")
-    assert told.code == 1
-    assert told.json["error"]["code"] == "internal"
-    assert "ZeroDivisionError: division by zero" in told.json["error"]["message"]
-    assert "Traceback" in told.err
+    output = kempf("segments", "--warehouse", filled, "--json")
+    assert output.code == 1
+    assert output.json["error"]["code"] == "internal"
+    assert "ZeroDivisionError: division by zero" in output.json["error"]["message"]
+    assert "Traceback" in output.err

@@ -82,8 +82,8 @@ def test_channels_of_an_earlier_version_are_exported(earlier: Path, tmp_path: Pa
 
 
 def test_a_set_of_an_estimator_that_is_gone_says_why_it_is_not_built_again(earlier: Path) -> None:
-    told = refused(kempf("rerun", GONE, "--warehouse", earlier, "--json"), 4, "no_estimator")
-    assert "prediction-error" in told["message"] and "commit f477316" in told["next_step"]
+    output = refused(kempf("rerun", GONE, "--warehouse", earlier, "--json"), 4, "no_estimator")
+    assert "prediction-error" in output["message"] and "commit f477316" in output["next_step"]
 
 
 def test_reprocessing_renews_it(earlier: Path) -> None:
@@ -91,9 +91,9 @@ def test_reprocessing_renews_it(earlier: Path) -> None:
     assert (first["status"], first["reread"], first["failures"]) == ("changed", 2, [])
     (again,) = ran(earlier, "reprocess", "--vessel", "ferry", "--json").json
     assert (again["status"], again["reread"], again["new_sets"]) == ("unchanged", 0, 0)
-    told = ran(earlier, "history", "--vessel", "ferry", "--json")
-    assert NEXT not in told.err, "nothing is out of date any more"
-    estimators = {row["estimator"] for row in told.json}
+    output = ran(earlier, "history", "--vessel", "ferry", "--json")
+    assert NEXT not in output.err, "nothing is out of date any more"
+    estimators = {row["estimator"] for row in output.json}
     assert {"ml", "ml-pooled", "least-squares"} == estimators, "those that are gone are superseded"
     old = ran(earlier, "history", "--vessel", "ferry", "--all", "--json").json
     assert {"prediction-error", "multiple-models", "ekf-ols", "ml-effects"} <= {row["estimator"] for row in old}

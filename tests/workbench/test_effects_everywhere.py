@@ -62,21 +62,21 @@ def shown(late: Late, tau: dict[str, Any]) -> None:
 
 
 def differs(late: Late, tau: dict[str, Any]) -> None:
-    told = late.json("params", "diff", late.plain, late.lag)["parameters"][NAME]
-    assert told == {"first": None, "second": tau["value"], "difference": None, "in_std": None, "unit": "s"}
+    output = late.json("params", "diff", late.plain, late.lag)["parameters"][NAME]
+    assert output == {"first": None, "second": tau["value"], "difference": None, "in_std": None, "unit": "s"}
     assert late.json("params", "diff", late.lag, late.plain)["parameters"][NAME]["first"] == tau["value"]
     row = next(line.split() for line in late.text("params", "diff", late.plain, late.lag).splitlines() if NAME in line)
     assert row[1] == "-" and row[-1] == "s"
 
 
 def steering(late: Late, tau: dict[str, Any]) -> None:
-    told = late.json("params", "steering", late.lag)
-    assert told["effects"] == {NAME: tau}
-    assert all(np.isfinite(c["std"]) for c in told["nomoto"]["constants"].values())
+    output = late.json("params", "steering", late.lag)
+    assert output["effects"] == {NAME: tau}
+    assert all(np.isfinite(c["std"]) for c in output["nomoto"]["constants"].values())
     assert NAME in late.text("params", "steering", late.lag)
     # the plain model puts the lag into the hull
     plain = late.json("params", "steering", late.plain)["nomoto"]["constants"]["T"]
-    assert plain["value"] != pytest.approx(told["nomoto"]["constants"]["T"]["value"], rel=0.05)
+    assert plain["value"] != pytest.approx(output["nomoto"]["constants"]["T"]["value"], rel=0.05)
 
 
 def exported(late: Late, tau: dict[str, Any]) -> None:
@@ -121,9 +121,9 @@ def as_mcap(late: Late, tau: dict[str, Any]) -> None:
 
 def steered(late: Late, tau: dict[str, Any]) -> None:
     asked = ("steer", "--vessel", VESSEL, "--set", late.lag, "--minutes", "8")
-    told = late.json(*asked, "--wrong", late.plain)
-    knows, ignores = told["laws"]
-    assert told["effects"] == {NAME: tau}
+    output = late.json(*asked, "--wrong", late.plain)
+    knows, ignores = output["laws"]
+    assert output["effects"] == {NAME: tau}
     assert (
         knows["law"]["states"] == ["v", "r", "psi", "F", "V_T", "rudder_lag"] and "rudder_lag" in knows["law"]["gain"]
     )

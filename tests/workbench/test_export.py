@@ -30,9 +30,9 @@ def hull(filled: Path) -> Hull:
 
 @pytest.mark.parametrize("form", ["yaml", "csv"])
 def test_text_is_what_params_export_writes(filled: Path, form: str):
-    told = exported(filled, form)
+    output = exported(filled, form)
     old = kempf("params", "export", one_of(filled, "ml"), "--format", form, "--warehouse", filled)
-    assert (told.code, told.out) == (0, old.out) and old.code == 0
+    assert (output.code, output.out) == (0, old.out) and old.code == 0
 
 
 def test_yaml_holds_all_that_is_promised(filled: Path):
@@ -52,8 +52,8 @@ def test_csv_is_one_row_a_number(filled: Path):
 def test_control_module_runs_and_is_the_model(filled: Path, tmp_path: Path):
     control = pytest.importorskip("control", reason="python-control is not installed")
     path = tmp_path / "ship.py"
-    told = exported(filled, "control", "--step", "0.5", "--out", path)
-    assert told.code == 0 and told.out == ""
+    output = exported(filled, "control", "--step", "0.5", "--out", path)
+    assert output.code == 0 and output.out == ""
     made = runpy.run_path(str(path))
     assert made["PARAMETERS"] == {n: p["value"] for n, p in shown(filled)["parameters"].items()}
     smooth, sampled = made["continuous"], made["discrete"]
@@ -100,8 +100,8 @@ def test_mat_file_is_the_model(filled: Path, tmp_path: Path):
 @pytest.mark.parametrize("form", ["yaml", "csv", "control", "mat"])
 def test_files_as_json(filled: Path, tmp_path: Path, form: str):
     path = tmp_path / "file"
-    told = exported(filled, form, "--out", path, "--json")
-    assert told.json == {"parameter_set_id": one_of(filled, "ml"), "format": form, "out": str(path), "text": None}
+    output = exported(filled, form, "--out", path, "--json")
+    assert output.json == {"parameter_set_id": one_of(filled, "ml"), "format": form, "out": str(path), "text": None}
     refused(exported(filled, form, "--out", path, "--json"), 2, "cannot_write")
     if form != "mat":
         assert exported(filled, form, "--json").json["text"].encode() == path.read_bytes()
@@ -122,23 +122,23 @@ def test_wrong_requests_are_refused(filled: Path, tmp_path: Path):
 
 def test_steering_of_a_set(filled: Path):
     name = one_of(filled, "ml")
-    told = kempf("params", "steering", name, "--warehouse", filled, "--json").json
-    constants = told["nomoto"]["constants"]
+    output = kempf("params", "steering", name, "--warehouse", filled, "--json").json
+    constants = output["nomoto"]["constants"]
     assert list(constants) == ["K", "T1", "T2", "T3", "T", "K'", "T'"]
     assert all(set(c) == {"value", "std", "unit", "interval_95"} and c["std"] > 0 for c in constants.values())
     truth = {"K": 0.185, "T2": 7.8, "T3": 18.5}  # published of the simulated ship
     for key, exact in truth.items():
         assert abs(constants[key]["value"] - exact) < 4 * constants[key]["std"]
-    assert told["stability"]["verdict"] in ("stable", "unstable", "cannot be determined from these data")
-    assert 0.0 <= told["stability"]["probability_stable"] <= 1.0
+    assert output["stability"]["verdict"] in ("stable", "unstable", "cannot be determined from these data")
+    assert 0.0 <= output["stability"]["probability_stable"] <= 1.0
     faster = kempf(
-        "params", "steering", name, "--speed", str(2 * told["speed_m_s"]), "--warehouse", filled, "--json"
+        "params", "steering", name, "--speed", str(2 * output["speed_m_s"]), "--warehouse", filled, "--json"
     ).json
     assert faster["nomoto"]["constants"]["K"]["value"] == pytest.approx(2 * constants["K"]["value"])
     assert faster["nomoto"]["constants"]["K'"]["value"] == pytest.approx(constants["K'"]["value"])
     human = kempf("params", "steering", name, "--warehouse", filled)
     assert human.code == 0 and "on a straight course: " in human.out and "\nT3 " in human.out
-    json.dumps(told)
+    json.dumps(output)
     refused(
         kempf("params", "steering", name, "--speed", "-1", "--warehouse", filled, "--json"), 2, "speed_not_positive"
     )

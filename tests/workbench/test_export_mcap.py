@@ -57,8 +57,8 @@ def test_topics_stand_side_by_side(topics: dict):
 
 def test_predictions_are_those_of_compare(topics: dict, _filled: Path):
     for horizon, topic in (("1", "one_step"), ("free", "free_run")):
-        told = kempf("compare", "--vessel", "mariner", "--horizon", horizon, "--warehouse", _filled, "--json").json
-        run = told["runs"][0]
+        output = kempf("compare", "--vessel", "mariner", "--horizon", horizon, "--warehouse", _filled, "--json").json
+        run = output["runs"][0]
         for name, unit in CHANNELS.items():
             field = f"{name}_{unit}"
             measured = dict(zip(topics[f"/measured/{name}"][0].tolist(), topics[f"/measured/{name}"][1], strict=True))

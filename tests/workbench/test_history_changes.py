@@ -75,10 +75,10 @@ def test_a_new_rudder_is_told_to_a_person_and_to_a_program(place: Path, tmp_path
     assert set(b2) == {*("before", "change", "std", "low", "high", "percent", "percent_std", "unit", "moved")}
     assert b2["moved"] and b2["unit"] == "1/m^2" and b2["low"] < 0.1 * 6.28e-05 < b2["high"]
     assert (tmp_path / "f.png").read_bytes().startswith(b"\x89PNG")
-    told = asked(place)
-    assert told.code == 0
-    assert "step between " in told.out and "do not agree within their standard errors" in told.out
-    assert "seen with 90 % probability" in told.out
+    output = asked(place)
+    assert output.code == 0
+    assert "step between " in output.out and "do not agree within their standard errors" in output.out
+    assert "seen with 90 % probability" in output.out
 
 
 def test_no_change_tells_what_would_have_been_seen(place: Path) -> None:
@@ -126,14 +126,14 @@ def test_a_voyage_that_two_logs_hold_counts_once(place: Path) -> None:
 
 def test_only_one_model_and_estimator_are_compared(place: Path) -> None:
     put(place, *made_sets(4), *made_sets(4, estimator="paper"), *made_sets(3, model_name="tank", model_sha256="d" * 64))
-    told = asked(place, "--json").json["changes"]
-    assert [(one["model"], one["estimator"], one["sets"]) for one in told] == [
+    output = asked(place, "--json").json["changes"]
+    assert [(one["model"], one["estimator"], one["sets"]) for one in output] == [
         ("linear", "ml", 4),
         ("tank", "ml", 3),
         ("linear", "paper", 4),
     ]
-    assert told[1]["verdict"] == "not testable with these data"
-    assert told[1]["p_value"] is None
+    assert output[1]["verdict"] == "not testable with these data"
+    assert output[1]["p_value"] is None
 
 
 def test_trials_of_one_day_are_one_occasion_unless_said_otherwise(place: Path) -> None:
@@ -155,9 +155,9 @@ def test_without_sets_nothing_is_told(place: Path) -> None:
 
 def test_the_plain_history_is_as_it_was_and_loads_no_engine(place: Path) -> None:
     put(place, *made_sets(4))
-    told = kempf("history", "--vessel", VESSEL, "--warehouse", place, "--json").json
-    assert isinstance(told, list) and len(told) == 24
-    assert asked(place, "--json").json["history"] == told
+    output = kempf("history", "--vessel", VESSEL, "--warehouse", place, "--json").json
+    assert isinstance(output, list) and len(output) == 24
+    assert asked(place, "--json").json["history"] == output
 
 
 def test_wrong_requests(place: Path, tmp_path: Path) -> None:

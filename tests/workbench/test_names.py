@@ -67,8 +67,8 @@ def test_a_vessel_may_be_called_anything(mariner: Ship, tmp_path: Path, monkeypa
     log = tmp_path / "day.nmea"
     log.write_bytes(b"".join(mariner.lines[:400]))
     place = tmp_path / "w"
-    told = kempf("ingest", log, f"--vessel={name}", "--warehouse", place, "--json")
-    assert told.code == 0, told
+    output = kempf("ingest", log, f"--vessel={name}", "--warehouse", place, "--json")
+    assert output.code == 0, output
     assert outside(tmp_path) == {"day.nmea"}
     check_names(place)
     assert [v["vessel"] for v in kempf("vessels", "list", "--warehouse", place, "--json").json] == [name]
@@ -112,8 +112,8 @@ def test_a_file_may_be_called_anything(mariner: Ship, tmp_path: Path, name: str)
     folder = tmp_path / "logs"
     folder.mkdir()
     (folder / name).write_bytes(b"".join(mariner.lines[:400]))
-    told = kempf("ingest", folder / name, "--vessel", "x", "--warehouse", tmp_path / "w", "--json")
-    assert told.code == 0
+    output = kempf("ingest", folder / name, "--vessel", "x", "--warehouse", tmp_path / "w", "--json")
+    assert output.code == 0
     check_names(tmp_path / "w")
     (row,) = kempf("logs", "list", "--warehouse", tmp_path / "w", "--json").json
     assert row["file_name"] == name
@@ -133,8 +133,8 @@ def test_columns_that_are_called_like_paths(mariner: Ship, tmp_path: Path):
     profile = {"vessel": "x", "sources": [{"match": "*.csv", "time": {"column": hostile["utc"]}, "channels": channels}]}
     (tmp_path / "p.yaml").write_text(yaml.safe_dump(profile))
     asked = ("--profile", tmp_path / "p.yaml", "--warehouse", tmp_path / "w", "--json")
-    told = kempf("ingest", tmp_path / "day.csv", *asked)
-    assert told.code == 0 and len(told.json[0]["segments"]) == 1
+    output = kempf("ingest", tmp_path / "day.csv", *asked)
+    assert output.code == 0 and len(output.json[0]["segments"]) == 1
     check_names(tmp_path / "w")
     assert outside(tmp_path) == {"day.csv", "p.yaml"}
 
@@ -158,8 +158,8 @@ def test_topics_that_are_called_like_paths(tmp_path: Path):
         yaml.safe_dump({"vessel": "x", "sources": [{"match": "*.mcap", "channels": mapped}]})
     )
     asked = ("--profile", tmp_path / "p.yaml", "--warehouse", tmp_path / "w", "--json")
-    told = kempf("ingest", tmp_path / "day.mcap", *asked)
-    assert told.code == 0, told
-    assert told.json[0]["records"]["kept"] == 100
+    output = kempf("ingest", tmp_path / "day.mcap", *asked)
+    assert output.code == 0, output
+    assert output.json[0]["records"]["kept"] == 100
     check_names(tmp_path / "w")
     assert outside(tmp_path) == {"day.mcap", "p.yaml"}

@@ -24,9 +24,9 @@ WARNINGS = (
 
 
 def test_the_gravest_come_first_and_those_alike_are_one() -> None:
-    told = ranked(WARNINGS)
-    assert [one[:10] for one in told] == ["not conver", "b2 < 0: th", "only 80 % ", "the wind i", "4 gross er"]
-    assert told[-1].endswith("left out (likewise yaw_rate)")
+    shown = ranked(WARNINGS)
+    assert [one[:10] for one in shown] == ["not conver", "b2 < 0: th", "only 80 % ", "the wind i", "4 gross er"]
+    assert shown[-1].endswith("left out (likewise yaw_rate)")
 
 
 def test_a_set_prints_three_warnings_and_all_of_them_where_asked(own: Path) -> None:
@@ -80,9 +80,9 @@ def test_ids_are_long_enough_to_tell_them_apart() -> None:
     ],
 )
 def test_no_table_is_wider_than_a_hundred_columns(filled: Path, arguments: tuple[str, ...]) -> None:
-    told = kempf(*arguments, *(() if arguments[0] == "effects" else ("--warehouse", filled)))
-    assert told.code == 0, told
+    output = kempf(*arguments, *(() if arguments[0] == "effects" else ("--warehouse", filled)))
+    assert output.code == 0, output
     wide = [
-        line for line in told.out.splitlines() if len(line) > WIDEST and not line.startswith(("initial ", "horizon"))
+        line for line in output.out.splitlines() if len(line) > WIDEST and not line.startswith(("initial ", "horizon"))
     ]
     assert wide == []

@@ -31,10 +31,10 @@ def test_identify_gives_the_sets_of_params_show(filled: Path):
 
 
 def test_identify_for_a_person(own: Path):
-    told = kempf("identify", "--vessel", "mariner", "--estimator", "least-squares", "--warehouse", own)
-    assert told.code == 0
-    assert all(f"\n{name} " in told.out for name in HULL)
-    assert "converged" in told.out and "next: kempf history" in told.out
+    output = kempf("identify", "--vessel", "mariner", "--estimator", "least-squares", "--warehouse", own)
+    assert output.code == 0
+    assert all(f"\n{name} " in output.out for name in HULL)
+    assert "converged" in output.out and "next: kempf history" in output.out
 
 
 def test_identify_with_a_model_of_its_own(own: Path, tmp_path: Path):
@@ -50,16 +50,16 @@ def test_params_list(filled: Path):
     listed = sets(filled)
     assert [one["estimator"] for one in listed].count("ml") == 2
     assert sum("current" in one["aliases"] for one in listed) == 1
-    told = kempf("params", "list", "--vessel", "mariner", "--warehouse", filled)
-    assert told.code == 0 and told.out.count("\nps-") == 4
+    output = kempf("params", "list", "--vessel", "mariner", "--warehouse", filled)
+    assert output.code == 0 and output.out.count("\nps-") == 4
 
 
 def test_params_show_by_a_beginning(filled: Path):
     whole = one_of(filled, "ml")
-    told = kempf("params", "show", whole[:9], "--warehouse", filled)
-    assert told.code == 0
-    assert told.out.startswith(f"{whole}: mariner, model plain, estimator ml")
-    assert "Discrete, eq. (17)" in told.out
+    output = kempf("params", "show", whole[:9], "--warehouse", filled)
+    assert output.code == 0
+    assert output.out.startswith(f"{whole}: mariner, model plain, estimator ml")
+    assert "Discrete, eq. (17)" in output.out
     refused(kempf("params", "show", "ps-", "--warehouse", filled, "--json"), 2, "ambiguous_parameter_set")
     refused(kempf("params", "show", "ps-zzz", "--warehouse", filled, "--json"), 4, "no_parameter_set")
     refused(kempf("params", "show", "", "--warehouse", filled, "--json"), 4, "no_parameter_set")
@@ -67,9 +67,9 @@ def test_params_show_by_a_beginning(filled: Path):
 
 def test_params_diff(filled: Path):
     first, second = one_of(filled, "ml"), one_of(filled, "least-squares")
-    told = kempf("params", "diff", first, second, "--warehouse", filled, "--json").json
-    assert list(told["parameters"]) == HULL
-    b2 = told["parameters"]["b2"]
+    output = kempf("params", "diff", first, second, "--warehouse", filled, "--json").json
+    assert list(output["parameters"]) == HULL
+    b2 = output["parameters"]["b2"]
     assert b2["difference"] == b2["second"] - b2["first"]
     same = kempf("params", "diff", first, first, "--warehouse", filled, "--json").json
     assert {p["in_std"] for p in same["parameters"].values()} == {0.0}
@@ -80,28 +80,28 @@ def test_params_diff(filled: Path):
 def test_params_export(filled: Path, tmp_path: Path, form: str):
     name = one_of(filled, "ml")
     shown = kempf("params", "show", name, "--warehouse", filled, "--json").json
-    told = kempf("params", "export", name, "--format", form, "--warehouse", filled)
-    assert told.code == 0
+    printed = kempf("params", "export", name, "--format", form, "--warehouse", filled)
+    assert printed.code == 0
     if form == "csv":
-        rows = {row["name"]: row for row in csv.DictReader(told.out.splitlines()) if row["group"] == "parameters"}
+        rows = {row["name"]: row for row in csv.DictReader(printed.out.splitlines()) if row["group"] == "parameters"}
         assert {n: float(row["value"]) for n, row in rows.items()} == {n: shown["parameters"][n]["value"] for n in HULL}
         assert all(row["unit"] == shown["parameters"][n]["unit"] for n, row in rows.items())
     else:
-        content = yaml.safe_load(told.out) if form == "yaml" else json.loads(told.out)
+        content = yaml.safe_load(printed.out) if form == "yaml" else json.loads(printed.out)
         assert content == {key: value for key, value in shown.items() if key != "iterations"}
     output = tmp_path / "set"
     assert kempf("params", "export", name, "--format", form, "--output", output, "--warehouse", filled).code == 0
-    assert output.read_text() == told.out
+    assert output.read_text() == printed.out
     again = kempf("params", "export", name, "--output", output, "--warehouse", filled, "--json")
     refused(again, 2, "cannot_write")
-    assert output.read_text() == told.out
+    assert output.read_text() == printed.out
 
 
 def test_history_as_known_now_and_before_anything_was(filled: Path):
-    told = kempf("history", "--vessel", "mariner", "--parameter", "b2", "--warehouse", filled, "--json").json
-    assert len(told) == 4
-    assert set(told[0]) >= {"parameter_set_id", "start", "parameter", "value", "std", "unit", "model", "estimator"}
-    assert [one["start"] for one in told] == sorted(one["start"] for one in told)
+    output = kempf("history", "--vessel", "mariner", "--parameter", "b2", "--warehouse", filled, "--json").json
+    assert len(output) == 4
+    assert set(output[0]) >= {"parameter_set_id", "start", "parameter", "value", "std", "unit", "model", "estimator"}
+    assert [one["start"] for one in output] == sorted(one["start"] for one in output)
     long_ago = ("--as-of", "2001-01-01", "--warehouse", filled)
     assert kempf("history", "--vessel", "mariner", *long_ago, "--json").json == []
     assert "No parameter set" in kempf("history", "--vessel", "mariner", *long_ago).out
@@ -125,10 +125,10 @@ def test_history_leaves_out_what_a_newer_profile_superseded(own: Path, logs: Pat
 
 def test_rerun_is_bit_identical(filled: Path):
     for name in (one_of(filled, "ml"), one_of(filled, "least-squares")):
-        told = kempf("rerun", name, "--warehouse", filled, "--json")
-        assert told.code == 0
-        assert told.json["verdict"] == "bit-identical"
-        assert (told.json["differences"], told.json["code_changed"]) == ([], False)
+        output = kempf("rerun", name, "--warehouse", filled, "--json")
+        assert output.code == 0
+        assert output.json["verdict"] == "bit-identical"
+        assert (output.json["differences"], output.json["code_changed"]) == ([], False)
     assert kempf("rerun", name, "--warehouse", filled).out == f"{name}: bit-identical\n"
     refused(kempf("rerun", "ps-zzz", "--warehouse", filled, "--json"), 4, "no_parameter_set")
 
@@ -139,11 +139,11 @@ def test_rerun_of_a_tampered_set_says_where_it_differs(own: Path):
     (row,) = delta.rows(table, "parameter_sets", {"parameter_set_id": name}).rows(named=True)
     row["parameters"][5]["value"] *= 1 + 1e-6
     delta.replace(table, "parameter_sets", [row], f"parameter_set_id = '{name}'")
-    told = kempf("rerun", name, "--warehouse", own, "--json")
-    assert told.code == 5
-    assert told.json["verdict"] == "different"
-    assert [one["field"] for one in told.json["differences"]] == ["parameters.b2.value"]
-    assert told.json["differences"][0]["relative"] == pytest.approx(1e-6, rel=0.1)
+    output = kempf("rerun", name, "--warehouse", own, "--json")
+    assert output.code == 5
+    assert output.json["verdict"] == "different"
+    assert [one["field"] for one in output.json["differences"]] == ["parameters.b2.value"]
+    assert output.json["differences"][0]["relative"] == pytest.approx(1e-6, rel=0.1)
     human = kempf("rerun", name, "--warehouse", own)
     assert human.code == 5 and "parameters.b2.value" in human.out
     within = kempf("rerun", name, "--tolerance", "1e-5", "--warehouse", own, "--json")
@@ -167,9 +167,9 @@ def test_identify_where_nothing_can_be_identified(mariner: Ship, tmp_path: Path)
     blind.write_bytes(b"".join(line for line in mariner.lines if b"$GP" not in line))
     place = tmp_path / "w"
     assert kempf("ingest", blind, "--vessel", "mariner", "--warehouse", place).code == 0
-    told = kempf("identify", "--vessel", "mariner", "--warehouse", place, "--json")
-    assert told.code == 3
-    (one,) = told.json
+    output = kempf("identify", "--vessel", "mariner", "--warehouse", place, "--json")
+    assert output.code == 3
+    (one,) = output.json
     assert set(one) == {"segment_id", "error"} and one["error"]["code"] == "channel_missing"
     human = kempf("identify", "--vessel", "mariner", "--warehouse", place)
     assert human.code == 3 and "not identified [channel_missing]" in human.err

@@ -21,14 +21,14 @@ def test_a_rotten_chunk_and_a_cut_are_told_at_ingest_and_in_the_list(tmp_path: P
     path.write_bytes(damaged)
     profile.write_text(PROFILE)
     common = ("--vessel", "aurora", "--profile", profile, "--warehouse", place)
-    (told,) = kempf("ingest", path, *common, "--json").json
-    assert told["records"] == {"read": 9 * EACH, "kept": 8 * EACH, "rejected": EACH}
-    assert told["partial"] is True
-    rotten, cut = told["lost"]
+    (output,) = kempf("ingest", path, *common, "--json").json
+    assert output["records"] == {"read": 9 * EACH, "kept": 8 * EACH, "rejected": EACH}
+    assert output["partial"] is True
+    rotten, cut = output["lost"]
     assert rotten["messages"] == EACH and "corruption" in rotten["why"]
     assert rotten["since"] < rotten["until"] < cut["since"] and cut["until"] is None and cut["messages"] is None
     (listed,) = kempf("logs", "list", "--warehouse", place, "--json").json
-    assert listed["partial"] is True and listed["lost"] == told["lost"]
+    assert listed["partial"] is True and listed["lost"] == output["lost"]
     shown = kempf("ingest", path, *common).out
     assert f"partial: 2 stretches of this log could not be read, the first from {rotten['since']} on" in shown
     assert "partial: 2 stretches" in kempf("logs", "list", "--warehouse", place).out

@@ -60,9 +60,9 @@ def test_one_vessel_needs_no_prefect(own: Path, arguments: tuple[str, ...]):
 
 
 def test_in_a_process_of_its_own_stdout_holds_the_one_document(filled: Path):
-    told = process("segments", "--json", "--warehouse", filled)
-    assert (told.code, told.err) == (0, "")
-    assert told.json == kempf("segments", "--json", "--warehouse", filled).json
+    output = process("segments", "--json", "--warehouse", filled)
+    assert (output.code, output.err) == (0, "")
+    assert output.json == kempf("segments", "--json", "--warehouse", filled).json
     refused(process("segments", "--vessel", "nobody", "--json", "--warehouse", filled), 4, "no_vessel")
     human = process("segments", "--vessel", "nobody", "--warehouse", filled)
     assert (human.code, human.out) == (4, "")
@@ -81,9 +81,9 @@ def test_no_escapes_off_a_terminal(filled: Path, logs: Path, tmp_path: Path):
             tmp_path / "w",
         ),
     ):
-        told = process(*arguments)
-        assert "\x1b" not in told.out + told.err
-        assert told.out + told.err
+        output = process(*arguments)
+        assert "\x1b" not in output.out + output.err
+        assert output.out + output.err
 
 
 def on_a_terminal(*arguments: object, **changes: str) -> str:
@@ -132,8 +132,8 @@ def test_a_reader_that_has_seen_enough_is_no_error(filled: Path):
 
 def test_letters_that_the_terminal_cannot_write_are_written_out(filled: Path):
     wrong = ("segments", "--vessel", "Ærø", "--warehouse", filled)
-    told = process(*wrong, "--json", PYTHONIOENCODING="ascii")
-    assert "Ærø" in refused(told, 4, "no_vessel")["message"]
+    output = process(*wrong, "--json", PYTHONIOENCODING="ascii")
+    assert "Ærø" in refused(output, 4, "no_vessel")["message"]
     assert process(*wrong, PYTHONIOENCODING="ascii").code == 4
 
 
@@ -142,9 +142,9 @@ def test_a_file_name_that_is_no_text(logs: Path, tmp_path: Path):
     name = os.fsencode(tmp_path) + b"/\xff\x1b[31m\n.csv.gz"
     Path(os.fsdecode(name)).write_bytes((logs / "mariner.csv.gz").read_bytes())
     asked = ("--profile", logs / "profile.yaml", "--warehouse", tmp_path / "w")
-    told = process("ingest", name, *asked, "--json")
-    assert told.code == 0, told.err
-    assert [one["outcome"] for one in told.json] == ["new"]
+    output = process("ingest", name, *asked, "--json")
+    assert output.code == 0, output.err
+    assert [one["outcome"] for one in output.json] == ["new"]
     human = process("ingest", name, *asked)
     assert human.code == 0 and "\x1b" not in human.out
     assert process("logs", "list", "--warehouse", tmp_path / "w").out.count("\n") == 2

@@ -49,6 +49,6 @@ def test_what_describes_itself_needs_no_draft(logs: Path, tmp_path: Path) -> Non
     bad = (("empty.csv", b"", 3, "empty_log"), ("noise.csv", bytes(range(256)), 2, "no_draft"))
     for name, content, code, error in bad:
         (tmp_path / name).write_bytes(content)
-        told = refused(kempf("profile", "draft", tmp_path / name, "--json"), code, error)
-        assert "Ingest it as it is" not in told["next_step"]
+        output = refused(kempf("profile", "draft", tmp_path / name, "--json"), code, error)
+        assert "Ingest it as it is" not in output["next_step"]
     assert "sources:" in kempf("profile", "draft", logs / "mariner.csv.gz", "--json").json["profile"]

@@ -18,9 +18,9 @@ def steered(filled: Path, *options: object):
 
 
 def test_a_law_and_one_from_wrong_parameters(filled: Path):
-    told = steered(filled, "--wrong", "4", "--json").json
-    assert told["vessel"] == "mariner" and told["parameter_set_id"] == one_of(filled, "ml")
-    right, wrong = told["laws"]
+    output = steered(filled, "--wrong", "4", "--json").json
+    assert output["vessel"] == "mariner" and output["parameter_set_id"] == one_of(filled, "ml")
+    right, wrong = output["laws"]
     assert right["closed_loop"]["stable"] and right["performance"]["kept"]
     assert right["performance"]["heading_rms_deg"] < 0.3
     assert list(right["law"]["gain"]) == ["v", "r", "psi", "F", "V_T"]
@@ -28,15 +28,15 @@ def test_a_law_and_one_from_wrong_parameters(filled: Path):
     assert wrong["performance"]["heading_rms_deg"] > right["performance"]["heading_rms_deg"]
     assert wrong["course_change"]["overshoot_deg"] > 2 * right["course_change"]["overshoot_deg"]
     assert wrong["closed_loop"]["modulus_margin"] < right["closed_loop"]["modulus_margin"]
-    assert steered(filled, "--wrong", "4", "--json").json == told
+    assert steered(filled, "--wrong", "4", "--json").json == output
 
 
 def test_for_a_person_with_another_set(filled: Path):
     other = one_of(filled, "least-squares")
-    told = steered(filled, "--wrong", other, "--method", "poles")
-    assert told.code == 0, told
-    assert "from wrong parameters" in told.out and f"wrong: {other} (mariner)" in told.out
-    assert "heading rms, deg" in told.out and "modulus margin" in told.out
+    output = steered(filled, "--wrong", other, "--method", "poles")
+    assert output.code == 0, output
+    assert "from wrong parameters" in output.out and f"wrong: {other} (mariner)" in output.out
+    assert "heading rms, deg" in output.out and "modulus margin" in output.out
     alone = steered(filled)
     assert alone.code == 0 and "wrong" not in alone.out
 

@@ -15,7 +15,7 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.ranked_warnings import MOST
-from kempf.workbench.terminal import number, print_json, print_note, print_table, progress, short_ids
+from kempf.workbench.terminal import number, print_json, print_note, print_table, progress_bar, short_ids
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -78,8 +78,8 @@ def command(
     wanted: list[str | None] = [*dict.fromkeys(sets)] or [None]
     figures = require_figures(figure, len(wanted))
     warehouse = Warehouse(uri)
-    with progress() as tell:
-        compared = [compare_vessel(warehouse, vessel, name, horizon, tell) for name in wanted]
+    with progress_bar() as progress:
+        compared = [compare_vessel(warehouse, vessel, name, horizon, progress) for name in wanted]
     print_note(said_of_vessel(warehouse, vessel))
     documents = []
     for found, path in zip_longest(compared, figures):
@@ -97,7 +97,7 @@ def command(
         print_json(documents if len(documents) > 1 else documents[0])
     else:
         for document in documents:
-            _tell(document, verbose=verbose)
+            _print_comparison(document, verbose=verbose)
     above = [one for one in documents if fail_above is not None and one["fail_above"]["exceeded"]]
     for document in above:
         judged = document["judged"]
@@ -118,7 +118,7 @@ def _draw(found: Comparison, figure: Path) -> None:
         draw_measured_over_predicted(found.runs, figure, title)
 
 
-def _tell_skipped(skipped: dict[str, str], *, verbose: bool) -> None:
+def _print_skipped(skipped: dict[str, str], *, verbose: bool) -> None:
     """Say which manoeuvres are left out, those of one reason together."""
     by_reason: dict[str, list[str]] = {}
     for name, why in skipped.items():
@@ -129,7 +129,7 @@ def _tell_skipped(skipped: dict[str, str], *, verbose: bool) -> None:
         click.echo(f"  left out: {', '.join(shown)}{more}: {why}", err=True)
 
 
-def _tell(document: dict[str, Any], *, verbose: bool) -> None:
+def _print_comparison(document: dict[str, Any], *, verbose: bool) -> None:
     by = f" (alias {document['alias']})" if document["alias"] else ""
     effects = f", effects {', '.join(document['effects'])}" if document["effects"] else ", without effects"
     click.echo(
@@ -144,14 +144,14 @@ def _tell(document: dict[str, Any], *, verbose: bool) -> None:
         click.echo(f"initial state: {start['initial_state']}; {start['disturbances']}")
     for sample, title in _SAMPLES.items():
         runs = [run for run in document["runs"] if run["sample"] == sample]
-        _tell_sample(title, runs, document["summary"][sample], verbose=verbose)
-    _tell_skipped(document["skipped"], verbose=verbose)
+        _print_sample(title, runs, document["summary"][sample], verbose=verbose)
+    _print_skipped(document["skipped"], verbose=verbose)
     for sample, title in _SAMPLES.items():
         if document.get("where", {}).get(sample):
-            _tell_where(title, document["where"][sample])
+            _print_where(title, document["where"][sample])
 
 
-def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | None, *, verbose: bool) -> None:
+def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | None, *, verbose: bool) -> None:
     if mean is None:
         click.echo(click.style(f"{title}: no manoeuvre", bold=True))
         return
@@ -189,7 +189,7 @@ def _tell_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] | 
     click.echo(f"  free-run error (100 - fit %, mean over channels): {_with_error(mean['free_run_error_percent'])} %")
 
 
-def _tell_where(title: str, where: dict[str, Any]) -> None:
+def _print_where(title: str, where: dict[str, Any]) -> None:
     click.echo(click.style(f"where it fails, {title} manoeuvres (whitened rms: 1 where the model is right)", bold=True))
     if not where["stands_out"]:
         click.echo("  no phase, side, bin or manoeuvre stands out from what a right model leaves")
@@ -215,7 +215,7 @@ def _tell_where(title: str, where: dict[str, Any]) -> None:
                 f"{most['low_hz']:g} and {most['high_hz']:g} Hz, most at {most['peak_hz']:.3g} Hz"
             )
     for channel, correlations in where["correlations"].items():
-        _tell_correlation(_CHANNELS[channel], correlations)
+        _print_correlation(_CHANNELS[channel], correlations)
     short = short_ids(w["run"] for w in where["worst"])
     rows = [
         [w["start"][:19], w["end"][11:19], short[w["run"]], _CHANNELS[w["channel"]], w["measure"], _size(w)]
@@ -224,7 +224,7 @@ def _tell_where(title: str, where: dict[str, Any]) -> None:
     print_table(["start UTC", "end", "manoeuvre", "channel", "horizon", "error"], rows, "  worst windows")
 
 
-def _tell_correlation(channel: str, correlations: dict[str, Any]) -> None:
+def _print_correlation(channel: str, correlations: dict[str, Any]) -> None:
     """Say that a channel's innovations are correlated with themselves or with the inputs, where they do."""
     p_value = correlations["auto"]["p_value"]
     if p_value is not None and p_value < _LEVEL:

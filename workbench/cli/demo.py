@@ -9,7 +9,7 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import folder_option, json_option
-from kempf.workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.demonstrate import Demonstration
@@ -27,8 +27,8 @@ def command(folder: Path, as_json: bool) -> None:
     """
     from kempf.flows.jobs.demonstrate import demonstrate
 
-    with progress() as tell:
-        shown = demonstrate(folder, tell)
+    with progress_bar() as progress:
+        shown = demonstrate(folder, progress)
     if as_json:
         print_json(
             {
@@ -41,10 +41,10 @@ def command(folder: Path, as_json: bool) -> None:
             }
         )
         return
-    _tell(shown)
+    _print_demonstration(shown)
 
 
-def _tell(shown: Demonstration) -> None:
+def _print_demonstration(shown: Demonstration) -> None:
     from kempf.workbench.cli.ingest import tell_outcomes
 
     click.echo(click.style("Raw logs", bold=True) + f" in {shown.folder / 'logs'}")

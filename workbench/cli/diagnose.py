@@ -10,7 +10,7 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
 _SHOWN = 12
 
@@ -57,12 +57,12 @@ def command(
     mine = Own(files=read_effect_files(files))
     spec, own = chosen_model(warehouse, vessel, set_id, model, mine)
     own = own.beside(mine)
-    with progress() as tell:
-        found, _ = diagnose_vessel(warehouse, vessel, spec, own, progress=tell)
+    with progress_bar() as progress:
+        found, _ = diagnose_vessel(warehouse, vessel, spec, own, progress=progress)
     if as_json:
         print_json(found.show())
         return
-    _tell(found.show(), everything=everything)
+    _print_diagnosis(found.show(), everything=everything)
 
 
 def _fleet(uri: str, *, as_json: bool) -> None:
@@ -92,7 +92,7 @@ def _percent(share: float | None) -> str:
     return "-" if share is None else number(100 * share, 3)
 
 
-def _tell(document: Mapping[str, Any], *, everything: bool) -> None:
+def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
     title = f"{document['vessel']}: {document['verdict'].replace('_', ' ')}"
     click.echo(click.style(title, bold=True) + f"  ({document['diagnosis_id']})")
     for sentence in document["sentences"]:

@@ -46,12 +46,12 @@ def command(
     if as_json:
         print_json({"log": found.file_name, "format": found.format, **found.content})
         return
-    tell(found.file_name, found.content, everything=everything)
+    print_examination(found.file_name, found.content, everything=everything)
     if figure is not None:
         click.echo(f"{figure}: drawn", err=True)
 
 
-def tell(name: str, content: dict[str, Any], *, everything: bool) -> None:
+def print_examination(name: str, content: dict[str, Any], *, everything: bool) -> None:
     """Print a verdict with its evidence and the lines that correct it."""
     findings = content["findings"]
     many = f"{len(findings)} contradiction{'' if len(findings) == 1 else 's'} between its channels"

@@ -60,12 +60,12 @@ def show(name: str | None, symbols: bool, as_json: bool) -> None:
         print_json({**shown, **(_symbols() if symbols else {})})
         return
     if effect is not None:
-        _tell(effect)
+        _print_effect(effect)
     if symbols:
-        _tell_symbols()
+        _print_symbols()
 
 
-def _tell(effect: Effect) -> None:
+def _print_effect(effect: Effect) -> None:
     click.echo(click.style(f"{effect.name}: {effect.title}", bold=True))
     click.echo(f"  {effect.plain}")
     click.echo(f"  equation: {effect.equation}")
@@ -102,7 +102,7 @@ def _symbols() -> dict[str, Any]:
     }
 
 
-def _tell_symbols() -> None:
+def _print_symbols() -> None:
     known = _symbols()
     print_table(["acts on", "what it is"], list(known["targets"].items()), "Before the colon")
     print_table(["symbol", "what it is"], list(known["symbols"].items()), "After the colon")

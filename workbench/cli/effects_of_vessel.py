@@ -13,7 +13,7 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import tell_rungs
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.ranked_warnings import show_warnings
-from kempf.workbench.terminal import number, print_json, print_note, print_table, progress
+from kempf.workbench.terminal import number, print_json, print_note, print_table, progress_bar
 
 
 @click.command("try", cls=GivenOnce)
@@ -41,20 +41,20 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     warehouse = Warehouse(uri)
     spec, own = standing_model(warehouse, vessel)
     own = own.beside(mine)
-    with progress() as tell:
+    with progress_bar() as progress:
         chosen = choose(warehouse, vessel)
         settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
-        found = examine(warehouse, chosen, spec, own, settings, tell, only=(name,))
+        found = examine(warehouse, chosen, spec, own, settings, progress, only=(name,))
     print_note(said_of_vessel(warehouse, vessel))
     document = diagnosis_as_json(found.diagnosis)
     document = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **document})
     if as_json:
         print_json(document)
         return
-    _tell_try(document)
+    _print_candidate(document)
 
 
-def _tell_try(document: Mapping[str, Any]) -> None:
+def _print_candidate(document: Mapping[str, Any]) -> None:
     (candidate,) = document["candidates"]
     refits = [r for one in document["sets"] for r in one["refits"]] + document["refused"]
     click.echo(click.style(f"{document['formula']} on {document['vessel']}", bold=True))
@@ -98,19 +98,19 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, verbose:
             "effect_name", f"{path} holds the effect {next(iter(mine.files))!r}, not {name!r}.", "Name it as it is."
         )
     warehouse = Warehouse(uri)
-    with progress() as tell:
-        made = add_effect(warehouse, vessel, name, mine, tell)
+    with progress_bar() as progress:
+        made = add_effect(warehouse, vessel, name, mine, progress)
     rungs = rungs_to(warehouse, made)
     if as_json:
         print_json({"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": made.show()})
         return
     tell_rungs(rungs[-2:], vessel)
-    _tell_runs(rungs[-2], rungs[-1])
+    _print_runs(rungs[-2], rungs[-1])
     show_warnings(made.warnings, verbose=verbose)
     click.echo(f"next: kempf ladder --vessel {vessel}, kempf effects undo --vessel {vessel}")
 
 
-def _tell_runs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
+def _print_runs(before: Mapping[str, Any], after: Mapping[str, Any]) -> None:
     """Print the free-run errors manoeuvre by manoeuvre, before and after, fitted and held out apart."""
     from math import degrees
 

@@ -80,7 +80,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     try:
         code = cli.main(args=given, prog_name="kempf", standalone_mode=False, color=_color())
     except click.ClickException as error:
-        code = _tell_usage(error, as_json)
+        code = _print_usage_error(error, as_json)
     except (click.Abort, KeyboardInterrupt):
         click.echo("Interrupted. What was finished is kept, nothing is half in; the same command goes on.", err=True)
         code = INTERRUPTED
@@ -90,7 +90,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         # click has put something else in its place: the reader of our output has seen enough
         code = 0
     except Exception as error:  # noqa: BLE001 - the last place where it can be reported
-        code = _tell(wrapped(error), as_json)
+        code = _print_error(wrapped(error), as_json)
     sys.exit(code if isinstance(code, int) else 0)
 
 
@@ -113,16 +113,16 @@ def _color() -> bool | None:
     return False if os.environ.get("NO_COLOR") else None
 
 
-def _tell_usage(error: click.ClickException, as_json: bool) -> int:
+def _print_usage_error(error: click.ClickException, as_json: bool) -> int:
     context = error.ctx if isinstance(error, click.UsageError) else None
     step = f"See `{context.command_path if context else 'kempf'} --help`."
     if type(error).__name__ == "NoArgsIsHelpError" and not as_json:  # the message is the whole help page
         click.echo(error.format_message(), err=True)
         return UsageError.exit_code
-    return _tell(UsageError("usage", error.format_message(), step), as_json)
+    return _print_error(UsageError("usage", error.format_message(), step), as_json)
 
 
-def _tell(error: KempfError, as_json: bool) -> int:
+def _print_error(error: KempfError, as_json: bool) -> int:
     if error.code == "internal":
         traceback.print_exception(error)
     if as_json:

@@ -82,7 +82,7 @@ def command(
         if len(documents) > 1:
             click.echo(click.style(document["vessel"], bold=True))
         for one in document["changes"]:
-            _tell(one)
+            _print_changes(one)
 
 
 def _rows(vessel: str, found: History) -> list[dict[str, Any]]:
@@ -151,7 +151,7 @@ def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: s
     }
 
 
-def _tell(one: dict[str, Any]) -> None:
+def _print_changes(one: dict[str, Any]) -> None:
     """Print what was found of one model and estimator, for a person."""
     left = ", ".join(f"{n} {reason}" for reason, n in one["left_out"].items())
     title = (
@@ -170,7 +170,7 @@ def _tell(one: dict[str, Any]) -> None:
         )
     click.echo(f"  {click.style(one['verdict'], bold=True)}: {one['why']}")
     for change in one["changes"]:
-        _tell_change(change)
+        _print_change(change)
     if one["verdict"].startswith("not testable"):
         return
     smallest, scatter = one["smallest_step_seen"], one["scatter_between_trials"]
@@ -187,7 +187,7 @@ def _percent(share: float) -> str:
     return number(share, 2) if not abs(share) >= 100 else f"{share:.0f}"
 
 
-def _tell_change(change: dict[str, Any]) -> None:
+def _print_change(change: dict[str, Any]) -> None:
     one, other = (t[:10] for t in change["between"])
     sure = f"{100 * change['confidence']:g} %"
     if change["kind"] == "step":

@@ -14,7 +14,7 @@ from kempf.schemas.errors import KempfError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.parameter_set_table import tell_set
-from kempf.workbench.terminal import counted, print_json, progress
+from kempf.workbench.terminal import counted, print_json, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
@@ -57,14 +57,14 @@ def command(
     mine = Own(files=read_effect_files(files))
     spec, own = named_model(warehouse, vessel, model, mine) if model else (ModelSpec(), Own())
     request = Request(spec, estimator, own=own.beside(mine))
-    with progress() as tell:
-        outcomes = identify_vessel(warehouse, vessel, request, progress=tell)
-        pooled = _pooled(warehouse, vessel, request, outcomes, tell)
+    with progress_bar() as progress:
+        outcomes = identify_vessel(warehouse, vessel, request, progress=progress)
+        pooled = _pooled(warehouse, vessel, request, outcomes, progress)
     if as_json:
         print_json([*(_show(outcome) for outcome in outcomes), *([pooled.show()] if pooled else [])])
     else:
         for outcome in outcomes:
-            _tell(outcome, verbose=verbose)
+            _print_outcome(outcome, verbose=verbose)
         if pooled is not None:
             held = len(pooled.convergence.get("held_out", ()))
             title = f"{counted(len(pooled.segment_ids) - held, 'zigzag')} pooled"
@@ -80,13 +80,13 @@ def command(
 
 
 def _pooled(
-    warehouse: Warehouse, vessel: str, request: Request, outcomes: list[IdentifyOutcome], tell: Progress
+    warehouse: Warehouse, vessel: str, request: Request, outcomes: list[IdentifyOutcome], progress: Progress
 ) -> ParameterSet | None:
     """Return the set that all manoeuvres share; where they share none the reason goes to stderr."""
     from kempf.flows.jobs.pool_vessel import pool_vessel
 
     try:
-        found = pool_vessel(warehouse, vessel, request, outcomes, progress=tell)
+        found = pool_vessel(warehouse, vessel, request, outcomes, progress=progress)
     except KempfError as error:
         click.echo(f"not pooled [{error.code}] {error}", err=True)
         return None
@@ -106,7 +106,7 @@ def _show(outcome: IdentifyOutcome) -> object:
     return {"segment_id": outcome.segment.segment_id, **outcome.error.to_json()}
 
 
-def _tell(outcome: IdentifyOutcome, *, verbose: bool) -> None:
+def _print_outcome(outcome: IdentifyOutcome, *, verbose: bool) -> None:
     segment = outcome.segment
     named = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} zigzag {segment.segment_id}"
     if outcome.parameter_set is None:

@@ -12,7 +12,7 @@ import click
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, profile_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.ranked_warnings import of_several, show_warnings
-from kempf.workbench.terminal import counted, one_line, print_json, progress
+from kempf.workbench.terminal import counted, one_line, print_json, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.ingest_logs import IngestOutcome
@@ -39,8 +39,8 @@ def command(
     from kempf.warehouse.store import Warehouse
 
     given = read_profiles(profiles) if profiles else None
-    with progress() as tell:
-        outcomes = ingest(Warehouse(uri), paths, vessel, given, tell)
+    with progress_bar() as progress:
+        outcomes = ingest(Warehouse(uri), paths, vessel, given, progress)
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if len(outcomes) == 1 and failed:
         raise failed[0]
@@ -57,9 +57,9 @@ def command(
 def tell_outcomes(outcomes: Sequence[IngestOutcome], *, verbose: bool = False, notes: bool = True) -> None:
     """Print what became of some logs, then what is to be said of their channels and of how they were read."""
     for outcome in outcomes:
-        _tell_outcome(outcome)
+        _print_outcome(outcome)
     for outcome in outcomes:
-        _tell_channels(outcome, named=len(outcomes) > 1)
+        _print_channels(outcome, named=len(outcomes) > 1)
     if notes:
         said: dict[str, list[str]] = {}
         for outcome in outcomes:
@@ -68,7 +68,7 @@ def tell_outcomes(outcomes: Sequence[IngestOutcome], *, verbose: bool = False, n
         show_warnings(every if verbose else of_several(said), verbose=verbose, word="note")
 
 
-def _tell_outcome(outcome: IngestOutcome) -> None:
+def _print_outcome(outcome: IngestOutcome) -> None:
     """Print what became of one log."""
     name = one_line(Path(outcome.path).name)
     if outcome.error is not None or outcome.tally is None:
@@ -98,7 +98,7 @@ def _ledger(tally: Tally) -> str:
     return f"{said} ({reasons})" if reasons else said
 
 
-def _tell_channels(outcome: IngestOutcome, *, named: bool = False) -> None:
+def _print_channels(outcome: IngestOutcome, *, named: bool = False) -> None:
     """Print what the channel doctor found in a log, nothing where it is clean; its name before it where asked."""
     examination = outcome.examination
     if examination is None or examination.verdict not in ("faults", "failed"):

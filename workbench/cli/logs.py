@@ -112,7 +112,7 @@ def show(log_id: str, uri: str, as_json: bool) -> None:
     """Show one log: how it was read, and what the channel doctor found in it."""
     from kempf.warehouse import examinations, logs
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.cli.doctor import tell
+    from kempf.workbench.cli.doctor import print_examination
 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
@@ -128,7 +128,7 @@ def show(log_id: str, uri: str, as_json: bool) -> None:
     if seen is None:
         click.echo("channels: read before there was a channel doctor; `kempf reprocess` examines it")
     else:
-        tell("channels", dict(seen.content), everything=True)
+        print_examination("channels", dict(seen.content), everything=True)
 
 
 def _damage(lost: Sequence[LostStretch]) -> str:

@@ -9,7 +9,7 @@ import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, output_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import print_json, progress
+from kempf.workbench.terminal import print_json, progress_bar
 
 
 @click.command("report", cls=GivenOnce)
@@ -47,8 +47,8 @@ def command(
     mine = Own(files=read_effect_files(files))
     spec, own = chosen_model(warehouse, vessel, set_id, model, mine)
     own = own.beside(mine)
-    with progress() as tell:
-        report = make_report(warehouse, vessel, spec, own, tell, say=lambda line: click.echo(line, err=True))
+    with progress_bar() as progress:
+        report = make_report(warehouse, vessel, spec, own, progress, say=lambda line: click.echo(line, err=True))
     write_new(path, report.html, "--output")
     if as_json:
         print_json(

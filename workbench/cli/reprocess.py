@@ -11,7 +11,7 @@ import click
 from kempf.schemas.errors import DataRejected
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import print_json, print_table, progress
+from kempf.workbench.terminal import print_json, print_table, progress_bar
 
 
 @click.command("reprocess", cls=GivenOnce)
@@ -43,8 +43,8 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
     if len(names) == 1:
         from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 
-        with progress() as tell:
-            reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=tell).show()]
+        with progress_bar() as progress:
+            reports = [reprocess_vessel(warehouse, names[0], changed_only=changed_only, progress=progress).show()]
     elif os.environ.get("PREFECT_API_URL"):
         from kempf.flows.fleet.flows import reports_of
 
@@ -52,8 +52,8 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
     else:
         from kempf.flows.fleet.plan import do_fleet
 
-        with progress() as tell:
-            reports = do_fleet(warehouse, names or None, changed_only=changed_only, progress=tell)
+        with progress_bar() as progress:
+            reports = do_fleet(warehouse, names or None, changed_only=changed_only, progress=progress)
     if as_json:
         print_json(reports)
     else:

@@ -10,7 +10,7 @@ import click
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import folder_option, json_option
-from kempf.workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.reproduce_paper import Experiment, Reproduction
@@ -29,8 +29,8 @@ def command(folder: Path, as_json: bool) -> None:
 
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        with progress() as tell:
-            made = reproduce_paper(tell)
+        with progress_bar() as progress:
+            made = reproduce_paper(progress)
         figures = draw(made, folder)
     except OSError as error:
         raise UsageError(
@@ -39,7 +39,7 @@ def command(folder: Path, as_json: bool) -> None:
     if as_json:
         print_json({**made.show(), "figures": [str(path) for path in figures]})
         return
-    _tell(made)
+    _print_reproduction(made)
     click.echo(click.style("Figures", bold=True))
     for path in figures:
         click.echo(f"  {path}")
@@ -63,15 +63,15 @@ def draw(made: Reproduction, folder: Path) -> list[Path]:
     return figures
 
 
-def _tell(made: Reproduction) -> None:
+def _print_reproduction(made: Reproduction) -> None:
     rows = [[name, value, by] for name, (value, by) in made.conditions.items()]
     print_table(["condition", "value", "stated by"], rows, "The experiment")
     click.echo()
     for one in made.experiments:
-        _tell_one(made, one)
+        _print_experiment(made, one)
 
 
-def _tell_one(made: Reproduction, one: Experiment) -> None:
+def _print_experiment(made: Reproduction, one: Experiment) -> None:
     shown = one.show()
     rows = [
         [

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from kempf.schemas.errors import DataRejected, ThresholdExceeded
-from kempf.workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.parameter_changes import Move
@@ -25,8 +25,8 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
     """Show it; exit code 3 where something could not be done, 5 where a parameter moves further than is allowed."""
     from kempf.flows.jobs.preview_code import preview_all
 
-    with progress() as tell:
-        found = preview_all(warehouse, vessels, tell)
+    with progress_bar() as progress:
+        found = preview_all(warehouse, vessels, progress)
     moves = sorted((m for one in found for m in one.moves), key=lambda m: -m.size)
     lines = _by_parameter(moves)
     if as_json:
@@ -40,7 +40,7 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
             }
         )
     else:
-        _tell(found, lines)
+        _print_preview(found, lines)
     if any(one.failures for one in found):
         sys.exit(DataRejected.exit_code)
     if fail_above is not None and moves and moves[0].size > fail_above:
@@ -84,7 +84,7 @@ def _by_parameter(moves: Sequence[Move]) -> list[dict[str, Any]]:
     ]
 
 
-def _tell(found: Sequence[VesselPreview], lines: Sequence[dict[str, Any]]) -> None:
+def _print_preview(found: Sequence[VesselPreview], lines: Sequence[dict[str, Any]]) -> None:
     counts = _counts(found)
     if counts["sets"] == counts["up_to_date"] and not counts["new"] and not counts["failures"]:
         click.echo(f"All {counts['sets']} current parameter sets were made by this code.")

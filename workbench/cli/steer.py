@@ -66,7 +66,7 @@ def command(
     if as_json:
         print_json(_show(done, figure))
     else:
-        _tell(done, figure, verbose=verbose)
+        _print_steered(done, figure, verbose=verbose)
 
 
 def _draw(done: Steered, figure: Path) -> None:
@@ -137,7 +137,7 @@ def _law(one: Tried) -> dict[str, Any]:
     }
 
 
-def _tell(done: Steered, figure: Path | None, *, verbose: bool) -> None:
+def _print_steered(done: Steered, figure: Path | None, *, verbose: bool) -> None:
     from kempf.workbench.ranked_warnings import show_warnings
 
     shown = [_law(one) for one in done.laws]

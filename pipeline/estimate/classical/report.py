@@ -8,7 +8,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.classical.resample import step_of
-from kempf.pipeline.estimate.plausibility import doubts
+from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.result import Estimate, Value, discrete_values, hull_values
 from kempf.schemas.model_spec import ModelSpec
@@ -59,7 +59,7 @@ def estimate_of(
         said.append(f"not converged: {reason}")
     said += warnings
     if whole:
-        said += doubts(values, np.sqrt(np.diag(covariance)), fit or {})
+        said += plausibility_warnings(values, np.sqrt(np.diag(covariance)), fit or {})
     discrete = discrete_values(values, covariance, speed, step) if whole else ()
     return Estimate(
         estimator=name,

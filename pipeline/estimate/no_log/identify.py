@@ -27,7 +27,7 @@ from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
 from kempf.pipeline.estimate.no_log.joint_motion import LateralFit, Priors, coarsened, run_of
 from kempf.pipeline.estimate.no_log.speed import Motion, Speed, speed_without_log
-from kempf.pipeline.estimate.plausibility import doubts
+from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
 from kempf.pipeline.estimate.result import Estimate, hull_values
@@ -289,7 +289,9 @@ def _combined(
     report["speed"]["converged"] = converged
     report["converged"] = bool(fit.converged and converged)
     kept = [w for w in fit.warnings if not w.startswith(("no water log", "not determined"))]
-    own_doubts = [d for d in doubts(hull, np.sqrt(np.diag(covariance)), {}) if d.startswith("not determined")]
+    own_warnings = [
+        d for d in plausibility_warnings(hull, np.sqrt(np.diag(covariance)), {}) if d.startswith("not determined")
+    ]
     return replace(
         fit,
         estimator="ml-no-log",
@@ -297,7 +299,7 @@ def _combined(
         covariance=covariance,
         converged=bool(fit.converged and converged),
         report=report,
-        warnings=(*kept, *own_doubts, *_warnings(speed, own, mean, std, motion.current, converged=converged)),
+        warnings=(*kept, *own_warnings, *_warnings(speed, own, mean, std, motion.current, converged=converged)),
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.plausibility import doubts
+from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.estimate.record.sampled import Sampled, sample
 from kempf.pipeline.estimate.result import Estimate, Value, hull_values
@@ -111,7 +111,7 @@ def estimate_from_discrete(
     values = hull.array() if hull is not None else np.full(6, np.nan)
     covariance = _continuous_covariance(found, hull, sampled) if hull is not None else np.full((6, 6), np.nan)
     if hull is not None:
-        caveats += doubts(values, np.sqrt(np.diag(covariance)), {})
+        caveats += plausibility_warnings(values, np.sqrt(np.diag(covariance)), {})
     names = ("A11", "A12", "A21", "A22", "B1", "B2")
     units = ("1", "m/rad", "rad/m", "1", "m/s/rad", "1/s")
     flat = np.concatenate([found.A.ravel(), found.B.ravel()])

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.estimate.one_step_fit import fit_percent
-from kempf.pipeline.estimate.plausibility import doubts
+from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.model.ship import mariner_like
 
 GOOD = mariner_like(100.0).array()
@@ -20,8 +20,8 @@ def fit(lag: float = 0.02, inside: float = 0.95) -> dict[str, Any]:
 
 
 def test_a_plausible_ship_with_white_errors_raises_no_doubt() -> None:
-    assert doubts(GOOD, SURE, fit()) == ()
-    assert doubts(GOOD, SURE, {}) == ()
+    assert plausibility_warnings(GOOD, SURE, fit()) == ()
+    assert plausibility_warnings(GOOD, SURE, {}) == ()
 
 
 WRONG = [(0, "a11 > 0"), (2, "a21 > 0"), (3, "a22 > 0"), (4, "b1 > 0")]
@@ -31,23 +31,23 @@ WRONG = [(0, "a11 > 0"), (2, "a21 > 0"), (3, "a22 > 0"), (4, "b1 > 0")]
 def test_a_wrong_sign_is_named(index: int, word: str) -> None:
     hull = GOOD.copy()
     hull[index] *= -1.0
-    said = doubts(hull, SURE, fit())
+    said = plausibility_warnings(hull, SURE, fit())
     assert len(said) == 1 and said[0].startswith(word)
 
 
 def test_a_rudder_of_the_wrong_sign_is_named_once() -> None:
-    said = doubts(GOOD * [1, 1, 1, 1, -1, -1], SURE, fit())
+    said = plausibility_warnings(GOOD * [1, 1, 1, 1, -1, -1], SURE, fit())
     assert len(said) == 1 and "sign of the rudder channel" in said[0]
 
 
 def test_a_parameter_lost_in_its_error_is_named() -> None:
-    said = doubts(GOOD, SURE * [1, 1, 30, 1, 1, 1], fit())
+    said = plausibility_warnings(GOOD, SURE * [1, 1, 30, 1, 1, 1], fit())
     assert len(said) == 1 and said[0].endswith("a21")
-    assert doubts(GOOD, np.full(6, np.nan), fit()) == ()
+    assert plausibility_warnings(GOOD, np.full(6, np.nan), fit()) == ()
 
 
 def test_coloured_errors_and_narrow_intervals_are_named() -> None:
-    said = doubts(GOOD, SURE, fit(lag=0.6, inside=0.7))
+    said = plausibility_warnings(GOOD, SURE, fit(lag=0.6, inside=0.7))
     assert len(said) == 2
     assert "0.60" in said[0] and "70 %" in said[1]
 
