@@ -262,13 +262,8 @@ class DiagnosisEvidence(_Part):
         return len(self.models) > 1
 
 
-def evidence_as_json(evidence: DiagnosisEvidence) -> str:
-    """Return the evidence as the JSON text that is stored."""
-    return evidence.model_dump_json()
-
-
 def evidence_from_json(text: str) -> DiagnosisEvidence | None:
-    """Return what `evidence_as_json` gave; None where another version of the code wrote another form."""
+    """Return evidence from its JSON; None where another version of the code wrote another form."""
     try:
         return DiagnosisEvidence.model_validate_json(text)
     except ValueError:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from json import loads
 from typing import Any
 
-from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, evidence_as_json, evidence_from_json
+from kempf.schemas.diagnosis_evidence import DiagnosisEvidence, evidence_from_json
 from kempf.warehouse import delta
 from kempf.warehouse.canonical import canonical_json, plain, sha256
 from kempf.warehouse.keys import quoted, vessel_key
@@ -90,7 +90,7 @@ def keep_evidence(warehouse: Warehouse, vessel: str, name: str, evidence: Diagno
         The diagnosis by its vessel and id.
     """
     key = vessel_key(vessel)
-    row = {"vessel_key": key, "vessel": vessel, "diagnosis_id": name, "evidence_json": evidence_as_json(evidence)}
+    row = {"vessel_key": key, "vessel": vessel, "diagnosis_id": name, "evidence_json": evidence.model_dump_json()}
 
     def attempt() -> None:
         with delta.ensured(warehouse, "diagnosis_evidence") as table:

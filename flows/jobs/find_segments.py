@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
-from typing import Any
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.no_log.companions import has_log, shaft_speed
@@ -69,7 +68,7 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
         executes_utc_ns=zigzag.executes_utc_ns,
         overshoots_deg=tuple(o.beyond_nominal_deg for o in zigzag.overshoots),
         code_version=code_version.fingerprint("segment"),
-        imo={criterion.name: _without_name(asdict(criterion)) for criterion in criteria},
+        imo={shown.pop("name"): shown for shown in map(asdict, criteria)},
         quality=asdict(zigzag.quality),
         detail={
             "psi0_measured_deg": zigzag.psi0_measured_deg,
@@ -84,7 +83,3 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
             "shaft_speed_per_s": shaft_speed(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
         },
     )
-
-
-def _without_name(criterion: dict[str, Any]) -> dict[str, Any]:
-    return {key: value for key, value in criterion.items() if key != "name"}

@@ -13,6 +13,7 @@ from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.ladder_step import Step, rung
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.schemas.effect import Effect
+from kempf.schemas.enumeration import listed
 
 Verdict = Literal["adequate", "explained", "ambiguous", "unexplained", "insufficient_data"]
 #: log-likelihood that the flexible reference must still gain, in runs that did not fit it: something is left
@@ -100,7 +101,7 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
             return EffectFinding("absent", f"{NOT_EXPLAINED}: {_sized(effect, members[effect.name])}")
         if effect.name in members:
             others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
-            alike = f"; these data would fit {_listed(others)} as well" if others else ""
+            alike = f"; these data would fit {listed(others)} as well" if others else ""
             return EffectFinding("present", f"step {number}: {_sized(effect, members[effect.name])}{alike}")
     untestable = _untestable(candidate)
     if untestable:
@@ -118,9 +119,9 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
 def _untestable(candidate: Candidate) -> str:
     """Say why these data do not determine an effect; empty where they do."""
     if candidate.missing:
-        return f"not in the logs: {_listed(list(candidate.missing))}"
+        return f"not in the logs: {listed(list(candidate.missing))}"
     if candidate.measured_by:
-        return f"the logs have {_listed(list(candidate.measured_by))}, which measures it already"
+        return f"the logs have {listed(list(candidate.measured_by))}, which measures it already"
     if np.isnan(candidate.score):
         share = _percent(candidate.absorption)
         return f"the model as it is absorbs {share} of it. {candidate.effect.separated_by}"
@@ -135,7 +136,7 @@ def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding
     last = {c.effect.name: c for c in diagnosis.steps[-1].screened}.get(name)
     refits = [k for step in diagnosis.steps for c, k in step.refused if c.effect.name == name]
     if added and (last is None or np.isnan(last.score) or last.p_adjusted >= diagnosis.settings.level):
-        return EffectFinding("absent", f"no longer significant once {_listed(added)} is included")
+        return EffectFinding("absent", f"no longer significant once {listed(added)} is included")
     if refits:
         return EffectFinding("absent", f"significant by itself; refused after the refit: {_refusal(refits[-1])}")
     return EffectFinding("absent", "significant by itself; not refitted, as others explain more")
@@ -207,7 +208,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             continue
         line = f"{candidate.effect.plain.rstrip('.')}: {_sized(candidate.effect, best)}"
         if others:
-            line += f"; the same data would fit {_listed([c.effect.title for c, _ in others])}"
+            line += f"; the same data would fit {listed([c.effect.title for c, _ in others])}"
             line += f". What distinguishes them: {candidate.effect.separated_by}"
         said.append(line.rstrip(".") + ".")
     if len(diagnosis.steps) > 1:
@@ -253,10 +254,6 @@ def _fall(first: Step, last: Step) -> str:
 def _percent(share: float) -> str:
     text = f"{100 * share:.2f}" if share < 0.9995 else f"{100 * share:.4f}"
     return f"{text} %"
-
-
-def _listed(names: list[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:

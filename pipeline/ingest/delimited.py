@@ -160,7 +160,7 @@ def _cells(layout: Layout, wanted: list[str]) -> tuple[Flag, dict[str, pl.Series
     """Cut the cells of some columns out of the rows; also tell which rows have as many cells as the header."""
     rows = layout.rows
     whole = rows.stop - rows.start <= _LONGEST_ROW
-    parts: list[dict[str, pl.Series]] = [_no_cells(wanted)]
+    parts: list[dict[str, pl.Series]] = [{name: pl.Series(name, [], dtype=pl.String) for name in wanted}]
     looked_at = np.flatnonzero(whole)
     # so that what is known of every byte is not held for all of a file
     for of_block in np.split(looked_at, _cuts(rows.take(looked_at))):
@@ -180,10 +180,6 @@ def _alone(rows: Spans) -> Spans:
     """Return rows with a buffer of their own, behind which there is room for one byte."""
     first, last = int(rows.start[0]), int(rows.stop[-1])
     return Spans(np.append(rows.buffer[first:last], np.uint8(_FEED)), rows.start - first, rows.stop - first)
-
-
-def _no_cells(wanted: list[str]) -> dict[str, pl.Series]:
-    return {name: pl.Series(name, [], dtype=pl.String) for name in wanted}
 
 
 def _cut(layout: Layout, rows: Spans, wanted: list[str]) -> tuple[Flag, dict[str, pl.Series]]:

@@ -24,7 +24,8 @@ def draw_effects(ranked: Sequence[EffectRow]) -> Any:
     with style():
         figure = new_figure(1.3 + 0.32 * len(shown))
         score, size, absorbed = figure.subplots(1, 3, sharey=True, width_ratios=(1.6, 2.9, 1.0))
-        colours = [_colour(row) for row in shown]
+        sets = [int(row.set_id[1:]) - 1 if row.set_id else None for row in shown]
+        colours = [_OTHER if k is None else SET_COLOURS[k % len(SET_COLOURS)] for k in sets]
         at = np.arange(len(shown))
         score.barh(at, [max(row.score, 0.1) for row in shown], color=colours, height=0.65)
         score.set_xscale("log")
@@ -65,10 +66,6 @@ def draw_effects(ranked: Sequence[EffectRow]) -> Any:
             panel.grid(visible=False, axis="y")
             panel.tick_params(axis="y", length=0)
         return figure
-
-
-def _colour(row: EffectRow) -> str:
-    return SET_COLOURS[(int(row.set_id[1:]) - 1) % len(SET_COLOURS)] if row.set_id else _OTHER
 
 
 def describe_effects(ranked: Sequence[EffectRow], first: str) -> str:

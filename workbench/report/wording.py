@@ -5,12 +5,13 @@ Nothing else in the report says what the model lacks: only ``explained`` and ``a
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 from shlex import quote
 from typing import Any
 
 from kempf.schemas.diagnosis_evidence import DiagnosisEvidence
+from kempf.schemas.enumeration import listed
 
 #: the verdicts that claim an effect
 CLAIMING = ("explained", "ambiguous")
@@ -78,7 +79,7 @@ def wording_of(
     """
     verdict = str(content["verdict"])
     given = evidence.models[0].effects
-    first = f"model with {_listed(given)}" if given else "plain model"
+    first = f"model with {listed(given)}" if given else "plain model"
     last = ("model with effects" if verdict in CLAIMING else "model with effects tried") if evidence.improved else first
     return ReportWording(
         verdict=verdict,
@@ -122,7 +123,7 @@ def _next_steps(
         else:
             steps.append(f"Include it in the model: kempf effects add {group['effects'][0]} --vessel {name}.")
         if len(group["effects"]) > 1:
-            alike = _listed([titles[effect] for effect in group["effects"]])
+            alike = listed([titles[effect] for effect in group["effects"]])
             steps.append(f"To distinguish {alike}: {_sentence(group['separated_by'])}")
     if verdict == "adequate":
         steps.append("Use the model as it is, with the standard errors of its parameters.")
@@ -130,9 +131,9 @@ def _next_steps(
     for candidate in content["candidates"]:
         missing = evidence.candidates[candidate["effect"]].missing_channels
         if missing and candidate["verdict"] == "not_testable":
-            channels = _listed([channel.replace("_", " ") for channel in missing])
+            channels = listed([channel.replace("_", " ") for channel in missing])
             untested.setdefault(channels, []).append(candidate["title"])
-    steps += [f"Log {channels}: without it {_listed(names)} cannot be tested." for channels, names in untested.items()]
+    steps += [f"Log {channels}: without it {listed(names)} cannot be tested." for channels, names in untested.items()]
     if verdict != "insufficient_data" and not evidence.models[0].held_out_errors.size:
         steps.append("Sail one manoeuvre more: three are needed to hold one out and judge the prediction by it.")
     return steps
@@ -223,7 +224,3 @@ def _titles(content: Mapping[str, Any]) -> dict[str, str]:
 
 def _sentence(text: str) -> str:
     return text if text.endswith(".") else f"{text}."
-
-
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"

@@ -57,7 +57,7 @@ def ship(name: str, seed: int) -> SimulatedHull:
     # a sister that is hardly stable any more would answer to everything with the same slow swing
     for _ in range(100):
         own = HullParameters(*(told * (1.0 + random.uniform(-0.05, 0.05, 6))).tolist())
-        if own.stability >= 0.8 * p.stability:
+        if own.a11 * own.a22 - own.a12 * own.a21 >= 0.8 * (p.a11 * p.a22 - p.a12 * p.a21):
             break
     return replace(hull, parameters=own, speed_loss=float(random.uniform(0.4, 1.2)))
 

@@ -87,7 +87,10 @@ def propose(fault: Fault, known: Mapping[str, tuple[str, ChannelMap]], log_forma
     if fault.kind in ("swap", "frame"):
         if log_format == "nmea":
             return ()  # a sentence fixes which channel it carries
-        return tuple(Correction(known[old][0], _renamed(known[old][1], new)) for old, new in _exchanged(fault))
+        return tuple(
+            Correction(known[old][0], known[old][1].model_copy(update={"channel": new}))
+            for old, new in _exchanged(fault)
+        )
     return tuple(Correction(known[c][0], _corrected(fault, c, known[c][1])) for c in fault.channels)
 
 
@@ -96,10 +99,6 @@ def _exchanged(fault: Fault) -> list[tuple[str, str]]:
         return [fault.channels[:2], fault.channels[1::-1]]  # type: ignore[list-item]
     other = VELOCITIES["body" if fault.channels == VELOCITIES["earth"] else "earth"]
     return list(zip(fault.channels, other, strict=True))
-
-
-def _renamed(mapped: ChannelMap, channel: str) -> ChannelMap:
-    return mapped.model_copy(update={"channel": channel})
 
 
 def _corrected(fault: Fault, channel: str, mapped: ChannelMap) -> ChannelMap:

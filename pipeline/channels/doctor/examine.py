@@ -25,7 +25,11 @@ class Check(Protocol):
     """One check; without its channels it returns nothing."""
 
     def __call__(self, log: Log, *, thorough: bool = True) -> list[Outcome]:
-        """Compare channels; not ``thorough``: only what takes a moment, which shows a fault but need not name it."""
+        """Compare channels.
+
+        Not ``thorough``: only what takes a moment, which shows a fault but need not name it: at lags that sound clocks
+        show, and without the way from fix to fix.
+        """
         ...
 
 

@@ -35,11 +35,6 @@ _TOGETHER = 0.6
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Compare the turning of the bow with that of every velocity that the log has.
 
-    Parameters
-    ----------
-    thorough : bool, optional
-        False: only at lags that sound clocks show, and not with the way from fix to fix.
-
     Returns
     -------
     list of Outcome

@@ -23,11 +23,6 @@ _CHANNELS = ("heading", "yaw_rate")
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Compare the changes of the heading with the integral of the yaw rate, and the clocks of both.
 
-    Parameters
-    ----------
-    thorough : bool, optional
-        False: only at lags that sound clocks show, and not with the way from fix to fix.
-
     Returns
     -------
     list of Outcome

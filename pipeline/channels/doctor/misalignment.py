@@ -33,11 +33,6 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     is how far heading or course are turned. Legs on several headings separate A and C; where they do not, what is
     known of streams beforehand is part of the standard error.
 
-    Parameters
-    ----------
-    thorough : bool, optional
-        False: not with the way from fix to fix.
-
     Returns
     -------
     list of Outcome

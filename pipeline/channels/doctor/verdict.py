@@ -10,7 +10,7 @@ from kempf.pipeline.channels.doctor.corrections import propose
 from kempf.pipeline.channels.doctor.examine import ChannelFinding, Examination
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome
-from kempf.schemas.channels import CHANNELS
+from kempf.schemas.enumeration import listed
 from kempf.schemas.profile import ChannelMap
 
 _FRAMES = {"body-fixed": "earth-fixed components are expected", "earth-fixed": "body-fixed components are expected"}
@@ -132,9 +132,3 @@ _WORDS: dict[str, Callable[[str, Fault], str]] = {
     "offset": _of_offset,
     "clock_scale": _of_clock,
 }
-
-
-def listed(channels: tuple[str, ...]) -> str:
-    """Return channels as words: a, b and c."""
-    assert all(channel in CHANNELS for channel in channels)
-    return channels[0] if len(channels) == 1 else f"{', '.join(channels[:-1])} and {channels[-1]}"

@@ -24,11 +24,6 @@ _ZERO_M_S = 0.1
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     """Compare the log with every velocity over ground, a constant stream taken out as far as the headings determine it.
 
-    Parameters
-    ----------
-    thorough : bool, optional
-        False: not with the way from fix to fix.
-
     Returns
     -------
     list of Outcome

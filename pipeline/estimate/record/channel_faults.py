@@ -12,7 +12,8 @@ from kempf.pipeline.channels.doctor.examine import ChannelFinding, examine_windo
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
 from kempf.pipeline.channels.doctor.outcome import Outcome
-from kempf.pipeline.channels.doctor.verdict import listed, sentence
+from kempf.pipeline.channels.doctor.verdict import sentence
+from kempf.schemas.enumeration import listed
 from kempf.schemas.errors import DataRejected
 
 _DIRECTIONS = ("heading", "course_over_ground", *VELOCITIES["earth"], *VELOCITIES["body"])

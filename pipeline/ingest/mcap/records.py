@@ -66,7 +66,8 @@ def parse_schema(content: bytes) -> tuple[int, Schema] | None:
         (length,) = struct.unpack_from("<I", content, at)
         if at + 4 + length > len(content):
             return None
-        return _id(content), Schema(name, encoding, content[at + 4 : at + 4 + length])
+        number = int(struct.unpack_from("<H", content, 0)[0])
+        return number, Schema(name, encoding, content[at + 4 : at + 4 + length])
     except struct.error:
         return None
 
@@ -101,10 +102,6 @@ def parse_statistics(content: bytes) -> tuple[int, int] | tuple[None, None]:
 def parse_chunk_place(content: bytes) -> tuple[int, int] | None:
     """Return where the chunk of a chunk index stands, and the bytes of its record."""
     return struct.unpack_from("<QQ", content, 16) if len(content) >= 32 else None
-
-
-def _id(content: bytes) -> int:
-    return int(struct.unpack_from("<H", content, 0)[0])
 
 
 def _text(content: bytes, at: int) -> tuple[str, int]:

@@ -116,7 +116,8 @@ def require_ordinary(effect: Effect) -> None:
     """
     own = tuple(state.name for state in effect.states)
     absent = {p.name: p.absent for p in effect.parameters}
-    trials = [absent, *({**absent, **_typical(effect, k)} for k in range(_most_steps(effect)))]
+    most = max((len(p.steps) for p in effect.parameters), default=0)
+    trials = [absent, *({**absent, **_typical(effect, k)} for k in range(most))]
     for place in places(effect):
         require_in_place(place, own)
         for parameters in trials:
@@ -134,10 +135,6 @@ def require_ordinary(effect: Effect) -> None:
                 "Write it so that a parameter multiplies the whole, as in 'c*(...)'.",
                 {"effect": effect.name, "target": target},
             )
-
-
-def _most_steps(effect: Effect) -> int:
-    return max((len(p.steps) for p in effect.parameters), default=0)
 
 
 def _typical(effect: Effect, k: int) -> dict[str, float]:
