@@ -51,18 +51,18 @@ def choose(warehouse: Warehouse, vessel: str, failed: Collection[str] = ()) -> C
         ``no_segments``.
     """
     rows = {row.ingest_id: row for row in logs.current(warehouse, vessel) if row.ingest_id not in failed}
-    found = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
-    if not found:
+    manoeuvres = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
+    if not manoeuvres:
         raise NotFound(
             "no_segments",
             f"No zigzag was found in the {len(rows)} logs of {vessel!r}.",
             "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
             {"vessel": vessel},
         )
-    profile_sha256 = rows[max(found, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
+    profile_sha256 = rows[max(manoeuvres, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
     # a broken-off zigzag stays: its rudder moved too
-    kept, skipped = once([s for s in found if rows[s.ingest_id].profile_sha256 == profile_sha256], same)
-    for segment in found:
+    kept, skipped = once([s for s in manoeuvres if rows[s.ingest_id].profile_sha256 == profile_sha256], same)
+    for segment in manoeuvres:
         if rows[segment.ingest_id].profile_sha256 != profile_sha256:
             skipped[segment.segment_id] = "its log is read with an older profile"
     logged = [s for s in kept if not without_log(s)]

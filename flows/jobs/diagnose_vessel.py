@@ -56,9 +56,9 @@ def diagnose_vessel(
         And whether it is new.
     """
     chosen = choose_refreshed(warehouse, vessel, progress)
-    found = diagnoses.find(warehouse, diagnosis_id(inputs_of_diagnosis(chosen, spec, own)))
-    if found is not None:
-        return found, False
+    stored = diagnoses.find(warehouse, diagnosis_id(inputs_of_diagnosis(chosen, spec, own)))
+    if stored is not None:
+        return stored, False
     return diagnose_again(warehouse, chosen, spec, own, progress), True
 
 
@@ -74,11 +74,11 @@ def diagnose_again(
     Whatever is stored of them; the parameters are those of `diagnose_vessel`.
     """
     examined = examine(warehouse, chosen, spec, own, progress=progress)
-    found, inputs = examined.diagnosis, inputs_of_diagnosis(chosen, spec, own)
-    fitted = Fitted(examined.runs, found.plain, found.way)
+    diagnosis, inputs = examined.diagnosis, inputs_of_diagnosis(chosen, spec, own)
+    fitted = Fitted(examined.runs, diagnosis.plain, diagnosis.way)
     base, _ = store_model(warehouse, chosen, spec, own, fitted=fitted)
     phases = _phases(examined)
-    content = {**as_json(found), "where": where_left(found, phases)}
+    content = {**as_json(diagnosis), "where": where_left(diagnosis, phases)}
     made = StoredDiagnosis(
         diagnosis_id=diagnosis_id(inputs),
         vessel=chosen.vessel,
@@ -91,7 +91,7 @@ def diagnose_again(
         code_version=inputs["code_version"],
     )
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        evidence = evidence_of(found, phases, _zigzags(chosen), examined.runs.skipped, workers)
+        evidence = evidence_of(diagnosis, phases, _zigzags(chosen), examined.runs.skipped, workers)
     diagnoses.keep_evidence(warehouse, chosen.vessel, made.diagnosis_id, evidence)
     diagnoses.insert(warehouse, made)
     # as it is read back, so that new and known answers are the same

@@ -46,8 +46,8 @@ def examine_instruments(
     known = entries(profile.source_for(file_name), log_format, instruments.sources)
     units = {channel: mapped.unit for channel, (_, mapped) in known.items()}
     log = Log.of(instruments, profile.length_m, units)
-    found = examine(log)
-    return ExaminedLog(file_name, log_format, log, found, as_content(found, known, log_format))
+    examination = examine(log)
+    return ExaminedLog(file_name, log_format, log, examination, as_content(examination, known, log_format))
 
 
 def examine_file(path: Path, profile: VesselProfile) -> ExaminedLog:

@@ -72,10 +72,10 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
         ``file_unreadable``: it is there but cannot be opened.
     """
     try:
-        found = path.stat()
-        if stat.S_ISDIR(found.st_mode):
+        status = path.stat()
+        if stat.S_ISDIR(status.st_mode):
             raise IsADirectoryError
-        if not stat.S_ISREG(found.st_mode):
+        if not stat.S_ISREG(status.st_mode):
             raise UsageError(
                 "not_a_file",
                 f"{path} is a device, a pipe or a socket; a {what} is a file.",

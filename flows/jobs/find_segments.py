@@ -47,8 +47,8 @@ def find_segments(
         note = f"no {missing} in this log: zigzags cannot be looked for; map it in the profile if the log has it"
         return [], (*instruments.notes, note)
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
-    found = [_segment(zigzag, ingest, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)]
-    return found, instruments.notes
+    manoeuvres = [_segment(zigzag, ingest, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)]
+    return manoeuvres, instruments.notes
 
 
 def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:

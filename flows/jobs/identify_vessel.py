@@ -133,16 +133,16 @@ def identify_segments(
     """
     by_ingest = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
     # of the logs just listed only: another process may read one anew at any moment
-    found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in by_ingest]
-    if not found:
+    current = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in by_ingest]
+    if not current:
         raise _no_segments(warehouse, vessel)
     table_versions = delta.versions(warehouse)
     outcomes: list[IdentifyOutcome] = []
-    readable = [segment for segment in found if segment.ingest_id not in refreshed.failed]
-    ingests = list(dict.fromkeys(segment.ingest_id for segment in found))
+    readable = [segment for segment in current if segment.ingest_id not in refreshed.failed]
+    ingests = list(dict.fromkeys(segment.ingest_id for segment in current))
     with ThreadPoolExecutor(max_workers=usable()) as pool:
         for done, ingest in enumerate(ingests):
-            hers = [segment for segment in found if segment.ingest_id == ingest]
+            hers = [segment for segment in current if segment.ingest_id == ingest]
             progress(done, len(ingests), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
             if ingest in refreshed.failed:
                 outcomes += [IdentifyOutcome(segment, None, error=refreshed.failed[ingest]) for segment in hers]
@@ -170,7 +170,7 @@ class _Identification:
 
 
 def _identify_log(
-    job: _Identification, row: logs.LogRow, found: Sequence[Segment], beside: Mapping[str, tuple[Segment, ...]]
+    job: _Identification, row: logs.LogRow, manoeuvres: Sequence[Segment], beside: Mapping[str, tuple[Segment, ...]]
 ) -> list[IdentifyOutcome]:
     """Identify the segments of one log, one a thread; the new sets are stored by the caller.
 
@@ -179,8 +179,8 @@ def _identify_log(
     warehouse, pool = job.warehouse, job.pool
     profile = vessels.get(warehouse, row.profile_sha256)
     alone = job.request.estimator not in CAN or bool(job.request.spec.effects)
-    companions = [() if alone else beside.get(s.segment_id, ()) for s in found]
-    wanted = [inputs_of(s, row.profile_sha256, job.request, c) for s, c in zip(found, companions, strict=True)]
+    companions = [() if alone else beside.get(s.segment_id, ()) for s in manoeuvres]
+    wanted = [inputs_of(s, row.profile_sha256, job.request, c) for s, c in zip(manoeuvres, companions, strict=True)]
     missing = _missing(warehouse, row.vessel, wanted)
     asked = [c for c, inputs in zip(companions, wanted, strict=True) if parameter_set_id(inputs) in missing]
     ingests = {row.ingest_id, *(s.ingest_id for c in asked for s in c)} if missing else set()
@@ -198,7 +198,7 @@ def _identify_log(
             return IdentifyOutcome(segment, None, error=wrapped(error))
         return IdentifyOutcome(segment, made, new=True)
 
-    return list(pool.map(one, found, wanted, companions))
+    return list(pool.map(one, manoeuvres, wanted, companions))
 
 
 def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:

@@ -176,9 +176,9 @@ def ingest_log(
         row = logs.of_ingest(warehouse, there.ingest_id)
         if unsearched(warehouse, [row]):
             search_log.store(warehouse, [search_log.search_again(warehouse, row)])
-        found = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
+        stored_segments = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
         seen = examinations.of_ingests(warehouse, [row.ingest_id])[row.ingest_id]
-        return _outcome(warehouse, path, "unchanged", row, found, seen)
+        return _outcome(warehouse, path, "unchanged", row, stored_segments, seen)
     with spooled(file_name, log, profile) as readings:
         give_back(readings.tally.records_read)
         read = look_through(vessel, file_name, log, profile, readings)
@@ -193,7 +193,7 @@ def _outcome(
     path: str,
     outcome: str,
     row: logs.LogRow,
-    found: tuple[Segment, ...],
+    found_segments: tuple[Segment, ...],
     examination: StoredExamination,
 ) -> IngestOutcome:
     return IngestOutcome(
@@ -203,7 +203,7 @@ def _outcome(
         row.ingest_id,
         row.tally,
         (*row.notes, *examination.notes),
-        found,
+        found_segments,
         lost=lost.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id, ()),
         examination=examination,
     )
@@ -220,11 +220,11 @@ class ReadLog:
 def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfile, readings: LogReadings) -> ReadLog:
     """Find the zigzags of a log that was read, and compare its channels."""
     code = code_version.fingerprint("ingest")
-    one = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code))
+    this_ingest = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code))
     instruments = from_readings(readings.lazy())
     give_back(readings.tally.records_read)
-    found = search(one, profile, file_name, readings.format, instruments, readings.tally.records_read)
-    return ReadLog(Delivery(vessel, file_name, log, profile, readings, code), found)
+    searched = search(this_ingest, profile, file_name, readings.format, instruments, readings.tally.records_read)
+    return ReadLog(Delivery(vessel, file_name, log, profile, readings, code), searched)
 
 
 def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:

@@ -12,12 +12,12 @@ from kempf.warehouse.store import Warehouse
 
 def measured_positions(warehouse: Warehouse, segments: Sequence[Segment]) -> dict[str, tuple[Series, Series]]:
     """Return latitude and longitude, rad, of the segments whose logs hold them, by segment."""
-    found = {}
+    positions = {}
     logs = {name: channels_of(warehouse, name) for name in dict.fromkeys(segment.ingest_id for segment in segments)}
     for segment in segments:
         log = logs[segment.ingest_id]
         latitude, longitude = log.get("latitude"), log.get("longitude")
         if latitude is not None and longitude is not None:
             window = (segment.start_utc_ns, segment.end_utc_ns)
-            found[segment.segment_id] = (latitude.between(*window), longitude.between(*window))
-    return found
+            positions[segment.segment_id] = (latitude.between(*window), longitude.between(*window))
+    return positions

@@ -36,12 +36,14 @@ def no_log_settings(wished: Mapping[str, Any]) -> dict[str, Any]:
     return asdict(NoLogSettings(**wished))
 
 
-def companions_of(segment: Segment, found: Sequence[Segment], by_ingest: Mapping[str, LogRow]) -> tuple[Segment, ...]:
+def companions_of(
+    segment: Segment, segments: Sequence[Segment], by_ingest: Mapping[str, LogRow]
+) -> tuple[Segment, ...]:
     """Return the segments to identify beside one without a log; see `pipeline.estimate.no_log.companions`.
 
     Parameters
     ----------
-    found : sequence of Segment
+    segments : sequence of Segment
         Of the same vessel.
     by_ingest : mapping of str to LogRow
         The ingests that they were found in; one reading of the logs has one profile.
@@ -49,7 +51,7 @@ def companions_of(segment: Segment, found: Sequence[Segment], by_ingest: Mapping
     profile = by_ingest[segment.ingest_id].profile_sha256
     others = [
         other
-        for other in found
+        for other in segments
         if other.kind == "zigzag" and without_log(other) and by_ingest[other.ingest_id].profile_sha256 == profile
     ]
     chosen = companions.companions_of(_passage(segment), [_passage(other) for other in others])

@@ -44,11 +44,11 @@ def said_of_logs(warehouse: Warehouse, vessel: str | None = None) -> str | None:
     NotFound
         ``no_warehouse``.
     """
-    found = _stale(warehouse, vessel)
-    if not found:
+    stale = _stale(warehouse, vessel)
+    if not stale:
         return None
-    whose = f" of {next(iter(found))}" if len(found) == 1 else f" of {len(found)} vessels"
-    return f"{_logs(found.total())}{whose} read {_OLDER}; next: {_next(found)}"
+    whose = f" of {next(iter(stale))}" if len(stale) == 1 else f" of {len(stale)} vessels"
+    return f"{_logs(stale.total())}{whose} read {_OLDER}; next: {_next(stale)}"
 
 
 def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
@@ -69,11 +69,11 @@ def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
 def said_of_sets(sets: Iterable[ParameterSet]) -> str | None:
     """Return the sentence that some parameter sets are of other code than the present; None where none is."""
     code = code_version.fingerprint("estimate")
-    old = [one for one in sets if one.provenance.get("code_version") != code]
+    old = [stored for stored in sets if stored.provenance.get("code_version") != code]
     if not old:
         return None
-    names = ", ".join(one.parameter_set_id for one in old)
-    return f"{names}: made with another version of kempf; next: {_next({one.vessel for one in old})}"
+    names = ", ".join(stored.parameter_set_id for stored in old)
+    return f"{names}: made with another version of kempf; next: {_next({stored.vessel for stored in old})}"
 
 
 def _stale(warehouse: Warehouse, vessel: str | None) -> Counter[str]:

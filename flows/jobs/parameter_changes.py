@@ -90,13 +90,18 @@ def paired(old: Sequence[ParameterSet], now: Sequence[ParameterSet]) -> Paired:
     """
     closeness = sorted(
         (
-            (-_shared(one, other), one.settings != other.settings, one.parameter_set_id, other.parameter_set_id)
-            for one in old
+            (
+                -_shared(stored, other),
+                stored.settings != other.settings,
+                stored.parameter_set_id,
+                other.parameter_set_id,
+            )
+            for stored in old
             for other in now
-            if _kind(one) == _kind(other) and _shared(one, other) > 0.5
+            if _kind(stored) == _kind(other) and _shared(stored, other) > 0.5
         ),
     )
-    by_id = {one.parameter_set_id: one for one in (*old, *now)}
+    by_id = {stored.parameter_set_id: stored for stored in (*old, *now)}
     counterpart: dict[str, str] = {}
     taken: set[str] = set()
     for _, _, name, successor in closeness:
@@ -104,34 +109,34 @@ def paired(old: Sequence[ParameterSet], now: Sequence[ParameterSet]) -> Paired:
             counterpart[name] = successor
             taken.add(successor)
     identical, moves = 0, []
-    for one in old:
-        if one.parameter_set_id in counterpart:
-            becomes = by_id[counterpart[one.parameter_set_id]]
-            same = _says(one) == _says(becomes)
+    for stored in old:
+        if stored.parameter_set_id in counterpart:
+            becomes = by_id[counterpart[stored.parameter_set_id]]
+            same = _says(stored) == _says(becomes)
             identical += same
-            moves += [] if same else list(_moves(one, becomes))
+            moves += [] if same else list(_moves(stored, becomes))
     new = [o for o in now if o.parameter_set_id not in taken]
     return Paired(
         identical,
         tuple(sorted(moves, key=lambda m: (-m.size, m.parameter_set_id, m.parameter))),
         tuple(NewSet(o.parameter_set_id, o.model_name, o.estimator, iso_utc(o.start_utc_ns)) for o in new),
-        tuple(one.parameter_set_id for one in old if one.parameter_set_id not in counterpart),
+        tuple(stored.parameter_set_id for stored in old if stored.parameter_set_id not in counterpart),
     )
 
 
-def _kind(one: ParameterSet) -> tuple[str, str]:
+def _kind(parameter_set: ParameterSet) -> tuple[str, str]:
     # by the present code's reading of the model: a key that is new in it gives its hash another value
-    return ModelSpec.model_validate(dict(one.model_spec)).sha256, one.estimator
+    return ModelSpec.model_validate(dict(parameter_set.model_spec)).sha256, parameter_set.estimator
 
 
-def _says(one: ParameterSet) -> str:
+def _says(stored: ParameterSet) -> str:
     """Return a digest of what a set says, without what it is called by."""
-    return content_digest(replace(one, segment_ids=(), model_sha256="", model_spec={}))
+    return content_digest(replace(stored, segment_ids=(), model_sha256="", model_spec={}))
 
 
-def _shared(one: ParameterSet, other: ParameterSet) -> float:
+def _shared(parameter_set: ParameterSet, other: ParameterSet) -> float:
     """Return the time that the segments of two sets share over the time of both together."""
-    ours, theirs = _bounds(one), _bounds(other)
+    ours, theirs = _bounds(parameter_set), _bounds(other)
     common = sum(
         max(0, min(a.end_utc_ns, b.end_utc_ns) - max(a.start_utc_ns, b.start_utc_ns))
         for a in ours
@@ -142,29 +147,29 @@ def _shared(one: ParameterSet, other: ParameterSet) -> float:
     return common / whole if whole else 0.0
 
 
-def _bounds(one: ParameterSet) -> list[Bounds]:
-    return [Bounds(**bounds) for bounds in one.provenance["inputs"]["segments"]]
+def _bounds(parameter_set: ParameterSet) -> list[Bounds]:
+    return [Bounds(**bounds) for bounds in parameter_set.provenance["inputs"]["segments"]]
 
 
-def _moves(one: ParameterSet, becomes: ParameterSet) -> Iterator[Move]:
+def _moves(parameter_set: ParameterSet, becomes: ParameterSet) -> Iterator[Move]:
     after = {estimate.name: estimate for estimate in becomes.parameters}
-    for before in one.parameters:
+    for before in parameter_set.parameters:
         now = after.get(before.name)
         if now is not None:
-            yield _move(one, becomes, before, now)
+            yield _move(parameter_set, becomes, before, now)
 
 
-def _move(one: ParameterSet, becomes: ParameterSet, before: StoredValue, now: StoredValue) -> Move:
+def _move(parameter_set: ParameterSet, becomes: ParameterSet, before: StoredValue, now: StoredValue) -> Move:
     std = before.std if before.std is not None and before.std > 0 and isfinite(before.std) else None
     return Move(
-        vessel=one.vessel,
-        model=one.model_name,
-        estimator=one.estimator,
+        vessel=parameter_set.vessel,
+        model=parameter_set.model_name,
+        estimator=parameter_set.estimator,
         parameter=before.name,
         unit=before.unit,
-        parameter_set_id=one.parameter_set_id,
+        parameter_set_id=parameter_set.parameter_set_id,
         becomes=becomes.parameter_set_id,
-        start=iso_utc(one.start_utc_ns),
+        start=iso_utc(parameter_set.start_utc_ns),
         before=before.value,
         after=now.value,
         std=std,

@@ -98,11 +98,11 @@ def channel_warnings(origin: Mapping[str, Any]) -> tuple[str, ...]:
     origin : mapping
         Provenance; a set from before there was a doctor has nothing of him.
     """
-    found = dict(origin.get("channels") or {})
+    by_log = dict(origin.get("channels") or {})
     return tuple(
         f"channels of log {log[:12]}: {words}; see `kempf doctor {log[:12]}`"
-        for log in sorted(found)
-        for words in found[log]
+        for log in sorted(by_log)
+        for words in by_log[log]
     )
 
 

@@ -68,11 +68,11 @@ class Waiting:
 @contextmanager
 def waiting(warehouse: Warehouse, vessel: str) -> Iterator[Waiting]:
     """Lend a list, and store what is in it also where the block is left by an error."""
-    one = Waiting(warehouse, vessel)
+    waiting_list = Waiting(warehouse, vessel)
     try:
-        yield one
+        yield waiting_list
     finally:
-        store(warehouse, [one])
+        store(warehouse, [waiting_list])
 
 
 def store(warehouse: Warehouse, lists: Sequence[Waiting]) -> None:

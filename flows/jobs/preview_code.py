@@ -84,15 +84,15 @@ def preview_all(warehouse: Warehouse, vessels: Sequence[str] = (), progress: Pro
     for vessel in vessels:
         vessel_table.require(warehouse, vessel)
     names = sorted(set(vessels)) or vessel_table.names(warehouse)
-    found = []
+    previews = []
     for done, vessel in enumerate(names):
         progress(done, len(names), f"{vessel}: comparing with the present code")
         try:
-            found.append(_preview(warehouse, vessel))
+            previews.append(_preview(warehouse, vessel))
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
-            found.append(VesselPreview(vessel, 0, 0, failures=(_failure(vessel, wrapped(error)),)))
+            previews.append(VesselPreview(vessel, 0, 0, failures=(_failure(vessel, wrapped(error)),)))
     progress(len(names), len(names), "done")
-    return found
+    return previews
 
 
 def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
@@ -100,7 +100,7 @@ def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
     vessel_table.require(warehouse, vessel)
     code = code_version.fingerprint("estimate")
     stand = standing_sets(warehouse, vessel)
-    old = [one for one in stand if one.provenance["code_version"] != code]
+    old = [stored for stored in stand if stored.provenance["code_version"] != code]
     ready = len(stand) - len(old)
     rows = logs.current(warehouse, vessel)
     read = all(row.code_version == code_version.fingerprint("ingest") for row in rows)
@@ -109,17 +109,17 @@ def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
     with _scratch() as scratch:
         failures = _seed(warehouse, scratch, vessel)
         report = reprocess_vessel(scratch, vessel)
-        now = [one for one in standing_sets(scratch, vessel) if one.provenance["code_version"] == code]
-    there = {one.parameter_set_id for one in parameter_sets.get_all(warehouse, vessel)}
-    found = paired(old, now)
+        now = [stored for stored in standing_sets(scratch, vessel) if stored.provenance["code_version"] == code]
+    there = {stored.parameter_set_id for stored in parameter_sets.get_all(warehouse, vessel)}
+    pairs = paired(old, now)
     return VesselPreview(
         vessel,
         sets=len(old) + ready,
         up_to_date=ready,
-        identical=found.identical,
-        moves=found.moves,
-        new=tuple(one for one in found.new if one.parameter_set_id not in there),
-        gone=found.gone,
+        identical=pairs.identical,
+        moves=pairs.moves,
+        new=tuple(stored for stored in pairs.new if stored.parameter_set_id not in there),
+        gone=pairs.gone,
         failures=(*failures, *report.failures),
     )
 

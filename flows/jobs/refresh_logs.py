@@ -149,14 +149,14 @@ def _search_anew(warehouse: Warehouse, rows: Sequence[LogRow], begin: Callable[[
 
     failed: dict[str, KempfError] = {}
     for chunk in _chunks(rows):
-        found: dict[str, SearchedLog] = {}
+        searched: dict[str, SearchedLog] = {}
         for row in chunk:
             begin(f"looking for zigzags in {row.file_name}")
             try:
-                found[row.ingest_id] = search_again(warehouse, row)
+                searched[row.ingest_id] = search_again(warehouse, row)
             except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                 failed[row.ingest_id] = wrapped(error)
-        failed |= together_or_each(found, partial(store, warehouse))
+        failed |= together_or_each(searched, partial(store, warehouse))
     return failed
 
 

@@ -126,7 +126,7 @@ class Reproduction:
             "conditions": {name: {"value": v, "stated_by": by} for name, (v, by) in self.conditions.items()},
             "truth": self.truth,
             "discrete": {v.name: {"value": v.value, "unit": v.unit} for v in self.discrete},
-            "experiments": [one.show() for one in self.experiments],
+            "experiments": [experiment.show() for experiment in self.experiments],
         }
 
 

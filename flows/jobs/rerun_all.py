@@ -142,8 +142,8 @@ def _groups(sets: Sequence[ParameterSet]) -> Iterator[list[ParameterSet]]:
     """Give sets of the same logs together, a few at a time."""
     batch = 4 * (cpu_count() or 1)
 
-    def sources(one: ParameterSet) -> tuple[str, ...]:
-        return (str(one.provenance["inputs"]["profile_sha256"]), *map(str, one.provenance["ingest_ids"]))
+    def sources(stored: ParameterSet) -> tuple[str, ...]:
+        return (str(stored.provenance["inputs"]["profile_sha256"]), *map(str, stored.provenance["ingest_ids"]))
 
     for _, same in groupby(sorted(sets, key=sources), key=sources):
         together = list(same)
@@ -156,16 +156,16 @@ def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: floa
     try:
         instruments, profile = raw_inputs(warehouse, group[0])
     except Exception as error:  # noqa: BLE001 - whatever it is, the other logs must not pay for it
-        return [_failed(one, wrapped(error)) for one in group]
+        return [_failed(stored, wrapped(error)) for stored in group]
 
-    def verdict_on(one: ParameterSet) -> RerunVerdict:
+    def verdict_on(stored: ParameterSet) -> RerunVerdict:
         try:
-            return _verdict(one, judged(one, rebuilt(one, instruments, profile), tolerance))
+            return _verdict(stored, judged(stored, rebuilt(stored, instruments, profile), tolerance))
         except Exception as error:  # noqa: BLE001 - whatever it is, the other sets must not pay for it
-            return _failed(one, wrapped(error))
+            return _failed(stored, wrapped(error))
 
     if len(inputs_of(group[0]).bounds) > 1:  # such a set takes all cores for itself
-        return [verdict_on(one) for one in group]
+        return [verdict_on(stored) for stored in group]
     workers = ThreadPoolExecutor(max_workers=cpu_count())
     try:
         return list(workers.map(verdict_on, group))
@@ -173,12 +173,12 @@ def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: floa
         workers.shutdown(cancel_futures=True)
 
 
-def _verdict(one: ParameterSet, result: Rerun) -> RerunVerdict:
+def _verdict(stored: ParameterSet, result: Rerun) -> RerunVerdict:
     fields = tuple(difference.as_json() for difference in result.differences[:_FIELDS_SHOWN])
     count = len(result.differences)
     return RerunVerdict(
-        vessel=one.vessel,
-        parameter_set_id=one.parameter_set_id,
+        vessel=stored.vessel,
+        parameter_set_id=stored.parameter_set_id,
         verdict=result.verdict,
         code_changed=result.code_changed,
         differences=count,
@@ -187,8 +187,8 @@ def _verdict(one: ParameterSet, result: Rerun) -> RerunVerdict:
     )
 
 
-def _failed(one: ParameterSet, error: KempfError) -> RerunVerdict:
-    return RerunVerdict(one.vessel, one.parameter_set_id, FAILED, code_changed(inputs_of(one)), error=error)
+def _failed(stored: ParameterSet, error: KempfError) -> RerunVerdict:
+    return RerunVerdict(stored.vessel, stored.parameter_set_id, FAILED, code_changed(inputs_of(stored)), error=error)
 
 
 def _run_id(parameter_set_id: str, tolerance: float) -> str:
@@ -197,15 +197,15 @@ def _run_id(parameter_set_id: str, tolerance: float) -> str:
     return runs.run_id(FLOW, {**what, "code": code_of_sets(), "packages": code_version.packages()})
 
 
-def _as_run(one: RerunVerdict, tolerance: float) -> runs.FlowRun:
+def _as_run(verdict: RerunVerdict, tolerance: float) -> runs.FlowRun:
     message = {
-        "parameter_set_id": one.parameter_set_id,
-        "code_changed": one.code_changed,
-        "packages_changed": one.packages_changed or {},
-        "differences": list(one.fields),
+        "parameter_set_id": verdict.parameter_set_id,
+        "code_changed": verdict.code_changed,
+        "packages_changed": verdict.packages_changed or {},
+        "differences": list(verdict.fields),
     }
-    name = _run_id(one.parameter_set_id, tolerance)
-    return runs.FlowRun(name, FLOW, one.vessel, one.verdict, {"differences": one.differences}, message)
+    name = _run_id(verdict.parameter_set_id, tolerance)
+    return runs.FlowRun(name, FLOW, verdict.vessel, verdict.verdict, {"differences": verdict.differences}, message)
 
 
 def _remembered(run: runs.FlowRun) -> RerunVerdict:

@@ -74,8 +74,8 @@ def search_again(warehouse: Warehouse, row: LogRow) -> SearchedLog:
     return search(log, profile, row.file_name, row.format, instruments, row.tally.records_read)
 
 
-def store(warehouse: Warehouse, found: Sequence[SearchedLog]) -> None:
+def store(warehouse: Warehouse, searched: Sequence[SearchedLog]) -> None:
     """Put what was found in some logs in place of what is stored of them, in one commit a table."""
-    segments.replace(warehouse, {(f.examination.vessel, f.examination.ingest_id): f.segments for f in found})
+    segments.replace(warehouse, {(f.examination.vessel, f.examination.ingest_id): f.segments for f in searched})
     # behind the zigzags: from the examination on the log counts as looked through
-    examinations.replace(warehouse, [f.examination for f in found])
+    examinations.replace(warehouse, [f.examination for f in searched])

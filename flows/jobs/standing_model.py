@@ -144,9 +144,9 @@ def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     return current if current is not None and current.estimator in (POOLED, WITH_EFFECTS) else None
 
 
-def model_of(one: ParameterSet) -> tuple[ModelSpec, Own]:
+def model_of(stored: ParameterSet) -> tuple[ModelSpec, Own]:
     """Return the model of a stored set and the effects of a person's own in it."""
-    return ModelSpec.model_validate(dict(one.model_spec)), Own.from_json(one.settings.get("own") or {})
+    return ModelSpec.model_validate(dict(stored.model_spec)), Own.from_json(stored.settings.get("own") or {})
 
 
 def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:
@@ -177,10 +177,10 @@ def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
 
 def _chain(warehouse: Warehouse, model: ParameterSet) -> list[ParameterSet]:
     """Return a model and its parents, the plain one first."""
-    found = [model]
-    while found[0].parent is not None:
-        found.insert(0, parameter_sets.get(warehouse, found[0].parent))
-    return found
+    chain = [model]
+    while chain[0].parent is not None:
+        chain.insert(0, parameter_sets.get(warehouse, chain[0].parent))
+    return chain
 
 
 def rungs_to(warehouse: Warehouse, model: ParameterSet) -> list[dict[str, Any]]:

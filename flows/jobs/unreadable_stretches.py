@@ -13,10 +13,10 @@ def as_json(lost: Sequence[LostStretch]) -> list[dict[str, Any]]:
     """Return stretches as JSON content, times in ISO 8601."""
     return [
         {
-            "since": None if one.since_ns is None else iso_utc(one.since_ns),
-            "until": None if one.until_ns is None else iso_utc(one.until_ns),
-            "messages": one.messages,
-            "why": one.why,
+            "since": None if stretch.since_ns is None else iso_utc(stretch.since_ns),
+            "until": None if stretch.until_ns is None else iso_utc(stretch.until_ns),
+            "messages": stretch.messages,
+            "why": stretch.why,
         }
-        for one in lost
+        for stretch in lost
     ]

@@ -274,8 +274,8 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
 def _gross_errors(fit: PooledFit, runs: VesselRuns) -> dict[str, dict[str, list[float]]]:
     """Return which measurements the fit left out, by run and measurement, so that a comparison leaves them out too."""
     whole = {run.name: run for run in runs.runs}
-    found = {one.run.name: instants_left_out(whole[one.run.name], one.run) for one in fit.runs}
-    return {name: instants for name, instants in found.items() if instants}
+    left_out = {one.run.name: instants_left_out(whole[one.run.name], one.run) for one in fit.runs}
+    return {name: instants for name, instants in left_out.items() if instants}
 
 
 def _parameters(fit: PooledFit, std: Float) -> tuple[Stored, ...]:

@@ -82,12 +82,12 @@ def command(
         compared = [compare_vessel(warehouse, vessel, name, horizon, progress) for name in wanted]
     print_note(said_of_vessel(warehouse, vessel))
     documents = []
-    for found, path in zip_longest(compared, figures):
-        document = found.show()
+    for comparison, path in zip_longest(compared, figures):
+        document = comparison.show()
         if with_where:
-            document["where"] = found.where()
+            document["where"] = comparison.where()
         if path is not None:
-            _draw(found, path)
+            _draw(comparison, path)
         if fail_above is not None:
             judged = document["judged"]
             exceeded = not judged["free_run_error_percent"] <= fail_above
@@ -110,12 +110,12 @@ def command(
         sys.exit(ThresholdExceeded.exit_code)
 
 
-def _draw(found: Comparison, figure: Path) -> None:
+def _draw(comparison: Comparison, figure: Path) -> None:
     from kempf.workbench.figures.measured_over_predicted import draw_measured_over_predicted
 
-    title = f"{found.vessel}, {found.parameter_set.parameter_set_id}: {found.horizon.words}"
+    title = f"{comparison.vessel}, {comparison.parameter_set.parameter_set_id}: {comparison.horizon.words}"
     with writing(figure):
-        draw_measured_over_predicted(found.runs, figure, title)
+        draw_measured_over_predicted(comparison.runs, figure, title)
 
 
 def _print_skipped(skipped: dict[str, str], *, verbose: bool) -> None:
@@ -195,13 +195,13 @@ def _print_where(title: str, where: dict[str, Any]) -> None:
         click.echo("  no phase, side, bin or manoeuvre stands out from what a right model leaves")
     rows = [
         [
-            _CHANNELS[one["channel"]],
-            f"{one['of'].removeprefix('by_').replace('_', ' ')}: {one['which'].replace('_', ' ')}",
-            f"{one['n']}",
-            f"{one['whitened_rms']:.2f}",
-            f"{one['band'][0]:.2f} to {one['band'][1]:.2f}",
+            _CHANNELS[group["channel"]],
+            f"{group['of'].removeprefix('by_').replace('_', ' ')}: {group['which'].replace('_', ' ')}",
+            f"{group['n']}",
+            f"{group['whitened_rms']:.2f}",
+            f"{group['band'][0]:.2f} to {group['band'][1]:.2f}",
         ]
-        for one in where["stands_out"]
+        for group in where["stands_out"]
     ]
     if rows:
         print_table(["channel", "where", "n", "whitened rms", "99 % band"], rows)
@@ -229,13 +229,13 @@ def _print_correlation(channel: str, correlations: dict[str, Any]) -> None:
     p_value = correlations["auto"]["p_value"]
     if p_value is not None and p_value < _LEVEL:
         click.echo(f"  {channel}: errors one step ahead are correlated in time (Ljung-Box p = {p_value:.1g})")
-    found = [(name, one) for name, one in correlations["cross"].items() if one["largest"] is not None]
-    found = [(name, one) for name, one in found if one["p_adjusted"] < _LEVEL]
-    if found:
-        name, one = min(found, key=lambda pair: float(pair[1]["p_adjusted"]))
+    significant = [(name, entry) for name, entry in correlations["cross"].items() if entry["largest"] is not None]
+    significant = [(name, entry) for name, entry in significant if entry["p_adjusted"] < _LEVEL]
+    if significant:
+        name, entry = min(significant, key=lambda pair: float(pair[1]["p_adjusted"]))
         click.echo(
-            f"  {channel}: errors are correlated with {name.replace('_', ' ')} {one['largest_lag_s']:g} s before: "
-            f"{one['largest']:+.2f} (99 % band ±{one['band']:.2f})"
+            f"  {channel}: errors are correlated with {name.replace('_', ' ')} {entry['largest_lag_s']:g} s before: "
+            f"{entry['largest']:+.2f} (99 % band ±{entry['band']:.2f})"
         )
 
 

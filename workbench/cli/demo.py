@@ -78,7 +78,7 @@ def _print_demonstration(shown: Demonstration) -> None:
     click.echo(f"  kempf segments\n  kempf history --vessel {shown.vessel} --parameter b2\n  kempf --help")
 
 
-def _compare(one: ParameterSet, truth: dict[str, float], title: str) -> None:
+def _compare(parameter_set: ParameterSet, truth: dict[str, float], title: str) -> None:
     rows = [
         [
             p.name,
@@ -88,9 +88,9 @@ def _compare(one: ParameterSet, truth: dict[str, float], title: str) -> None:
             number(truth[p.name]),
             f"{(p.value - truth[p.name]) / p.std:+.1f}" if p.std else "-",
         ]
-        for p in one.parameters
+        for p in parameter_set.parameters
     ]
-    converged = "converged" if one.convergence.get("converged") else "NOT CONVERGED"
+    converged = "converged" if parameter_set.convergence.get("converged") else "NOT CONVERGED"
     head = ["", "value", "std", "unit", "truth", "error in std"]
-    print_table(head, rows, f"{title}: {one.parameter_set_id}, {converged}")
+    print_table(head, rows, f"{title}: {parameter_set.parameter_set_id}, {converged}")
     click.echo()

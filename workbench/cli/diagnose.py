@@ -58,11 +58,11 @@ def command(
     spec, own = chosen_model(warehouse, vessel, set_id, model, mine)
     own = own.beside(mine)
     with progress_bar() as progress:
-        found, _ = diagnose_vessel(warehouse, vessel, spec, own, progress=progress)
+        diagnosis, _ = diagnose_vessel(warehouse, vessel, spec, own, progress=progress)
     if as_json:
-        print_json(found.show())
+        print_json(diagnosis.show())
         return
-    _print_diagnosis(found.show(), everything=everything)
+    _print_diagnosis(diagnosis.show(), everything=everything)
 
 
 def _fleet(uri: str, *, as_json: bool) -> None:
@@ -74,15 +74,15 @@ def _fleet(uri: str, *, as_json: bool) -> None:
         return
     table = [
         [
-            one["vessel"],
-            one["verdict"].replace("_", " "),
-            one["effects"] or "-",
-            one["since"][:19] or "-",
-            _percent(one["held_out_before"]),
-            _percent(one["held_out_after"]),
-            one["note"],
+            row["vessel"],
+            row["verdict"].replace("_", " "),
+            row["effects"] or "-",
+            row["since"][:19] or "-",
+            _percent(row["held_out_before"]),
+            _percent(row["held_out_after"]),
+            row["note"],
         ]
-        for one in rows
+        for row in rows
     ]
     head = ["vessel", "verdict", "lacks", "since UTC", "held out, %", "after", "note"]
     print_table(head, table, "What the models of the fleet lack")

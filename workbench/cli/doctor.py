@@ -35,18 +35,18 @@ def command(
 
     require_figures(figure)
     if profiles or path.exists():
-        found = examine_file(path, read_profiles(profiles) if profiles else VesselProfile())
+        examined = examine_file(path, read_profiles(profiles) if profiles else VesselProfile())
     else:
-        found = examine_held(Warehouse(uri), str(path))
+        examined = examine_held(Warehouse(uri), str(path))
     if figure is not None:
         from kempf.workbench.figures.doctor import draw
 
         with writing(figure):
-            draw(found, figure)
+            draw(examined, figure)
     if as_json:
-        print_json({"log": found.file_name, "format": found.format, **found.content})
+        print_json({"log": examined.file_name, "format": examined.format, **examined.content})
         return
-    print_examination(found.file_name, found.content, everything=everything)
+    print_examination(examined.file_name, examined.content, everything=everything)
     if figure is not None:
         click.echo(f"{figure}: drawn", err=True)
 

@@ -34,13 +34,13 @@ def list_effects(group: str | None, markdown: bool, as_json: bool) -> None:
     from kempf.schemas.effects import catalogue
     from kempf.workbench.effects_table import effects_table
 
-    found = [effect for effect in catalogue().values() if group in (None, effect.group)]
+    chosen = [effect for effect in catalogue().values() if group in (None, effect.group)]
     if as_json:
-        print_json([effect.as_json() for effect in found])
+        print_json([effect.as_json() for effect in chosen])
     elif markdown:
-        click.echo(effects_table(found), nl=False)
+        click.echo(effects_table(chosen), nl=False)
     else:
-        rows = [[e.name, e.group, ", ".join(e.needs) or "-", e.title] for e in found]
+        rows = [[e.name, e.group, ", ".join(e.needs) or "-", e.title] for e in chosen]
         print_table(["effect", "group", "needs", "what it is"], rows)
 
 

@@ -10,7 +10,7 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.ladder import tell_rungs
+from kempf.workbench.cli.ladder import print_rungs
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.ranked_warnings import show_warnings
 from kempf.workbench.terminal import number, print_json, print_note, print_table, progress_bar
@@ -44,9 +44,9 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     with progress_bar() as progress:
         chosen = choose(warehouse, vessel)
         settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
-        found = examine(warehouse, chosen, spec, own, settings, progress, only=(name,))
+        examined = examine(warehouse, chosen, spec, own, settings, progress, only=(name,))
     print_note(said_of_vessel(warehouse, vessel))
-    document = diagnosis_as_json(found.diagnosis)
+    document = diagnosis_as_json(examined.diagnosis)
     document = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **document})
     if as_json:
         print_json(document)
@@ -104,7 +104,7 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, verbose:
     if as_json:
         print_json({"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": made.show()})
         return
-    tell_rungs(rungs[-2:], vessel)
+    print_rungs(rungs[-2:], vessel)
     _print_runs(rungs[-2], rungs[-1])
     show_warnings(made.warnings, verbose=verbose)
     click.echo(f"next: kempf ladder --vessel {vessel}, kempf effects undo --vessel {vessel}")

@@ -85,12 +85,12 @@ def command(
             _print_changes(one)
 
 
-def _rows(vessel: str, found: History) -> list[dict[str, Any]]:
-    return [{"vessel": vessel, **row} for row in found.rows()]
+def _rows(vessel: str, history: History) -> list[dict[str, Any]]:
+    return [{"vessel": vessel, **row} for row in history.rows()]
 
 
 def _show(histories: dict[str, History], *, as_json: bool) -> None:
-    listed = [row for name, found in histories.items() for row in _rows(name, found)]
+    listed = [row for name, history in histories.items() for row in _rows(name, history)]
     if as_json:
         print_json(listed)
     if not listed or as_json:
@@ -133,20 +133,20 @@ def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: s
     left_out = dict(kind.left_out)
     if not bool(np.all(good)):
         left_out["covariance not positive definite"] = int(np.sum(~good))
-    found = find_changes(history, replace(ChangeSettings(), occasion_s=3600.0 * occasion_h))
+    changes = find_changes(history, replace(ChangeSettings(), occasion_s=3600.0 * occasion_h))
     if figure is not None and len(history):
         from kempf.workbench.figures.history import draw_history
 
-        title = f"{vessel}, model {kind.model}, estimator {kind.estimator}: {found.verdict}"
+        title = f"{vessel}, model {kind.model}, estimator {kind.estimator}: {changes.verdict}"
         with writing(figure):
-            draw_history(history, found, figure, title)
+            draw_history(history, changes, figure, title)
     return {
         "model": kind.model,
         "model_sha256": kind.model_sha256,
         "estimator": kind.estimator,
         "parameter_set_ids": [name for name, ok in zip(kind.parameter_set_ids, good, strict=True) if ok],
         "left_out": left_out,
-        **report(history, pool(history.value, history.covariance) if len(history) else None, found),
+        **report(history, pool(history.value, history.covariance) if len(history) else None, changes),
         "figure": str(figure) if figure is not None and len(history) else None,
     }
 

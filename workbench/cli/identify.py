@@ -86,17 +86,17 @@ def _pooled(
     from kempf.flows.jobs.pool_vessel import pool_vessel
 
     try:
-        found = pool_vessel(warehouse, vessel, request, outcomes, progress=progress)
+        pooled = pool_vessel(warehouse, vessel, request, outcomes, progress=progress)
     except KempfError as error:
         click.echo(f"not pooled [{error.code}] {error}", err=True)
         return None
-    if found is None and request.estimator == "ml" and len(outcomes) > 1:
+    if pooled is None and request.estimator == "ml" and len(outcomes) > 1:
         click.echo(
             "not pooled: that takes two whole zigzags that converged, each with a speed log, at different times, read "
             "with one profile",
             err=True,
         )
-    return found[0] if found else None
+    return pooled[0] if pooled else None
 
 
 def _show(outcome: IdentifyOutcome) -> object:

@@ -38,26 +38,26 @@ def command(vessel: str, uri: str, as_json: bool) -> None:
     if as_json:
         print_json(rungs)
     else:
-        tell_rungs(rungs, vessel)
+        print_rungs(rungs, vessel)
 
 
-def tell_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
+def print_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
     """Print rungs of a ladder as a table."""
-    ids = short_ids([one["parameter_set_id"] for one in rungs])
+    ids = short_ids([rung["parameter_set_id"] for rung in rungs])
     rows = []
-    for one in rungs:
-        held, wind = one["held_out_error"], one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"]
-        own = {n.partition(".")[2]: v for n, v in one["effects"].items() if n.partition(".")[0] == one["added"]}
+    for rung in rungs:
+        held, wind = rung["held_out_error"], rung["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"]
+        own = {n.partition(".")[2]: v for n, v in rung["effects"].items() if n.partition(".")[0] == rung["added"]}
         sizes = [_size(name, size) for name, size in own.items()]
         rows.append(
             [
-                str(one["step"]),
-                one["added"] or "plain model",
+                str(rung["step"]),
+                rung["added"] or "plain model",
                 ", ".join(sizes) or "-",
-                number(100 * one["in_sample_error"], 3),
+                number(100 * rung["in_sample_error"], 3),
                 "-" if held is None else number(100 * held, 3),
                 number(wind, 2),
-                ids[one["parameter_set_id"]],
+                ids[rung["parameter_set_id"]],
             ]
         )
     head = ["step", "added", "size, ± 1 s.e.", "fitted", "held out", "wind, m/s^2/s^0.5", "set"]

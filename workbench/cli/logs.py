@@ -40,7 +40,7 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     rows_of_logs = logs.current(warehouse, vessel)
     gone = lost.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
     said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
-    found = [
+    facts = [
         {
             **_facts(row),
             "partial": row.ingest_id in gone,
@@ -52,11 +52,11 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     ]
     print_note(said_of_logs(warehouse, vessel))
     if as_json:
-        print_json(found)
+        print_json(facts)
         return
     head = ["log_id", "vessel", "file_name", "start", "records_kept", "records_rejected"]
     most = {"log_id": 12, "start": 16}
-    rows = [[*(str(one[name])[: most.get(name, 28)] for name in head), _brief(one["channels"])] for one in found]
+    rows = [[*(str(one[name])[: most.get(name, 28)] for name in head), _brief(one["channels"])] for one in facts]
     head = ["log", "vessel", "file name", "start UTC", "records kept", "rejected", "channels"]
     if gone:
         head.append("damage")

@@ -67,12 +67,12 @@ def _print_reproduction(made: Reproduction) -> None:
     rows = [[name, value, by] for name, (value, by) in made.conditions.items()]
     print_table(["condition", "value", "stated by"], rows, "The experiment")
     click.echo()
-    for one in made.experiments:
-        _print_experiment(made, one)
+    for experiment in made.experiments:
+        _print_experiment(made, experiment)
 
 
-def _print_experiment(made: Reproduction, one: Experiment) -> None:
-    shown = one.show()
+def _print_experiment(made: Reproduction, experiment: Experiment) -> None:
+    shown = experiment.show()
     rows = [
         [
             name,
@@ -83,16 +83,16 @@ def _print_experiment(made: Reproduction, one: Experiment) -> None:
         ]
         for name, row in shown["accuracy"].items()
     ]
-    last = len(one.course.passes) - 1
+    last = len(experiment.course.passes) - 1
     head = ["", "truth", "paper", "first approximation", f"iteration {last}", "maximum likelihood", "its std"]
-    print_table(head, rows, f"Noise {one.noise_factor:g} times that of usual instruments: errors in percent")
+    print_table(head, rows, f"Noise {experiment.noise_factor:g} times that of usual instruments: errors in percent")
     for name, unit, key in (("force", "m/s^2", "force_m_s2"), ("current", "m/s", "current_m_s")):
-        found = shown["disturbances_at_the_end"][key]
-        first, end, true = (number(found[which], 3) for which in ("first", "last", "true"))
+        estimated = shown["disturbances_at_the_end"][key]
+        first, end, true = (number(estimated[which], 3) for which in ("first", "last", "true"))
         estimates = f"{first} after the first approximation, {end} after iteration {last}"
         click.echo(f"  {name} at the end: {estimates}; true {true} {unit}")
-    likely = one.maximum_likelihood
-    click.echo(f"  procedure: {one.course.reason}")
+    likely = experiment.maximum_likelihood
+    click.echo(f"  procedure: {experiment.course.reason}")
     click.echo(f"  maximum likelihood: {'converged' if likely.converged else 'NOT CONVERGED'}")
     for warning in likely.warnings:
         click.echo(f"    warning: {warning}")

@@ -26,36 +26,36 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
     from kempf.flows.jobs.preview_code import preview_all
 
     with progress_bar() as progress:
-        found = preview_all(warehouse, vessels, progress)
-    moves = sorted((m for one in found for m in one.moves), key=lambda m: -m.size)
+        previews = preview_all(warehouse, vessels, progress)
+    moves = sorted((m for vessel_preview in previews for m in vessel_preview.moves), key=lambda m: -m.size)
     lines = _by_parameter(moves)
     if as_json:
         shown = [{k: v for k, v in line.items() if k != "size"} for line in lines]
         print_json(
             {
-                **_counts(found),
+                **_counts(previews),
                 "parameters": shown,
-                "vessels": [one.show() for one in found],
+                "vessels": [vessel_preview.show() for vessel_preview in previews],
                 "moves": [m.show() for m in moves],
             }
         )
     else:
-        _print_preview(found, lines)
-    if any(one.failures for one in found):
+        _print_preview(previews, lines)
+    if any(vessel_preview.failures for vessel_preview in previews):
         sys.exit(DataRejected.exit_code)
     if fail_above is not None and moves and moves[0].size > fail_above:
         sys.exit(ThresholdExceeded.exit_code)
 
 
-def _counts(found: Sequence[VesselPreview]) -> dict[str, int]:
+def _counts(previews: Sequence[VesselPreview]) -> dict[str, int]:
     return {
-        "sets": sum(one.sets for one in found),
-        "up_to_date": sum(one.up_to_date for one in found),
-        "identical": sum(one.identical for one in found),
-        "moved": sum(len({m.parameter_set_id for m in one.moves}) for one in found),
-        "new": sum(len(one.new) for one in found),
-        "gone": sum(len(one.gone) for one in found),
-        "failures": sum(len(one.failures) for one in found),
+        "sets": sum(vessel_preview.sets for vessel_preview in previews),
+        "up_to_date": sum(vessel_preview.up_to_date for vessel_preview in previews),
+        "identical": sum(vessel_preview.identical for vessel_preview in previews),
+        "moved": sum(len({m.parameter_set_id for m in vessel_preview.moves}) for vessel_preview in previews),
+        "new": sum(len(vessel_preview.new) for vessel_preview in previews),
+        "gone": sum(len(vessel_preview.gone) for vessel_preview in previews),
+        "failures": sum(len(vessel_preview.failures) for vessel_preview in previews),
     }
 
 
@@ -84,8 +84,8 @@ def _by_parameter(moves: Sequence[Move]) -> list[dict[str, Any]]:
     ]
 
 
-def _print_preview(found: Sequence[VesselPreview], lines: Sequence[dict[str, Any]]) -> None:
-    counts = _counts(found)
+def _print_preview(previews: Sequence[VesselPreview], lines: Sequence[dict[str, Any]]) -> None:
+    counts = _counts(previews)
     if counts["sets"] == counts["up_to_date"] and not counts["new"] and not counts["failures"]:
         click.echo(f"All {counts['sets']} current parameter sets were made by this code.")
         return
@@ -117,7 +117,7 @@ def _print_preview(found: Sequence[VesselPreview], lines: Sequence[dict[str, Any
         print_table(head, rows)
         if len(lines) > _SHOWN:
             click.echo(f"... and {len(lines) - _SHOWN} more; --json has all.")
-    for one in found:
-        for failure in one.failures:
-            click.echo(f"{one.vessel}, {failure['what']}: {failure['error']['message']}", err=True)
+    for vessel_preview in previews:
+        for failure in vessel_preview.failures:
+            click.echo(f"{vessel_preview.vessel}, {failure['what']}: {failure['error']['message']}", err=True)
     click.echo("Nothing was stored. next: kempf reprocess")

@@ -73,7 +73,7 @@ def _draw(done: Steered, figure: Path) -> None:
     from kempf.workbench.figures.course_keeping import draw_course_keeping
 
     labels = ["from the set", "from wrong parameters"]
-    tracks = [(label, one.track) for label, one in zip(labels, done.laws, strict=False)]
+    tracks = [(label, tried.track) for label, tried in zip(labels, done.laws, strict=False)]
     with writing(figure):
         draw_course_keeping(tracks, figure, f"{done.ship.parameter_set.vessel} at {number(done.ship.speed_m_s)} m/s")
 
@@ -92,17 +92,17 @@ def _show(done: Steered, figure: Path | None) -> dict[str, Any]:
             "wind_force_m_s2": {"mean": wind.wind_force.mean, "std": wind.wind_force.std},
             "current_m_s": {"north": wind.current_north.mean, "east": wind.current_east.mean},
         },
-        "laws": [_law(one) for one in done.laws],
+        "laws": [_law(tried) for tried in done.laws],
         "effects": {p.name: {"value": p.value, "std": p.std, "unit": p.unit} for p in done.ship.effect_parameters},
         "figure": str(figure) if figure else None,
         "warnings": list(done.warnings),
     }
 
 
-def _law(one: Tried) -> dict[str, Any]:
-    p, law, loop = one.performance, one.law, one.loop
+def _law(tried: Tried) -> dict[str, Any]:
+    p, law, loop = tried.performance, tried.law, tried.loop
     return {
-        "parameters": one.label,
+        "parameters": tried.label,
         "law": {
             "method": law.settings.method,
             "step_s": law.step_s,
@@ -123,8 +123,8 @@ def _law(one: Tried) -> dict[str, Any]:
             "kept": p.kept,
         },
         "course_change": {
-            "overshoot_deg": degrees(one.change.overshoot_rad),
-            "settled_s": one.change.settled_s,
+            "overshoot_deg": degrees(tried.change.overshoot_rad),
+            "settled_s": tried.change.settled_s,
         },
         "closed_loop": {
             "stable": loop.stable,
@@ -132,7 +132,7 @@ def _law(one: Tried) -> dict[str, Any]:
             "slowest_s": loop.slowest_s,
             "least_damping": loop.least_damping,
             "modulus_margin": loop.modulus_margin,
-            "share_of_allowed_ships_held": one.held,
+            "share_of_allowed_ships_held": tried.held,
         },
     }
 
@@ -140,7 +140,7 @@ def _law(one: Tried) -> dict[str, Any]:
 def _print_steered(done: Steered, figure: Path | None, *, verbose: bool) -> None:
     from kempf.workbench.ranked_warnings import show_warnings
 
-    shown = [_law(one) for one in done.laws]
+    shown = [_law(tried) for tried in done.laws]
     rows = [
         (
             f"{key.removesuffix('_deg').replace('_', ' ')}, deg" if key.endswith("_deg") else _WORDS.get(key, key),
@@ -150,7 +150,7 @@ def _print_steered(done: Steered, figure: Path | None, *, verbose: bool) -> None
         for group, keys in _ROWS.items()
         for key in keys
     ]
-    cells = [[name, *(_cell(one[group][key]) for one in shown)] for name, group, key in rows]
+    cells = [[name, *(_cell(tried[group][key]) for tried in shown)] for name, group, key in rows]
     head = ["", "from the set", "from wrong parameters"][: len(shown) + 1]
     about = f"{done.ship.parameter_set.vessel}, {done.ship.parameter_set.parameter_set_id}"
     print_table(head, cells, f"{about} at {number(done.ship.speed_m_s)} m/s, {shown[0]['law']['method']}")
