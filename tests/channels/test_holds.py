@@ -85,7 +85,7 @@ def test_a_native_channel_is_left_alone() -> None:
     np.testing.assert_array_equal(held.rows, np.arange(3000))
 
 
-def test_too_few_changes_tell_nothing() -> None:
+def test_too_few_changes_show_nothing() -> None:
     time = np.arange(100, dtype=np.int64) * ROW_NS
     held = find_held(time, np.repeat(np.arange(10.0), 10)[:, None])
     assert held.rows_per_value == 1

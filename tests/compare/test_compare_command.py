@@ -126,7 +126,7 @@ def test_runs_that_a_model_held_out_stay_held_out(own: Path, document: dict) -> 
     assert [run["held_out"] for run in asked(own, "--set", made.parameter_set_id)["runs"]] == [True]
 
 
-def test_where_it_fails_is_told_by_sample(place: Path) -> None:
+def test_where_it_fails_is_shown_by_sample(place: Path) -> None:
     document = asked(place, "--where")
     assert document["where"]["held_out"] is None
     found = document["where"]["fitted"]

@@ -61,7 +61,7 @@ def test_levels_come_back_from_a_run_of_the_model() -> None:
     assert not lost.converged and lost.log_likelihood == -np.inf
 
 
-def test_what_is_told_of_runs_keeps_the_samples_apart() -> None:
+def test_the_summary_of_runs_keeps_the_samples_apart() -> None:
     trial = sailed("ferry", seed=3, duration_s=400.0)
     hull = truth_of(trial)
     point = Point(hull, np.zeros(0), levels_of())

@@ -30,7 +30,7 @@ def test_the_thresholds_are_those_of_the_code() -> None:
         assert float(value) == found, path
 
 
-def test_every_verdict_is_told() -> None:
+def test_every_verdict_is_documented() -> None:
     section = TEXT.partition("## The verdicts")[2].partition("\n## ")[0]
     whole, _, single = section.partition("Each effect has a verdict")
     documented = [set(re.findall(r"^\| `(\w+)` \|", part, flags=re.MULTILINE)) for part in (whole, single)]
@@ -38,5 +38,5 @@ def test_every_verdict_is_told() -> None:
     assert documented == [set(get_args(Verdict)), set(of_an_effect)]
 
 
-def test_the_reference_has_as_many_terms_as_are_told() -> None:
+def test_the_reference_has_as_many_terms_as_documented() -> None:
     assert f"{len(TERMS)} smooth terms" in TEXT

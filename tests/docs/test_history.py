@@ -18,7 +18,7 @@ def test_the_example_runs_to_its_output(tmp_path: Path) -> None:
     assert [kind for kind, _, _ in blocks(TEXT)] == ["python", "console"]
 
 
-def test_every_setting_is_told_with_its_value() -> None:
+def test_every_setting_is_documented_with_its_value() -> None:
     documented = dict(re.findall(r"^\| `(\w+)` \| ([\d.]+) \|", TEXT, flags=re.MULTILINE))
     assert {name: float(value) for name, value in documented.items()} == {
         field.name: float(getattr(ChangeSettings(), field.name)) for field in fields(ChangeSettings)

@@ -27,17 +27,17 @@ def test_tank_example_is_the_file() -> None:
     assert yaml.safe_load("\n".join(shown)) == yaml.safe_load((FOLDER / "models" / "tank.yaml").read_text("utf-8"))
 
 
-def test_every_key_is_told() -> None:
+def test_every_key_is_documented() -> None:
     for key in ModelSpec.model_fields:
         assert f"| `{key}` |" in TEXT, key
 
 
 @pytest.mark.parametrize(("key", "documented"), [("name", "`plain`"), ("base", "`sway-yaw-16`"), ("wind", "`force`")])
-def test_defaults_are_as_told(key: str, documented: str) -> None:
+def test_defaults_are_as_documented(key: str, documented: str) -> None:
     assert f"| `{key}` | {documented} |" in TEXT
     assert documented.strip("`") == getattr(ModelSpec(), key)
 
 
-def test_rates_are_as_told() -> None:
+def test_rates_are_as_documented() -> None:
     assert ModelSpec().current == "earth"
     assert (ModelSpec().wind_correlation_rate_per_s, ModelSpec().current_correlation_rate_per_s) == (1e-5, 1e-6)

@@ -15,7 +15,7 @@ TEXT = (ROOT / "docs" / "no_log.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.parametrize("key", [f.name for f in fields(NoLogSettings)])
-def test_settings_are_as_told(key: str) -> None:
+def test_settings_are_as_documented(key: str) -> None:
     default = getattr(NoLogSettings(), key)
     assert f"| `{key}` | {'none' if default is None else default} |" in TEXT
 

@@ -123,7 +123,7 @@ def test_ship_and_logger_files_are_laid_over_each_other() -> None:
     assert (changed.length_m, changed.sources) == (43.0, both.sources)
 
 
-def test_every_key_channel_and_unit_is_told() -> None:
+def test_every_key_channel_and_unit_is_documented() -> None:
     for model in (VesselProfile, Source, ChannelMap, TimeColumn, Antenna):
         for key in model.model_fields:
             assert f"`{key}`" in TEXT, (model.__name__, key)

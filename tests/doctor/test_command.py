@@ -57,7 +57,7 @@ def test_every_ingest_and_every_list(folder: Path) -> None:
     assert kempf("logs", "list", "--warehouse", place, "--json").json[0]["channels"]["verdict"] == "clean"
 
 
-def test_segments_tell_it(folder: Path) -> None:
+def test_segments_show_it(folder: Path) -> None:
     place = folder / "warehouse"
     kempf("ingest", folder / "made.csv", "--profile", folder / "wrong.yaml", "--warehouse", place)
     for segment in kempf("segments", "--warehouse", place, "--json").json:

@@ -116,13 +116,13 @@ def test_a_ship_that_does_not_swing_back_is_flagged() -> None:
 
 
 @pytest.mark.parametrize("log", [stuck("yaw_rate"), held("yaw_rate", 100.0, 140.0)])
-def test_a_yaw_rate_that_stands_still_is_left_out(log: Instruments) -> None:
+def test_a_yaw_rate_that_is_stuck_is_left_out(log: Instruments) -> None:
     record = make_record(log, START, END)
     assert record.used == (True, False, True)
     assert len(record.warnings) == 1 and "is stuck" in record.warnings[0]
 
 
-def test_a_speed_that_stands_still_is_fine() -> None:
+def test_a_constant_speed_is_fine() -> None:
     assert make_record(stuck("speed_through_water"), START, END).warnings == ()
 
 

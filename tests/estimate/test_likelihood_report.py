@@ -30,7 +30,7 @@ def test_the_slowest_time_constant_is_that_of_the_matrix() -> None:
     assert slowest_s(np.array([*A.ravel(), 0.0, 0.0]), 5.0) == pytest.approx(100.0)
 
 
-def test_a_record_of_few_time_constants_is_told() -> None:
+def test_a_record_of_few_time_constants_is_flagged() -> None:
     trial = sailed("tanker", seed=5)
     found = identify(record_of(trial), ModelSpec(), trial.truth.wind_arm_per_m, SETTINGS)
     own = slowest_s(found.hull.array(), found.report["speed_m_s"])

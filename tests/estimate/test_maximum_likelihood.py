@@ -139,7 +139,7 @@ def test_iterations_report_and_covariance_agree() -> None:
     assert abs(channels["yaw_rate"]["lag1_autocorrelation"]) < 0.1
 
 
-def test_too_few_iterations_are_told() -> None:
+def test_too_few_iterations_are_reported() -> None:
     trial = sailed("mariner", seed=1)
     hasty = MaximumLikelihoodSettings(max_iterations=1, coarse_iterations=1)
     found = identify(record_of(trial), ModelSpec(), trial.truth.wind_arm_per_m, hasty)

@@ -211,7 +211,7 @@ def test_a_run_on_the_opposite_heading_and_a_trial_speed_make_it_better() -> Non
     assert found(pair=True).report["speed"]["runs"] == 2
 
 
-def test_without_an_earth_current_only_a_trial_speed_tells() -> None:
+def test_without_an_earth_current_only_a_trial_speed_helps() -> None:
     trial, (record, _) = sailed(0.6)
     vague = found(current="lateral")
     assert vague.report["speed"]["std_m_s"] > 1.0

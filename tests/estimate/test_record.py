@@ -139,7 +139,7 @@ def test_sampling_takes_the_mean_rudder_of_the_step() -> None:
     assert caught.value.code == "segment_too_short"
 
 
-def test_a_hole_in_the_speed_is_refused_and_a_cut_end_is_told() -> None:
+def test_a_hole_in_the_speed_is_refused_and_a_cut_end_is_flagged() -> None:
     trial = sailed(seed=2, duration_s=500.0)
     instruments = instruments_of(trial)
     start, end = bounds(trial)

@@ -113,7 +113,7 @@ def test_jumps_of_the_gnss_do_not_bend_the_estimate(hull: str, length_s: float, 
     assert np.max(np.abs(found.hull.array() - truth_of(trial(hull))) / [p.std for p in found.parameters]) < 4.0
 
 
-def test_jumps_over_a_quarter_of_the_time_are_told_not_guessed() -> None:
+def test_jumps_over_a_quarter_of_the_time_are_flagged_not_guessed() -> None:
     log = disturbed(instruments_of(trial("mariner")), leaps(40.0, 3.0, 0.0, every_s=130.0))
     said = make_record(log, *bounds(trial("mariner"))).warnings
     assert any("nothing shows which side is right" in warning for warning in said)
@@ -139,7 +139,7 @@ def test_jumps_are_found_to_the_reading() -> None:
     np.testing.assert_array_equal(find_jumps(jumped).inside, damaged)
 
 
-def test_a_lasting_leap_is_told() -> None:
+def test_a_lasting_leap_is_flagged() -> None:
     lateral = record_of(trial("mariner")).lateral
     half = np.arange(lateral.time_utc_ns.size) > lateral.time_utc_ns.size // 2
     found = find_jumps(replace(lateral, value_m_s=lateral.value_m_s + np.where(half, 2.0, 0.0)))

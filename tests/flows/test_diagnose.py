@@ -65,7 +65,7 @@ def diagnosed(late: Late) -> dict[str, Any]:
     return dict(late.json("diagnose", "--vessel", VESSEL))
 
 
-def test_the_command_tells_under_the_keys_that_people_script_against(late: Late, diagnosed: dict[str, Any]) -> None:
+def test_the_command_keeps_the_keys_that_people_script_against(late: Late, diagnosed: dict[str, Any]) -> None:
     keys = {"vessel", "parameter_set_id", "verdict", "candidates", "sets", "where", "ladder"}
     assert keys <= set(diagnosed)
     assert diagnosed["vessel"] == VESSEL and diagnosed["verdict"] == "explained"
@@ -185,7 +185,7 @@ def test_a_vessel_that_fails_does_not_stop_the_fleet(late: Late, diagnosed: dict
         ("yaw: r/0", 2),
     ],
 )
-def test_a_slip_in_a_formula_is_told_before_anything_is_read(late: Late, formula: str, code: int) -> None:
+def test_a_slip_in_a_formula_is_reported_before_anything_is_read(late: Late, formula: str, code: int) -> None:
     ran = late.kempf("effects", "try", formula, "--vessel", VESSEL, "--json")
     assert ran.code == code, ran
     error = ran.json["error"]

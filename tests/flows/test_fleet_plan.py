@@ -182,7 +182,7 @@ def test_batches_of_hardly_anything() -> None:
     assert Plan((), ()).batches(4) == []
 
 
-def test_a_lost_batch_is_told_and_tried_again_and_other_code_is_refused(own: Warehouse) -> None:
+def test_a_lost_batch_is_reported_and_tried_again_and_other_code_is_refused(own: Warehouse) -> None:
     reports = lost(["ferry", "idle"], RuntimeError("worker killed"))
     assert to_try_again(reports) == ["ferry", "idle"] and all(map(fleet_report.alarming, reports))
     first = {**do_batch(own, ["ferry"], changed_only=True)[0], "new_sets": 2, "reread": 1, "kept_sets": 0}

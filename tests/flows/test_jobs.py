@@ -41,7 +41,7 @@ def stocked(harbour: Path, tmp_path: Path) -> Warehouse:
     return warehouse
 
 
-def test_progress_is_told_from_the_first_to_the_last(harbour: Path, tmp_path: Path):
+def test_progress_is_shown_from_the_first_to_the_last(harbour: Path, tmp_path: Path):
     told: list[tuple[int, int, str]] = []
 
     def progress(done: int, total: int, what: str) -> None:
@@ -59,7 +59,7 @@ def test_progress_is_told_from_the_first_to_the_last(harbour: Path, tmp_path: Pa
     ]
 
 
-def test_the_three_formats_tell_of_one_zigzag(harbour: Path, stocked: Warehouse):
+def test_the_three_formats_hold_one_zigzag(harbour: Path, stocked: Warehouse):
     ingest(stocked, [harbour / "mariner.csv.gz"], given=loaded(harbour))
     found = segments.current(stocked)
     assert len(found) == 3

@@ -104,7 +104,7 @@ def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: py
     assert found.show()["known_before"] == 1
 
 
-def test_what_differs_and_what_cannot_be_built_is_told(own: Warehouse):
+def test_what_differs_and_what_cannot_be_built_is_reported(own: Warehouse):
     csv = next(row for row in logs.current(own) if row.format == "delimited")
     assert own.folder is not None
     (own.folder / "raw" / csv.log_id[:2] / csv.log_id).unlink()
@@ -190,7 +190,7 @@ def test_a_model_of_which_no_set_stands_is_in_the_preview_too(own: Warehouse, mo
     assert {one.parameter_set_id for one in found.new} < {s.parameter_set_id for s in standing_sets(own, "mariner")}
 
 
-def test_what_code_would_move_is_told_in_standard_errors(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+def test_what_code_would_change_is_given_in_standard_errors(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
     other_code(monkeypatch)
     (bent, other) = (row.log_id for row in logs.current(own))
     steps = {"a11": 0.3, "a12": -1.5, "b2": 0.01}

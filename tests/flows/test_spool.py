@@ -90,7 +90,7 @@ def test_a_log_that_proves_unreadable_late_leaves_nothing(
 
 
 @pytest.mark.usefixtures("cut")
-def test_no_room_for_the_parts_is_told(ferry: Ship, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_room_for_the_parts_is_reported(ferry: Ship, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*arguments: object, **named: object) -> None:
         raise OSError(28, "No space left on device")
 

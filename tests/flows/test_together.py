@@ -85,7 +85,7 @@ def test_one_that_fails_at_any_step_takes_no_other_with_her(own: Warehouse, monk
     assert (again.failures, again.new_sets + again.kept_sets) == ([], 1)
 
 
-def test_a_set_that_cannot_be_stored_is_told_of_its_vessel_alone(own: Warehouse, tmp_path: Path) -> None:
+def test_a_set_that_cannot_be_stored_is_reported_for_its_vessel_alone(own: Warehouse, tmp_path: Path) -> None:
     assert own.folder is not None
     elsewhere = fresh(copytree(own.folder, tmp_path / "elsewhere"))
     (there,) = identify_vessel(elsewhere, "ferry", QUICK)

@@ -71,7 +71,7 @@ def plain(path: Path) -> str:
     return (gzip.decompress(data) if path.suffix == ".gz" else data).decode("latin-1")
 
 
-def test_nothing_in_a_folder_tells_the_effect(written, sample):
+def test_nothing_in_a_folder_reveals_the_effect(written, sample):
     words = [*CATALOGUE, *OUTSIDERS, *HULLS, "moderate", "calm", "effect", "theta", "outsider", "catalogue"]
     for case, folder, _ in written:
         names = sorted(p.name for p in folder.iterdir())

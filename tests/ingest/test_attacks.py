@@ -80,7 +80,7 @@ def test_deep_nesting_is_refused_where_it_begins(tmp_path: Path, text: str) -> N
 @pytest.mark.parametrize(
     "text", ["length_m: !!float ''", "length_m: !!int _", "vessel: !!bool x", r'vessel: "\UFFFFFFFF"']
 )
-def test_broken_yaml_is_told_as_such(tmp_path: Path, text: str) -> None:
+def test_broken_yaml_is_reported_as_such(tmp_path: Path, text: str) -> None:
     profile = tmp_path / "profile.yaml"
     profile.write_text(text)
     with pytest.raises(UsageError) as caught:

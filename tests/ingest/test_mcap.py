@@ -184,7 +184,7 @@ def _chunk_places(data):
     return places
 
 
-def test_a_mapped_field_that_never_comes_is_told():
+def test_a_mapped_field_that_never_comes_is_reported():
     readings = read(write([("/gyro", 1, {"heading": 1}), ("/nav", 1, {"pose": {"speed": 3}})]))
     assert readings.notes == ("No message of /nav has the field pose.cog.",)
 

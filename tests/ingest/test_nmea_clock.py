@@ -82,7 +82,7 @@ def test_a_date_that_is_updated_late_at_midnight_is_put_right():
 
 
 @pytest.mark.parametrize("weeks", [1024, 2048])
-def test_weeks_that_overflowed_are_told_by_the_stamps(weeks):
+def test_weeks_that_overflowed_are_recognised_by_the_stamps(weeks):
     early = START - timedelta(weeks=weeks)
     lines = [
         f"{START + timedelta(seconds=k):%Y-%m-%dT%H:%M:%S}.300Z " + rmc(early + timedelta(seconds=k)) for k in range(5)
@@ -92,7 +92,7 @@ def test_weeks_that_overflowed_are_told_by_the_stamps(weeks):
     assert "5 dates were 1024 weeks" in readings.notes[0]
 
 
-def test_weeks_that_overflowed_are_told_by_another_receiver():
+def test_weeks_that_overflowed_are_recognised_by_another_receiver():
     lines = []
     when = [START + timedelta(seconds=k) for k in range(5)]
     for w in when:
@@ -137,7 +137,7 @@ def test_a_tag_block_under_a_wrong_checksum_is_not_believed():
     assert "1 TAG blocks have a wrong checksum" in readings.notes[0]
 
 
-def test_a_tag_block_that_lost_a_backslash_is_told_and_its_line_refused():
+def test_a_tag_block_that_lost_a_backslash_is_reported_and_its_line_refused():
     good = [tag(f"c:{1746295200 + k}") + sentence(f"HEHDT,{k}.0,T") for k in range(4)]
     no_end, no_beginning = good[2].replace("\\$", "-$"), good[3].replace("\\c", "c")
     readings = read(*good[:2], no_end, no_beginning)
@@ -160,7 +160,7 @@ def test_a_plain_log_keeps_the_sentence_behind_a_broken_tag_block():
     assert "1 TAG blocks" in readings.notes[0]
 
 
-def test_a_receiver_without_a_fix_tells_no_date_where_another_does():
+def test_a_receiver_without_a_fix_gives_no_date_where_another_does():
     lines = [rmc(datetime(1999, 8, 22, tzinfo=UTC), status="V"), rmc(START), sentence("HEHDT,1.0,T")]
     readings = read(*lines)
     assert times(readings) == [START, START]
@@ -196,7 +196,7 @@ def test_two_transducer_sentences_of_one_instant_stay_together():
     assert set(times(read(*lines))) == {START + timedelta(seconds=k) for k in range(4)}
 
 
-def test_a_log_of_carriage_returns_that_begins_in_the_middle_of_a_line_is_told_by_its_content():
+def test_a_log_of_carriage_returns_that_begins_in_the_middle_of_a_line_is_recognised_by_its_content():
     assert sniff(b"54.0,N,0\r" + b"\r".join(sentence(f"HEHDT,{k}.0,T").encode() for k in range(9))) == "nmea"
 
 

@@ -209,7 +209,7 @@ def column(readings, name):
     return readings.frame[name].to_list()
 
 
-def test_a_magnetic_heading_is_made_true_by_the_variation_that_the_log_tells():
+def test_a_magnetic_heading_is_made_true_by_the_variation_in_the_log():
     fix = "GPRMC,074701.15,A,5954.0003,N,02435.9999,E,17.64,13.43,030525,3.4,W,A"
     readings = read(fix, "HCHDM,10.0,M", "HCHDG,1.0,1.0,E,,")
     assert np.degrees(column(readings, "heading_rad")[1:]) == pytest.approx([6.6, 358.6])

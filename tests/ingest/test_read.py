@@ -14,7 +14,7 @@ NMEA = b"2025-05-03T07:47:01.148Z $HEHDT,11.37,T*2B\n2025-05-03T07:47:02.148Z $S
 NOBODY = VesselProfile()
 
 
-def test_the_content_tells_the_format_and_not_the_name():
+def test_the_content_decides_the_format_and_not_the_name():
     readings = read_log("strange.dat", NMEA, NOBODY)
     assert (readings.format, readings.frame.height) == ("nmea", 2)
 
@@ -89,7 +89,7 @@ def test_files_that_give_nothing_are_refused_with_a_code(data, code):
     assert error.value.next_step
 
 
-def test_a_log_without_a_clock_tells_the_year():
+def test_a_log_without_a_clock_gives_the_year():
     with pytest.raises(DataRejected, match=r"2 clock_unset\. Its times lie in 1980\.") as error:
         read_log("a.log", NMEA.replace(b"2025", b"1980"), NOBODY)
     assert error.value.details["by_reason"] == {"clock_unset": 2}

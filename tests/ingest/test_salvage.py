@@ -188,7 +188,7 @@ def test_a_summary_that_leaves_a_chunk_out_does_not_vouch_for_what_seems_to_stan
     assert readings.partial
 
 
-def test_damage_behind_the_last_chunk_is_told_where_nothing_counts_the_messages():
+def test_damage_behind_the_last_chunk_is_reported_where_nothing_counts_the_messages():
     data = bytearray(loose_behind_chunks(data_crc=False, statistics=False))
     first = data.index(loose()[:40])
     data[first + sum(len(record(*one)) for one in messages(CHUNKS)[:5])] = 0
@@ -274,7 +274,7 @@ def test_a_summary_whose_crc_fails_is_not_used():
     assert readings.notes == ("The CRC of the file's summary does not match: its summary was not used.",)
 
 
-def test_a_data_section_whose_crc_fails_is_told_even_where_no_chunk_is_damaged():
+def test_a_data_section_whose_crc_fails_is_reported_even_where_no_chunk_is_damaged():
     def wrong(out, places):
         return out[: places[2][1] + 20] + bytes([out[places[2][1] + 20] ^ 1]) + out[places[2][1] + 21 :]
 
@@ -371,7 +371,7 @@ def test_a_large_record_of_another_kind_is_stepped_over_and_a_garbled_one_is_not
 
 
 @pytest.mark.parametrize("instant", [0, 2**63, 2**64 - 1])
-def test_times_that_damage_made_are_not_told(instant):
+def test_times_that_damage_made_are_not_reported(instant):
     def wrong(out, places):
         at, to = places[4]
         struct.pack_into("<QQ", out, at + 9, instant, instant)

@@ -99,7 +99,7 @@ def test_a_horizon_longer_than_the_run_is_refused() -> None:
     assert refused.value.code == "horizon_too_long"
 
 
-def test_a_ship_that_runs_away_is_told() -> None:
+def test_a_ship_that_runs_away_is_reported() -> None:
     trial = sailed("ferry", seed=4, duration_s=400.0)
     wild = truth_of(trial) * np.array([-400.0, 1.0, 1.0, -400.0, 1.0, 1.0])
     for asked in HORIZONS:

@@ -98,7 +98,7 @@ def test_reprocessing_moves_the_alias_and_history_stays(stored: Warehouse) -> No
     assert aliases.point(stored, "ferry", name) and aliases.of_vessel(stored, "ferry") == {"current": name}
 
 
-def test_a_damaged_object_is_told_and_mended(stored: Warehouse, ferry: Ship) -> None:
+def test_a_damaged_object_is_reported_and_repaired(stored: Warehouse, ferry: Ship) -> None:
     (row,) = logs.current(stored)
     stored.write_bytes(ferry.csv[:-1], "raw", row.log_id[:2], row.log_id)
     with pytest.raises(KempfError, match="is damaged"):

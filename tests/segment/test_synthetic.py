@@ -225,7 +225,7 @@ def test_log_that_begins_with_the_rudder_over() -> None:
     assert (found[0].psi0_deg, found[0].delta0_deg) == (20, 20)
 
 
-def test_gap_within_a_leg_is_told_and_one_over_an_execute_breaks() -> None:
+def test_gap_within_a_leg_is_flagged_and_one_over_an_execute_breaks() -> None:
     vessel = Ship()
     vessel.wait(0.0, 60.0)
     executes = vessel.zigzag(20.0, 20.0, 1, 6)

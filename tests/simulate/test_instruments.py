@@ -177,7 +177,7 @@ def test_impossible_settings_are_refused(change: dict[str, object], code: str) -
     assert caught.value.code == code
 
 
-def test_unknown_names_are_told(clean: Trial) -> None:
+def test_unknown_names_are_reported(clean: Trial) -> None:
     with pytest.raises(UsageError, match="sextant"):
         clean.record("sextant")
     with pytest.raises(UsageError, match="raft"):

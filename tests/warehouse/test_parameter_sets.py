@@ -109,7 +109,7 @@ def test_malformed_ones_cannot_be_made() -> None:
         parameter_set(fit={"x": {1, 2}})
 
 
-def test_the_verdict_tells_bits_from_tolerance_from_difference() -> None:
+def test_the_verdict_separates_bits_tolerance_and_difference() -> None:
     one = parameter_set()
     close, far = nudged(one, 1 + 1e-12), nudged(one, 1.5)
     assert verdict(one, close, 1e-9)[0] == "equal within tolerance"

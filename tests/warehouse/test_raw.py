@@ -104,7 +104,7 @@ class Rotten(BytesIO):
         raise OSError(5, "Input/output error")
 
 
-def test_a_disk_that_fails_is_told_with_the_place(warehouse: Warehouse) -> None:
+def test_a_disk_that_fails_is_reported_with_the_place(warehouse: Warehouse) -> None:
     with pytest.raises(KempfError, match="byte 0 of 3: Input/output error") as caught:
         raw.put(warehouse, LogFile(Rotten(b"log")))
     assert caught.value.code == "log_unreadable"

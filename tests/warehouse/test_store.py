@@ -159,7 +159,7 @@ def test_a_damaged_table_log_is_one_clear_error(warehouse: Warehouse) -> None:
     assert caught.value.details["table"] == "runs"
 
 
-def test_a_folder_that_cannot_be_written_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("x")
     with pytest.raises(KempfError) as caught:
         Warehouse(str(tmp_path / "file" / "below")).create()
@@ -185,7 +185,7 @@ def test_readings_that_are_lent_and_missing_are_one_clear_error(warehouse: Wareh
     assert caught.value.code == "table_unreadable"
 
 
-def test_a_full_disk_is_told(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_full_disk_is_reported(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*arguments, **options):
         raise OSError("no space left on device")
 

@@ -39,7 +39,7 @@ def test_without_a_command_the_help_is_shown_and_it_is_a_usage_error():
         assert "error" not in output.err.split("Commands:")[0].replace("internal error", "")
 
 
-def test_ingest_tells_every_log_with_its_ledger(logs: Path, tmp_path: Path):
+def test_ingest_prints_every_log_with_its_ledger(logs: Path, tmp_path: Path):
     paths = sorted(logs.glob("mariner.*"))
     output = kempf("ingest", *paths, "--profile", logs / "profile.yaml", "--warehouse", tmp_path)
     assert output.code == 0
@@ -200,7 +200,7 @@ def test_the_version_is_that_of_the_package():
         ("params", "diff", "x"),
     ],
 )
-def test_a_wrong_request_is_told_with_where_to_look(arguments: tuple[str, ...]):
+def test_a_wrong_request_says_where_to_look(arguments: tuple[str, ...]):
     error = refused(kempf(*arguments, "--json"), 2, "usage")
     assert "--help`" in error["next_step"]
     human = kempf(*arguments)
@@ -234,7 +234,7 @@ def test_the_demonstration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert versions(tmp_path / "demo" / "warehouse") == at
 
 
-def test_a_fault_of_our_own_is_told_as_one(filled: Path, monkeypatch: pytest.MonkeyPatch):
+def test_a_fault_of_our_own_is_reported_as_one(filled: Path, monkeypatch: pytest.MonkeyPatch):
     from kempf.warehouse import logs
 
     def broken(*_: object) -> None:

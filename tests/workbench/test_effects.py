@@ -54,7 +54,7 @@ def test_show_symbols() -> None:
     assert as_json["functions"]["max"] == 2
 
 
-def test_what_is_not_there_is_told() -> None:
+def test_what_is_not_there_is_reported() -> None:
     refused(kempf("effects", "show", "yaw_quadratics", "--json"), 4, "effect_unknown")
     refused(kempf("effects", "show", "--json"), 2, "usage")
     refused(kempf("effects", "list", "--group", "colour", "--json"), 2, "usage")

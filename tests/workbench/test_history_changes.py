@@ -54,7 +54,7 @@ def asked(place: Path, *more: object) -> Ran:
     return kempf("history", "--vessel", VESSEL, "--changes", *more, "--warehouse", place)
 
 
-def test_a_new_rudder_is_told_to_a_person_and_to_a_program(place: Path, tmp_path: Path) -> None:
+def test_a_new_rudder_is_reported_as_text_and_as_json(place: Path, tmp_path: Path) -> None:
     put(place, *made_sets(16, step(16, 9, b1=0.1, b2=0.1)))
     document = asked(place, "--figure", tmp_path / "f.png", "--json").json
     assert set(document) == {"vessel", "history", "changes"}
@@ -81,7 +81,7 @@ def test_a_new_rudder_is_told_to_a_person_and_to_a_program(place: Path, tmp_path
     assert "seen with 90 % probability" in output.out
 
 
-def test_no_change_tells_what_would_have_been_seen(place: Path) -> None:
+def test_no_change_says_what_would_have_been_seen(place: Path) -> None:
     put(place, *made_sets(12))
     (one,) = asked(place, "--json").json["changes"]
     assert (one["verdict"], one["changes"]) == ("no change seen", [])
@@ -146,7 +146,7 @@ def test_trials_of_one_day_are_one_occasion_unless_said_otherwise(place: Path) -
     assert other["verdict"] != one["verdict"]
 
 
-def test_without_sets_nothing_is_told(place: Path) -> None:
+def test_without_sets_nothing_is_reported(place: Path) -> None:
     assert asked(place, "--json").json == {"vessel": VESSEL, "history": [], "changes": []}
     assert "No parameter set" in asked(place).out
     long_ago = asked(place, "--as-of", "2001-01-01", "--json").json

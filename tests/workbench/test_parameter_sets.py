@@ -150,7 +150,7 @@ def test_rerun_of_a_tampered_set_says_where_it_differs(own: Path):
     assert (within.code, within.json["verdict"]) == (0, "equal within tolerance")
 
 
-def test_a_damaged_raw_log_is_told_and_mended_by_the_original(own: Path, logs: Path):
+def test_a_damaged_raw_log_is_reported_and_repaired_by_the_original(own: Path, logs: Path):
     name = one_of(own, "least-squares")
     for kept in (own / "raw").rglob("*"):
         if kept.is_file():

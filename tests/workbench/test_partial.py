@@ -13,7 +13,7 @@ sources:
 """
 
 
-def test_a_rotten_chunk_and_a_cut_are_told_at_ingest_and_in_the_list(tmp_path: Path):
+def test_a_rotten_chunk_and_a_cut_are_reported_at_ingest_and_in_the_list(tmp_path: Path):
     data, places = log()
     damaged = bytearray(data[: places[8][1] + 30])
     damaged[places[3][1] - 20] ^= 1

@@ -60,7 +60,7 @@ def test_truth_and_measurements_stand_at_the_same_instants() -> None:
     assert quiet.time_s[0] == -20.0 and np.all(np.diff(quiet.time_s) == 1.0)
 
 
-def test_the_command_tells_the_same_and_draws_three_figures(tmp_path: Path) -> None:
+def test_the_command_prints_the_same_and_draws_three_figures(tmp_path: Path) -> None:
     ran = kempf("reproduce-paper", "--folder", tmp_path / "a", "--json")
     assert ran.code == 0, ran
     document = ran.json
