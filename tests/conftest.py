@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 import gzip
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+
+
+def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
+    """One process more than there are cores: tests with servers, workers and kills wait more than they compute."""
+    return (os.cpu_count() or 1) + 1
 
 
 @dataclass(frozen=True)

@@ -46,8 +46,15 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
     return found, None
 
 
-def named_set(warehouse: Warehouse, name: str) -> ParameterSet:
+def named_set(warehouse: Warehouse, name: str | None, vessel: str | None = None) -> ParameterSet:
     """Return a parameter set by its id, a unique beginning of it, or an alias that one vessel alone has.
+
+    Parameters
+    ----------
+    name : str or None
+        None for ``current``.
+    vessel : str, optional
+        Whose alias it is, see `chosen_set`.
 
     Raises
     ------
@@ -56,6 +63,9 @@ def named_set(warehouse: Warehouse, name: str) -> ParameterSet:
     UsageError
         ``alias_ambiguous``: several vessels have this alias. ``ambiguous_parameter_set``: several ids begin so.
     """
+    if vessel is not None:
+        return chosen_set(warehouse, vessel, name)[0]
+    name = name or aliases.CURRENT
     if name.startswith("ps-"):
         return parameter_sets.get(warehouse, name)
     held = aliases.holders(warehouse, name)
@@ -63,7 +73,7 @@ def named_set(warehouse: Warehouse, name: str) -> ParameterSet:
         raise UsageError(
             "alias_ambiguous",
             f"{name!r} names a parameter set of each of {', '.join(held)}.",
-            "Give the id: `kempf params list` has them all.",
+            f"Say which vessel, such as with --vessel {min(held)!r}, or give the id that `kempf params list` shows.",
             {"alias": name, "parameter_sets": held},
         )
     return parameter_sets.get(warehouse, held[min(held)] if held else name)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.flows.jobs.chosen_set import named_set
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.steering.carried import carried, sentences
@@ -64,26 +63,21 @@ class KnownShip:
         return tuple(held[name] for name in (self.effects.model.names if self.effects is not None else ()))
 
 
-def known_ship(warehouse: Warehouse, set_id: str, speed_m_s: float | None = None) -> KnownShip:
-    """Read a parameter set for steering.
+def known_ship(warehouse: Warehouse, one: ParameterSet, speed_m_s: float | None = None) -> KnownShip:
+    """Return what a parameter set says of a ship, for steering.
 
     Parameters
     ----------
-    set_id : str
-        Or a unique beginning of it, or an alias.
     speed_m_s : float, optional
         Speed through the water to work at; by default the mean one of the manoeuvre.
 
     Raises
     ------
-    NotFound
-        There is no such set.
     UsageError
         No speed is known, or it is not positive.
     DataRejected
         The set holds no six finite parameters.
     """
-    one = named_set(warehouse, set_id)
     spec = ModelSpec.model_validate(dict(one.model_spec))
     speed = speed_m_s if speed_m_s is not None else one.convergence.get("speed_m_s")
     if speed is None:

@@ -8,7 +8,7 @@ from math import degrees, isfinite, nan, radians
 
 import numpy as np
 
-from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.chosen_set import chosen_set, named_set
 from kempf.flows.jobs.ship_model import KnownShip, known_ship
 from kempf.flows.jobs.steered_ship import SteeredShip
 from kempf.pipeline.model.ship import Hull
@@ -106,7 +106,7 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
             "Ask for legs that are more than a minute longer.",
         )
     one, _ = chosen_set(warehouse, vessel, request.set_id)
-    ship, dropped = _with_right_instruments(known_ship(warehouse, one.parameter_set_id, request.speed_m_s))
+    ship, dropped = _with_right_instruments(known_ship(warehouse, one, request.speed_m_s))
     wanted = [(one.parameter_set_id, ship.hull, ship.effects)]
     if request.wrong is not None:
         wanted.append(_wrong(warehouse, request.wrong, ship))
@@ -159,7 +159,7 @@ def _wrong(warehouse: Warehouse, wrong: str, ship: KnownShip) -> tuple[str, Hull
     try:
         factor = float(wrong)
     except ValueError:
-        other, _ = _with_right_instruments(known_ship(warehouse, wrong, ship.speed_m_s))
+        other, _ = _with_right_instruments(known_ship(warehouse, named_set(warehouse, wrong), ship.speed_m_s))
         return f"{other.parameter_set.parameter_set_id} ({other.parameter_set.vessel})", other.hull, other.effects
     if not (isfinite(factor) and factor > 0.0):
         raise UsageError("wrong_factor", f"The factor is {wrong}, expected more than 0.", "Give 0.5 or 2, say.")

@@ -12,7 +12,7 @@ import click
 
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.workbench.cli.given_once import GivenOnceGroup
-from kempf.workbench.cli.options import json_option, output_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import json_option, output_option, set_argument, vessel_option, warehouse_option
 from kempf.workbench.terminal import counted, print_json, print_note, progress
 
 if TYPE_CHECKING:
@@ -25,12 +25,13 @@ F = TypeVar("F", bound=Callable[..., Any])
 def command() -> None:
     """Write a parameter set, or manoeuvres with their predictions, as a file that other programs read.
 
-    A unique beginning of its id is enough. Without --output it goes to stdout. Nothing is overwritten.
+    An id, a unique beginning of one, or an alias names the set; default: current. Without --output it goes to stdout.
+    Nothing is overwritten.
     """
 
 
 def _file_options(function: F) -> F:
-    return click.argument("set_id")(output_option()(warehouse_option(json_option(function))))
+    return set_argument(output_option()(warehouse_option(json_option(function))))
 
 
 def _linear_options(function: F) -> F:
@@ -44,34 +45,48 @@ def _linear_options(function: F) -> F:
 
 @command.command("yaml")
 @_file_options
-def yaml_file(set_id: str, output: Path | None, uri: str, as_json: bool) -> None:
+def yaml_file(set_id: str | None, vessel: str | None, output: Path | None, uri: str, as_json: bool) -> None:
     """Values, units, standard errors, covariance, noise, fit, inputs by hash, parent, as YAML."""
-    _text("yaml", set_id, output, uri, as_json)
+    _text("yaml", set_id, vessel, output, uri, as_json)
 
 
 @command.command("csv")
 @_file_options
-def csv_file(set_id: str, output: Path | None, uri: str, as_json: bool) -> None:
+def csv_file(set_id: str | None, vessel: str | None, output: Path | None, uri: str, as_json: bool) -> None:
     """Parameters, discrete parameters and noise levels with standard errors and units, as CSV."""
-    _text("csv", set_id, output, uri, as_json)
+    _text("csv", set_id, vessel, output, uri, as_json)
 
 
 @command.command("control")
 @_linear_options
 def control_file(
-    set_id: str, output: Path | None, uri: str, as_json: bool, speed: float | None, step: float, course: float
+    set_id: str | None,
+    vessel: str | None,
+    output: Path | None,
+    uri: str,
+    as_json: bool,
+    speed: float | None,
+    step: float,
+    course: float,
 ) -> None:
     """State space as a Python module for python-control: named systems, noise, covariance."""
     from kempf.workbench.export import as_control
 
-    model = _linear(uri, set_id, speed, step, course)
+    model = _linear(uri, set_id, vessel, speed, step, course)
     _deliver("control", model.ship.parameter_set.parameter_set_id, as_control(model), output, as_json)
 
 
 @command.command("mat")
 @_linear_options
 def mat_file(
-    set_id: str, output: Path | None, uri: str, as_json: bool, speed: float | None, step: float, course: float
+    set_id: str | None,
+    vessel: str | None,
+    output: Path | None,
+    uri: str,
+    as_json: bool,
+    speed: float | None,
+    step: float,
+    course: float,
 ) -> None:
     """State space as a MATLAB file; there: load FILE, then ss(A, B, C, D) or ss(Ad, Bd, C, D, step_s)."""
     from kempf.workbench.export import as_mat
@@ -82,7 +97,7 @@ def mat_file(
             "A MATLAB file is not text and does not go to stdout.",
             "Give a file with --output FILE.mat.",
         )
-    model = _linear(uri, set_id, speed, step, course)
+    model = _linear(uri, set_id, vessel, speed, step, course)
     _deliver("mat", model.ship.parameter_set.parameter_set_id, as_mat(model), output, as_json)
 
 
@@ -150,24 +165,26 @@ def _only(found: Comparison, wanted: Sequence[str]) -> Comparison:
     return replace(found, runs=tuple(run for run, _ in pairs), found=tuple(segment for _, segment in pairs))
 
 
-def _linear(uri: str, set_id: str, speed: float | None, step: float, course: float) -> Any:
+def _linear(uri: str, set_id: str | None, vessel: str | None, speed: float | None, step: float, course: float) -> Any:
+    from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.flows.jobs.ship_model import known_ship
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import linear
 
-    ship = known_ship(Warehouse(uri), set_id, speed)
+    warehouse = Warehouse(uri)
+    ship = known_ship(warehouse, named_set(warehouse, set_id, vessel), speed)
     print_note(said_of_sets([ship.parameter_set]))
     return linear(ship, step, radians(course))
 
 
-def _text(form: str, set_id: str, output: Path | None, uri: str, as_json: bool) -> None:
+def _text(form: str, set_id: str | None, vessel: str | None, output: Path | None, uri: str, as_json: bool) -> None:
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import as_text
 
-    one = named_set(Warehouse(uri), set_id)
+    one = named_set(Warehouse(uri), set_id, vessel)
     print_note(said_of_sets([one]))
     _deliver(form, one.parameter_set_id, as_text(one, form), output, as_json)
 

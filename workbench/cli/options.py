@@ -50,6 +50,12 @@ def vessel_option(*, required: bool = False, multiple: bool = False) -> Callable
     )
 
 
+def set_argument(function: F) -> F:
+    """Add the argument SET_ID, None where it is not given, and ``--vessel``, whose alias it is."""
+    vessel = click.option("--vessel", metavar="NAME", help="Whose alias it is; needed where several vessels have it.")
+    return click.argument("set_id", required=False)(vessel(function))
+
+
 def profile_option(function: F) -> F:
     """Add ``--profile``, which may be repeated."""
     return click.option(

@@ -12,6 +12,7 @@ from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import (
     json_option,
     output_option,
+    set_argument,
     verbose_option,
     vessel_option,
     warehouse_option,
@@ -65,18 +66,18 @@ def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
 
 
 @command.command("show")
-@click.argument("set_id")
+@set_argument
 @verbose_option
 @warehouse_option
 @json_option
-def show(set_id: str, verbose: bool, uri: str, as_json: bool) -> None:
-    """Show a parameter set whole; a unique beginning of its id is enough."""
+def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_json: bool) -> None:
+    """Show a parameter set whole: an id, a unique beginning of one, an alias; default: current."""
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.parameter_set_table import tell_set
 
-    one = named_set(Warehouse(uri), set_id)
+    one = named_set(Warehouse(uri), set_id, vessel)
     print_note(said_of_sets([one]))
     if as_json:
         print_json(one.show())
@@ -97,9 +98,10 @@ def show(set_id: str, verbose: bool, uri: str, as_json: bool) -> None:
 @command.command("diff")
 @click.argument("first")
 @click.argument("second")
+@vessel_option()
 @warehouse_option
 @json_option
-def diff(first: str, second: str, uri: str, as_json: bool) -> None:
+def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -> None:
     """Compare the parameters of two sets: difference, and the same in standard errors of the difference.
 
     A parameter that only one of the sets has is shown with a dash for the other.
@@ -110,7 +112,7 @@ def diff(first: str, second: str, uri: str, as_json: bool) -> None:
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
-    one, other = named_set(warehouse, first), named_set(warehouse, second)
+    one, other = named_set(warehouse, first, vessel), named_set(warehouse, second, vessel)
     found = compare(one, other)
     print_note(said_of_sets([one, other]))
     if as_json:
@@ -124,12 +126,12 @@ def diff(first: str, second: str, uri: str, as_json: bool) -> None:
 
 
 @command.command("export")
-@click.argument("set_id")
+@set_argument
 @click.option("--format", "form", type=click.Choice(["yaml", "csv", "json"]), default="yaml", show_default=True)
 @output_option()
 @warehouse_option
 @json_option
-def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool) -> None:
+def export(set_id: str | None, vessel: str | None, form: str, output: Path | None, uri: str, as_json: bool) -> None:
     """Export a parameter set with values, units, standard errors, covariance, inputs by hash and fit.
 
     --json is short for --format json.
@@ -140,7 +142,7 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
     from kempf.workbench.export import as_text
     from kempf.workbench.new_file import write_new
 
-    one = named_set(Warehouse(uri), set_id)
+    one = named_set(Warehouse(uri), set_id, vessel)
     print_note(said_of_sets([one]))
     text = as_text(one, "json" if as_json else form)
     if output is None:
@@ -152,9 +154,10 @@ def export(set_id: str, form: str, output: Path | None, uri: str, as_json: bool)
 @command.command("alias")
 @click.argument("name")
 @click.argument("set_id")
+@vessel_option()
 @warehouse_option
 @json_option
-def alias(name: str, set_id: str, uri: str, as_json: bool) -> None:
+def alias(name: str, set_id: str, vessel: str | None, uri: str, as_json: bool) -> None:
     """Let NAME point to a parameter set of its vessel; `current` is what every command takes unless another is named.
 
     Every command that takes the id of a set takes the name as well. Names move, sets never change.
@@ -164,7 +167,7 @@ def alias(name: str, set_id: str, uri: str, as_json: bool) -> None:
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
-    one = named_set(warehouse, set_id)
+    one = named_set(warehouse, set_id, vessel)
     before = aliases.of_vessel(warehouse, one.vessel).get(name)
     aliases.point(warehouse, one.vessel, one.parameter_set_id, name)
     if as_json:
@@ -175,17 +178,20 @@ def alias(name: str, set_id: str, uri: str, as_json: bool) -> None:
 
 
 @command.command("steering")
-@click.argument("set_id")
+@set_argument
 @click.option("--speed", type=float, metavar="M/S", help="Speed through the water; default: that of the trial.")
 @verbose_option
 @warehouse_option
 @json_option
-def steering(set_id: str, speed: float | None, verbose: bool, uri: str, as_json: bool) -> None:
+def steering(
+    set_id: str | None, vessel: str | None, speed: float | None, verbose: bool, uri: str, as_json: bool
+) -> None:
     """Show Nomoto's constants and whether she holds a straight course, with standard errors.
 
     Of a set with effects these are the constants of its linear model about a straight course; what has no part in it is
     named, and so is a lag of the rudder, which is none of the hull's.
     """
+    from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.flows.jobs.ship_model import known_ship
     from kempf.pipeline.steering.motion import linear_hull
@@ -194,7 +200,8 @@ def steering(set_id: str, speed: float | None, verbose: bool, uri: str, as_json:
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.ranked_warnings import show_warnings
 
-    ship = known_ship(Warehouse(uri), set_id, speed)
+    warehouse = Warehouse(uri)
+    ship = known_ship(warehouse, named_set(warehouse, set_id, vessel), speed)
     print_note(said_of_sets([ship.parameter_set]))
     linear = linear_hull(ship.hull, ship.effects, ship.covariance, ship.speed_m_s)
     constants = nomoto(linear.hull, linear.covariance, ship.speed_m_s, ship.length_m)

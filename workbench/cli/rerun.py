@@ -46,9 +46,12 @@ def command(
 ) -> None:
     """Build a parameter set again from the raw bytes and say whether it is the same, bit for bit.
 
+    Where several vessels have an alias, --vessel says whose is meant.
+
     Exit code 5 where one is different, 3 where one of --all cannot be built again. Interrupted, --all goes on where it
     stopped when it is called again.
     """
+    from kempf.flows.jobs.chosen_set import named_set
     from kempf.warehouse.store import Warehouse
 
     if all_sets == (set_id is not None):
@@ -57,13 +60,15 @@ def command(
             "Either one parameter set or --all was expected, found " + ("both." if all_sets else "neither."),
             "Give the id of one, as `kempf params list` shows it, or --all.",
         )
-    if not all_sets and (vessel or not verify or afresh):
-        raise UsageError("only_with_all", "--vessel, --preview and --afresh go with --all.", "Add --all, leave out ID.")
+    if not all_sets and (len(vessel) > 1 or not verify or afresh):
+        raise UsageError(
+            "only_with_all", "--preview, --afresh and several vessels go with --all.", "Add --all, leave out ID."
+        )
     if fail_above is not None and verify:
         raise UsageError("only_with_preview", "--fail-above goes with --preview.", "Add --preview, or leave it out.")
     warehouse, vessels = Warehouse(uri), sorted(set(vessel))
     if set_id is not None:
-        _one(warehouse, set_id, tolerance, as_json=as_json)
+        _one(warehouse, named_set(warehouse, set_id, *vessel).parameter_set_id, tolerance, as_json=as_json)
     elif verify:
         _verify(warehouse, vessels, tolerance, afresh=afresh, as_json=as_json)
     else:
