@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
 _SHOWN = 12
@@ -18,10 +18,7 @@ _SHOWN = 12
 @click.command("diagnose", cls=GivenOnce)
 @vessel_option()
 @click.option("--fleet", is_flag=True, help="Every vessel of the warehouse, as a Prefect flow, and a summary.")
-@click.option("--set", "set_id", metavar="ID", help="Begin from the model of this parameter set.")
-@click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Begin from this model, YAML.")
-@click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
-              help="An effect of your own, YAML; tried beside the catalogue. May be repeated.")  # fmt: skip
+@beginning_options
 @click.option("--all", "everything", is_flag=True, help="Also the effects that are absent or cannot be tested.")
 @warehouse_option
 @json_option

@@ -92,3 +92,15 @@ def folder_option(default: str, help_text: str) -> Callable[[F], F]:
     return click.option(
         "--folder", type=click.Path(path_type=Path), default=Path(default), show_default=True, help=help_text
     )
+
+
+def beginning_options(function: F) -> F:
+    """Add ``--set``, ``--model`` and ``--effect-file``: what a diagnosis begins from, and what it tries too."""
+    for option in (
+        click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
+                     help="An effect of your own, YAML; tried beside the catalogue. May be repeated."),
+        click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Begin from this model, YAML."),
+        click.option("--set", "set_id", metavar="ID", help="Begin from the model of this parameter set."),
+    ):  # fmt: skip
+        function = option(function)
+    return function

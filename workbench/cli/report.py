@@ -8,16 +8,13 @@ from pathlib import Path
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, output_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import beginning_options, json_option, output_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import print_json, progress_bar
 
 
 @click.command("report", cls=GivenOnce)
 @vessel_option(required=True)
-@click.option("--set", "set_id", metavar="ID", help="Begin from the model of this parameter set.")
-@click.option("--model", type=click.Path(path_type=Path), metavar="FILE", help="Begin from this model, YAML.")
-@click.option("--effect-file", "files", multiple=True, type=click.Path(path_type=Path), metavar="FILE",
-              help="An effect of your own, YAML; tried beside the catalogue. May be repeated.")  # fmt: skip
+@beginning_options
 @output_option("Write here; default: the vessel's name with .html. Nothing is overwritten.")
 @warehouse_option
 @json_option

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from kempf.pipeline.steering.track import Track
+from kempf.workbench.figures.drawn import pyplot, save
 
 _COLOURS = ("tab:blue", "tab:red", "0.35", "tab:green")
 
@@ -24,12 +25,7 @@ def draw_course_keeping(tracks: Sequence[tuple[str, Track]], path: Path, title: 
     title : str, optional
         Above the figure.
     """
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(4, 1, figsize=(10, 10), sharex=True, layout="constrained")
+    figure, axes = pyplot().subplots(4, 1, figsize=(10, 10), sharex=True, layout="constrained")
     heading, close, rudder, wind = axes
     first = tracks[0][1]
     start = first.course_rad[0]
@@ -60,7 +56,4 @@ def draw_course_keeping(tracks: Sequence[tuple[str, Track]], path: Path, title: 
     handles, labels = heading.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=min(len(labels), 4), frameon=False, title=title)
     wind.set_xlabel("time, s")
-    metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    with mpl.rc_context({"svg.hashsalt": "kempf"}):
-        figure.savefig(path, dpi=100, metadata=metadata.get(path.suffix))
-    plt.close(figure)
+    save(figure, path, 100)

@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from kempf.workbench.figures.drawn import pyplot, save
+
 Float = NDArray[np.float64]
 
 _LABELS = ("v, m/s", "r, deg/s", "F, 1e-3 m/s²", "$V_T$, m/s")
@@ -31,12 +33,7 @@ def draw_disturbed_zigzag(
     title : str
         Above the figure.
     """
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
-    figure, axes = plt.subplots(4, 1, figsize=(10, 9), sharex=True, layout="constrained")
+    figure, axes = pyplot().subplots(4, 1, figsize=(10, 9), sharex=True, layout="constrained")
     for k, (panel, label, factor) in enumerate(zip(axes, _LABELS, _FACTORS, strict=True)):
         if k < 2:
             panel.plot(time_s, factor * measured[:, k], ".", ms=2.0, color="tab:orange", label="measured")
@@ -52,5 +49,4 @@ def draw_disturbed_zigzag(
     handles, labels = axes[0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=3, frameon=False, title=title)
     axes[-1].set_xlabel("time since the first execute, s")
-    figure.savefig(path, dpi=90, metadata={"Software": None})
-    plt.close(figure)
+    save(figure, path, 90)

@@ -11,6 +11,7 @@ from kempf.flows.jobs.examine_log import ExaminedLog
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.outcome import Figure
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.workbench.figures.drawn import pyplot, save
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -34,18 +35,13 @@ def draw(found: ExaminedLog, path: Path) -> None:
     path : Path
         Ending ``.png``, ``.svg`` or ``.pdf``.
     """
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
     rows = [(outcome, figure) for outcome in found.examination.outcomes for figure in outcome.figures]
     corrected = found.log
     for finding in found.examination.findings:
         corrected = finding.faults[0].corrected(corrected) if finding.faults else corrected
     sides = [("as logged", found.log)] + ([("corrected", corrected)] if corrected is not found.log else [])
     height = 0.24 * max(len(rows), 1) + 1.0
-    sheet = plt.figure(figsize=(12, height + 7.5), layout="constrained")
+    sheet = pyplot().figure(figsize=(12, height + 7.5), layout="constrained")
     upper, lower = np.asarray(sheet.subfigures(2, 1, height_ratios=[height, 7.5]))
     _forest(upper.subplots(), rows)
     panels = lower.subplots(3, len(sides), sharex=True, sharey="row", squeeze=False)
@@ -56,8 +52,7 @@ def draw(found: ExaminedLog, path: Path) -> None:
         panels[0, column].set_title(title)
         panels[2, column].set_xlabel("time, s")
     sheet.suptitle(f"{found.file_name}: {found.examination.verdict}")
-    sheet.savefig(path, dpi=110, metadata={"Software": None} if path.suffix == ".png" else None)
-    plt.close(sheet)
+    save(sheet, path, 110)
 
 
 def _forest(panel: Axes, rows: list[tuple[Any, Figure]]) -> None:

@@ -10,6 +10,7 @@ from kempf.pipeline.channels.series import Float, Nanoseconds
 from kempf.pipeline.history.changes import Change, Changes
 from kempf.pipeline.history.scan import YEAR_S
 from kempf.pipeline.history.sets import ParameterHistory
+from kempf.workbench.figures.drawn import pyplot, save
 
 
 def draw_history(history: ParameterHistory, found: Changes, path: Path, title: str) -> None:
@@ -24,14 +25,9 @@ def draw_history(history: ParameterHistory, found: Changes, path: Path, title: s
     title : str
         Above the figure.
     """
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
     p = len(history.names)
     rows = (p + 1) // 2
-    figure, axes = plt.subplots(
+    figure, axes = pyplot().subplots(
         rows, 2, figsize=(12, 2.6 * rows + 1.2), sharex=True, layout="constrained", squeeze=False
     )
     std = np.sqrt(np.einsum("ijj->ij", history.covariance))
@@ -66,8 +62,7 @@ def draw_history(history: ParameterHistory, found: Changes, path: Path, title: s
         "red: when it changed, solid where this parameter moved by itself",
         fontsize=9,
     )
-    figure.savefig(path, dpi=90, metadata={"Software": None} if path.suffix == ".png" else None)
-    plt.close(figure)
+    save(figure, path, 90)
 
 
 def _mark(panel: object, change: Change, j: int, *, first: bool) -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from kempf.pipeline.estimate.result import Value
+from kempf.workbench.figures.drawn import pyplot, save
 
 
 def draw_iterations(iterations: Sequence[dict[str, Any]], truth: Sequence[Value], path: Path, title: str) -> None:
@@ -23,14 +24,9 @@ def draw_iterations(iterations: Sequence[dict[str, Any]], truth: Sequence[Value]
     title : str
         Above the figure.
     """
-    import matplotlib as mpl
-
-    mpl.use("Agg")
-    import matplotlib.pyplot as plt
-
     count = [entry["iteration"] for entry in iterations]
     found = [[*entry["A"][0], *entry["A"][1], *entry["B"]] for entry in iterations]
-    figure, axes = plt.subplots(3, 2, figsize=(10, 8), sharex=True, layout="constrained")
+    figure, axes = pyplot().subplots(3, 2, figsize=(10, 8), sharex=True, layout="constrained")
     for k, (panel, true) in enumerate(zip(axes.flat, truth, strict=True)):
         panel.axhline(true.value, color="black", lw=1.2, label="true")
         panel.plot(count, [values[k] for values in found], "o-", ms=3, lw=1.0, color="tab:blue", label="estimated")
@@ -39,5 +35,4 @@ def draw_iterations(iterations: Sequence[dict[str, Any]], truth: Sequence[Value]
     handles, labels = axes[0, 0].get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=2, frameon=False, title=title)
     figure.supxlabel("iteration (0: first approximation)")
-    figure.savefig(path, dpi=90, metadata={"Software": None})
-    plt.close(figure)
+    save(figure, path, 90)

@@ -13,6 +13,7 @@ from kempf.pipeline.compare.comparison import ORDER, ComparedRun
 from kempf.pipeline.compare.group import UNITS
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.prediction import WIDTH_95
+from kempf.workbench.figures.drawn import save
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -114,8 +115,4 @@ def draw_measured_over_predicted(runs: Sequence[ComparedRun], path: Path, title:
     path : Path
         Ending ``.png``, ``.svg`` or ``.pdf``.
     """
-    import matplotlib as mpl
-
-    metadata = {".png": {"Software": None}, ".svg": {"Date": None}, ".pdf": {"CreationDate": None}}
-    with mpl.rc_context({"svg.hashsalt": "kempf"}):
-        measured_over_predicted(runs, title).savefig(path, dpi=90, metadata=metadata.get(path.suffix))
+    save(measured_over_predicted(runs, title), path, 90)
