@@ -27,7 +27,8 @@ def test_every_setting_is_documented_with_its_value() -> None:
 
 def test_the_verdicts_are_those_of_the_code() -> None:
     source = (ROOT / "pipeline" / "history" / "changes.py").read_text(encoding="utf-8")
-    documented = re.findall(r"``([a-z ]+)``", source.partition("verdict : str")[2].partition("why : str")[0])
+    comment = source.partition("class Changes:")[2].partition("verdict: str")[0].replace("\n    #:", "")
+    documented = re.findall(r"``([a-z ]+)``", comment)
     table = TEXT.partition("| verdict |")[2].partition("\n\n")[0]
     assert set(documented) == set(re.findall(r"`([a-z ]+)`", table))
     assert len(documented) == 7
