@@ -14,7 +14,7 @@ from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.ship_model import KnownShip
+    from kempf.flows.jobs.ship_model import ShipOfSet
     from kempf.pipeline.steering.state_space import StateSpace
 
 #: bytes of the description at the head of a MAT file, which scipy fills with the time of day
@@ -25,7 +25,7 @@ _MAT_DESCRIPTION = 116
 class Linear:
     """A ship with her state space, continuous and sampled at a step."""
 
-    ship: KnownShip
+    ship: ShipOfSet
     continuous: StateSpace
     discrete: StateSpace
 
@@ -52,7 +52,7 @@ def as_text(one: ParameterSet, form: str) -> str:
     return str(yaml.safe_dump(json.loads(json.dumps(content)), sort_keys=False, allow_unicode=True))
 
 
-def linear(ship: KnownShip, step_s: float, course_rad: float) -> Linear:
+def linear(ship: ShipOfSet, step_s: float, course_rad: float) -> Linear:
     """Return the state space of a ship about a course, continuous and at a step.
 
     Raises
@@ -171,7 +171,7 @@ def as_mat(model: Linear) -> bytes:
     return described.encode("ascii", "replace")[:_MAT_DESCRIPTION].ljust(_MAT_DESCRIPTION) + data[_MAT_DESCRIPTION:]
 
 
-def _parameters(ship: KnownShip) -> tuple[list[str], list[float], list[float | None], list[str]]:
+def _parameters(ship: ShipOfSet) -> tuple[list[str], list[float], list[float | None], list[str]]:
     held = {p.name: p for p in ship.parameter_set.parameters}
     found = [*(held[name] for name in HULL_PARAMETERS), *ship.effect_parameters]
     spread = [p.std if p.std is not None and p.std == p.std else None for p in found]

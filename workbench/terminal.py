@@ -158,7 +158,3 @@ def progress_bar() -> Iterator[Progress]:
             bar.update(task, completed=done, total=total, description=what)
 
         yield update
-
-
-#: the earlier name, for export and rerun
-progress = progress_bar

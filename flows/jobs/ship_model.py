@@ -34,7 +34,7 @@ _LEAST_OF_A_MEASUREMENT = 0.02
 
 
 @dataclass(frozen=True, eq=False)
-class KnownShip:
+class ShipOfSet:
     """What a parameter set says of a ship."""
 
     parameter_set: ParameterSet
@@ -63,7 +63,7 @@ class KnownShip:
         return tuple(held[name] for name in (self.effects.model.names if self.effects is not None else ()))
 
 
-def known_ship(warehouse: Warehouse, one: ParameterSet, speed_m_s: float | None = None) -> KnownShip:
+def ship_of_set(warehouse: Warehouse, one: ParameterSet, speed_m_s: float | None = None) -> ShipOfSet:
     """Return what a parameter set says of a ship, for steering.
 
     Parameters
@@ -99,7 +99,7 @@ def known_ship(warehouse: Warehouse, one: ParameterSet, speed_m_s: float | None 
         warnings.insert(0, f"the set did not converge: {one.convergence.get('reason')}")
     covariance = _covariance(one, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
     numbers = (float(speed), arm or 0.0, profile.length_m)
-    return KnownShip(one, hull, effects, covariance, spec, *numbers, noise, remarks, tuple(warnings))
+    return ShipOfSet(one, hull, effects, covariance, spec, *numbers, noise, remarks, tuple(warnings))
 
 
 def _effects(one: ParameterSet, profile: VesselProfile) -> ShipEffects | None:

@@ -9,7 +9,7 @@ from math import degrees, isfinite, nan, radians
 import numpy as np
 
 from kempf.flows.jobs.chosen_set import chosen_set, named_set
-from kempf.flows.jobs.ship_model import KnownShip, known_ship
+from kempf.flows.jobs.ship_model import ShipOfSet, ship_of_set
 from kempf.flows.jobs.steered_ship import SteeredShip
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.simulate.disturbances import Environment
@@ -77,7 +77,7 @@ class Tried:
 class Steered:
     """What the job did."""
 
-    ship: KnownShip
+    ship: ShipOfSet
     request: SteerRequest
     #: From the set's own parameters, then from the wrong ones if any were asked for.
     laws: tuple[Tried, ...]
@@ -106,7 +106,7 @@ def steer_vessel(warehouse: Warehouse, vessel: str, request: SteerRequest = Stee
             "Ask for legs that are more than a minute longer.",
         )
     one, _ = chosen_set(warehouse, vessel, request.set_id)
-    ship, dropped = _with_right_instruments(known_ship(warehouse, one, request.speed_m_s))
+    ship, dropped = _with_right_instruments(ship_of_set(warehouse, one, request.speed_m_s))
     wanted = [(one.parameter_set_id, ship.hull, ship.effects)]
     if request.wrong is not None:
         wanted.append(_wrong(warehouse, request.wrong, ship))
@@ -126,7 +126,7 @@ def _on_instruments(effects: ShipEffects | None) -> list[str]:
     return [one.name for one in every if one.terms and set(one.terms) <= {"lateral_speed", "yaw_rate", "heading"}]
 
 
-def _with_right_instruments(ship: KnownShip) -> tuple[KnownShip, tuple[str, ...]]:
+def _with_right_instruments(ship: ShipOfSet) -> tuple[ShipOfSet, tuple[str, ...]]:
     """Return a ship whose instruments read right, and what was dropped for it."""
     names = _on_instruments(ship.effects)
     if ship.effects is None or not names:
@@ -138,7 +138,7 @@ def _with_right_instruments(ship: KnownShip) -> tuple[KnownShip, tuple[str, ...]
     return replace(ship, effects=ship.effects.without(*names), covariance=known), (said,)
 
 
-def _not_simulated(ship: KnownShip, dropped: tuple[str, ...]) -> tuple[str, ...]:
+def _not_simulated(ship: ShipOfSet, dropped: tuple[str, ...]) -> tuple[str, ...]:
     """Say what the simulator cannot do, or does to first order only."""
     if ship.effects is None:
         return ()
@@ -155,11 +155,11 @@ def _not_simulated(ship: KnownShip, dropped: tuple[str, ...]) -> tuple[str, ...]
     return (f"the simulated ship sails without {', '.join(lacking)}",) if lacking else ()
 
 
-def _wrong(warehouse: Warehouse, wrong: str, ship: KnownShip) -> tuple[str, Hull, ShipEffects | None]:
+def _wrong(warehouse: Warehouse, wrong: str, ship: ShipOfSet) -> tuple[str, Hull, ShipEffects | None]:
     try:
         factor = float(wrong)
     except ValueError:
-        other, _ = _with_right_instruments(known_ship(warehouse, named_set(warehouse, wrong), ship.speed_m_s))
+        other, _ = _with_right_instruments(ship_of_set(warehouse, named_set(warehouse, wrong), ship.speed_m_s))
         return f"{other.parameter_set.parameter_set_id} ({other.parameter_set.vessel})", other.hull, other.effects
     if not (isfinite(factor) and factor > 0.0):
         raise UsageError("wrong_factor", f"The factor is {wrong}, expected more than 0.", "Give 0.5 or 2, say.")
@@ -167,7 +167,7 @@ def _wrong(warehouse: Warehouse, wrong: str, ship: KnownShip) -> tuple[str, Hull
     return f"rudder taken for {factor:g} times as effective", hull, ship.effects
 
 
-def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: KnownShip, request: SteerRequest) -> Tried:
+def _tried(label: str, hull: Hull, effects: ShipEffects | None, ship: ShipOfSet, request: SteerRequest) -> Tried:
     law = course_law(
         hull,
         ship.speed_m_s,
@@ -209,7 +209,7 @@ _PARTS: dict[str, Callable[[float], GearPart]] = {
 }
 
 
-def _simulated_gear(ship: KnownShip) -> SteeringGear | None:
+def _simulated_gear(ship: ShipOfSet) -> SteeringGear | None:
     """Return what lies between the rudder's reading and the hull of a parameter set, None where nothing does."""
     if ship.effects is None:
         return None
@@ -219,7 +219,7 @@ def _simulated_gear(ship: KnownShip) -> SteeringGear | None:
     return SteeringGear(parts, zero) if parts or zero != 0.0 else None
 
 
-def _simulated_hull(ship: KnownShip, settings: LawSettings) -> SimulatedHull:
+def _simulated_hull(ship: ShipOfSet, settings: LawSettings) -> SimulatedHull:
     """Return the ship of a parameter set as the simulator takes her; without a length her speed stays constant."""
     hull = equivalent_hull(ship.hull, ship.effects, ship.speed_m_s)
     parameters = HullParameters(*(float(x) for x in hull.array()))

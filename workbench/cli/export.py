@@ -13,7 +13,7 @@ import click
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, output_option, set_argument, vessel_option, warehouse_option
-from kempf.workbench.terminal import counted, print_json, print_note, progress
+from kempf.workbench.terminal import counted, print_json, print_note, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -127,8 +127,8 @@ def mcap_file(
 
     require_new(output, "--output")
     warehouse = Warehouse(uri)
-    with progress() as tell:
-        found = compare_vessel(warehouse, vessel, set_id, "1", tell)
+    with progress_bar() as progress:
+        found = compare_vessel(warehouse, vessel, set_id, "1", progress)
     print_note(said_of_vessel(warehouse, vessel))
     found = _only(found, segments) if segments else found
     data = to_mcap(found.runs, about(found), measured_positions(warehouse, found.found))
@@ -168,12 +168,12 @@ def _only(found: Comparison, wanted: Sequence[str]) -> Comparison:
 def _linear(uri: str, set_id: str | None, vessel: str | None, speed: float | None, step: float, course: float) -> Any:
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
-    from kempf.flows.jobs.ship_model import known_ship
+    from kempf.flows.jobs.ship_model import ship_of_set
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import linear
 
     warehouse = Warehouse(uri)
-    ship = known_ship(warehouse, named_set(warehouse, set_id, vessel), speed)
+    ship = ship_of_set(warehouse, named_set(warehouse, set_id, vessel), speed)
     print_note(said_of_sets([ship.parameter_set]))
     return linear(ship, step, radians(course))
 

@@ -193,7 +193,7 @@ def steering(
     """
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
-    from kempf.flows.jobs.ship_model import known_ship
+    from kempf.flows.jobs.ship_model import ship_of_set
     from kempf.pipeline.steering.motion import linear_hull
     from kempf.pipeline.steering.nomoto import nomoto
     from kempf.pipeline.steering.stability import stability
@@ -201,7 +201,7 @@ def steering(
     from kempf.workbench.ranked_warnings import show_warnings
 
     warehouse = Warehouse(uri)
-    ship = known_ship(warehouse, named_set(warehouse, set_id, vessel), speed)
+    ship = ship_of_set(warehouse, named_set(warehouse, set_id, vessel), speed)
     print_note(said_of_sets([ship.parameter_set]))
     linear = linear_hull(ship.hull, ship.effects, ship.covariance, ship.speed_m_s)
     constants = nomoto(linear.hull, linear.covariance, ship.speed_m_s, ship.length_m)

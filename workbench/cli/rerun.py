@@ -10,7 +10,7 @@ import click
 from kempf.schemas.errors import DataRejected, ThresholdExceeded, UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table, progress
+from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.rerun_all import Verification
@@ -84,12 +84,12 @@ def _one(warehouse: Warehouse, set_id: str, tolerance: float, *, as_json: bool) 
     if as_json:
         print_json(result.show())
     else:
-        _tell(result)
+        _print_rerun(result)
     if result.verdict == "different":
         sys.exit(ThresholdExceeded.exit_code)
 
 
-def _tell(result: Rerun) -> None:
+def _print_rerun(result: Rerun) -> None:
     click.echo(f"{result.parameter_set_id}: {result.verdict}")
     if result.code_changed:
         click.echo("  the code is not the one that made it")
@@ -103,12 +103,12 @@ def _tell(result: Rerun) -> None:
 def _verify(warehouse: Warehouse, vessels: list[str], tolerance: float, *, afresh: bool, as_json: bool) -> None:
     from kempf.flows.jobs.rerun_all import verify_all
 
-    with progress() as tell:
-        found = verify_all(warehouse, vessels, tolerance, afresh=afresh, progress=tell)
+    with progress_bar() as progress:
+        found = verify_all(warehouse, vessels, tolerance, afresh=afresh, progress=progress)
     if as_json:
         print_json(found.show())
     else:
-        _tell_all(found)
+        _print_verification(found)
     counts = found.counts()
     if counts["failed"]:
         sys.exit(DataRejected.exit_code)
@@ -116,7 +116,7 @@ def _verify(warehouse: Warehouse, vessels: list[str], tolerance: float, *, afres
         sys.exit(ThresholdExceeded.exit_code)
 
 
-def _tell_all(found: Verification) -> None:
+def _print_verification(found: Verification) -> None:
     this, other = found.counts(code_changed=False), found.counts(code_changed=True)
     rows = [[verdict, str(n), str(this[verdict]), str(other[verdict])] for verdict, n in found.counts().items()]
     print_table(["verdict", "sets", "of this code", "of other code"], rows)
