@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from kempf.flows.jobs.chosen_manoeuvres import choose, without_log
+from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose, without_log
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
 from kempf.flows.jobs.pending import Waiting, waiting
 from kempf.flows.jobs.standing_model import SINGLE
@@ -30,6 +30,27 @@ def pool_vessel(
     """
     with waiting(warehouse, vessel) as new:
         return pool_segments(warehouse, vessel, request, outcomes, new, flow_run=flow_run, progress=progress)
+
+
+def poolable(warehouse: Warehouse, vessel: str, request: Request, outcomes: Sequence[IdentifyOutcome]) -> Chosen | str:
+    """Return the zigzags that are pooled, each manoeuvre once, or why there is nothing to pool."""
+    if request.estimator != SINGLE:
+        return f"the estimator {request.estimator} takes one zigzag at a time; {SINGLE} pools"
+    # a log none of whose manoeuvres could be identified stays out
+    usable = {o.segment.ingest_id for o in outcomes if o.parameter_set is not None}
+    if not usable:
+        return "no zigzag could be identified"
+    chosen = choose(warehouse, vessel, {row.ingest_id for row in logs.current(warehouse, vessel)} - usable)
+    if len(chosen.segments) < 2:
+        others = "; ".join(sorted(set(chosen.skipped.values())))
+        return "there is one zigzag that counts" + (f", of the others: {others}" if others else "")
+    # pooled with the speed over ground they would be wrong together, and sure of it
+    if request.spec.current != "none" and any(without_log(segment) for segment in chosen.segments):
+        return (
+            "the zigzags have no speed through the water, and in a current that over ground is another; in still water "
+            "a model with `current: none` pools them: --model FILE"
+        )
+    return chosen
 
 
 def pool_segments(
@@ -59,23 +80,15 @@ def pool_segments(
     Returns
     -------
     (ParameterSet, bool) or None
-        The pooled set, and whether it is new; None where the estimator is another or fewer than two segments with a
-        log converged. A manoeuvre that two logs hold counts once.
+        The pooled set, and whether it is new; None where there is nothing to pool, see `poolable`.
 
     Raises
     ------
     KempfError
         The segments have nothing in common.
     """
-    if request.estimator != SINGLE:
-        return None
-    # a log none of whose manoeuvres could be identified stays out
-    usable = {o.segment.ingest_id for o in outcomes if o.parameter_set is not None}
-    if not usable:
-        return None
-    chosen = choose(warehouse, vessel, {row.ingest_id for row in logs.current(warehouse, vessel)} - usable)
-    # pooled with the speed over ground they would be wrong together, and sure of it
-    if len(chosen.segments) < 2 or any(without_log(segment) for segment in chosen.segments):
+    chosen = poolable(warehouse, vessel, request, outcomes)
+    if isinstance(chosen, str):
         return None
     made, is_new = store_model(
         *(warehouse, chosen, request.spec, request.own, progress, flow_run),

@@ -261,6 +261,7 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
         },
         warnings=(
             *(() if fit.converged else (f"not converged: {fit.reason}",)),
+            *_at_bounds(fit),
             *dict.fromkeys(
                 sentence for one in known.one_step for sentence in plausibility_warnings(fit.hull, std[:6], one)
             ),
@@ -269,6 +270,15 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
         ),
         parent=None,
     )
+
+
+def _at_bounds(fit: PooledFit) -> tuple[str, ...]:
+    """Return a warning for every parameter of an effect that ended at a bound."""
+    ended = zip(fit.model.names, fit.values, (p for _, p in fit.model.parameters), strict=True)
+    pressed = [(name, value) for name, value, p in ended if not p.low < value < p.high]
+    sentences = [f"at a bound, not estimated: {name} = {value:.3g}" for name, value in pressed]
+    nothing = "; the effect as fitted changes nothing"
+    return tuple(said + (nothing if value == 0.0 else "") for said, (_, value) in zip(sentences, pressed, strict=True))
 
 
 def _gross_errors(fit: PooledFit, runs: VesselRuns) -> dict[str, dict[str, list[float]]]:

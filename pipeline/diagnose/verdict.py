@@ -239,16 +239,22 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 
 def _fall(first: Step, last: Step) -> str:
     a, b = first.held_out_error, last.held_out_error
-    if a is None or b is None:
-        a, b = first.in_sample_error, last.in_sample_error
-        where = "fitted manoeuvres (none is held out)"
-    else:
-        where = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
+    fitted = f"from {100 * first.in_sample_error:.1f} to {100 * last.in_sample_error:.1f} %"
     force = last.intensities[0] / first.intensities[0]
-    return (
-        f"The free-run error of {where} goes from {100 * a:.1f} to {100 * b:.1f} % of the motion, the intensity of the "
-        f"lateral disturbance to {100 * force:.0f} % of what it was."
+    disturbance = f"the intensity of the lateral disturbance to {100 * force:.0f} % of what it was."
+    if a is None or b is None:
+        return f"The free-run error of fitted manoeuvres (none is held out) goes {fitted} of the motion, {disturbance}"
+    held = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
+    said = (
+        f"The free-run error of {held} goes from {100 * a:.1f} to {100 * b:.1f} % of the motion, of the fitted ones "
+        f"{fitted}, {disturbance}"
     )
+    if b > a:
+        said += (
+            " The held-out error is no smaller: what speaks for the effects is the likelihood of held-out measurements "
+            "and the disturbance."
+        )
+    return said
 
 
 def _percent(share: float) -> str:

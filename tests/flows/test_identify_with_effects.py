@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from benchmarks.diagnose import late_rudder
@@ -12,6 +14,10 @@ from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.vessel_model import _at_bounds
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.schemas.effects import catalogue
 from kempf.warehouse import aliases
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
@@ -91,3 +97,16 @@ def test_one_error_of_a_model(place: Path, identified: list[dict[str, Any]]) -> 
 def test_an_estimator_that_knows_no_effects_refuses_the_model(place: Path) -> None:
     arguments = ("identify", "--vessel", VESSEL, "--model", place / "lag.yaml", "--estimator", "paper")
     refused(kempf(*arguments, "--warehouse", place / "w", "--json"), 2, "effects_need_ml")
+
+
+def test_an_effect_at_its_bound_is_warned_of() -> None:
+    model = EffectModel((catalogue()["backlash"], catalogue()["rudder_lag"]))
+    (_, backlash), (_, lag) = model.parameters
+    ended = SimpleNamespace(model=model, values=np.array([backlash.low, 0.5 * (lag.low + lag.high)]))
+    assert _at_bounds(cast(PooledFit, ended)) == (
+        "at a bound, not estimated: backlash.c = 0; the effect as fitted changes nothing",
+    )
+    ended.values = np.array([backlash.high, lag.high])
+    assert [said.split(" = ")[0] for said in _at_bounds(cast(PooledFit, ended))] == [
+        f"at a bound, not estimated: {name}" for name in model.names
+    ]

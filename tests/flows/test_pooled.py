@@ -10,7 +10,7 @@ import pytest
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.pool_vessel import pool_vessel
+from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.standing_model import POOLED
@@ -68,11 +68,24 @@ def test_reprocessing_keeps_the_pool_and_the_command_lists_it_last(days: Warehou
     listed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri), "--json").json
     assert [one["estimator"] for one in listed] == ["ml", "ml", "ml", POOLED]
     output = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri))
-    assert "2 zigzags pooled" in output.out and "not in it: 1 zigzag broken off" in output.out
+    assert "2 zigzags pooled" in output.out and "not in it: 1 zigzag" in output.out
     assert len(parameter_sets.summaries(days, "mariner")) == 4
 
 
-def test_zigzags_that_are_not_pooled_are_said_to_be_so(days: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("kempf.flows.jobs.pool_vessel.pool_vessel", lambda *_, **__: None)
-    said = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri))
-    assert said.code == 0 and "not pooled: that takes two whole zigzags" in said.err
+def test_why_zigzags_are_not_pooled_is_said(days: Warehouse) -> None:
+    outcomes = identify_vessel(days, "mariner")
+    reasons = [
+        poolable(days, "mariner", Request(estimator="least-squares"), outcomes),
+        poolable(days, "mariner", Request(), []),
+        poolable(days, "mariner", Request(), outcomes[:1]),
+    ]
+    expected = ("takes one zigzag at a time", "no zigzag could be identified", "there is one zigzag that counts")
+    assert all(words in str(reason) for words, reason in zip(expected, reasons, strict=True)), reasons
+
+
+def test_the_current_set_is_named(days: Warehouse) -> None:
+    stored = parameter_sets.summaries(days, "mariner").rows(named=True)
+    (pooled,) = (s["parameter_set_id"] for s in stored if s["estimator"] == POOLED)
+    printed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri)).out
+    assert f"current of mariner: {pooled}, plain, pooled" in printed
+    assert printed.index("zigzags pooled") < printed.index("20/20 zigzag")

@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from kempf.flows.jobs.chosen_manoeuvres import without_log
+from kempf.flows.jobs.chosen_manoeuvres import Chosen, without_log
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel, inputs_of
 from kempf.flows.jobs.no_speed_log import KEY
-from kempf.flows.jobs.pool_vessel import pool_vessel
+from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
 from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings
 from kempf.pipeline.simulate.csv_log import to_csv
@@ -23,6 +23,7 @@ from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
 from kempf.pipeline.simulate.plant import STATE
 from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import parameter_sets, segments
 from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
@@ -136,7 +137,11 @@ def test_a_rerun_builds_the_same_bits(filled: tuple[Warehouse, Any], made: tuple
 
 def test_nothing_is_pooled_with_the_speed_over_ground(filled: tuple[Warehouse, Any]) -> None:
     warehouse, _ = filled
-    assert pool_vessel(warehouse, "mariner", Request(), identify_vessel(warehouse, "mariner")) is None
+    outcomes = identify_vessel(warehouse, "mariner")
+    assert pool_vessel(warehouse, "mariner", Request(), outcomes) is None
+    assert "no speed through the water" in str(poolable(warehouse, "mariner", Request(), outcomes))
+    still = Request(ModelSpec(current="none"))
+    assert isinstance(poolable(warehouse, "mariner", still, outcomes), Chosen)
     assert all(without_log(segment) for segment in segments.current(warehouse, "mariner"))
 
 

@@ -94,10 +94,11 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
     click.echo(click.style(title, bold=True) + f"  ({document['diagnosis_id']})")
     for sentence in document["sentences"]:
         click.echo(f"  {sentence}")
+    first = _first_model(document["ladder"][0])
     ladder = [
         [
             str(one["step"]),
-            one["added"] or "plain model",
+            one["added"] or first,
             number(100 * one["in_sample_error"], 3),
             "-" if one["held_out_error"] is None else number(100 * one["held_out_error"], 3),
             number(one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"], 2),
@@ -123,7 +124,7 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
         for one in shown
     ]
     head = ["effect", "set", "score", "expected change, ± 1 s.e.", "absorbed", "verdict"]
-    print_table(head, rows, "Screened beside the plain model")
+    print_table(head, rows, f"Screened beside the {first}")
     reasons: dict[str, list[str]] = {}
     for one in shown:
         reasons.setdefault(one["why"], []).append(one["effect"])
@@ -131,11 +132,16 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
         click.echo(f"  {', '.join(effects)}: {why}")
     if not everything and len(document["candidates"]) > _SHOWN:
         click.echo(f"  of {len(document['candidates'])} effects; --all shows every one, also what cannot be tested")
-    first = next((name for one in document["sets"] for name in one["effects"]), None)
-    if first:
-        click.echo(
-            f"next: kempf effects add {first} --vessel {document['vessel']}, kempf ladder --vessel {document['vessel']}"
-        )
+    claimed = next((name for one in document["sets"] for name in one["effects"]), None)
+    if claimed:
+        vessel = document["vessel"]
+        click.echo(f"next: kempf effects add {claimed} --vessel {vessel}, kempf ladder --vessel {vessel}")
+
+
+def _first_model(step: Mapping[str, Any]) -> str:
+    """Return what the diagnosis began from: the plain model, or one that has effects already."""
+    effects = dict.fromkeys(name.partition(".")[0] for name in step["effects"])
+    return "model with " + ", ".join(effects) if effects else "plain model"
 
 
 def _change(change: Mapping[str, Mapping[str, Any]]) -> str:

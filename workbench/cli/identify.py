@@ -10,7 +10,7 @@ import click
 
 from kempf.flows.process.progress import Progress
 from kempf.pipeline.estimate.names import NAMES
-from kempf.schemas.errors import KempfError
+from kempf.schemas.errors import KempfError, NotFound
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.parameter_set_table import tell_set
@@ -63,8 +63,6 @@ def command(
     if as_json:
         print_json([*(_show(outcome) for outcome in outcomes), *([pooled.show()] if pooled else [])])
     else:
-        for outcome in outcomes:
-            _print_outcome(outcome, verbose=verbose)
         if pooled is not None:
             held = len(pooled.convergence.get("held_out", ()))
             title = f"{counted(len(pooled.segment_ids) - held, 'zigzag')} pooled"
@@ -72,7 +70,11 @@ def command(
             tell_set(pooled, title, verbose=verbose)
             out = len(outcomes) - len(pooled.segment_ids)
             if out:
-                click.echo(f"  not in it: {counted(out, 'zigzag')} broken off, not converged, or in another log, too")
+                why = "without a speed log, in another log, too, or read with an older profile"
+                click.echo(f"  not in it: {counted(out, 'zigzag')} {why}")
+        for outcome in outcomes:
+            _print_outcome(outcome, verbose=verbose)
+        _print_current(warehouse, vessel, pooled)
         click.echo(f"next: kempf history --vessel {vessel}, kempf params show ID, kempf rerun ID")
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if failed and len(failed) == len(outcomes):
@@ -83,7 +85,7 @@ def _pooled(
     warehouse: Warehouse, vessel: str, request: Request, outcomes: list[IdentifyOutcome], progress: Progress
 ) -> ParameterSet | None:
     """Return the set that all manoeuvres share; where they share none the reason goes to stderr."""
-    from kempf.flows.jobs.pool_vessel import pool_vessel
+    from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
 
     try:
         pooled = pool_vessel(warehouse, vessel, request, outcomes, progress=progress)
@@ -91,12 +93,24 @@ def _pooled(
         click.echo(f"not pooled [{error.code}] {error}", err=True)
         return None
     if pooled is None and request.estimator == "ml" and len(outcomes) > 1:
-        click.echo(
-            "not pooled: that takes two whole zigzags that converged, each with a speed log, at different times, read "
-            "with one profile",
-            err=True,
-        )
+        click.echo(f"not pooled: {poolable(warehouse, vessel, request, outcomes)}", err=True)
     return pooled[0] if pooled else None
+
+
+def _print_current(warehouse: Warehouse, vessel: str, pooled: ParameterSet | None) -> None:
+    """Say which set every command takes from now on, and why it is not the pooled one where it is not."""
+    from kempf.flows.jobs.chosen_set import chosen_set
+
+    try:
+        current, _ = chosen_set(warehouse, vessel)
+    except NotFound:
+        click.echo(f"current of {vessel}: no set; none of them converged")
+        return
+    name, model = current.parameter_set_id, current.model_name
+    what = "pooled" if len(current.segment_ids) > 1 else "one zigzag"
+    click.echo(f"current of {vessel}: {name}, {model}, {what}")
+    if pooled is not None and pooled.parameter_set_id != name:
+        click.echo(f"  it stays; to have the pooled one: kempf params alias current {pooled.parameter_set_id}")
 
 
 def _show(outcome: IdentifyOutcome) -> object:
