@@ -59,14 +59,20 @@ def _rung(told: Mapping[str, Any], one: Mapping[str, Any]) -> list[str]:
     return [
         str(one["step"]),
         one["added"] or "plain model",
-        f"{100 * one['in_sample_error']:.2f}",
-        "none held out" if one["held_out_error"] is None else f"{100 * one['held_out_error']:.2f}",
+        _percent(one["in_sample_error"], one["in_sample"]),
+        _percent(one["held_out_error"], one["held_out"]),
         f"{rms['yaw_rate'] * _DEG:.4f}",
         f"{rms['heading'] * _DEG:.3f}",
         f"{rms['lateral_speed']:.4f}",
         f"{one['disturbance_intensity']['wind_force_m_s2_per_sqrt_s']:.2g}",
         f"{one['log_likelihood']:.1f}",
     ]
+
+
+def _percent(error: float | None, runs: Mapping[str, Any]) -> str:
+    if not runs:
+        return "none held out"
+    return "diverges" if error is None else f"{100 * error:.2f}"
 
 
 def _number(value: float | None, form: str) -> str:

@@ -239,14 +239,14 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
 
 def _fall(first: Step, last: Step) -> str:
     a, b = first.held_out_error, last.held_out_error
-    fitted = f"from {100 * first.in_sample_error:.1f} to {100 * last.in_sample_error:.1f} %"
+    fitted = f"from {_share(first.in_sample_error)} to {_share(last.in_sample_error)} %"
     force = last.intensities[0] / first.intensities[0]
     disturbance = f"the intensity of the lateral disturbance to {100 * force:.0f} % of what it was."
     if a is None or b is None:
         return f"The free-run error of fitted manoeuvres (none is held out) goes {fitted} of the motion, {disturbance}"
     held = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
     said = (
-        f"The free-run error of {held} goes from {100 * a:.1f} to {100 * b:.1f} % of the motion, of the fitted ones "
+        f"The free-run error of {held} goes from {_share(a)} to {_share(b)} % of the motion, of the fitted ones "
         f"{fitted}, {disturbance}"
     )
     if b > a:
@@ -255,6 +255,10 @@ def _fall(first: Step, last: Step) -> str:
             "and the disturbance."
         )
     return said
+
+
+def _share(error: float) -> str:
+    return "divergence" if np.isnan(error) else f"{100 * error:.1f}"
 
 
 def _percent(share: float) -> str:

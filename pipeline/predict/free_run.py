@@ -54,9 +54,10 @@ class FreeRun:
     def relative_error(self) -> float:
         """The error of a model on this manoeuvre in one number: the mean of the channels' relative errors.
 
-        It is what ladder, comparison, diagnosis and report all show: 1 - fit % / 100, mean over the channels.
+        It is what ladder, comparison, diagnosis and report all show: 1 - fit % / 100, mean over the channels. NaN where
+        the run diverges.
         """
-        return float(np.nanmean(self.relative))
+        return float("nan") if np.any(np.isinf(self.error)) else float(np.nanmean(self.relative))
 
 
 def free_run(fit: PooledFit, run: GridRun) -> FreeRun:

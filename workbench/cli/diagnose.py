@@ -9,6 +9,7 @@ from typing import Any
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
+from kempf.workbench.cli.ladder import free_run_percent
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
@@ -99,8 +100,8 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
         [
             str(one["step"]),
             one["added"] or first,
-            number(100 * one["in_sample_error"], 3),
-            "-" if one["held_out_error"] is None else number(100 * one["held_out_error"], 3),
+            free_run_percent(one["in_sample_error"], one["in_sample"]),
+            free_run_percent(one["held_out_error"], one["held_out"]),
             number(one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"], 2),
         ]
         for one in document["ladder"]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from math import isnan
 from typing import Any
 
 import click
@@ -46,7 +48,7 @@ def print_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
     ids = short_ids([rung["parameter_set_id"] for rung in rungs])
     rows = []
     for rung in rungs:
-        held, wind = rung["held_out_error"], rung["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"]
+        wind = rung["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"]
         own = {n.partition(".")[2]: v for n, v in rung["effects"].items() if n.partition(".")[0] == rung["added"]}
         sizes = [_size(name, size) for name, size in own.items()]
         rows.append(
@@ -54,14 +56,21 @@ def print_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
                 str(rung["step"]),
                 rung["added"] or "plain model",
                 ", ".join(sizes) or "-",
-                number(100 * rung["in_sample_error"], 3),
-                "-" if held is None else number(100 * held, 3),
+                free_run_percent(rung["in_sample_error"], rung["in_sample"]),
+                free_run_percent(rung["held_out_error"], rung["held_out"]),
                 number(wind, 2),
                 ids[rung["parameter_set_id"]],
             ]
         )
     head = ["step", "added", "size, ± 1 s.e.", "fitted", "held out", "wind, m/s^2/s^0.5", "set"]
     print_table(head, rows, f"{vessel}: free-run error, % of the motion")
+
+
+def free_run_percent(error: float | None, runs: Mapping[str, Any]) -> str:
+    """Return the free-run error of some manoeuvres as percent of the motion, ``diverges`` where one has none."""
+    if not runs:
+        return "-"
+    return "diverges" if error is None or isnan(error) else number(100 * error, 3)
 
 
 def _size(name: str, size: dict[str, Any]) -> str:

@@ -97,6 +97,10 @@ def _wrapped(text: str) -> str:
     return fill(text, 18)
 
 
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if np.isfinite(share) else "diverges"
+
+
 def describe_ladder(ladder: Sequence[FittedModel], first: str) -> str:
     """Return the figure in words.
 
@@ -107,6 +111,6 @@ def describe_ladder(ladder: Sequence[FittedModel], first: str) -> str:
     """
     parts = []
     for model in ladder:
-        held = f", held out {100 * model.held_out_error:.1f} %" if model.held_out_errors.size else ""
-        parts.append(f"{model.added or first}: fitted {100 * model.fitted_error:.1f} %{held}")
+        held = f", held out {_percent(model.held_out_error)}" if model.held_out_errors.size else ""
+        parts.append(f"{model.added or first}: fitted {_percent(model.fitted_error)}{held}")
     return f"Free-run error of the manoeuvres by model, in percent of the motion. {'; '.join(parts)}."
