@@ -42,6 +42,12 @@ def print_note(sentence: str | None) -> None:
         click.echo(f"{click.style('note', fg='yellow')}: {one_line(sentence)}", err=True)
 
 
+def print_paragraph(text: str, indent: str = "  ") -> None:
+    """Print a sentence on stdout in lines of at most `WIDEST` columns, each indented."""
+    for line in wrap(text, WIDEST, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False):
+        click.echo(line)
+
+
 def print_table(head: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
     """Print a table on stdout, numbers to the right; plain text off a terminal.
 

@@ -111,10 +111,13 @@ def find_changes(history: ParameterHistory, settings: ChangeSettings | None = No
 
 def _not_testable(history: ParameterHistory, merged: ParameterHistory, settings: ChangeSettings) -> str:
     if len(merged) < settings.fewest:
-        sets = f"{len(history)} parameter sets" if len(history) != 1 else "1 parameter set"
+        sets, days = (
+            f"{n} {noun}{'' if n == 1 else 's'}"
+            for n, noun in ((len(history), "parameter set"), (len(merged), "occasion"))
+        )
         shared = f"; sets begun within {settings.occasion_s / 3600:g} h are one occasion: they share load and weather"
         return (
-            f"{sets} with covariances on {len(merged)} occasions, at least {settings.fewest} are needed, "
+            f"{sets} with covariances on {days}, at least {settings.fewest} occasions are needed, "
             f"{settings.smallest_side} on either side of a step{shared if len(merged) < len(history) else ''}"
         )
     if merged.time_utc_ns[0] == merged.time_utc_ns[-1]:

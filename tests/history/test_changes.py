@@ -121,7 +121,7 @@ def test_more_sets_see_smaller_changes() -> None:
 def test_too_few_are_not_tested(n: int) -> None:
     found = found_in(history(n))
     assert found.verdict == "not testable with these data"
-    assert "at least 4 are needed" in found.why
+    assert "at least 4 occasions are needed" in found.why
     assert found.changes == ()
     assert np.isnan(found.p_value)
 

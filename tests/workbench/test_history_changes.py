@@ -106,7 +106,29 @@ def test_what_cannot_be_compared_is_left_out_and_counted(place: Path) -> None:
         "of a segment that is there already": 1,
         "without standard errors": 1,
     }
-    assert "left out: 1 made of several segments" in asked(place).out
+    output = asked(place).out
+    assert output.splitlines()[-1] == "left out: 1 set made of several manoeuvres"
+    assert "1 set not converged" in output and "several segments" not in output
+
+
+def test_pooled_sets_are_left_out_in_one_line_and_every_line_fits(place: Path) -> None:
+    put(place, *(replace(s, start_utc_ns=10**18 + i) for i, s in enumerate(made_sets(4))))
+    for i, model in enumerate(("tank", "plain + wind_force")):
+        pooled = made_sets(2, estimator="ml-pooled", model_name=model, model_sha256=f"{i}" * 64)[i]
+        put(place, replace(pooled, segment_ids=("seg-0", "seg-1")))
+    lines = asked(place).out.splitlines()
+    assert lines[0] == "model linear, estimator ml: not testable with these data"
+    assert lines[-1] == "left out: 2 sets made of several manoeuvres"
+    assert not any("tank" in line for line in lines) and max(map(len, lines)) <= 100
+    assert "on 1 occasion, at least 4 occasions are needed" in " ".join(" ".join(lines).split())
+
+
+def test_of_pooled_sets_alone_nothing_can_be_tested(place: Path) -> None:
+    put(place, replace(made_sets(1)[0], segment_ids=("seg-0", "seg-1")))
+    assert asked(place).out.splitlines() == [
+        "not testable with these data: no set of a single manoeuvre to compare",
+        "left out: 1 set made of several manoeuvres",
+    ]
 
 
 def test_a_voyage_that_two_logs_hold_counts_once(place: Path) -> None:

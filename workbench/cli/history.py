@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -13,10 +15,14 @@ from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
 from kempf.workbench.new_file import require_figures, writing
-from kempf.workbench.terminal import counted, number, print_json, print_note, print_table, short_ids
+from kempf.workbench.terminal import counted, number, print_json, print_note, print_paragraph, print_table, short_ids
 
 if TYPE_CHECKING:
     from kempf.warehouse.history import Comparable, History
+
+
+#: Smaller p-values are not written out.
+_LEAST_P = 1e-16
 
 
 @click.command("history", cls=GivenOnce)
@@ -81,8 +87,7 @@ def command(
     for document in documents:
         if len(documents) > 1:
             click.echo(click.style(document["vessel"], bold=True))
-        for one in document["changes"]:
-            _print_changes(one)
+        _print_all(document["changes"])
 
 
 def _rows(vessel: str, history: History) -> list[dict[str, Any]]:
@@ -95,23 +100,25 @@ def _show(histories: dict[str, History], *, as_json: bool) -> None:
         print_json(listed)
     if not listed or as_json:
         return
-    several, short = len(histories) > 1, short_ids(row["parameter_set_id"] for row in listed)
-    rows = [
-        [
-            *([r["vessel"]] if several else []),
-            r["start"][:16],
-            r["parameter"],
-            number(r["value"]),
-            number(r["std"], 2),
-            r["unit"],
-            r["estimator"],
-            r["model"],
-            short[r["parameter_set_id"]] + (" superseded" if r["superseded"] else ""),
-        ]
-        for r in listed
-    ]
-    head = ["vessel"] if several else []
-    print_table([*head, "start UTC", "parameter", "value", "std", "unit", "estimator", "model", "set"], rows)
+    short = short_ids(row["parameter_set_id"] for row in listed)
+    # a series can be read down only where one model and estimator made it
+    series: dict[tuple[str, str, str], list[list[str]]] = {}
+    for r in listed:
+        series.setdefault((r["vessel"], r["model"], r["estimator"]), []).append(
+            [
+                r["start"][:16],
+                r["parameter"],
+                number(r["value"]),
+                number(r["std"], 2),
+                r["unit"],
+                short[r["parameter_set_id"]] + (" superseded" if r["superseded"] else ""),
+            ]
+        )
+    # sorted, for sets of one start come in the order of their ids; the vessels stay as they were asked for
+    order = list(histories)
+    for vessel, model, estimator in sorted(series, key=lambda kind: (order.index(kind[0]), kind)):
+        title = f"{vessel}, model {model}, estimator {estimator}"
+        print_table(["start UTC", "parameter", "value", "std", "unit", "set"], series[vessel, model, estimator], title)
 
 
 def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: str) -> dict[str, Any]:
@@ -151,27 +158,54 @@ def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: s
     }
 
 
+#: Why a set is left out, of those that no history of single manoeuvres could take.
+_SEVERAL = "made of several segments"
+
+
+def _print_all(examined: Sequence[dict[str, Any]]) -> None:
+    """Print what was found of each model and estimator that has sets to compare; the other sets in one sentence."""
+    for one in examined:
+        if one["sets"]:
+            _print_changes(one)
+    out: Counter[str] = Counter()
+    for one in examined:
+        out.update({reason: n for reason, n in one["left_out"].items() if reason == _SEVERAL or not one["sets"]})
+    if examined and not any(one["sets"] for one in examined):
+        click.echo(f"{click.style(examined[0]['verdict'], bold=True)}: no set of a single manoeuvre to compare")
+    if out:
+        print_paragraph(f"left out: {_left_out(out)}", indent="")
+
+
+def _left_out(reasons: Mapping[str, int]) -> str:
+    return ", ".join(
+        f"{counted(n, 'set')} {'made of several manoeuvres' if reason == _SEVERAL else reason}"
+        for reason, n in reasons.items()
+    )
+
+
 def _print_changes(one: dict[str, Any]) -> None:
     """Print what was found of one model and estimator, for a person."""
-    left = ", ".join(f"{n} {reason}" for reason, n in one["left_out"].items())
-    title = (
-        f"model {one['model']}, estimator {one['estimator']}: {counted(one['sets'], 'set')} on "
-        f"{counted(len(one['occasions']), 'occasion')}"
-    )
-    click.echo(click.style(title, bold=True) + (f"; left out: {left}" if left else ""))
+    left = _left_out({reason: n for reason, n in one["left_out"].items() if reason != _SEVERAL})
+    testable = not one["verdict"].startswith("not testable")
+    about = f"{counted(one['sets'], 'set')} on {counted(len(one['occasions']), 'occasion')}: " if testable else ""
+    click.echo(f"model {one['model']}, estimator {one['estimator']}: {click.style(one['verdict'], bold=True)}")
+    print_paragraph(f"{about}{one['why']}")
+    if left:
+        print_paragraph(f"left out: {left}")
     pooled = one["pooled"]
     if pooled is not None and pooled["poolable"] is not None:
-        p_value = number(pooled["p_value"], 2) if pooled["p_value"] > 1e-16 else "0 to 16 digits"
-        may = "may be pooled" if pooled["poolable"] else "do not agree within their standard errors"
-        click.echo(
-            f"  the sets {may}: Q = {number(pooled['q'])} on {pooled['degrees_of_freedom']} degrees of freedom, "
-            f"p = {p_value}; with standard errors {number(pooled['scale'], 3)} times as large "
-            "they would agree"
+        p_value = f"= {number(pooled['p_value'], 2)}" if pooled["p_value"] > _LEAST_P else f"< {_LEAST_P:g}"
+        may, larger = "may be pooled", ""
+        if not pooled["poolable"]:
+            may = "do not agree within their standard errors"
+            larger = f"; with standard errors {number(pooled['scale'], 3)} times as large they would agree"
+        print_paragraph(
+            f"the sets {may}: Q = {number(pooled['q'])} on {pooled['degrees_of_freedom']} degrees of freedom, "
+            f"p {p_value}{larger}"
         )
-    click.echo(f"  {click.style(one['verdict'], bold=True)}: {one['why']}")
     for change in one["changes"]:
         _print_change(change)
-    if one["verdict"].startswith("not testable"):
+    if not testable:
         return
     smallest, scatter = one["smallest_step_seen"], one["scatter_between_trials"]
     rows = [
@@ -213,8 +247,8 @@ def _print_change(change: dict[str, Any]) -> None:
     ]
     print_table(["", "before", "change", "std", "%", "std %", "low", "high", "moved", "unit"], rows, f"  {head}{doubt}")
     for by in change["alone"]:
-        click.echo(
-            f"  {by['parameter']} alone would explain it: {number(by['change'], 3)} ± {number(by['std'], 2)} (1 s.e.) "
+        print_paragraph(
+            f"{by['parameter']} alone would explain it: {number(by['change'], 3)} ± {number(by['std'], 2)} (1 s.e.) "
             f"{by['unit']} ({by['percent']:+.1f} %)"
         )
 
