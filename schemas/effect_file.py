@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from kempf.schemas import yaml_text
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
+from kempf.schemas.faults import faults_of
 
 _LONGEST = 50_000
 _NEXT = "Correct it; docs/effects.md shows an effect file that works."
@@ -34,7 +35,7 @@ def read(text: str, where: str) -> Effect:
     try:
         return Effect.model_validate(content)
     except ValidationError as error:
-        faults = [_fault(e, content) for e in error.errors()]
+        faults = faults_of(error, "file", content)
         raise invalid(where, "; ".join(faults[:5]), {"faults": faults}) from error
 
 
@@ -64,12 +65,3 @@ def _content(text: str, where: str) -> dict[str, Any]:
     if not isinstance(content, dict):
         raise invalid(where, f"expected keys such as 'name' and 'terms', found {type(content).__name__}")
     return content
-
-
-def _fault(error: Any, content: Mapping[str, Any]) -> str:
-    """Say what is wrong and where, parameters and states by name."""
-    place = list(error["loc"])
-    entries = content.get(place[0]) if len(place) > 1 else None
-    if isinstance(entries, dict) and isinstance(place[1], int):
-        place[1] = list(entries)[place[1]]
-    return f"{'.'.join(map(str, place))[:80] or 'file'}: {error['msg'].removeprefix('Value error, ')}"

@@ -16,6 +16,7 @@ from pydantic import AwareDatetime, Field, ValidationError, field_validator, mod
 
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import UsageError
+from kempf.schemas.faults import faults_of
 from kempf.schemas.frozen import Frozen
 from kempf.schemas.units import factor_to_si
 
@@ -160,7 +161,7 @@ def parse(mapping: Any, where: str) -> VesselProfile:
     try:
         return VesselProfile.model_validate(mapping)
     except ValidationError as error:
-        faults = [f"{'.'.join(str(p) for p in e['loc']) or 'profile'}: {e['msg']}" for e in error.errors()]
+        faults = faults_of(error, "profile", mapping)
         raise UsageError(
             "profile_invalid",
             f"{where} is not a valid vessel profile: {'; '.join(faults)}.",

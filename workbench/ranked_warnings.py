@@ -21,7 +21,7 @@ _GRAVEST = (
     "not white|lie in their",
     "held out|no water log|wind_arm|no yaw rate",
 )
-_LEAST = "left out|holds each value|not used|spikes"
+_LEAST = "left out|is in [0-9]+ rows|not used|spikes"
 _CHANNEL = re.compile(r"\b(yaw_rate|heading|lateral_speed|speed_through_water|rudder_angle)\b")
 _NUMBER = re.compile(r"\d[\d.,e+-]*")
 
@@ -42,9 +42,10 @@ def ranked(warnings: Sequence[str]) -> list[str]:
 
 
 def _joined(group: Sequence[str]) -> str:
-    others = [match.group() for other in group[1:] if (match := _CHANNEL.search(other))]
     if len(group) == 1:
         return group[0]
+    channels = [match.group() for warning in group if (match := _CHANNEL.search(warning))]
+    others = [name for name in dict.fromkeys(channels) if name != channels[0]]
     return f"{group[0]} (likewise {', '.join(others)})" if others else f"{group[0]} (and {len(group) - 1} alike)"
 
 

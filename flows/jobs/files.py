@@ -6,6 +6,7 @@ import re
 import stat
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from difflib import get_close_matches
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -15,6 +16,7 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas import profile as profiles
 from kempf.schemas import yaml_text
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
+from kempf.schemas.faults import faults_of
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 
@@ -84,11 +86,12 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
             )
         stream = path.open("rb")
     except FileNotFoundError as error:
-        beside = sorted(p.name for p in path.parent.iterdir())[:5] if path.parent.is_dir() else []
+        beside = sorted(p.name for p in path.parent.iterdir()) if path.parent.is_dir() else []
+        near = get_close_matches(path.name, beside)
         raise NotFound(
             "no_such_file",
             f"There is no {what} at {path}.",
-            f"Check the path; the folder holds {', '.join(beside)}." if beside else "Check the path.",
+            f"Check the path; names in the folder that are like it: {', '.join(near)}." if near else "Check the path.",
             {"path": str(path)},
         ) from error
     except IsADirectoryError as error:
@@ -184,7 +187,7 @@ def read_model(path: Path) -> ModelSpec:
     try:
         spec = ModelSpec.model_validate(content)
     except ValidationError as error:
-        faults = [f"{'.'.join(str(p) for p in e['loc']) or 'model'}: {e['msg']}" for e in error.errors()]
+        faults = faults_of(error, "model", content)
         raise UsageError(
             "model_invalid",
             f"{path} is not a valid model specification: {'; '.join(faults)}.",

@@ -143,8 +143,8 @@ def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
         values[field] = standard if level is None else max(float(level), least)
         if level is None:
             assumed.append(f"{name} is not in the set: {standard:g} assumed for an estimator")
-        elif level < least:
-            assumed.append(f"{name} is {level:.2g} in the set: {least:.2g} taken, an estimator finds it from nothing")
+        elif level < least and f"{level:.2g}" != f"{least:.2g}":
+            assumed.append(f"{name} is {level:.2g} in the set, too little for an estimator: {least:.2g} taken")
     return NoiseLevels(**values), assumed
 
 

@@ -15,7 +15,7 @@ from kempf.schemas.effect import Effect
 from kempf.schemas.effect_file import read
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, code_version, parameter_sets
+from kempf.warehouse import aliases, code_version, parameter_sets, vessels
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
 
@@ -161,8 +161,9 @@ def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
     Raises
     ------
     NotFound
-        ``no_parent``.
+        ``no_vessel``, ``no_parent``.
     """
+    vessels.require(warehouse, vessel)
     now = standing(warehouse, vessel)
     if now is None or now.parent is None:
         raise NotFound(

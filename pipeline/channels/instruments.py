@@ -133,7 +133,8 @@ def _at_instants(
     held = find_held(time, values)
     if held.rows_per_value > 1:
         notes.append(
-            f"{' and '.join(group)}: {source} holds each value for {held.rows_per_value} rows; "
+            f"{' and '.join(group)}: each measurement is in {held.rows_per_value} rows"
+            f"{'' if source == 'row' else f' of {source}'}; "
             f"kept {held.time_utc_ns.size} of {time.size} rows, at their instants of measurement"
         )
     result = {}

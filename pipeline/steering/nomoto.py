@@ -177,10 +177,11 @@ def _warnings(p: Float, covariance: Float, determinant: float, turning: float, a
                 f"{name} divide by a number only {abs(value) / error:.1f} standard errors from zero: "
                 "read the interval, not the standard error"
             )
-    if abs(apart) < _SAFE * std[2]:
+    # the discriminant is the square of the difference of the poles, which is twice as many standard errors from zero
+    if 2.0 * abs(apart) < _SAFE * std[2]:
         warnings.append(
-            f"the two poles are as good as equal (their discriminant lies {abs(apart) / std[2]:.1f} standard errors "
-            "from zero): T1 and T2 one by one, or that they exist, cannot be determined; T and K can"
+            f"the two poles cannot be separated (their discriminant lies {abs(apart) / std[2]:.1f} standard errors "
+            "from zero, at least 2 are expected): T1 and T2 one by one, or that they exist, cannot be determined"
         )
     return tuple(warnings)
 

@@ -60,7 +60,7 @@ def _print_demonstration(shown: Demonstration) -> None:
         ]
         for s in (o.segment for o in shown.identified)
     ]
-    print_table(["psi0/delta0", "first side", "K0 deg", "executes", "overshoots deg"], zigzags, "Zigzags found")
+    print_table(["heading/rudder deg", "first side", "K0 deg", "executes", "overshoots deg"], zigzags, "Zigzags found")
     click.echo()
     for outcome in shown.identified:
         segment = outcome.segment

@@ -17,6 +17,10 @@ if TYPE_CHECKING:
     from kempf.warehouse.logs import LogRow
 
 
+#: Letters of a long file name that a table shows, first and last.
+_ENDS = (14, 15)
+
+
 @click.group("logs", cls=GivenOnceGroup)
 def command() -> None:
     """List the logs, show one with what its channels say, and what was rejected in it and why."""
@@ -54,14 +58,24 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     if as_json:
         print_json(facts)
         return
-    head = ["log_id", "vessel", "file_name", "start", "records_kept", "records_rejected"]
-    most = {"log_id": 12, "start": 16}
-    rows = [[*(str(one[name])[: most.get(name, 28)] for name in head), _brief(one["channels"])] for one in facts]
+    rows = [
+        [
+            *(one["log_id"][:12], one["vessel"], _shortened(one["file_name"]), str(one["start"])[:16]),
+            *(str(one["records_kept"]), str(one["records_rejected"]), _brief(one["channels"])),
+        ]
+        for one in facts
+    ]
     head = ["log", "vessel", "file name", "start UTC", "records kept", "rejected", "channels"]
     if gone:
         head.append("damage")
         rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, rows_of_logs, strict=True)]
     print_table(head, rows)
+
+
+def _shortened(name: str) -> str:
+    """Leave out the middle of a long name, whose ends distinguish it."""
+    head, tail = _ENDS
+    return name if len(name) <= head + 3 + tail else f"{name[:head]}...{name[-tail:]}"
 
 
 def _facts(row: LogRow) -> dict[str, Any]:

@@ -150,7 +150,7 @@ def _print_steered(done: Steered, figure: Path | None, *, verbose: bool) -> None
         for group, keys in _ROWS.items()
         for key in keys
     ]
-    cells = [[name, *(_cell(tried[group][key]) for tried in shown)] for name, group, key in rows]
+    cells = [[name, *(_cell(tried[group][key], key) for tried in shown)] for name, group, key in rows]
     head = ["", "from the set", "from wrong parameters"][: len(shown) + 1]
     about = f"{done.ship.parameter_set.vessel}, {done.ship.parameter_set.parameter_set_id}"
     print_table(head, cells, f"{about} at {number(done.ship.speed_m_s)} m/s, {shown[0]['law']['method']}")
@@ -186,11 +186,11 @@ _WORDS = {
     "stable": "loop stable",
     "slowest_s": "slowest pole, s",
     "modulus_margin": "modulus margin",
-    "share_of_allowed_ships_held": "share of allowed ships held",
+    "share_of_allowed_ships_held": "ships within the errors of the set kept stable, %",
 }
 
 
-def _cell(value: float | bool | None) -> str:
+def _cell(value: float | bool | None, key: str) -> str:
     if isinstance(value, bool):
         return "yes" if value else "NO"
-    return number(value, 3)
+    return number(100.0 * value if value is not None and key.startswith("share") else value, 3)
