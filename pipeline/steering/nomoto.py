@@ -128,6 +128,10 @@ def nomoto(hull: Hull, covariance: Float, speed_m_s: float, length_m: float | No
     return Nomoto(V, poles, {name: found[name] for name in order}, warnings)
 
 
+#: (a11 + a22)^2 - 4 (a11 a22 - a12 a21) = p' Q p
+_DISCRIMINANT = np.zeros((6, 6))
+_DISCRIMINANT[:4, :4] = [[1, 0, 0, -1], [0, 0, 2, 0], [0, 2, 0, 0], [-1, 0, 0, 1]]
+
 _UNITS = {"K": "1/s", "T1": "s", "T2": "s", "T3": "s", "T": "s", "natural_frequency": "rad/s", "damping": "1"}
 
 
@@ -177,10 +181,12 @@ def _warnings(p: Float, covariance: Float, determinant: float, turning: float, a
                 f"{name} divide by a number only {abs(value) / error:.1f} standard errors from zero: "
                 "read the interval, not the standard error"
             )
-    # the discriminant is the square of the difference of the poles, which is twice as many standard errors from zero
-    if 2.0 * abs(apart) < _SAFE * std[2]:
+    # the discriminant is a quadratic form; its error is that of the second order, which counts where poles are near
+    twice = _DISCRIMINANT @ covariance
+    error = float(np.sqrt(std[2] ** 2 + 2.0 * np.trace(twice @ twice)))
+    if abs(apart) < 2.0 * error:
         warnings.append(
-            f"the two poles cannot be separated (their discriminant lies {abs(apart) / std[2]:.1f} standard errors "
+            f"the two poles cannot be separated (their discriminant lies {abs(apart) / error:.1f} standard errors "
             "from zero, at least 2 are expected): T1 and T2 one by one, or that they exist, cannot be determined"
         )
     return tuple(warnings)

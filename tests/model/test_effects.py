@@ -336,7 +336,7 @@ def test_the_catalogue_is_read_without_anything_heavy() -> None:
     ("content", "message"),
     [
         ("x = (", "expected keys"),
-        ("x: 1", "name: Field required; plain: Field required"),
+        ("x: 1", "name: the key is missing; plain: the key is missing"),
         ("name: [", "not valid YAML"),
         (GOOD.format(name="other", target="yaw"), "bears the name of its effect"),
         (GOOD.format(name="zz_wrong", target="roll"), "'roll'"),

@@ -100,6 +100,16 @@ def test_poles_that_are_as_good_as_equal_are_reported():
     assert any("cannot be separated" in w for w in result.warnings)
 
 
+def test_poles_far_apart_are_separate_however_badly_the_faster_one_is_known():
+    p = hull_of("mariner").array()
+    p[3] *= 12.0
+    covariance = np.zeros((6, 6))
+    covariance[3, 3] = (p[3] / 6.0) ** 2
+    result = nomoto(Hull(*p), covariance, 8.0)
+    assert abs(value(result, "T1")) > 8.0 * abs(value(result, "T2"))
+    assert not any("cannot be separated" in w for w in result.warnings)
+
+
 def test_an_unbounded_interval_is_none():
     p = hull_of("tanker").array()
     result = nomoto(Hull(*p), covariance_of(Hull(*p), np.full(6, 0.3)), 7.5)

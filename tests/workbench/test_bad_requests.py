@@ -248,7 +248,8 @@ def test_nobody_says_whose_the_log_is(logs: Path, tmp_path: Path):
         ("nmae: x", "model_invalid", "nmae"),
         ("- name: x", "model_invalid", "model"),
         ("", "model_invalid", "model"),
-        ("current: sideways", "model_invalid", "current"),
+        ("current: sideways", "model_invalid", "found 'sideways', expected 'earth', 'lateral' or 'none'"),
+        ("effects: 3", "model_invalid", "effects: found 3, expected a list"),
         ("wind_correlation_rate_per_s: 0", "model_invalid", "wind_correlation_rate_per_s"),
         ("effects: [sails]", "model_unknown", "sails"),
         ("base: guesswork", "model_unknown", "guesswork"),
@@ -267,8 +268,9 @@ def test_a_model_that_is_none(filled: Path, tmp_path: Path, text: str, code: str
 def test_files_that_are_not_there(filled: Path, logs: Path):
     gone = logs / "gone"
     asked = ("--vessel", "mariner", "--warehouse", filled, "--json")
-    error = refused(kempf("ingest", gone, *asked), 4, "no_such_file")
+    error = refused(kempf("ingest", logs / "marine.csv.gz", *asked), 4, "no_such_file")
     assert "mariner.csv.gz" in error["next_step"]
+    assert refused(kempf("ingest", gone, *asked), 4, "no_such_file")["next_step"] == "Check the path."
     refused(kempf("identify", "--model", gone, *asked), 4, "no_such_file")
     refused(kempf("ingest", logs / "mariner.mcap", "--profile", gone, *asked), 4, "no_such_file")
     refused(kempf("ingest", logs, *asked), 2, "path_is_directory")

@@ -29,6 +29,12 @@ def test_the_gravest_come_first_and_those_alike_are_one() -> None:
     assert shown[-1].endswith("left out (likewise yaw_rate)")
 
 
+def test_a_channel_is_not_named_beside_itself() -> None:
+    alike = [f"errors of {name} are not white (lag {lag})" for name, lag in (("heading", 1), ("heading", 2))]
+    assert ranked(alike) == [f"{alike[0]} (and 1 alike)"]
+    assert ranked([*alike, "errors of yaw_rate are not white (lag 3)"]) == [f"{alike[0]} (likewise yaw_rate)"]
+
+
 def test_a_set_prints_three_warnings_and_all_of_them_where_asked(own: Path) -> None:
     warehouse = Warehouse(str(own))
     made = replace(parameter_sets.get(warehouse, one_of(own, "ml")), parameter_set_id="ps-0", warnings=WARNINGS)

@@ -53,7 +53,7 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     ]
     head = ["segment", "vessel", "zigzag", "first side", "K0 deg", "start UTC"]
     print_table([*head, "overshoots deg", "IMO"], rows)
-    click.echo("zigzag: heading / rudder at which it is reversed, deg; K0: heading before it")
+    click.echo("zigzag: heading at which the rudder is reversed / rudder angle, deg; K0: heading before it")
     for ingest, findings in contradictions.items():
         for words in findings:
             click.echo(f"warning: {one_line(names[ingest])}: {one_line(words)}")
