@@ -113,7 +113,7 @@ def _started_from(run: ComparedRun) -> dict[str, Any]:
     return {
         "initial_state": state,
         "disturbances": {name: value for there, name, value in disturbances if there},
-        "note": "constants fitted to this very run, the same few for every model; whatever changes on the way is error",
+        "note": "constants fitted to this manoeuvre, the same few for every model; their changes count as error",
     }
 
 

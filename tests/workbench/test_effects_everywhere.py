@@ -69,6 +69,11 @@ def differs(late: Late, tau: dict[str, Any]) -> None:
     assert row[1] == "-" and row[-1] == "s"
 
 
+def test_the_discrete_matrices_are_said_to_be_the_hulls(late: Late) -> None:
+    assert "of the hull alone, without rudder_lag" in late.text("params", "show", late.lag)
+    assert "of the hull alone" not in late.text("params", "show", late.plain)
+
+
 def steering(late: Late, tau: dict[str, Any]) -> None:
     output = late.json("params", "steering", late.lag)
     assert output["effects"] == {NAME: tau}

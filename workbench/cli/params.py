@@ -90,6 +90,9 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
         f"Discrete, eq. (17), at {number(one.convergence.get('speed_m_s'))} m/s and a step of "
         f"{number(one.convergence.get('step_s'))} s",
     )
+    effects = one.model_spec.get("effects")
+    if effects:
+        click.echo(f"  of the hull alone, without {', '.join(effects)}; with them: kempf export control")
     origin = one.provenance
     click.echo(f"  log {', '.join(one.log_ids)}")
     click.echo(f"  profile {origin['profile_sha256']}, code {origin['code_version']}, commit {origin['git_commit']}")
