@@ -57,6 +57,8 @@ class Confirmation:
     held_out_gains: Float
     #: Whether a parameter of the effect ended at a bound.
     at_bound: bool
+    #: Whether the refit left nothing of the effect: each of its parameters ended at a lower bound of 0.
+    absent: bool
     #: Of ``fit``.
     unseen: Unseen
     #: Whether the refit was given up, for it could not come near what another one reached; its gains are then those of
@@ -71,7 +73,7 @@ class Confirmation:
             self.bic_change < -BIC_SAVING
             and np.mean(gains > 0.0) > 0.5
             and np.sum(gains) > 0.0
-            and not (self.at_bound or self.outdone)
+            and not (self.at_bound or self.absent or self.outdone)
             and np.isfinite(self.fit.log_likelihood)
         )
 
@@ -105,8 +107,9 @@ def confirm(
     last = slice(base.values.size, None)
     reach = 1e-9 * np.maximum(np.abs(model.high[last]), np.abs(model.low[last]))
     low, high, at = model.low[last], model.high[last], fit.values[last]
-    # at a lower bound of 0 the effect is absent, which the criterion shows; any other bound is implausible
     bound = (at >= high - reach) | ((at <= low + reach) & (low != 0.0))
+    # at lower bounds of 0 the effect is absent, and what the refit gained is a better hull's: it found another maximum
+    absent = np.all((at <= low + reach) & (low == 0.0))
     outdone = not fit.converged and fit.log_likelihood < wanted
     after = before if outdone else unseen(fit, held, workers)
     return Confirmation(
@@ -116,6 +119,7 @@ def confirm(
         fold_gains=after.folds - before.folds,
         held_out_gains=after.held - before.held,
         at_bound=bool(np.any(bound)),
+        absent=bool(absent),
         unseen=after,
         outdone=outdone,
     )

@@ -41,7 +41,7 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
 
     A hull fitted without a lag of the rudder has been bent to imitate it, and from there the way to the true
     hull leads through worse ones. So an effect with a threshold races from several sizes and two hulls, and where the
-    hull has bent so far that it is no ship, every effect climbs from an ordinary one too.
+    hull has bent so far that it is no ship, before or behind the fit, every effect climbs from an ordinary one too.
 
     Parameters
     ----------
@@ -66,7 +66,7 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
     else:
         hull = base.hull
     fitted = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted)
-    if is_ship(base.hull):
+    if is_ship(base.hull) and is_ship(fitted.hull):
         return fitted
     # what the score predicts beside such a hull says little, and the disturbances beside it have eaten the effect
     levels = base.levels.copy()
@@ -91,7 +91,7 @@ def _sizes(effect: Effect) -> list[Float]:
 
 
 def is_ship(hull: Float) -> bool:
-    """Tell whether sway and yaw are damped and the rudder turns her the way it should.
+    """Return whether sway and yaw are damped, drift turns her away from the flow and the rudder turns her as it should.
 
     A ship that does not keep a straight course by herself is one too.
 
@@ -99,8 +99,8 @@ def is_ship(hull: Float) -> bool:
     ----------
     hull : ndarray, shape (6,)
     """
-    a11, _, _, a22, _, b2 = (float(x) for x in hull)
-    return a11 < 0.0 and a22 < 0.0 and b2 > 0.0
+    a11, _, a21, a22, b1, b2 = (float(x) for x in hull)
+    return max(a11, a21, a22, b1) < 0.0 < b2
 
 
 def _climbed(
