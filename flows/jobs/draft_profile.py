@@ -6,34 +6,51 @@ from pathlib import Path
 
 from kempf.flows.jobs.files import opened_log
 from kempf.pipeline.ingest import delimited, draft_profile
-from kempf.pipeline.ingest.sniff import sniff
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.ingest.mcap.fields import fields_of
+from kempf.pipeline.ingest.sniff import MCAP_MAGIC, is_json, sniff
 from kempf.pipeline.ingest.unpack import unpack
 from kempf.schemas.errors import DataRejected, UsageError
 
 
 def draft(path: Path) -> str:
-    """Return the draft of a profile for a delimited log.
+    """Return the draft of a profile for a delimited log or an MCAP one.
 
     Raises
     ------
     DataRejected
         ``empty_log``.
     UsageError
-        ``no_draft``: the log describes itself, or is no text with columns.
+        ``no_draft``: the log describes itself, or holds neither columns nor topics with numbers.
     """
     with opened_log(path) as log:
+        if log.read(0, len(MCAP_MAGIC)) == MCAP_MAGIC:
+            return _of_topics(path, log)
         data, _ = unpack(path.name, log.whole())
     if not data:
         raise DataRejected("empty_log", f"{path.name} is empty.", "Copy the file again from the logger.")
     found = sniff(data)
-    columns = delimited.columns_found(data, None, most=None) if found == "delimited" else []
+    if found == "mcap":
+        return _of_topics(path, LogFile(data))
+    if found == "nmea":
+        raise _no_draft(path, "an NMEA 0183 log", "Ingest it as it is: NMEA logs describe themselves.", found)
+    columns = delimited.columns_found(data, None, most=None) if found and not is_json(data) else []
     if not columns:
-        raise UsageError(
-            "no_draft",
-            f"{path.name} is {found or 'of no known format'}; a profile is drafted from the columns of delimited text.",
-            "Ingest it as it is: NMEA and MCAP logs describe themselves; `kempf ingest` says what a profile must add."
-            if found
-            else "Export the log as delimited text with a line of column names, or as NMEA 0183 or MCAP.",
-            {"path": str(path), "format": found},
-        )
-    return draft_profile.draft_profile(path.name, columns)
+        what = "of no known format" if found is None else "text without columns"
+        next_step = "Export the log as delimited text with a line of column names, or as NMEA 0183 or MCAP."
+        raise _no_draft(path, "JSON text" if is_json(data) else what, next_step, found)
+    return draft_profile.draft_profile(path.name, columns, delimited.titled(data))
+
+
+def _of_topics(path: Path, log: LogFile) -> str:
+    topics = fields_of(path.name, log)
+    if not any(topics.values()):
+        listed = ", ".join(topics) or "none"
+        next_step = f"Look which of its topics carries the measurements; they are {listed}."
+        raise _no_draft(path, "an MCAP log of which no topic holds a number that can be read", next_step, "mcap")
+    return draft_profile.draft_topics(path.name, topics)
+
+
+def _no_draft(path: Path, what: str, next_step: str, found: str | None) -> UsageError:
+    wanted = "a profile is drafted from the columns of delimited text or the topics of MCAP"
+    return UsageError("no_draft", f"{path.name} is {what}; {wanted}.", next_step, {"path": str(path), "format": found})

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import codecs
 from dataclasses import dataclass
+from statistics import median
 
 import numpy as np
 import polars as pl
@@ -11,7 +12,7 @@ from numpy.typing import NDArray
 
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Nanoseconds, Reason, Values
 from kempf.pipeline.ingest.mapping import check_once
-from kempf.pipeline.ingest.sniff import separator_of
+from kempf.pipeline.ingest.sniff import SAMPLE, separator_of
 from kempf.pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, spans_of, trimmed
 from kempf.pipeline.ingest.text.cells import number
 from kempf.pipeline.ingest.text.times import decimal_times, iso_instants
@@ -43,6 +44,24 @@ class Layout:
     columns: tuple[str, ...]
     #: One character, ``whitespace``, or None for a single column.
     separator: str | None
+
+
+@dataclass(frozen=True)
+class Titled:
+    """A table below lines of title."""
+
+    #: Lines before it.
+    header_lines: int
+    #: One character or ``whitespace``.
+    separator: str
+    #: Names of its columns; none where no line names them.
+    names: tuple[str, ...]
+    #: Number of its columns.
+    count: int
+
+
+#: Lines in which a table is looked for below a title, at most and at least.
+_LOOKED_AT, _FEWEST = 200, 6
 
 
 def decode(name: str, data: bytes, source: Source) -> Decoded:
@@ -94,6 +113,45 @@ def columns_found(data: bytes, source: Source | None, most: int | None = _SHOWN)
     """Return the first names of columns that a file's header shows, for a person who writes its profile."""
     layout = _layout(data, source or Source(match="*"))
     return list(layout.columns[:most])
+
+
+def titled(data: bytes) -> Titled | None:
+    """Return where a table begins that has a title before it or blanks between its cells; None for other text.
+
+    Parameters
+    ----------
+    data : bytes
+        Whole, or its first lines.
+    """
+    text = [line.strip() for line in _as_utf8(data[:SAMPLE], "utf-8").decode("utf-8", errors="replace").splitlines()]
+    lines = [(k, line) for k, line in enumerate(text[:_LOOKED_AT]) if line]
+    if len(lines) < _FEWEST:
+        return None
+    later = [line for _, line in lines[len(lines) // 2 : -1]]
+    first = separator_of(lines[0][1])
+    # a damaged row or two make no title of a head
+    if first and median(line.count(first) for line in later) == lines[0][1].count(first):
+        return None
+    for separator in (",", ";", "\t", None):
+        counts = {len(line.split(separator)) for line in later}
+        if len(counts) == 1 and (cells := counts.pop()) > 1:
+            break
+    else:
+        return None
+    begin = len(lines) - 1  # the last one may be cut
+    while begin and len(lines[begin - 1][1].split(separator)) == cells:
+        begin -= 1
+    place, head = lines[begin]
+    names = [] if any(map(_is_number, head.split(separator))) else [n.strip(' "') for n in head.split(separator)]
+    return Titled(place, separator or "whitespace", tuple(names), cells) if begin or separator is None else None
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
 
 
 def _layout(data: bytes, source: Source) -> Layout:

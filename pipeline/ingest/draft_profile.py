@@ -1,4 +1,4 @@
-"""A profile for a person to complete, from the names of a log's columns: what is guessed is marked with a ``?``.
+"""A profile for a person to complete, from the columns or topics of a log: what is guessed is marked with a ``?``.
 
 Nothing is read with a guess: a profile in which a ``?`` is left is refused.
 """
@@ -7,9 +7,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
 
 from kempf.schemas.units import TO_SI
+
+if TYPE_CHECKING:
+    from kempf.pipeline.ingest.delimited import Titled
+    from kempf.pipeline.ingest.mcap.fields import Fields
 
 #: channel and the unit that loggers mostly write it in, by what its column is called; the first that fits
 _NAMES: tuple[tuple[str, str, str], ...] = (
@@ -35,34 +40,82 @@ _TIME = re.compile(r"utc|t|time( ?stamp)?|date ?time|datetime|epoch|gps ?time|ti
 _UNIT = {re.sub(r"[^a-z]", "", unit.lower()): unit for unit in TO_SI} | {"degs": "deg/s", "knots": "kn", "kts": "kn"}
 
 
-def draft_profile(file_name: str, columns: Sequence[str]) -> str:
+def draft_profile(file_name: str, columns: Sequence[str], titled: Titled | None = None) -> str:
     """Return the draft of a profile for a delimited log, YAML with a ``?`` wherever a person has to look.
 
     Parameters
     ----------
     columns : sequence of str
         Every column of the log.
+    titled : Titled, optional
+        Where lines of title stand before the table.
     """
+    if titled is not None:
+        columns = titled.names or [f"column {k}" for k in range(1, titled.count + 1)]
     words = [_words(column) for column in columns]
     clock = next((c for c, (name, _) in zip(columns, words, strict=True) if _TIME.fullmatch(name)), None)
     lines = [
-        f"# A draft from the columns of {file_name}. Correct every line that has a ? and delete the ?;",
-        "# take out the columns that are not needed. docs/profile.md lists the channels and the units.",
-        'vessel: "?"',
-        "length_m: null",
-        "sources:",
-        f"  - match: {json.dumps(file_name)}",
+        *_head(file_name, "columns"),
+        *_table(titled, columns),
         f"    time: {{column: {json.dumps((clock or '') + '?')}}}  # with a unit if it is a number of seconds",
         "    channels:",
     ]
     for column, (name, unit) in zip(columns, words, strict=True):
         if column != clock:
             channel, usual = _guess(name)
-            lines.append(
-                f"      {json.dumps(column)}: {{channel: {json.dumps(channel + '?')}, "
-                f"unit: {json.dumps((unit or usual) + '?')}}}"
-            )
+            lines.append(_entry(column, channel, unit or usual))
     return "\n".join(lines) + "\n"
+
+
+def draft_topics(file_name: str, topics: Mapping[str, Fields]) -> str:
+    """Return the draft of a profile for an MCAP log, with a ``?`` wherever a person has to look.
+
+    Parameters
+    ----------
+    topics : mapping of str to Fields
+        The fields of every topic that hold a number.
+    """
+    lines = [*_head(file_name, "topics"), "    channels:  # '<topic>.<field>'; the time is that at which it was logged"]
+    for topic, fields in topics.items():
+        for field, known in fields.items():
+            if known is not None:
+                more = ", positive: port" if known.positive == "port" else ""
+                more += f", offset: {known.offset:.6g}" if known.offset else ""
+                lines.append(_entry(f"{topic}.{field}", known.channel, known.unit, more))
+                continue
+            name, unit = _words(field.rpartition(".")[2])
+            last = _words(topic.rpartition("/")[2])[0]
+            guesses = [_guess(words) for words in (name, f"{last} {name}", last)]
+            channel, usual = next((guess for guess in guesses if guess[0]), ("", ""))
+            lines.append(_entry(f"{topic}.{field}", channel, unit or usual))
+    return "\n".join(lines) + "\n"
+
+
+def _head(file_name: str, what: str) -> list[str]:
+    return [
+        f"# A draft from the {what} of {file_name}. Correct every line that has a ? and delete the ?;",
+        "# take out the lines that are not needed. docs/profile.md lists the channels and the units.",
+        'vessel: "?"',
+        "length_m: null",
+        "sources:",
+        f"  - match: {json.dumps(file_name)}",
+    ]
+
+
+def _table(titled: Titled | None, columns: Sequence[str]) -> list[str]:
+    """Return how a table below lines of title is read."""
+    if titled is None:
+        return []
+    return [
+        *([f"    header_lines: {titled.header_lines}  # of title, before the table"] if titled.header_lines else []),
+        f"    separator: {json.dumps(titled.separator)}",
+        *([] if titled.names else [f"    columns: {json.dumps(list(columns))}  # no line of the file names them"]),
+    ]
+
+
+def _entry(key: str, channel: str, unit: str, more: str = "") -> str:
+    fields = f"channel: {json.dumps(channel + '?')}, unit: {json.dumps(unit + '?')}{more}"
+    return f"      {json.dumps(key, ensure_ascii=False)}: {{{fields}}}"
 
 
 def _words(column: str) -> tuple[str, str | None]:

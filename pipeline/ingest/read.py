@@ -77,7 +77,7 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
         raise DataRejected(
             "unknown_format",
             f"{name} is neither MCAP, nor NMEA 0183, nor delimited text{' once unpacked' if packed else ''}.",
-            "Export the log as one of these; " + _SEE_PROFILE,
+            "Export the log as one of these. " + _SEE_PROFILE,
             {"name": name},
         )
     screen, clocks, summary = Screen(log_format), OwnClocks(source), _Summary()
@@ -130,6 +130,13 @@ def _delimited(name: str, log: LogFile, profile: VesselProfile, source: Source |
 
     data = _whole(name, log)
     if source is None or source.time is None or not source.channels:
+        if source is None and sniff.is_json(data):
+            raise DataRejected(
+                "unknown_format",
+                f"{name} is JSON text, which is no log; expected MCAP, NMEA 0183 or delimited text.",
+                "Give the log that the logger wrote, or export it as one of these. " + _SEE_PROFILE,
+                {"name": name},
+            )
         columns = delimited.columns_found(data, source)
         lacks = "no source" if source is None else "a source without time or channels"
         raise UsageError(

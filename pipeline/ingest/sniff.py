@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from typing import Literal
 
@@ -39,6 +40,24 @@ def sniff(data: bytes) -> Format | None:
     if lines and (wide or odd <= len(sample) // 1000):
         return "delimited"
     return None
+
+
+def is_json(data: bytes) -> bool:
+    """Return whether a text is one JSON object or list, or one a line: no columns of a log.
+
+    Parameters
+    ----------
+    data : bytes
+        Whole.
+    """
+    if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] not in (b"{", b"["):
+        return False
+    for text in (data.lstrip().partition(b"\n")[0], data):
+        try:
+            return isinstance(json.loads(text), dict | list)
+        except (ValueError, RecursionError):
+            continue
+    return False
 
 
 def separator_of(line: str) -> str | None:

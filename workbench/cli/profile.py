@@ -21,7 +21,7 @@ def command() -> None:
 @output_option()
 @json_option
 def draft(log: Path, output: Path | None, as_json: bool) -> None:
-    """Draft a profile from the columns of a log: guessed channels and units are marked with a ?.
+    """Draft a profile from the columns or topics of a log: guessed channels and units are marked with a ?.
 
     Look at every line that has a ?, correct it and delete the ?; a profile with one left is refused.
     """

@@ -318,8 +318,8 @@ class _DecodeJob:
             raise UsageError(
                 "no_source_for_log",
                 f"{self.name} is an MCAP file, for which the profile maps no topic; its topics are {named}.",
-                "Add a source to the profile that maps '<topic>.<field>' to channels. See docs/profile.md."
-                + (f" With axes as in REP-103: {offers}." if offers else ""),
+                f"`kempf profile draft {self.name}` writes a source to complete, which maps '<topic>.<field>' to "
+                "channels. See docs/profile.md." + (f" With axes as in REP-103: {offers}." if offers else ""),
                 {"name": self.name, "topics": topics, "patterns": patterns},
             )
         if self.time_field is not None and not self.timed:

@@ -62,7 +62,7 @@ class ProtobufReader:
     """
 
     def __init__(self, name: str, descriptor_set: bytes, wanted: list[str]) -> None:
-        types = _proto_types_of(descriptor_set)
+        types = proto_types_of(descriptor_set)
         if f".{name}" not in types:
             raise NoReaderError(f"its descriptor has no message {name}")
         self._kinds = [""] * len(wanted)
@@ -169,7 +169,7 @@ class ProtoField:
 ProtoTypes = dict[str, dict[str, ProtoField]]
 
 
-def _proto_types_of(descriptor_set: bytes) -> ProtoTypes:
+def proto_types_of(descriptor_set: bytes) -> ProtoTypes:
     """Return the messages of a FileDescriptorSet."""
     types: ProtoTypes = {}
     for number, file in _fields(descriptor_set):
