@@ -149,10 +149,9 @@ def _refusal(confirmation: Confirmation) -> str:
         return "the refitted model diverges"
     if confirmation.outdone:
         return "another effect is so much better that its fit was not finished"
-    if confirmation.at_bound:
-        return "its size is at the limit of what is physical"
-    if confirmation.absent:
-        return "the refit leaves nothing of it"
+    if confirmation.at_bound or confirmation.absent:
+        limit = "its size is at the limit of what is physical"
+        return limit if confirmation.at_bound else "the refit leaves nothing of it"
     if confirmation.bic_change > -6.0:
         return f"the improvement does not justify its parameters (BIC {confirmation.bic_change:+.1f})"
     if np.mean(gains > 0.0) <= 0.5 or np.sum(gains) <= 0.0:

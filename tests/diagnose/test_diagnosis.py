@@ -3,17 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 
+from kempf.pipeline.diagnose.confirm import Confirmation, Unseen
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.diagnose.forward_selection import added, is_ship, staged
 from kempf.pipeline.diagnose.screen import score
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.diagnose.verdict import as_json, finding, sentences, verdict
+from kempf.pipeline.diagnose.verdict import _refusal, as_json, finding, sentences, verdict
 from kempf.pipeline.estimate.plain_fit import fit_plain
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.terms.own import from_expression
 from kempf.schemas import effects
 from kempf.schemas.errors import DataRejected
@@ -227,3 +231,29 @@ def test_a_channel_that_the_runs_lack_is_named() -> None:
     (one,) = as_json(found)["candidates"]
     assert one["verdict"] == "not_testable" and one["why"] == "not in the logs: water_depth"
     assert np.isnan(one["score"])
+
+
+def test_an_effect_that_the_refit_leaves_nothing_of_is_not_claimed() -> None:
+    """From a hull at a lower maximum a refit may gain much by the hull alone."""
+    sound = Confirmation(
+        fit=cast(PooledFit, SimpleNamespace(log_likelihood=100.0)),
+        likelihood_ratio=500.0,
+        bic_change=-490.0,
+        fold_gains=np.ones(3),
+        held_out_gains=np.ones(1),
+        at_bound=False,
+        absent=False,
+        unseen=Unseen(np.ones(3), np.ones(1)),
+    )
+    assert sound.holds
+    nothing = replace(sound, absent=True)
+    assert not nothing.holds and _refusal(nothing) == "the refit leaves nothing of it"
+
+
+@pytest.mark.parametrize("wrong", range(6))
+def test_a_hull_of_which_a_sign_is_wrong_is_no_ship(wrong: int) -> None:
+    hull = np.array([-0.7, -0.3, -3.8, -4.0, -0.36, 2.7])
+    assert is_ship(hull)
+    hull[wrong] *= -1.0
+    # a12 may have either sign
+    assert is_ship(hull) == (wrong == 1)
