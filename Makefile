@@ -23,11 +23,12 @@ demo: $(RUNTIME)
 	$(BIN)/kempf demo
 	@echo "  (first: source $(BIN)/activate)"
 
-# In the order of their names: by default the files with the fewest tests come last, and these are the slowest.
-# Last, whether the demonstration still gives the reference's segments and parameter sets, bit for bit.
+# First, whether the demonstration still gives the reference's segments and parameter sets, bit for bit: it compiles what
+# the tests call, which each of their processes would do for itself. Then the tests, in the order of their names: by default
+# the files with the fewest tests come last, and these are the slowest.
 test: check
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 	$(BIN)/python -m benchmarks.identify.identical demo
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 check: $(DEVELOP)
 	$(BIN)/ruff check .

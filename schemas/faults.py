@@ -91,5 +91,8 @@ def _fault(one: Any) -> str:
 def _shown(found: Any) -> str:
     if found is None:
         return "nothing"
-    text = repr(found)
+    try:
+        text = repr(found)
+    except ValueError:  # an integer of thousands of digits is not written out
+        return f"a {type(found).__name__} too long to show"
     return text if len(text) <= _SHOWN else f"{text[:_SHOWN]}..."

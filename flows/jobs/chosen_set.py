@@ -25,7 +25,7 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
     """
     vessels.require(warehouse, vessel)
     pointed = aliases.of_vessel(warehouse, vessel)
-    alias = name or aliases.CURRENT
+    alias = aliases.CURRENT if name is None else name
     if alias in pointed:
         return parameter_sets.get(warehouse, pointed[alias]), alias
     if name is None:
@@ -65,7 +65,7 @@ def named_set(warehouse: Warehouse, name: str | None, vessel: str | None = None)
     """
     if vessel is not None:
         return chosen_set(warehouse, vessel, name)[0]
-    name = name or aliases.CURRENT
+    name = aliases.CURRENT if name is None else name
     if name.startswith("ps-"):
         return parameter_sets.get(warehouse, name)
     held = aliases.holders(warehouse, name)
