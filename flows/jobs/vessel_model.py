@@ -274,11 +274,12 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
 
 def _at_bounds(fit: PooledFit) -> tuple[str, ...]:
     """Return a warning for every parameter of an effect that ended at a bound."""
-    ended = zip(fit.model.names, fit.values, (p for _, p in fit.model.parameters), strict=True)
-    pressed = [(name, value) for name, value, p in ended if not p.low < value < p.high]
-    sentences = [f"at a bound, not estimated: {name} = {value:.3g}" for name, value in pressed]
-    nothing = "; the effect as fitted changes nothing"
-    return tuple(said + (nothing if value == 0.0 else "") for said, (_, value) in zip(sentences, pressed, strict=True))
+    lowest, highest = fit.model.at_bounds(fit.values)
+    return tuple(
+        f"at a bound, not estimated: {fit.model.names[k]} = {fit.values[k]:.3g}"
+        + ("; the effect as fitted changes nothing" if fit.values[k] == 0.0 else "")
+        for k in np.flatnonzero(lowest | highest)
+    )
 
 
 def _gross_errors(fit: PooledFit, runs: VesselRuns) -> dict[str, dict[str, list[float]]]:

@@ -57,7 +57,7 @@ def compare_run(
         held_out=held_out,
         predicted=free if horizon.kind == "free run" else predict(filtered, point, horizon),
         free=free,
-        free_run_error_percent=100.0 * found.relative_error,
+        free_run_error=found.relative_error,
         overshoots=compare_overshoots(
             run.time_s, run.measured[:, _HEADING], found.predicted[:, _HEADING], tuple(turns)
         ),

@@ -32,8 +32,8 @@ class ComparedRun:
     predicted: Predicted
     #: The free run, for overshoots and for the threshold.
     free: Predicted
-    #: The error of the model on this run, `kempf.pipeline.predict.free_run.FreeRun.relative_error` in percent.
-    free_run_error_percent: float
+    #: The error of the model on this run, `kempf.pipeline.predict.free_run.FreeRun.relative_error`.
+    free_run_error: float
     overshoots: tuple[OvershootError, ...]
     #: For `kempf.pipeline.compare.misfit.where`.
     looked: Looked
@@ -44,6 +44,11 @@ class ComparedRun:
     def sample(self) -> str:
         """``fitted`` or ``held_out``."""
         return HELD_OUT if self.held_out else FITTED
+
+    @property
+    def free_run_error_percent(self) -> float:
+        """The error in percent."""
+        return 100.0 * self.free_run_error
 
     def show(self) -> dict[str, Any]:
         """Return the run as JSON content; overshoots in deg, ``rms`` in SI, ``rms_display`` in display units."""
@@ -163,7 +168,7 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
             "n": len(known),
             "not_predicted": len(errors) - len(known),
         },
-        "free_run_error_percent": _mean([run.free_run_error_percent for run in runs]),
+        "free_run_error_percent": _in_percent(_mean([run.free_run_error for run in runs])),
     }
 
 
@@ -180,7 +185,12 @@ def judged(runs: Sequence[ComparedRun]) -> tuple[str, float]:
 
 
 def _error(runs: Sequence[ComparedRun]) -> float:
-    return float(np.mean([run.free_run_error_percent for run in runs]))
+    # a ladder keeps means of shares; to the last digit the same they are only if the mean comes first here too
+    return 100.0 * float(np.mean([run.free_run_error for run in runs]))
+
+
+def _in_percent(mean: dict[str, float | None]) -> dict[str, float | None]:
+    return {name: None if value is None else 100.0 * value for name, value in mean.items()}
 
 
 def _mean(values: Sequence[float]) -> dict[str, float | None]:

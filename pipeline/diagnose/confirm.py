@@ -102,14 +102,10 @@ def confirm(
     price = len(candidate.effect.parameters) * float(np.log(base.count))
     wanted = base.log_likelihood + 0.5 * (price - most_bic)
     fit = added(base, candidate, workers, wanted)
-    model = fit.model
     ratio = 2.0 * (fit.log_likelihood - base.log_likelihood)
     last = slice(base.values.size, None)
-    reach = 1e-9 * np.maximum(np.abs(model.high[last]), np.abs(model.low[last]))
-    low, high, at = model.low[last], model.high[last], fit.values[last]
-    bound = (at >= high - reach) | ((at <= low + reach) & (low != 0.0))
-    # at lower bounds of 0 the effect is absent, and what the refit gained is a better hull's: it found another maximum
-    absent = np.all((at <= low + reach) & (low == 0.0))
+    lowest, highest = (ended[last] for ended in fit.model.at_bounds(fit.values))
+    nothing = lowest & (fit.model.low[last] == 0.0)
     outdone = not fit.converged and fit.log_likelihood < wanted
     after = before if outdone else unseen(fit, held, workers)
     return Confirmation(
@@ -118,8 +114,9 @@ def confirm(
         bic_change=price - ratio,
         fold_gains=after.folds - before.folds,
         held_out_gains=after.held - before.held,
-        at_bound=bool(np.any(bound)),
-        absent=bool(absent),
+        at_bound=bool(np.any((lowest & ~nothing) | highest)),
+        # what the refit gained is then a better hull's: it found another maximum
+        absent=bool(np.all(nothing)),
         unseen=after,
         outdone=outdone,
     )

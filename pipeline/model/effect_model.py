@@ -79,6 +79,17 @@ class EffectModel:
         """Upper bounds, shape (p,)."""
         return np.array([p.high for _, p in self.parameters])
 
+    def at_bounds(self, values: Float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Return which parameters have ended at their lower and which at their upper bound, but for rounding.
+
+        Parameters
+        ----------
+        values : ndarray, shape (p,)
+            Of the parameters, in their order.
+        """
+        reach = 1e-9 * np.maximum(np.abs(self.high), np.abs(self.low))
+        return values <= self.low + reach, values >= self.high - reach
+
     def with_effect(self, effect: Effect) -> EffectModel:
         """Return the model with one more effect at its end."""
         return EffectModel((*self.effects, effect))

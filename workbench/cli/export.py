@@ -45,49 +45,31 @@ def _linear_options(function: F) -> F:
 
 @command.command("yaml")
 @_file_options
-def yaml_file(set_id: str | None, vessel: str | None, output: Path | None, uri: str, as_json: bool) -> None:
+def yaml_file(**given: Any) -> None:
     """Values, units, standard errors, covariance, noise, fit, inputs by hash, parent, as YAML."""
-    _text("yaml", set_id, vessel, output, uri, as_json)
+    _text("yaml", **given)
 
 
 @command.command("csv")
 @_file_options
-def csv_file(set_id: str | None, vessel: str | None, output: Path | None, uri: str, as_json: bool) -> None:
+def csv_file(**given: Any) -> None:
     """Parameters, discrete parameters and noise levels with standard errors and units, as CSV."""
-    _text("csv", set_id, vessel, output, uri, as_json)
+    _text("csv", **given)
 
 
 @command.command("control")
 @_linear_options
-def control_file(
-    set_id: str | None,
-    vessel: str | None,
-    output: Path | None,
-    uri: str,
-    as_json: bool,
-    speed: float | None,
-    step: float,
-    course: float,
-) -> None:
+def control_file(output: Path | None, as_json: bool, **asked: Any) -> None:
     """State space as a Python module for python-control: named systems, noise, covariance."""
     from kempf.workbench.export import as_control
 
-    model = _linear(uri, set_id, vessel, speed, step, course)
+    model = _linear(**asked)
     _deliver("control", model.ship.parameter_set.parameter_set_id, as_control(model), output, as_json)
 
 
 @command.command("mat")
 @_linear_options
-def mat_file(
-    set_id: str | None,
-    vessel: str | None,
-    output: Path | None,
-    uri: str,
-    as_json: bool,
-    speed: float | None,
-    step: float,
-    course: float,
-) -> None:
+def mat_file(output: Path | None, as_json: bool, **asked: Any) -> None:
     """State space as a MATLAB file; there: load FILE, then ss(A, B, C, D) or ss(Ad, Bd, C, D, step_s)."""
     from kempf.workbench.export import as_mat
 
@@ -97,7 +79,7 @@ def mat_file(
             "A MATLAB file is not text and does not go to stdout.",
             "Give a file with --output FILE.mat.",
         )
-    model = _linear(uri, set_id, vessel, speed, step, course)
+    model = _linear(**asked)
     _deliver("mat", model.ship.parameter_set.parameter_set_id, as_mat(model), output, as_json)
 
 
@@ -165,7 +147,7 @@ def _only(found: Comparison, wanted: Sequence[str]) -> Comparison:
     return replace(found, runs=tuple(run for run, _ in pairs), found=tuple(segment for _, segment in pairs))
 
 
-def _linear(uri: str, set_id: str | None, vessel: str | None, speed: float | None, step: float, course: float) -> Any:
+def _linear(set_id: str | None, vessel: str | None, uri: str, speed: float | None, step: float, course: float) -> Any:
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
     from kempf.flows.jobs.ship_model import ship_of_set

@@ -131,24 +131,12 @@ def _error(share: float, *, any_there: bool = True) -> str:
 
 
 def _caveats(content: ReportContent) -> list[Block]:
-    """Say plainly where held-out manoeuvres are few, or are predicted no better."""
-    first, last = content.evidence.models[0], content.evidence.models[-1]
-    many = first.held_out_errors.size
-    made: list[Block] = []
-    if 0 < many < 3:
-        held = "One manoeuvre is" if many == 1 else "Two manoeuvres are"
-        made.append(
-            TextBlock(f"{held} held out: too few to distinguish a small change of the held-out error from chance.")
-        )
-    if content.evidence.improved and last.held_out_error > first.held_out_error:
-        made.append(
-            TextBlock(
-                f"The held-out free-run error is no smaller with the effects ({_error(last.held_out_error)} %) than "
-                f"without ({_error(first.held_out_error)} %): the evidence lies in the likelihood of held-out "
-                "measurements and in the disturbances, not in this error."
-            )
-        )
-    return made
+    """Say plainly where held-out manoeuvres are few."""
+    many = content.evidence.models[0].held_out_errors.size
+    if not 0 < many < 3:
+        return []
+    held = "One manoeuvre is" if many == 1 else "Two manoeuvres are"
+    return [TextBlock(f"{held} held out: too few to distinguish a small change of the held-out error from chance.")]
 
 
 def prediction(content: ReportContent) -> list[Block]:
