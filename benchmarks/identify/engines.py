@@ -36,8 +36,8 @@ from kempf.pipeline.estimate.record.average import step_of
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Instants, Record
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
-from kempf.pipeline.estimate.search.block_arrow import ArrowSteps
-from kempf.pipeline.estimate.search.climb import Search, climb_by
+from kempf.pipeline.estimate.search.climb import Search
+from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.uncertainty import from_information
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
@@ -133,7 +133,7 @@ def extended(one: Zigzag) -> Outcome:
 
         def fit() -> PooledFit:
             layout = Extended(plain.runs, workers)
-            return ended(layout, climb_by(ArrowSteps(), layout, theta, MAX_ITERATIONS, DECREMENT))
+            return ended(layout, climb_in_variances(layout, theta, MAX_ITERATIONS, DECREMENT))
 
         fit()
         best, fit_ms = _timed(fit)

@@ -11,9 +11,8 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.pooled_fit import CommonLikelihood
-from kempf.pipeline.estimate.search.block_arrow import ArrowSteps
-from kempf.pipeline.estimate.search.climb import climb_by
 from kempf.pipeline.estimate.search.starts import noise_levels
+from kempf.pipeline.estimate.search.variances import climb_in_variances
 
 _DECREMENT, _MAX_ITERATIONS = 1e-2, 30
 
@@ -51,5 +50,5 @@ def fit_levels(filtered: RunFilter, hull: Float, values: Float, start: Float) ->
         objective = CommonLikelihood([filtered], workers)
         objective.active[: objective.shared] = False
         begin = np.concatenate([hull, values / objective.unit, start])
-        found = climb_by(ArrowSteps(), objective, begin, _MAX_ITERATIONS, _DECREMENT)
+        found = climb_in_variances(objective, begin, _MAX_ITERATIONS, _DECREMENT)
     return Levels(found.theta[objective.shared :], found.log_likelihood, found.converged)

@@ -9,6 +9,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filters.linear_kernel import (
     ERROR,
+    LOG_F,
     LOG_MEASUREMENT,
     N_STATE,
     N_THETA,
@@ -60,6 +61,8 @@ class Likelihood:
     ----------
     active : ndarray of bool, shape (12,)
         Elements of theta that these data and this specification have.
+    logarithms : ndarray of bool, shape (12,)
+        Elements of theta that are logarithms of noise levels.
     low, high : ndarray, shape (12,)
         Bounds of theta.
     """
@@ -78,6 +81,7 @@ class Likelihood:
         used = record.used
         wind, moment, current = spec.wind != "none", spec.moment == "gauss-markov", spec.current != "none"
         self.active: Mask = np.array([*[True] * 6, wind, moment, current, *used])
+        self.logarithms: Mask = np.arange(N_THETA) >= LOG_F
         present = np.array([1, 1, used[2], wind, moment, current, current, spec.rate_bias and used[1] and used[2]])
         if spec.current == "earth":
             row = np.column_stack([-np.sin(record.heading_rad), np.cos(record.heading_rad)])
@@ -99,6 +103,11 @@ class Likelihood:
         # a disturbance that the specification leaves out has no intensity at all
         absent = np.flatnonzero(~self.active[6:LOG_MEASUREMENT]) + 6
         self.low[absent], self.high[absent] = _NOTHING, _NOTHING
+
+    def room(self, theta: Float, *, far: bool) -> tuple[Float, Float]:
+        """Return how far a step may go down and up, shape (12,) each: by one in a logarithm."""
+        reach = np.where(self.logarithms, 1.0, np.inf)
+        return -reach, reach
 
     def value(self, theta: Float) -> float:
         """Log-likelihood alone."""

@@ -20,8 +20,8 @@ from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
 from kempf.pipeline.estimate.pooled_fit import DECREMENT, MAX_ITERATIONS, CommonLikelihood, PooledFit, ended
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.estimate.search.block_arrow import ArrowSteps
-from kempf.pipeline.estimate.search.climb import Search, climb_by
+from kempf.pipeline.estimate.search.climb import Search
+from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.uncertainty import from_information
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import DataRejected, KempfError
@@ -34,6 +34,8 @@ LEVEL = 0.01
 _ENTRIES = 4
 #: a measurement's level, by its logarithm, that is so far from its usual one is on another hill
 _UNLIKE, _DISTURBANCES = np.log(3.0), 3
+#: a disturbance's level so far below its usual one has sunk to nothing
+_SUNK = np.log(10.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +130,7 @@ def fit_plain(
     layout = CommonLikelihood([RunFilter(single.run, EffectModel(), spec) for single in alone], workers)
     levels = _first_levels(np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])).ravel()
     begin = np.concatenate([_first_hull(layout, alone, levels), levels])
-    climbed = climb_by(ArrowSteps(), layout, begin, MAX_ITERATIONS, DECREMENT)
+    climbed = climb_in_variances(layout, begin, MAX_ITERATIONS, DECREMENT)
     separate = sum(single.search.log_likelihood for single in alone)
     return PlainFit(ended(layout, climbed), alone, left_out, max(2.0 * (separate - climbed.log_likelihood), 0.0))
 
@@ -147,11 +149,12 @@ def _first_levels(levels: Float) -> Float:
     """Return levels to begin from, shape (runs, 6): those of single runs, but for levels far from their usual ones.
 
     The instruments are the same in every run. Where a model lacks something a single run has several maxima, and one
-    that takes, say, the yaw rate for exact and the heading for noisy is no measure of the instruments.
+    that takes, say, the yaw rate for exact and the heading for noisy is no measure of the instruments. A disturbance
+    that sank to nothing in a single run is often what her hull had taken for the ship's.
     """
     usual = np.median(levels, axis=0)
     strange = np.abs(levels - usual) > _UNLIKE
-    strange[:, :_DISTURBANCES] = False
+    strange[:, :_DISTURBANCES] = (levels < usual - _SUNK)[:, :_DISTURBANCES]
     begin: Float = np.where(strange, usual, levels)
     return begin
 

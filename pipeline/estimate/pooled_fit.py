@@ -12,9 +12,10 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.level_bounds import level_bounds, to_intensities
-from kempf.pipeline.estimate.search.block_arrow import Arrow, ArrowSteps, inverse
-from kempf.pipeline.estimate.search.climb import Search, climb_by, free
+from kempf.pipeline.estimate.search.block_arrow import Arrow, inverse
+from kempf.pipeline.estimate.search.climb import Search, free
 from kempf.pipeline.estimate.search.scoring import Mask
+from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.sensitivity import N_HULL, N_LEVELS, Point
 from kempf.pipeline.model.batch import MOST
 from kempf.pipeline.model.effect_model import EffectModel
@@ -114,7 +115,7 @@ def fit(
     least = 0.05 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
     begin = np.where(np.abs(hull) < least, np.copysign(least, hull), hull)
     theta = np.concatenate([begin, np.clip(values, model.low, model.high) / layout.unit, levels.ravel()])
-    return ended(layout, climb_by(ArrowSteps(), layout, theta, max_iterations, DECREMENT, wanted))
+    return ended(layout, climb_in_variances(layout, theta, max_iterations, DECREMENT, wanted))
 
 
 def ended(layout: CommonLikelihood, found: Search[Arrow]) -> PooledFit:
@@ -165,6 +166,7 @@ class CommonLikelihood:
         self.scale = np.concatenate([np.ones(N_HULL), self.unit])
         used: Mask = np.concatenate([np.ones(self.shared, dtype=np.bool_), *(f.levels_used() for f in filtered)])
         self.active = used.astype(np.bool_)
+        self.levels: Mask = np.arange(used.size) >= self.shared
         self.highest, self.top = -np.inf, np.zeros(0)
         self.lines: tuple[Linearised, ...] = ()
 
@@ -184,13 +186,11 @@ class CommonLikelihood:
         """Log-likelihood, score and expected information, summed in the order of the runs."""
         value, parts = self._linear(theta) if self.linear else self._extended(theta)
         s, runs = self.shared, len(self.filtered)
-        score, information = np.zeros(theta.size), np.zeros((runs, s + N_LEVELS, s + N_LEVELS))
+        scores, information = np.zeros((runs, s + N_LEVELS)), np.zeros((runs, s + N_LEVELS, s + N_LEVELS))
         for run, (own_score, own_information) in enumerate(parts):
-            score[:s] += own_score[:s]
-            score[s + N_LEVELS * run : s + N_LEVELS * (run + 1)] = own_score[s:]
-            information[run] = own_information
-        shared: Float = np.sum(information[:, :s, :s], axis=0)
-        arrow = Arrow(shared, information[:, :s, s:], information[:, s:, s:])
+            scores[run], information[run] = own_score, own_information
+        score = np.concatenate([np.sum(scores[:, :s], axis=0), scores[:, s:].ravel()])
+        arrow = Arrow(information[:, :s, :s], information[:, :s, s:], information[:, s:, s:], scores)
         if not (np.all(np.isfinite(score)) and np.all(np.isfinite(information))):
             # a step beside it the filter runs away: from there no way leads on
             return -np.inf, np.zeros(theta.size), _nothing(s, runs)
@@ -238,7 +238,10 @@ class CommonLikelihood:
 
 
 def _nothing(shared: int, runs: int) -> Arrow:
-    return Arrow(np.zeros((shared, shared)), np.zeros((runs, shared, N_LEVELS)), np.zeros((runs, N_LEVELS, N_LEVELS)))
+    own = np.zeros((runs, N_LEVELS, N_LEVELS))
+    return Arrow(
+        np.zeros((runs, shared, shared)), np.zeros((runs, shared, N_LEVELS)), own, np.zeros((runs, shared + N_LEVELS))
+    )
 
 
 def linearise(

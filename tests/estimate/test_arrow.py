@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -23,14 +24,15 @@ def arrow(members: int, seed: int = 0) -> Arrow:
         root = random.standard_normal((SHARED + OWN, SHARED + OWN + 3)) * scale[:, None]
         blocks.append(root @ root.T)
     all_of = np.array(blocks)
-    return Arrow(all_of[:, :SHARED, :SHARED].sum(axis=0), all_of[:, :SHARED, SHARED:], all_of[:, SHARED:, SHARED:])
+    scores = scale * random.standard_normal((members, SHARED + OWN))
+    return Arrow(all_of[:, :SHARED, :SHARED], all_of[:, :SHARED, SHARED:], all_of[:, SHARED:, SHARED:], scores)
 
 
 def dense_of(one: Arrow) -> np.ndarray:
-    """The arrow as one matrix, without what was shown."""
-    n, (members, _, width) = one.shared.shape[0], one.coupling.shape
+    """The arrow as one matrix."""
+    members, n, width = one.coupling.shape
     matrix = np.zeros((n + members * width, n + members * width))
-    matrix[:n, :n] = one.shared
+    matrix[:n, :n] = one.shared.sum(axis=0)
     for i in range(members):
         here = slice(n + i * width, n + (i + 1) * width)
         matrix[:n, here], matrix[here, :n] = one.coupling[i], one.coupling[i].T
@@ -65,20 +67,61 @@ def test_steps_are_those_of_the_dense_matrix(members: int, damping: float) -> No
         assert np.all(found[~free] == 0.0)
 
 
-def test_steps_shown_correct_it_as_bfgs_corrects_the_dense_matrix() -> None:
+def moved_by(one: Arrow, free: np.ndarray, seed: int) -> tuple[np.ndarray, np.ndarray]:
+    """A step of all, and what of it every member has."""
+    step = np.where(free, score_of(one, seed) / np.diag(dense_of(one)), 0.0)
+    members = one.coupling.shape[0]
+    own = step[SHARED:].reshape(members, OWN)
+    return step, np.concatenate([np.tile(step[:SHARED], (members, 1)), own], axis=1)
+
+
+def test_every_member_is_corrected_by_what_a_step_showed_of_it() -> None:
+    here, truth = arrow(3), arrow(3, seed=9)
+    free = free_of(here, 5)
+    step, moved = moved_by(here, free, 1)
+    fall = np.einsum("mij,mj->mi", truth.blocks(), moved)
+    before = replace(here, scores=here.scores + fall)
+    steps = ArrowSteps()
+    corrected = steps.corrected(here, before, here, step, np.zeros(step.size), free)
+    shown = np.concatenate([np.tile(free[:SHARED], (3, 1)), free[SHARED:].reshape(3, OWN)], axis=1)
+    scale = np.sqrt(np.diagonal(truth.blocks(), axis1=1, axis2=2))
+    found = np.einsum("mij,mj->mi", corrected.blocks(), moved)
+    convex = np.sum(moved * fall, axis=1) > 0.2 * np.sum(moved * np.einsum("mij,mj->mi", here.blocks(), moved), axis=1)
+    assert convex.any()
+    np.testing.assert_allclose((found / scale)[convex], (fall * shown / scale)[convex], rtol=1e-6, atol=1e-9)
+
+
+def test_a_member_whose_score_rose_on_a_step_keeps_a_positive_definite_block() -> None:
+    here = arrow(2)
+    free = np.ones(SHARED + 2 * OWN, dtype=bool)
+    step, moved = moved_by(here, free, 2)
+    fall = np.einsum("mij,mj->mi", here.blocks(), moved) * np.array([[-1.0], [1.0]])
+    corrected = ArrowSteps().corrected(here, replace(here, scores=here.scores + fall), here, step, step, free)
+    blocks, scale = corrected.blocks(), np.sqrt(np.diagonal(here.blocks(), axis1=1, axis2=2))
+    unit = blocks / scale[:, :, None] / scale[:, None, :]
+    assert np.all(np.linalg.eigvalsh(unit) > 0.0)
+    np.testing.assert_allclose(
+        blocks[1] / np.outer(scale[1], scale[1]), here.blocks()[1] / np.outer(scale[1], scale[1])
+    )
+    # along the step a fifth of its curvature is left of the first
+    along = [moved[0] @ block @ moved[0] for block in (blocks[0], here.blocks()[0])]
+    assert along[0] == pytest.approx(0.2 * along[1])
+
+
+def test_what_has_no_room_is_put_to_its_edge_and_the_rest_solved_anew() -> None:
     one = arrow(3)
-    free = free_of(one, 5)
-    truth = dense_of(arrow(3, seed=9))  # another curvature, which the steps show
-    steps, dense, shown = ArrowSteps(), dense_of(one), one
-    for seed in range(4):
-        step = np.where(free, score_of(one, seed) / np.diag(dense_of(one)), 0.0)
-        fall = truth @ step
-        dense, shown = bfgs(dense, step, fall, free), steps.updated(shown, step, fall, free)
-        expected = damped_step(score_of(one), dense, free, 0.0)
-        assert scaled_difference(one, steps.damped(score_of(one), shown, free, 0.0), expected) < 1e-6
-    assert len(shown.shown) == 4
-    # a step on which the score rose shows nothing that a maximum has
-    assert steps.updated(shown, step, -fall, free) is shown
+    dense, score = dense_of(one), score_of(one)
+    free = np.ones(score.size, dtype=bool)
+    step = ArrowSteps().damped(score, one, free, 0.0)
+    low, high = np.full(score.size, -np.inf), np.full(score.size, np.inf)
+    put = SHARED + OWN + 2
+    low[put], high[put] = -0.3 * abs(step[put]), 0.3 * abs(step[put])
+    found = ArrowSteps().within(score, one, free, 0.0, (low, high))
+    rest = np.arange(score.size) != put
+    expected = np.zeros(score.size)
+    expected[put] = 0.3 * step[put]
+    expected = expected + damped_step(score - dense @ expected, dense, rest, 0.0)
+    assert scaled_difference(one, found, expected) < 1e-7
 
 
 def test_the_complement_is_the_hulls_information_with_all_levels_unknown() -> None:
@@ -100,7 +143,7 @@ def test_what_nothing_determines_gets_no_step() -> None:
     one = arrow(2)
     own, coupling = one.own.copy(), one.coupling.copy()
     own[1, 3], own[1, :, 3], coupling[1, :, 3] = 0.0, 0.0, 0.0
-    loose = Arrow(one.shared, coupling, own)
+    loose = replace(one, coupling=coupling, own=own)
     score = score_of(loose)
     step = ArrowSteps().damped(score, loose, np.ones(score.size, dtype=bool), 0.0)
     assert np.all(np.isfinite(step)) and step[SHARED + OWN + 3] == 0.0
@@ -122,6 +165,15 @@ def test_cost_is_linear_in_members() -> None:
 
     # sixteen times the members: sixteen times the time and not 4096, with room for a busy machine
     assert fastest(of(3200)) < 100.0 * fastest(of(200))
+
+
+def test_a_corrected_matrix_gives_what_the_step_showed() -> None:
+    curvature, truth = dense_of(arrow(1)), dense_of(arrow(1, seed=9))
+    step = 1.0 / np.sqrt(np.diag(truth))
+    corrected = bfgs(curvature, step, truth @ step, np.ones(step.size, dtype=np.bool_))
+    np.testing.assert_allclose(corrected @ step * step, truth @ step * step, rtol=1e-6)
+    # a step on which the score rose shows nothing that a maximum has
+    assert bfgs(curvature, step, -truth @ step, np.ones(step.size, dtype=np.bool_)) is curvature
 
 
 def test_a_step_whose_curvature_is_beyond_numbers_corrects_nothing() -> None:

@@ -29,8 +29,8 @@ MOST_APART = 10.0
 
 
 @lru_cache(maxsize=8)
-def run(seed: int, hull: str = "ferry") -> GridRun:
-    trial = sailed(hull, seed=seed, heading_deg=80.0 * seed, duration_s=500.0)
+def run(seed: int, hull: str = "ferry", duration_s: float = 500.0) -> GridRun:
+    trial = sailed(hull, seed=seed, heading_deg=80.0 * seed, duration_s=duration_s)
     record = record_of(trial)
     ship = ShipConstants(90.0, 5.0, trial.truth.wind_arm_per_m)
     return make_run(f"{hull} {seed}", record, instruments_of(trial), SPEC, ship, step_of([record], 90.0))
@@ -105,6 +105,19 @@ def test_standard_errors_grow_where_prediction_errors_are_not_white(three: Plain
     measured[:, 2] -= 0.004 / 0.15 * np.cos(0.15 * run(21).time_s)
     shaken = uncertainty_of(fitted(replace(run(21), measured=measured), run(22)).fit)
     assert shaken.kind in {"information", "sandwich"} and np.all(np.diag(shaken.covariance) > 0.0)
+
+
+@pytest.mark.parametrize(("hull", "first"), [("ferry", 31), ("mariner", 36)])
+def test_a_pool_of_short_zigzags_converges(hull: str, first: int) -> None:
+    """In five minutes without a heading wind and current of single runs trade places and sink to nothing."""
+    short = [run(seed, hull, 300.0) for seed in range(first, first + 5)]
+    for i, one in enumerate(short):
+        measured = one.measured.copy()
+        measured[:, 2] = np.nan
+        short[i] = replace(one, measured=measured)
+    pool = fitted(*short)
+    assert min(float(np.min(one.search.theta[[6, 8]])) for one in pool.alone) < np.log(0.01)
+    assert pool.fit.converged and pool.fit.iterations <= 12
 
 
 def test_two_ships_are_no_pool() -> None:

@@ -1,6 +1,7 @@
 """The climb to a maximum of a log-likelihood: damped Fisher scoring far away, quasi-Newton near the top.
 
-Where the model lacks something the expected information is not the curvature, and scoring alone creeps.
+Where the model lacks something the expected information is not the curvature, and scoring alone creeps. One run is
+climbed by logarithms of its noise levels, several together by variances (decision 0036).
 """
 
 from __future__ import annotations
@@ -36,14 +37,26 @@ C_co = TypeVar("C_co", covariant=True)
 
 
 class Objective(Protocol[C_co]):
-    """What can be climbed: theta begins with the six hull parameters, the rest are logarithms."""
+    """What can be climbed: theta begins with the six hull parameters.
+
+    Attributes
+    ----------
+    active, logarithms : ndarray of bool, shape (n_theta,)
+        What may move; which are logarithms of what may be nothing.
+    low, high : ndarray, shape (n_theta,)
+        Bounds.
+    """
 
     active: Mask
+    logarithms: Mask
     low: Float
     high: Float
 
     def full(self, theta: Float) -> tuple[float, Float, C_co]:
         """Log-likelihood, score and expected information."""
+
+    def room(self, theta: Float, *, far: bool) -> tuple[Float, Float]:
+        """Return by how much a step, far from the top or near it, may move theta down (negative) and up."""
 
 
 class Steps(Protocol[C]):
@@ -52,11 +65,17 @@ class Steps(Protocol[C]):
     def damped(self, score: Float, curvature: C, free: Mask, damping: float) -> Float:
         """Solve (I + damping diag I) step = score over what is free; 0 for the rest."""
 
+    def within(self, score: Float, curvature: C, free: Mask, damping: float, room: tuple[Float, Float]) -> Float:
+        """Return the same step as far as it matters that there is no more room."""
+
     def counted(self, gain: float, score: Float, curvature: C, free: Mask) -> float:
         """Return how much of a promised gain of log-likelihood says that the search must go on."""
 
-    def updated(self, curvature: C, step: Float, fall: Float, free: Mask) -> C:
-        """Return the curvature corrected by what one step showed: by so much the score fell."""
+    def corrected(self, curvature: C, before: C, here: C, step: Float, fall: Float, free: Mask) -> C:
+        """Return a curvature corrected by what one step showed: by so much the score fell.
+
+        ``curvature`` is what the step was made from, ``before`` and ``here`` is the information at its ends.
+        """
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,7 +101,15 @@ class Search(Generic[C]):
     passes: tuple[Pass, ...]
 
 
-def free(objective: Objective[C], theta: Float, score: Float) -> Mask:
+class Bounded(Protocol):
+    """What has bounds; see `Objective`."""
+
+    active: Mask
+    low: Float
+    high: Float
+
+
+def free(objective: Bounded, theta: Float, score: Float) -> Mask:
     """Return which elements may move: active and not pressed against a bound."""
     pressed: Mask = ((theta <= objective.low) & (score < 0)) | ((theta >= objective.high) & (score > 0))
     return objective.active & ~pressed
@@ -134,9 +161,11 @@ def climb_by(
         if len(passes) > _FIRST and value + _HOPE * gain < wanted:
             reason = "what is wanted is out of reach"
             break
-        found = None
+        found, far = None, gain > _NEAR
+        low, high = objective.room(theta, far=far)
         while damping < 1e9:
-            step = _bounded(steps.damped(score, curvature, movable, damping), theta, scale)
+            step = steps.within(score, curvature, movable, damping, (low, high))
+            step = np.clip(_shortened(step, theta, scale), low, high)
             found, there = _risen(objective, theta, value, step)
             if found is not None:
                 break
@@ -144,15 +173,15 @@ def climb_by(
         if found is None:
             converged, reason = gain < 1e-3, "no step raises the log-likelihood any more"
             break
-        damping, far = damping / 10.0 if damping > 1e-9 else 0.0, gain > _NEAR
+        damping = damping / 10.0 if damping > 1e-9 else 0.0
         if gain < _LITTLE:
             found, there = _sunk(objective, theta, found, there)
-        step, before, rise = found - theta, score, there[0] - value
-        theta, (value, score, information) = found, there
-        if far and rise > _KEPT * gain:
-            curvature = information
+        if far and there[0] - value > _KEPT * gain:
+            curvature = there[2]
         else:
-            curvature = steps.updated(information if far else curvature, step, before - score, movable)
+            made = there[2] if far else curvature
+            curvature = steps.corrected(made, information, there[2], found - theta, score - there[1], movable)
+        theta, (value, score, information) = found, there
         passes.append(Pass(theta, value, gain, damping))
     return Search(theta, value, score, information, converged, reason, tuple(passes))
 
@@ -178,8 +207,7 @@ def _sunk(
     The log-likelihood goes with the square of a level near nothing, so that by its logarithm every step goes only a
     part of the way, and the same part again.
     """
-    sinking: Mask = (found - theta < -_SINKING) & (there[1] < 0.0) & (found > objective.low)
-    sinking[:_HULL] = False
+    sinking: Mask = (found - theta < -_SINKING) & (there[1] < 0.0) & (found > objective.low) & objective.logarithms
     if not sinking.any():
         return found, there
     bottom = np.where(sinking, objective.low, found)
@@ -187,14 +215,14 @@ def _sunk(
     return (bottom, lower) if lower[0] > there[0] else (found, there)
 
 
-def _bounded(step: Float, theta: Float, scale: Float) -> Float:
-    """Shorten a step that would at once double a hull parameter or leave the scale of the start.
+def _shortened(step: Float, theta: Float, scale: Float) -> Float:
+    """Shorten a step of the hull that would at once double one of its parameters or leave the scale of the start.
 
     Far from the maximum the quadratic model sends the ship into regions where she answers absurdly fast.
     """
     reach = np.maximum(np.abs(theta[:_HULL]), scale)
     # a parameter that began at nothing and is still there has no scale to leave
     large = np.max(np.abs(step[:_HULL]) / np.where(reach > 0.0, reach, np.inf))
-    bounded = step * min(1.0, 1.0 / float(large + 1e-300))
-    bounded[_HULL:] = np.clip(step[_HULL:], -1.0, 1.0)
-    return bounded
+    shortened = step.copy()
+    shortened[:_HULL] *= min(1.0, 1.0 / float(large + 1e-300))
+    return shortened

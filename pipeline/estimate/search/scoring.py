@@ -67,10 +67,14 @@ class DenseSteps:
         """See `damped_step`."""
         return damped_step(score, curvature, free, damping)
 
+    def within(self, score: Float, curvature: Float, free: Mask, damping: float, room: tuple[Float, Float]) -> Float:
+        """Return the step as it is: logarithms that it moves too far are worth little to the rest."""
+        return damped_step(score, curvature, free, damping)
+
     def counted(self, gain: float, score: Float, curvature: Float, free: Mask) -> float:
         """Return all of it."""
         return gain
 
-    def updated(self, curvature: Float, step: Float, fall: Float, free: Mask) -> Float:
-        """See `bfgs`."""
+    def corrected(self, curvature: Float, before: Float, here: Float, step: Float, fall: Float, free: Mask) -> Float:
+        """Return the curvature with what all steps near the top have shown; see `bfgs`."""
         return bfgs(curvature, step, fall, free)
