@@ -20,6 +20,7 @@ from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
 from kempf.pipeline.estimate.pooled_fit import DECREMENT, MAX_ITERATIONS, CommonLikelihood, PooledFit, ended
 from kempf.pipeline.estimate.record.grid_run import GridRun
+from kempf.pipeline.estimate.search.block_arrow import Arrow
 from kempf.pipeline.estimate.search.climb import Search
 from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.uncertainty import from_information
@@ -129,8 +130,12 @@ def fit_plain(
         )
     layout = CommonLikelihood([RunFilter(single.run, EffectModel(), spec) for single in alone], workers)
     levels = _first_levels(np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])).ravel()
-    begin = np.concatenate([_first_hull(layout, alone, levels), levels])
-    climbed = climb_in_variances(layout, begin, MAX_ITERATIONS, DECREMENT)
+    climbed = _climbed(layout, alone[0].hull if len(alone) == 1 else _weighted_mean(alone), levels)
+    if not np.isfinite(climbed.log_likelihood):
+        # the mean is no ship: from the best of a few runs' own, then
+        hulls = [single.hull for single in alone[:_ENTRIES]]
+        best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
+        climbed = _climbed(layout, best, levels)
     separate = sum(single.search.log_likelihood for single in alone)
     return PlainFit(ended(layout, climbed), alone, left_out, max(2.0 * (separate - climbed.log_likelihood), 0.0))
 
@@ -159,16 +164,8 @@ def _first_levels(levels: Float) -> Float:
     return begin
 
 
-def _first_hull(layout: CommonLikelihood, alone: Sequence[Alone], levels: Float) -> Float:
-    """Return the hull to begin from: the mean by information, or the best of a few runs' own where that is no ship."""
-    mean = _weighted_mean(alone)
-    if len(alone) == 1:
-        return alone[0].hull
-    if np.all(np.isfinite(mean)) and np.isfinite(layout.full(np.concatenate([mean, levels]))[0]):
-        return mean
-    hulls = [single.hull for single in alone[:_ENTRIES]]
-    best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
-    return best
+def _climbed(layout: CommonLikelihood, hull: Float, levels: Float) -> Search[Arrow]:
+    return climb_in_variances(layout, np.concatenate([hull, levels]), MAX_ITERATIONS, DECREMENT)
 
 
 def _weighted_mean(alone: Sequence[Alone]) -> Float:
