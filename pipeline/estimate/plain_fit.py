@@ -130,8 +130,9 @@ def fit_plain(
         )
     layout = CommonLikelihood([RunFilter(single.run, EffectModel(), spec) for single in alone], workers)
     levels = _first_levels(np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])).ravel()
-    climbed = _climbed(layout, alone[0].hull if len(alone) == 1 else _weighted_mean(alone), levels)
-    if not np.isfinite(climbed.log_likelihood):
+    mean = alone[0].hull if len(alone) == 1 else _weighted_mean(alone)
+    climbed = _climbed(layout, mean, levels) if np.all(np.isfinite(mean)) else None
+    if climbed is None or not np.isfinite(climbed.log_likelihood):
         # the mean is no ship: from the best of a few runs' own, then
         hulls = [single.hull for single in alone[:_ENTRIES]]
         best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
@@ -155,7 +156,7 @@ def _first_levels(levels: Float) -> Float:
 
     The instruments are the same in every run. Where a model lacks something a single run has several maxima, and one
     that takes, say, the yaw rate for exact and the heading for noisy is no measure of the instruments. A disturbance
-    that sank to nothing in a single run is often what her hull had taken for the ship's.
+    that sank to nothing in a single run is often one that the run's own hull has explained away.
     """
     usual = np.median(levels, axis=0)
     strange = np.abs(levels - usual) > _UNLIKE

@@ -66,7 +66,7 @@ class Steps(Protocol[C]):
         """Solve (I + damping diag I) step = score over what is free; 0 for the rest."""
 
     def within(self, score: Float, curvature: C, free: Mask, damping: float, room: tuple[Float, Float]) -> Float:
-        """Return the same step as far as it matters that there is no more room."""
+        """Return the same step made for the room there is, see `Objective.room`; what still leaves it is cut off."""
 
     def counted(self, gain: float, score: Float, curvature: C, free: Mask) -> float:
         """Return how much of a promised gain of log-likelihood says that the search must go on."""

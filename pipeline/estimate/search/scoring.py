@@ -68,7 +68,7 @@ class DenseSteps:
         return damped_step(score, curvature, free, damping)
 
     def within(self, score: Float, curvature: Float, free: Mask, damping: float, room: tuple[Float, Float]) -> Float:
-        """Return the step as it is: logarithms that it moves too far are worth little to the rest."""
+        """Return the step as it is; what has no room is cut off after it."""
         return damped_step(score, curvature, free, damping)
 
     def counted(self, gain: float, score: Float, curvature: Float, free: Mask) -> float:
