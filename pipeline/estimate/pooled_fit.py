@@ -166,7 +166,7 @@ class CommonLikelihood:
         self.scale = np.concatenate([np.ones(N_HULL), self.unit])
         used: Mask = np.concatenate([np.ones(self.shared, dtype=np.bool_), *(f.levels_used() for f in filtered)])
         self.active = used.astype(np.bool_)
-        self.levels: Mask = np.arange(used.size) >= self.shared
+        self.logarithms: Mask = np.arange(used.size) >= self.shared
         self.highest, self.top = -np.inf, np.zeros(0)
         self.lines: tuple[Linearised, ...] = ()
 

@@ -29,7 +29,7 @@ class Pool(Protocol):
 
     #: Shape (n_theta,) each. What may move; logarithms of noise levels; bounds.
     active: Mask
-    levels: Mask
+    logarithms: Mask
     low: Float
     high: Float
 
@@ -64,8 +64,8 @@ class _InVariances:
     def __init__(self, pool: Pool) -> None:
         self._pool, self.active = pool, pool.active
         # a level that the data do not have stays the logarithm that it is
-        self._levels: Mask = pool.levels & pool.active
-        self._effects: Mask = ~pool.levels & (np.arange(pool.levels.size) >= _HULL)
+        self._levels: Mask = pool.logarithms & pool.active
+        self._effects: Mask = ~pool.logarithms & (np.arange(pool.logarithms.size) >= _HULL)
         self.logarithms: Mask = np.zeros_like(self._levels)
         self.low, self.high = self.variances(pool.low), self.variances(pool.high)
 
