@@ -13,15 +13,28 @@ from kempf.flows.jobs.standing_model import (
     stored_model,
 )
 from kempf.flows.process.progress import Progress, silent
-from kempf.schemas.errors import UsageError
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
+#: standard errors beyond which a prediction is worse
+WORSE = 2.0
+
 
 def add_effect(
-    warehouse: Warehouse, vessel: str, name: str, own: Own = NONE_OF_ONES_OWN, progress: Progress = silent
+    warehouse: Warehouse,
+    vessel: str,
+    name: str,
+    own: Own = NONE_OF_ONES_OWN,
+    progress: Progress = silent,
+    *,
+    begin: tuple[ModelSpec, Own] | None = None,
+    force: bool = False,
 ) -> ParameterSet:
     """Add an effect to a vessel's model, refit, and make the result her model; its parent is the one before.
+
+    A model that predicts worse than its parent, beyond the error, is stored and does not become hers.
 
     Parameters
     ----------
@@ -29,6 +42,10 @@ def add_effect(
         Of the catalogue, or of an effect in ``own``.
     own : Own, optional
         An effect of a person's own.
+    begin : (ModelSpec, Own), optional
+        The model that it is added to; the vessel's current one by default.
+    force : bool, optional
+        Make it her model though it predicts worse.
 
     Raises
     ------
@@ -36,9 +53,11 @@ def add_effect(
         ``effect_unknown``, ``no_vessel``, ``no_segments``, ``no_runs``.
     UsageError
         ``effect_there``, ``effect_name``.
+    DataRejected
+        ``effect_worsens``: with the errors before and after.
     """
     named((name,), known_effects(own))
-    spec, before = standing_model(warehouse, vessel)
+    spec, before = begin or standing_model(warehouse, vessel)
     if name in spec.effects:
         raise UsageError(
             "effect_there", f"The model of {vessel!r} holds {name!r} already.", f"See `kempf ladder --vessel {vessel}`."
@@ -52,5 +71,34 @@ def add_effect(
         from kempf.flows.jobs.vessel_model import store_model
 
         made, _ = store_model(warehouse, chosen, wanted, both, progress)
+    worse = worsening(made)
+    if worse and not force:
+        raise DataRejected(
+            "effect_worsens",
+            f"{name} makes the predictions of {vessel!r} worse: {'; '.join(worse)}. The model is stored as "
+            f"{made.parameter_set_id}; her current one stays.",
+            "Add it all the same with --force, or see what `kempf diagnose` names.",
+            {"effect": name, "parameter_set_id": made.parameter_set_id, "worse": worse},
+        )
     point(warehouse, made)
     return made
+
+
+def worsening(made: ParameterSet) -> list[str]:
+    """Return what a model predicts worse than its parent one leg ahead, beyond the error, a phrase each."""
+    ahead = made.fit["rung"].get("one_leg_ahead")
+    found = []
+    for sample, one in ((ahead or {}).get("beside_the_rung_below") or {}).items():
+        words = {
+            "fitted": "of fitted manoeuvres",
+            "left_out": "of manoeuvres left out",
+            "held_out": "of those held out",
+        }
+        if one["in_std"] is None and (one["falls_by"] or 0.0) < 0.0:
+            found.append(f"the prediction {words[sample]} diverges")
+        elif one["in_std"] is not None and one["in_std"] < -WORSE:
+            found.append(
+                f"the misfit {words[sample]} one leg ahead rises by {-100.0 * one['falls_by']:.0f} % "
+                f"({-one['in_std']:.1f} standard errors; {one['better']} of {one['of']} better)"
+            )
+    return found

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncertainty_of
 from kempf.pipeline.estimate.record.left_out import instants_left_out
 from kempf.pipeline.estimate.result import discrete_values
+from kempf.pipeline.shooting.ahead import Ahead, ahead_of
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS, NOISE_PARAMETERS, ModelSpec
 from kempf.warehouse import parameter_sets, provenance, vessels
@@ -48,6 +50,13 @@ class Fitted:
     plain: PlainFit
     #: With one effect more each.
     fits: tuple[PooledFit, ...]
+
+    @cached_property
+    def ahead(self) -> tuple[Ahead | None, ...]:
+        """The same models one leg ahead, fitted to predict it; None where one manoeuvre alone is fitted."""
+        _, left = split(self.runs.runs)
+        with ThreadPoolExecutor(max_workers=usable()) as workers:
+            return ahead_of(self.fits, [self.runs.runs[i] for i in left], workers)
 
 
 def _fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own, search: Mapping[str, Any] | None = None) -> Fitted:
@@ -166,7 +175,9 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
             "no_parent", f"The model {' + '.join(effects)} has no parent.", "Make it with `kempf effects add`."
         )
     _, left = split(runs.runs)
-    step = step_of(fit, [runs.runs[i] for i in left])
+    number = next(k for k, one in enumerate(fitted.fits) if one is fit)
+    step = step_of(fit, [runs.runs[i] for i in left], fitted.ahead[number])
+    before = fitted.ahead[number - 1] if number else None
     known, plain = _known(fit), fitted.plain
     if not effects:
         known = replace(known, covariance=known.covariance * plain.widened**2)
@@ -176,7 +187,7 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
     skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in request.segment_ids}
     return replace(
         made,
-        fit={"horizon": "free run", "rung": rung(0, step)},
+        fit={"horizon": "free run", "rung": rung(0, step, before)},
         convergence={
             **made.convergence,
             "held_out": [run.name for run in step.held],

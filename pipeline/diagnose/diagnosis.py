@@ -1,36 +1,37 @@
-"""Diagnosis: screen, confirm, sets, step, and the reference that says whether anything is left.
+"""Diagnosis: structure by prediction one leg ahead, then by likelihood; and what says whether anything is left.
 
-Effects are added one at a time, the simplest of the best set first, until no candidate stands the tests. Held-out
-manoeuvres are chosen before the first screen and never fitted.
+Effects are added one at a time. First those that make manoeuvres left out better predicted one leg ahead
+(`kempf.pipeline.diagnose.by_prediction`), then those that the likelihood is sure of
+(`kempf.pipeline.diagnose.by_likelihood`): what of these changes neither a prediction nor a parameter by more than its
+error is listed as immaterial and stays out of the ladder. Held-out manoeuvres are chosen before the first screen and
+never fitted.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unseen
-from kempf.pipeline.diagnose.confusion_sets import WINDOW, shortlist, undecided
-from kempf.pipeline.diagnose.forward_selection import is_ship, staged
+from kempf.pipeline.diagnose.by_likelihood import certain_ones
+from kempf.pipeline.diagnose.by_prediction import predicting_better
+from kempf.pipeline.diagnose.forward_selection import staged
+from kempf.pipeline.diagnose.immaterial import Immaterial
+from kempf.pipeline.diagnose.ladder import Announce, Ladder, silent
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
+from kempf.pipeline.diagnose.remainder import something_left
 from kempf.pipeline.diagnose.ridge_reference import RidgeReference, ridge_reference_of
-from kempf.pipeline.diagnose.screen import Candidate, score, screen
+from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.plain_fit import PlainFit
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
+from kempf.pipeline.shooting.ahead import Ahead, ShootingRange, shooting_range
 from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import ModelSpec
-
-Announce = Callable[[str], None]
-#: how many times its score a refit gains at most, as far as has been seen; a hull bent by what is missing hides much
-_MOST_GAIN = 10.0
-#: standard errors from nothing below which an effect added before is taken out again
-_SEEN = 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,19 +40,25 @@ class Diagnosis:
 
     #: The plain model, then with one given effect more after the other; the last one is diagnosed.
     way: tuple[PooledFit, ...]
-    #: The diagnosed model first.
+    #: The diagnosed model first; the effects of the others are claimed.
     steps: tuple[Step, ...]
+    #: Steps after them whose effects only the likelihood chose, while something that no effect explains is left: they
+    #: improve the fit and may imitate it.
+    imitating: tuple[Step, ...]
+    #: Whether something is left that the catalogue does not name.
+    something_left: bool
     #: before, after: The flexible reference beside the plain model and beside the last; None with a single run.
     before: RidgeReference | None
     after: RidgeReference | None
+    #: Certain, and changing nothing that a user predicts.
+    immaterial: tuple[Immaterial, ...]
+    #: Significant one step ahead, but not beyond what errors that hang together allow, or making predictions worse: by
+    #: name, why.
+    suspected: Mapping[str, str]
     fitted: tuple[GridRun, ...]
     held: tuple[GridRun, ...]
     plain: PlainFit
     settings: DiagnosisSettings
-
-
-def _silent(_: str) -> None:
-    return
 
 
 def diagnose(
@@ -61,7 +68,7 @@ def diagnose(
     workers: Executor,
     settings: DiagnosisSettings = STANDARD,
     given: Sequence[Effect] = (),
-    announce: Announce = _silent,
+    announce: Announce = silent,
 ) -> Diagnosis:
     """Find what a vessel's model lacks.
 
@@ -78,84 +85,56 @@ def diagnose(
     announce : callable, optional
         Called with what is being done, for a progress line.
     """
-    chosen, left = split(runs)
-    announce(f"fitting the model to {len(chosen)} manoeuvres, {len(left)} held out")
+    chosen, apart = split(runs)
+    announce(f"fitting the model to {len(chosen)} manoeuvres, {len(apart)} held out")
     plain, fits = staged([runs[i] for i in chosen], spec, given, workers)
     base = fits[-1]
-    held = [runs[i] for i in left]
+    held = [runs[i] for i in apart]
+    shooting = None
+    if len(chosen) > 1:
+        announce("predicting one leg ahead")
+        shooting = shooting_range([filtered.run for filtered in base.runs], held, base.runs[0].spec, workers)
     announce(f"screening {len(effects)} effects")
-    steps = [make_step(base, None, (), (), held, screen(base, effects, workers), workers)]
+    first = make_step(base, None, (), (), held, screen(base, effects, workers), workers, _begun(shooting, base))
     before = ridge_reference_of(base, workers) if len(chosen) > 1 else None
-    while len(steps) <= settings.most_steps:
-        last = steps[-1]
-        tried: list[tuple[Candidate, Confirmation]] = []
-        worth = shortlist(last.screened, settings.level, settings.refits)
-        if not worth:
-            break
-        alone = _unseen(last, held, workers)
-        for candidate in worth:
-            # the score predicts the likelihood ratio, but not beside what is no ship; what is far behind the best refit
-            # cannot come near it
-            if is_ship(last.fit.hull) and any(
-                candidate.score * _MOST_GAIN < k.likelihood_ratio - WINDOW for _, k in tried if k.holds
-            ):
-                continue
-            announce(f"step {len(steps)}: refitting with {candidate.effect.title}")
-            most = min((k.bic_change for _, k in tried if k.holds), default=np.inf) + WINDOW
-            tried.append((candidate, confirm(last.fit, alone, candidate, held, workers, most)))
-        best = undecided([pair for pair in tried if pair[1].holds])
-        if not best:
-            steps[-1] = replace(last, refused=(*last.refused, *tried))
-            break
-        names = {candidate.effect.name for candidate, _ in best}
-        worse = tuple(pair for pair in tried if pair[0].effect.name not in names)
-        fit = best[0][1].fit
-        announce(f"step {len(steps)}: screening beside {best[0][0].effect.title}")
-        screened = screen(fit, effects, workers)
-        steps.append(make_step(fit, best[0][0].effect, tuple(best), worse, held, screened, workers))
-        idle = _idle(steps)
-        if idle is not None:
-            announce(f"step {len(steps) - 1}: {idle.title} is no longer significant")
-            steps = _without(idle, steps, held, effects, workers)
+    ladder = Ladder(shooting, effects, held, workers, settings, announce, base)
+    steps = predicting_better(ladder, [first])
+    found = certain_ones(ladder, steps)
+    steps = found.steps
     announce("measuring what is left")
-    after = ridge_reference_of(steps[-1].fit, workers) if before is not None and len(steps) > 1 else before
-    fitted = tuple(filtered.run for filtered in base.runs)
-    return Diagnosis(tuple(fits), tuple(steps), before, after, fitted, tuple(held), plain, settings)
+    after = before
+    if before is not None and ladder.probe is not base:
+        after = ridge_reference_of(ladder.probe, workers)
+    left = something_left(steps, before, after)
+    kept = _claimed(steps) if left else len(steps)
+    return Diagnosis(
+        way=tuple(fits),
+        steps=tuple(steps[:kept]),
+        imitating=tuple(steps[kept:]),
+        something_left=left,
+        before=before,
+        after=after,
+        immaterial=tuple(found.immaterial),
+        suspected=found.suspected,
+        fitted=tuple(filtered.run for filtered in base.runs),
+        held=tuple(held),
+        plain=plain,
+        settings=settings,
+    )
 
 
-def _unseen(step: Step, held: Sequence[GridRun], workers: Executor) -> Unseen:
-    """Return how a rung predicts what it did not see; its confirmation has asked that already."""
-    return step.chosen_from[0][1].unseen if step.chosen_from else unseen(step.fit, held, workers)
+def _claimed(steps: Sequence[Step]) -> int:
+    """Return how many steps are claimed though something is left: those that predictions of legs chose.
+
+    What was chosen by its prediction of manoeuvres left out, and by every repetition without one of them, is there
+    though something else may be missing too; what only the likelihood sees may imitate that.
+    """
+    return max(number for number, step in enumerate(steps) if number == 0 or step.stability is not None) + 1
 
 
-def _idle(steps: Sequence[Step]) -> Effect | None:
-    """Return an effect added before the last one that is absent in the last fit, None where all are significant."""
-    fit, at = steps[-1].fit, 0
-    added = {step.added.name for step in steps[1:-1] if step.added is not None}
-    for effect in fit.model.effects:
-        own = slice(at, at + len(effect.parameters))
-        at = own.stop
-        value, std = fit.values[own], fit.std[6:][own]
-        if effect.name in added and not np.any(np.abs(value) > _SEEN * np.nan_to_num(std, nan=0.0)):
-            return effect
-    return None
-
-
-def _without(
-    idle: Effect, steps: list[Step], held: Sequence[GridRun], effects: Mapping[str, Effect], workers: Executor
-) -> list[Step]:
-    """Climb the ladder again without an effect; what was refused on the way stays listed."""
-    made = [steps[0]]
-    refused = [pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused)]
-    for step in steps[1:]:
-        if step.added is None or step.added.name == idle.name:
-            continue
-        base = made[-1].fit
-        candidate = score(base, step.added, workers)
-        confirmation = confirm(base, _unseen(made[-1], held, workers), candidate, held, workers)
-        others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
-        screened = screen(confirmation.fit, effects, workers)
-        made.append(
-            make_step(confirmation.fit, step.added, ((candidate, confirmation),), others, held, screened, workers)
-        )
-    return made
+def _begun(shooting: ShootingRange | None, base: PooledFit) -> Ahead | None:
+    """Return the model that a diagnosis begins from one leg ahead."""
+    if shooting is None or not base.model.effects:
+        return None if shooting is None else shooting.plain
+    shared = np.concatenate([shooting.plain.fit.hull, base.values])
+    return shooting.refitted(base.model, shared, shooting.plain)

@@ -11,11 +11,15 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
+from kempf.pipeline.diagnose.matters import comparisons
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import FreeRun, free_run
+from kempf.pipeline.shooting.ahead import Ahead
 from kempf.schemas.effect import Effect
+
+_HULL = ("a11", "a12", "a21", "a22", "b1", "b2")
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +38,11 @@ class Step:
     #: fitted, held: Free runs of the fitted and of the held-out manoeuvres.
     fitted: tuple[FreeRun, ...]
     held: tuple[FreeRun, ...]
+    #: The model one leg ahead, fitted by shooting; None where one manoeuvre alone is fitted.
+    ahead: Ahead | None = None
+    #: Share of repetitions, each without one manoeuvre, that chose the same set by its prediction one leg ahead; None
+    #: where the likelihood chose.
+    stability: float | None = None
 
     @property
     def in_sample_error(self) -> float:
@@ -52,9 +61,10 @@ class Step:
         return result
 
 
-def step_of(fit: PooledFit, held: Sequence[GridRun]) -> Step:
+def step_of(fit: PooledFit, held: Sequence[GridRun], ahead: Ahead | None) -> Step:
     """Return a fitted model as a rung by itself, with its free runs and nothing screened."""
-    return make_step(fit, fit.model.effects[-1] if fit.model.effects else None, (), (), held, ())
+    added = fit.model.effects[-1] if fit.model.effects else None
+    return make_step(fit, added, (), (), held, (), ahead=ahead)
 
 
 def make_step(
@@ -65,6 +75,7 @@ def make_step(
     held: Sequence[GridRun],
     screened: Sequence[Candidate],
     workers: Executor | None = None,
+    ahead: Ahead | None = None,
 ) -> Step:
     """Return a fitted model as a rung, with the free runs of fitted and held-out manoeuvres.
 
@@ -78,16 +89,24 @@ def make_step(
         Held out.
     workers : Executor, optional
         Free runs share it.
+    ahead : Ahead, optional
+        The same model one leg ahead.
     """
     runs = [*(filtered.run for filtered in fit.runs), *held]
     each = map if workers is None else workers.map
     free = tuple(each(lambda run: free_run(fit, run), runs))
     many = len(fit.runs)
-    return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:])
+    return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:], ahead)
 
 
-def rung(number: int, step: Step) -> dict[str, Any]:
-    """Return one rung of the ladder as JSON content."""
+def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]:
+    """Return one rung of the ladder as JSON content.
+
+    Parameters
+    ----------
+    before : Ahead, optional
+        The rung below one leg ahead, to compare with.
+    """
     force, moment, current = step.intensities
     return {
         "step": number,
@@ -101,14 +120,48 @@ def rung(number: int, step: Step) -> dict[str, Any]:
             "moment_rad_s2_per_sqrt_s": float(moment),
             "current_m_s_per_sqrt_s": float(current),
         },
+        "one_leg_ahead": None if step.ahead is None else _ahead(step.ahead, before),
         "log_likelihood": step.fit.log_likelihood,
         "converged": step.fit.converged,
-        "hull": dict(zip(("a11", "a12", "a21", "a22", "b1", "b2"), (float(x) for x in step.fit.hull), strict=True)),
+        "hull": dict(zip(_HULL, (float(x) for x in step.fit.hull), strict=True)),
         "effects": {
             f"{effect.name}.{parameter.name}": {"value": float(v), "std": float(s), "unit": parameter.unit}
             for (effect, parameter), v, s in zip(
                 step.fit.model.parameters, step.fit.values, step.fit.std[6:], strict=True
             )
+        },
+    }
+
+
+def _ahead(ahead: Ahead, before: Ahead | None) -> dict[str, Any]:
+    """Return how a model predicts one leg ahead as JSON content: per cent of the motion, and sums of squares."""
+    names = [shot.windows.run.name for shot in ahead.fit.shots]
+    held = [windows.run.name for windows in ahead.held_windows]
+    covariance = ahead.fit.covariance
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    samples = ("fitted", "left_out", "held_out")
+    against = [] if before is None else comparisons(before, ahead)
+    return {
+        "horizon_s": ahead.horizon_s,
+        "fitted_percent": dict(zip(names, ahead.percent(ahead.own).tolist(), strict=True)),
+        "left_out_percent": dict(zip(names, ahead.percent(ahead.left_out).tolist(), strict=True)),
+        "held_out_percent": dict(zip(held, ahead.percent(ahead.held).tolist(), strict=True)),
+        "fitted_misfit": ahead.own.mean,
+        "left_out_misfit": ahead.left_out.mean,
+        "held_out_misfit": ahead.held.mean if held else None,
+        "parameters": {
+            name: {"value": float(value), "std": float(std)}
+            for name, value, std in zip((*_HULL, *ahead.model.names), ahead.fit.shared, std, strict=True)
+        },
+        "covariance": covariance.tolist(),
+        "beside_the_rung_below": {
+            sample: {
+                "falls_by": one.fall,
+                "in_std": one.t,
+                "better": one.better,
+                "of": one.manoeuvres,
+            }
+            for sample, one in zip(samples, against, strict=False)
         },
     }
 

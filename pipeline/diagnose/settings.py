@@ -13,6 +13,8 @@ class DiagnosisSettings:
     level: float = 0.01
     #: At most, of one step.
     refits: int = 6
+    #: Standard errors, allowing for errors that hang together within a leg, from which a candidate is certain.
+    certain_std: float = 3.0
     #: Effects added at most.
     most_steps: int = 4
 

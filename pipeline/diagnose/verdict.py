@@ -10,22 +10,14 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
+from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step, rung
+from kempf.pipeline.diagnose.remainder import reference_gains
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.schemas.effect import Effect
 from kempf.schemas.enumeration import listed
 
-Verdict = Literal["adequate", "explained", "ambiguous", "unexplained", "insufficient_data"]
-#: log-likelihood that the flexible reference must still gain, in runs that did not fit it: something is left
-LEFT_OVER = 12.0
-#: and the share that this must be of what it gained beside the plain model: of an effect that was rightly named a
-#: little stays unexplained, and the stronger the effect, the more log-likelihood that little is worth
-LEFT_SHARE = 0.07
-#: so many effects, of which the first has less than this share of the gain, together imitate something else
-MANY, FIRST_SHARE = 3, 0.8
-#: what explains the innovations must show to the flexible reference as far as the reference can see it: it lacks at
-#: most this share of what it would gain, or so little log-likelihood as chance takes away
-UNSEEN_SHARE, UNSEEN = 0.5, 5.0
+Verdict = Literal["adequate", "explained", "ambiguous", "partly_explained", "unexplained", "insufficient_data"]
 #: said of an effect that improves the prediction while something that repeats itself is left
 NOT_EXPLAINED = "improves the fit, but does not explain the misfit (see what remains)"
 #: an effect whose possible size is smaller than this many standard errors cannot be seen
@@ -40,7 +32,8 @@ NEGLIGIBLE = 5e-4
 class EffectFinding:
     """One effect's verdict, and why."""
 
-    verdict: Literal["present", "negligible", "not_testable", "absent"]
+    #: ``present`` is what matters; ``immaterial`` is certain and changes nothing that a user predicts.
+    verdict: Literal["present", "immaterial", "suspected", "negligible", "not_testable", "absent"]
     why: str
 
 
@@ -48,42 +41,25 @@ def verdict(diagnosis: Diagnosis) -> Verdict:
     """Return what the diagnosis comes to."""
     if diagnosis.before is None:
         return "insufficient_data"
-    if _something_left(diagnosis):
-        return "unexplained"
+    if diagnosis.something_left:
+        return "partly_explained" if len(diagnosis.steps) > 1 else "unexplained"
     sizes = [len(step.chosen_from) for step in diagnosis.steps[1:]]
     if not sizes:
         return "adequate"
     return "explained" if max(sizes) == 1 else "ambiguous"
 
 
-def _something_left(diagnosis: Diagnosis) -> bool:
-    """Tell whether something is there that the catalogue does not name.
-
-    Either the flexible reference still finds what repeats itself; or the first effect goes by v, r, rudder or heading
-    and yet the reference, which tries all of these, does not see it in runs that did not fit it: what it imitates is
-    something else; or it took several effects of which the first explains little: terms that together imitate what
-    none of them is.
-    """
-    if _reference_gains(diagnosis) or _unseen_by_reference(diagnosis):
-        return True
-    ratios = [step.chosen_from[0][1].likelihood_ratio for step in diagnosis.steps[1:]]
-    return len(ratios) >= MANY and ratios[0] < FIRST_SHARE * sum(ratios)
+def _climbed(diagnosis: Diagnosis) -> tuple[Step, ...]:
+    """Return every step that was taken, also those whose effects only imitate what is left."""
+    return (*diagnosis.steps, *diagnosis.imitating)
 
 
-def _reference_gains(diagnosis: Diagnosis) -> bool:
-    """Tell whether the flexible reference still finds what repeats itself, beyond a rest of what was found."""
-    before, after = diagnosis.before, diagnosis.after
-    if before is None or after is None:
-        return False
-    return after.repeats and after.gain > max(LEFT_OVER, LEFT_SHARE * before.gain)
-
-
-def _unseen_by_reference(diagnosis: Diagnosis) -> bool:
-    """Tell whether the first effect found should have shown to the flexible reference, and did not."""
-    if diagnosis.before is None or len(diagnosis.steps) < 2:
-        return False
-    foreseen = diagnosis.before.foreseen(diagnosis.steps[1].chosen_from[0][0].direction)
-    return foreseen - diagnosis.before.gain > max(UNSEEN, UNSEEN_SHARE * foreseen)
+def share_explained(diagnosis: Diagnosis) -> float | None:
+    """Return the part of the misfit one leg ahead, in manoeuvres left out, that the last model explains."""
+    first, last = diagnosis.steps[0].ahead, diagnosis.steps[-1].ahead
+    if first is None or last is None or last is first:
+        return None
+    return 1.0 - last.left_out.mean / first.left_out.mean
 
 
 def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
@@ -95,25 +71,49 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
         Of the plain model's screen.
     """
     effect = candidate.effect
-    for number, step in enumerate(diagnosis.steps[1:], start=1):
-        members = {c.effect.name: k for c, k in step.chosen_from}
-        if effect.name in members and _something_left(diagnosis):
-            return EffectFinding("absent", f"{NOT_EXPLAINED}: {_sized(effect, members[effect.name])}")
-        if effect.name in members:
-            others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
-            alike = f"; these data would fit {listed(others)} as well" if others else ""
-            return EffectFinding("present", f"step {number}: {_sized(effect, members[effect.name])}{alike}")
+    found = _refitted(diagnosis, candidate.effect)
+    if found is not None:
+        return found
     untestable = _untestable(candidate)
     if untestable:
         return EffectFinding("not_testable", untestable)
     if candidate.p_adjusted >= diagnosis.settings.level:
         return EffectFinding("absent", _absent(candidate))
+    if effect.name in diagnosis.suspected:
+        return EffectFinding("suspected", diagnosis.suspected[effect.name])
     measured = sum(line.u.size // 2 for line in diagnosis.steps[0].fit.linearised)
     if candidate.score / measured < NEGLIGIBLE:
         return EffectFinding(
             "negligible", f"it explains {_percent(candidate.score / measured)} of the innovations' variance"
         )
     return _explained_away(diagnosis, candidate)
+
+
+def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
+    """Return the verdict on an effect that a step was made of, or that is immaterial; None on any other."""
+    for number, step in enumerate(diagnosis.steps[1:], start=1):
+        members = {c.effect.name: k for c, k in step.chosen_from}
+        if effect.name in members:
+            others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
+            alike = f"; these data would fit {listed(others)} as well" if others else ""
+            return EffectFinding("present", f"step {number}: {_sized(effect, members[effect.name])}{alike}")
+    for step in diagnosis.imitating:
+        for member, confirmation in step.chosen_from:
+            if member.effect.name == effect.name:
+                return EffectFinding("absent", f"{NOT_EXPLAINED}: {_sized(effect, confirmation)}")
+    for one in diagnosis.immaterial:
+        for member, confirmation in one.chosen_from:
+            if member.effect.name == effect.name:
+                return EffectFinding("immaterial", f"{_sized(effect, confirmation)}; {_changes(one)}")
+    return None
+
+
+def _changes(one: Immaterial) -> str:
+    """Say how little an effect changes."""
+    return (
+        f"the error one leg ahead falls by {100.0 * one.weight.fall:.1f} % with it, and no parameter of the hull moves "
+        f"by more than {one.weight.shift:.1f} standard errors"
+    )
 
 
 def _untestable(candidate: Candidate) -> str:
@@ -134,7 +134,7 @@ def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding
     name = candidate.effect.name
     added = [step.added.title for step in diagnosis.steps[1:] if step.added is not None]
     last = {c.effect.name: c for c in diagnosis.steps[-1].screened}.get(name)
-    refits = [k for step in diagnosis.steps for c, k in step.refused if c.effect.name == name]
+    refits = [k for step in _climbed(diagnosis) for c, k in step.refused if c.effect.name == name]
     if added and (last is None or np.isnan(last.score) or last.p_adjusted >= diagnosis.settings.level):
         return EffectFinding("absent", f"no longer significant once {listed(added)} is included")
     if refits:
@@ -203,17 +203,21 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     what = verdict(diagnosis)
     for step in diagnosis.steps[1:]:
         (candidate, best), *others = step.chosen_from
-        if what == "unexplained":
-            size = _sized(candidate.effect, best)
-            said.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
-            continue
         line = f"{candidate.effect.plain.rstrip('.')}: {_sized(candidate.effect, best)}"
         if others:
             line += f"; the same data would fit {listed([c.effect.title for c, _ in others])}"
             line += f". What distinguishes them: {candidate.effect.separated_by}"
         said.append(line.rstrip(".") + ".")
     if len(diagnosis.steps) > 1:
+        said += _ahead(diagnosis)
         said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
+    for step in diagnosis.imitating:
+        (candidate, best), *_ = step.chosen_from
+        size = _sized(candidate.effect, best)
+        said.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
+    for one in diagnosis.immaterial:
+        (candidate, best), *_ = one.chosen_from
+        said.append(f"Certain but immaterial: {_sized(candidate.effect, best)}; {_changes(one)}.")
     if what == "insufficient_data":
         said.append(
             "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, "
@@ -221,8 +225,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         )
     if what == "adequate":
         said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
-    if what == "unexplained" and diagnosis.after is not None:
-        if _reference_gains(diagnosis):
+    if what in ("unexplained", "partly_explained") and diagnosis.after is not None:
+        if what == "partly_explained" or reference_gains(diagnosis.before, diagnosis.after):
             said.append(
                 "None of the known effects explains what remains: a smooth force of unknown origin still gains "
                 f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."
@@ -238,6 +242,29 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     return said
 
 
+def _ahead(diagnosis: Diagnosis) -> list[str]:
+    """Say how the prediction one leg ahead changes: fitted, left out and held out, best and worst manoeuvre."""
+    first, last = diagnosis.steps[0].ahead, diagnosis.steps[-1].ahead
+    if first is None or last is None:
+        return []
+    parts = [("manoeuvres left out", first.left_out, last.left_out), ("the fitted ones", first.own, last.own)]
+    if first.held.errors:
+        parts.append(("those held out", first.held, last.held))
+    falls = [
+        f"of {name} from {np.mean(first.percent(a)):.1f} to {np.mean(last.percent(b)):.1f} %" for name, a, b in parts
+    ]
+    before, after = first.percent(first.left_out), last.percent(last.left_out)
+    best, worst = int(np.argmin(after - before)), int(np.argmax(after - before))
+    said = [
+        f"One leg ahead ({last.horizon_s:.3g} s) the error goes {', '.join(falls)} of the motion; "
+        f"best from {before[best]:.1f} to {after[best]:.1f} %, worst from {before[worst]:.1f} to {after[worst]:.1f} %."
+    ]
+    share = share_explained(diagnosis)
+    if share is not None:
+        said.append(f"Of the misfit one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained.")
+    return said
+
+
 def _fall(first: Step, last: Step) -> str:
     a, b = first.held_out_error, last.held_out_error
     fitted = f"from {_share(first.in_sample_error)} to {_share(last.in_sample_error)} %"
@@ -250,12 +277,23 @@ def _fall(first: Step, last: Step) -> str:
         f"The free-run error of {held} goes from {_share(a)} to {_share(b)} % of the motion, of the fitted ones "
         f"{fitted}, {disturbance}"
     )
-    if b > a:
+    if not _keeps_course(last.fit.hull):
+        said += (
+            " She does not keep a straight course by herself, so that the free run of any model leaves hers: what "
+            "counts is the error one leg ahead."
+        )
+    elif b > a:
         said += (
             " The held-out error is no smaller: what speaks for the effects is the likelihood of held-out measurements "
             "and the disturbance."
         )
     return said
+
+
+def _keeps_course(hull: Float) -> bool:
+    """Return whether a hull goes straight ahead with the rudder amidships: both roots of eq. (16) are damped."""
+    a11, a12, a21, a22 = hull[:4]
+    return bool(a11 + a22 < 0.0 and a11 * a22 - a12 * a21 > 0.0)
 
 
 def _share(error: float) -> str:
@@ -269,28 +307,33 @@ def _percent(share: float) -> str:
 
 def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     """Return the diagnosis under the command line's keys, JSON content; what is not finite is None."""
-    sets = []
-    member: dict[str, str] = {}
-    for number, step in enumerate(diagnosis.steps[1:], start=1):
-        names = [c.effect.name for c, _ in step.chosen_from]
-        sets.append(
-            {
-                "set_id": f"S{number}",
-                "effects": names,
-                "separated_by": step.chosen_from[0][0].effect.separated_by if len(names) > 1 else "",
-                "since_utc_ns": _since(diagnosis, step.chosen_from[0][1]),
-                "refits": [_refit(c, k) for c, k in step.chosen_from],
-            }
-        )
-        member |= dict.fromkeys(names, f"S{number}")
+    sets = [_set(diagnosis, f"S{number}", step) for number, step in enumerate(diagnosis.steps[1:], start=1)]
+    first = len(diagnosis.steps)
+    imitating = [_set(diagnosis, f"S{number}", step) for number, step in enumerate(diagnosis.imitating, start=first)]
+    member = {name: one["set_id"] for one in sets for name in one["effects"]}
     return {
         "verdict": verdict(diagnosis),
         "sentences": sentences(diagnosis),
         "candidates": [_candidate(diagnosis, c, member) for c in diagnosis.steps[0].screened],
-        "sets": [] if _something_left(diagnosis) else sets,
-        "stand_ins": sets if _something_left(diagnosis) else [],
-        "refused": [_refit(c, k) | {"why": _refusal(k)} for step in diagnosis.steps for c, k in step.refused],
-        "ladder": [rung(number, step) for number, step in enumerate(diagnosis.steps)],
+        "sets": sets,
+        "stand_ins": imitating,
+        "immaterial": [
+            {
+                "effects": [c.effect.name for c, _ in one.chosen_from],
+                "error_ahead_falls_by": one.weight.fall,
+                "in_std": one.weight.t,
+                "hull_changes_by_std": one.weight.shift,
+                "refits": [_refit(c, k) for c, k in one.chosen_from],
+            }
+            for one in diagnosis.immaterial
+        ],
+        "suspected": [{"effect": name, "why": why} for name, why in diagnosis.suspected.items()],
+        "share_explained": share_explained(diagnosis),
+        "refused": [_refit(c, k) | {"why": _refusal(k)} for step in _climbed(diagnosis) for c, k in step.refused],
+        "ladder": [
+            rung(number, step, diagnosis.steps[number - 1].ahead if number else None)
+            for number, step in enumerate(diagnosis.steps)
+        ],
         "left_over": None
         if diagnosis.after is None or diagnosis.before is None
         else {
@@ -311,12 +354,25 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
     }
 
 
+def _set(diagnosis: Diagnosis, name: str, step: Step) -> dict[str, Any]:
+    """Return one confusion set as JSON content."""
+    effects = [c.effect.name for c, _ in step.chosen_from]
+    return {
+        "set_id": name,
+        "effects": effects,
+        "separated_by": step.chosen_from[0][0].effect.separated_by if len(effects) > 1 else "",
+        "since_utc_ns": _since(diagnosis, step.chosen_from[0][1]),
+        "stability": step.stability,
+        "refits": [_refit(c, k) for c, k in step.chosen_from],
+    }
+
+
 def _candidate(diagnosis: Diagnosis, candidate: Candidate, member: dict[str, str]) -> dict[str, Any]:
     result = finding(diagnosis, candidate)
     return {
         "effect": candidate.effect.name,
         "title": candidate.effect.title,
-        "set_id": None if _something_left(diagnosis) else member.get(candidate.effect.name),
+        "set_id": member.get(candidate.effect.name),
         "score": candidate.score,
         "p_adjusted": candidate.p_adjusted,
         "expected_change": _values(candidate.effect, candidate.change, candidate.std),

@@ -43,7 +43,7 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     own = own.beside(mine)
     with progress_bar() as progress:
         chosen = choose(warehouse, vessel)
-        settings = DiagnosisSettings(level=1.0, refits=1, most_steps=1)
+        settings = DiagnosisSettings(level=1.0, refits=1, certain_std=0.0, most_steps=1)
         examined = examine(warehouse, chosen, spec, own, settings, progress, only=(name,))
     print_note(said_of_vessel(warehouse, vessel))
     document = diagnosis_as_json(examined.diagnosis)
@@ -56,7 +56,8 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
 
 def _print_candidate(document: Mapping[str, Any]) -> None:
     (candidate,) = document["candidates"]
-    refits = [r for one in document["sets"] for r in one["refits"]] + document["refused"]
+    found = [*document["sets"], *document["immaterial"], *document["stand_ins"]]
+    refits = [r for one in found for r in one["refits"]] + document["refused"]
     click.echo(click.style(f"{document['formula']} on {document['vessel']}", bold=True))
     click.echo(f"  score {number(candidate['score'])}, p = {number(candidate['p_adjusted'], 2)}")
     click.echo(f"  absorbed by the model as it is: {number(candidate['absorption'])}")
@@ -68,7 +69,10 @@ def _print_candidate(document: Mapping[str, Any]) -> None:
         better = sum(g > 0 for g in gains)
         click.echo(f"  refitted: BIC {number(one['bic_change'], 3)}, {better} of {len(gains)} manoeuvres better")
     kept = bool(document["sets"])
-    click.echo("  it holds" if kept else f"  it does not hold: {_why(document, candidate)}")
+    if document["immaterial"]:
+        click.echo(f"  it holds, but is immaterial: {candidate['why']}")
+    else:
+        click.echo("  it holds" if kept else f"  it does not hold: {_why(document, candidate)}")
 
 
 def _why(document: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
@@ -80,15 +84,33 @@ def _why(document: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
 @vessel_option(required=True)
 @click.option("--formula", help="The effect is your own: its formula.")
 @click.option("--file", "path", type=click.Path(path_type=Path), help="The effect is your own: its YAML file.")
+@click.option(
+    "--model", type=click.Path(path_type=Path), help="Add it to the model of this file, not to the current one."
+)
+@click.option("--force", is_flag=True, help="Add it though it makes predictions worse.")
 @verbose_option
 @warehouse_option
 @json_option
-def add(name: str, vessel: str, formula: str | None, path: Path | None, verbose: bool, uri: str, as_json: bool) -> None:
-    """Add an effect to a vessel's current model, refit, and show the error before and after."""
+def add(
+    name: str,
+    vessel: str,
+    formula: str | None,
+    path: Path | None,
+    model: Path | None,
+    force: bool,
+    verbose: bool,
+    uri: str,
+    as_json: bool,
+) -> None:
+    """Add an effect to a vessel's current model, refit, and show the error before and after.
+
+    An effect that makes predictions worse beyond their error is fitted and stored, but becomes the current model only
+    with --force.
+    """
     from kempf.flows.jobs.add_effect import add_effect
     from kempf.flows.jobs.standing_model import Own, rungs_to
     from kempf.warehouse.store import Warehouse
-    from kempf.workbench.chosen_model import read_effect_files
+    from kempf.workbench.chosen_model import chosen_model, read_effect_files
 
     if formula is not None and path is not None:
         raise UsageError("two_effects", "Both --formula and --file say what the effect is.", "Give one of them.")
@@ -98,8 +120,9 @@ def add(name: str, vessel: str, formula: str | None, path: Path | None, verbose:
             "effect_name", f"{path} holds the effect {next(iter(mine.files))!r}, not {name!r}.", "Name it as it is."
         )
     warehouse = Warehouse(uri)
+    begin = chosen_model(warehouse, vessel, None, model, mine)
     with progress_bar() as progress:
-        made = add_effect(warehouse, vessel, name, mine, progress)
+        made = add_effect(warehouse, vessel, name, mine, progress, begin=begin, force=force)
     rungs = rungs_to(warehouse, made)
     if as_json:
         print_json({"vessel": vessel, "added": name, "before": rungs[-2], "after": rungs[-1], "set": made.show()})

@@ -1,0 +1,129 @@
+"""What the likelihood is sure of beside what makes predictions better: material, immaterial or only suspected.
+
+One step ahead a log of any rate shows more than changes a prediction. So each effect is asked two questions: is it
+there, by scores whose errors allow for what hangs together within a leg; and does it matter, by what it changes in
+predictions of legs and in the hull's parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, unseen
+from kempf.pipeline.diagnose.confusion_sets import WINDOW, shortlist, undecided
+from kempf.pipeline.diagnose.forward_selection import is_ship
+from kempf.pipeline.diagnose.immaterial import Immaterial, weighed
+from kempf.pipeline.diagnose.ladder import Ladder, Pairs
+from kempf.pipeline.diagnose.ladder_step import Step
+from kempf.pipeline.diagnose.legs import candidate_in_std
+from kempf.pipeline.diagnose.matters import worsens
+from kempf.pipeline.diagnose.screen import Candidate, score, screen
+from kempf.schemas.effect import Effect
+
+#: how many times its score a refit gains at most, as far as has been seen; a hull bent by what is missing hides much
+_MOST_GAIN = 10.0
+#: standard errors from nothing below which an effect added before is taken out again
+_SEEN = 2.0
+
+
+@dataclass(eq=False)
+class Certain:
+    """What the likelihood found."""
+
+    #: The ladder with what matters.
+    steps: list[Step]
+    immaterial: list[Immaterial] = field(default_factory=list)
+    #: By name, why it is no more than suspected.
+    suspected: dict[str, str] = field(default_factory=dict)
+
+
+def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
+    """Add what the likelihood is sure of to a ladder."""
+    found = Certain(steps)
+    while len(found.steps) + len(found.immaterial) <= ladder.settings.most_steps:
+        last = found.steps[-1]
+        tried = _refitted(ladder, found)
+        kept = _kept(ladder, found, undecided([pair for pair in tried if pair[1].holds]))
+        if not kept:
+            found.steps[-1] = replace(last, refused=(*last.refused, *tried))
+            break
+        names = {candidate.effect.name for candidate, _ in kept}
+        worse = tuple(pair for pair in tried if pair[0].effect.name not in names)
+        candidate, confirmation = kept[0]
+        ahead = ladder.ahead(last, candidate.effect)
+        weight = weighed(last.ahead, ahead, ladder.probe, confirmation.fit)
+        before, ladder.probe = ladder.probe, confirmation.fit
+        if not weight.matters:
+            found.immaterial.append(Immaterial(kept, weight))
+            continue
+        if before is not last.fit:
+            # the ladder goes on without what is immaterial
+            beside = score(last.fit, candidate.effect, ladder.workers)
+            kept = ((beside, ladder.confirmed(last.fit, ladder.unseen(last), beside)), *kept[1:])
+        found.steps.append(ladder.stepped(kept, worse, ahead, None))
+        idle = _idle(found.steps)
+        if idle is not None:
+            found.steps = ladder.without(idle, found.steps)
+            ladder.probe = found.steps[-1].fit
+    claimed = {c.effect.name for step in found.steps for c, _ in step.chosen_from}
+    claimed |= {c.effect.name for one in found.immaterial for c, _ in one.chosen_from}
+    found.suspected = {name: why for name, why in sorted(found.suspected.items()) if name not in claimed}
+    return found
+
+
+def _refitted(ladder: Ladder, found: Certain) -> list[tuple[Candidate, Confirmation]]:
+    """Refit what is certain beside everything found so far."""
+    last, fit = found.steps[-1], ladder.probe
+    screened: Sequence[Candidate] = last.screened
+    alone: Unseen
+    if fit is last.fit:
+        alone = ladder.unseen(last)
+    else:
+        screened, alone = screen(fit, ladder.effects, ladder.workers), unseen(fit, ladder.held, ladder.workers)
+    tried: list[tuple[Candidate, Confirmation]] = []
+    for candidate in shortlist(screened, ladder.settings.level, ladder.settings.refits):
+        if ladder.shooting is not None:
+            certain = candidate_in_std(fit, candidate, ladder.shooting.horizon_s)
+            if certain < ladder.settings.certain_std:
+                found.suspected[candidate.effect.name] = (
+                    f"significant one step ahead, but leg by leg only {certain:.1f} standard errors from nothing"
+                )
+                continue
+        # the score predicts the likelihood ratio, but not beside what is no ship; what is far behind the best refit
+        # cannot come near it
+        if is_ship(fit.hull) and any(
+            candidate.score * _MOST_GAIN < k.likelihood_ratio - WINDOW for _, k in tried if k.holds
+        ):
+            continue
+        most = min((k.bic_change for _, k in tried if k.holds), default=np.inf) + WINDOW
+        tried.append((candidate, ladder.confirmed(fit, alone, candidate, most)))
+    return tried
+
+
+def _kept(ladder: Ladder, found: Certain, best: Sequence[tuple[Candidate, Confirmation]]) -> Pairs:
+    """Return those of the best that make no prediction one leg ahead worse."""
+    last, kept = found.steps[-1], []
+    for candidate, confirmation in best:
+        if last.ahead is not None:
+            ahead = ladder.ahead(last, candidate.effect)
+            if ahead is None or worsens(last.ahead, ahead):
+                found.suspected[candidate.effect.name] = "it makes the prediction one leg ahead worse"
+                continue
+        kept.append((candidate, confirmation))
+    return tuple(kept)
+
+
+def _idle(steps: Sequence[Step]) -> Effect | None:
+    """Return an effect that the likelihood added before the last one and that is absent in the last fit, or None."""
+    fit, at = steps[-1].fit, 0
+    added = {step.added.name for step in steps[1:-1] if step.added is not None and step.stability is None}
+    for effect in fit.model.effects:
+        own = slice(at, at + len(effect.parameters))
+        at = own.stop
+        value, std = fit.values[own], fit.std[6:][own]
+        if effect.name in added and not np.any(np.abs(value) > _SEEN * np.nan_to_num(std, nan=0.0)):
+            return effect
+    return None

@@ -1,0 +1,86 @@
+"""What a ladder is climbed with: manoeuvres, catalogue and settings; a step put on it, and one taken out again."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unseen
+from kempf.pipeline.diagnose.ladder_step import Step, make_step
+from kempf.pipeline.diagnose.screen import Candidate, score, screen
+from kempf.pipeline.diagnose.settings import DiagnosisSettings
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun
+from kempf.pipeline.shooting.ahead import Ahead, ShootingRange
+from kempf.schemas.effect import Effect
+
+Announce = Callable[[str], None]
+Pairs = tuple[tuple[Candidate, Confirmation], ...]
+
+
+def silent(_: str) -> None:
+    """Say nothing of the progress."""
+
+
+@dataclass(eq=False)
+class Ladder:
+    """What a ladder is climbed with."""
+
+    #: None where one manoeuvre alone is fitted.
+    shooting: ShootingRange | None
+    effects: Mapping[str, Effect]
+    held: Sequence[GridRun]
+    workers: Executor
+    settings: DiagnosisSettings
+    announce: Announce
+    #: The model with everything that was found, immaterial or not: what is left is looked for beside it.
+    probe: PooledFit
+
+    def confirmed(
+        self, base: PooledFit, alone: Unseen, candidate: Candidate, most_bic: float = float("inf")
+    ) -> Confirmation:
+        """Refit a model with one effect more, see `kempf.pipeline.diagnose.confirm.confirm`."""
+        self.announce(f"refitting with {candidate.effect.title}")
+        return confirm(base, alone, candidate, self.held, self.workers, most_bic)
+
+    def unseen(self, step: Step) -> Unseen:
+        """Return how a rung predicts what it did not see; its confirmation has asked that already."""
+        if step.chosen_from:
+            return step.chosen_from[0][1].unseen
+        return unseen(step.fit, self.held, self.workers)
+
+    def ahead(self, last: Step, effect: Effect) -> Ahead | None:
+        """Return the model of a rung with one effect more one leg ahead, None where it diverges or nothing is shot."""
+        if self.shooting is None or last.ahead is None:
+            return None
+        return self.shooting.with_effect(last.ahead, effect)
+
+    def stepped(self, close: Pairs, others: Pairs, ahead: Ahead | None, stability: float | None) -> Step:
+        """Return the rung of the first of what these data do not distinguish.
+
+        Parameters
+        ----------
+        close, others : tuple of (Candidate, Confirmation)
+            Chosen from, and refused.
+        """
+        candidate, best = close[0]
+        self.announce(f"screening beside {candidate.effect.title}")
+        screened = screen(best.fit, self.effects, self.workers)
+        made = make_step(best.fit, candidate.effect, close, others, self.held, screened, self.workers, ahead)
+        return replace(made, stability=stability)
+
+    def without(self, idle: Effect, steps: Sequence[Step]) -> list[Step]:
+        """Climb the ladder again without an effect; what was refused on the way stays listed."""
+        self.announce(f"{idle.title} is no longer needed")
+        made = [steps[0]]
+        refused = [pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused)]
+        for step in steps[1:]:
+            if step.added is None or step.added.name == idle.name:
+                continue
+            candidate = score(made[-1].fit, step.added, self.workers)
+            confirmation = self.confirmed(made[-1].fit, self.unseen(made[-1]), candidate)
+            others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
+            ahead = self.ahead(made[-1], step.added)
+            made.append(self.stepped(((candidate, confirmation),), others, ahead, step.stability))
+        return made

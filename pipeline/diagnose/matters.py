@@ -1,0 +1,98 @@
+"""Which effect makes the prediction one leg ahead better, on manoeuvres that were not fitted: the structure of a model.
+
+A likelihood one step ahead answers whether an effect is there; at the rate of a log it sees what changes no
+prediction, and disturbances carry what is missing. What a user predicts is legs. So effects are chosen by the error one
+leg ahead of manoeuvres left out, paired window by window; their sizes, and the last word between those that predict
+alike, are the likelihood's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from kempf.pipeline.shooting.ahead import Ahead, ShootingRange, at_bound
+from kempf.pipeline.shooting.paired import Paired, paired
+from kempf.schemas.effect import Effect
+
+#: standard errors by which the error of manoeuvres left out must fall: the best of three dozen candidates is chosen
+FALLS = 3.5
+#: and part of it, below which a fall is of no use to anybody
+LEAST_FALL = 0.05
+#: share of the manoeuvres that must be predicted better
+_MOST = 2.0 / 3.0
+#: share of the repetitions, each without one manoeuvre, that must choose the same set
+STABLE = 0.9
+#: standard errors within which two models predict alike, and beyond which one is worse
+ALIKE, WORSE = 2.0, 2.0
+#: refits at a step
+_REFITS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class Choice:
+    """The models with one effect more that predict best, and alike."""
+
+    #: The best first.
+    close: tuple[Ahead, ...]
+    #: Share of the repetitions, each without one manoeuvre, whose best is one of them.
+    stability: float
+
+
+def falls(before: Ahead, after: Ahead) -> bool:
+    """Return whether a model predicts manoeuvres left out clearly better than another, and no others worse."""
+    found = paired(before.left_out, after.left_out)
+    return bool(
+        found.t > FALLS
+        and found.fall > LEAST_FALL
+        and found.better >= _MOST * found.manoeuvres
+        and not worsens(before, after)
+    )
+
+
+def worsens(before: Ahead, after: Ahead) -> bool:
+    """Return whether a model predicts fitted, left-out or held-out manoeuvres worse than another, beyond the error."""
+    return any(one.t < -WORSE for one in comparisons(before, after))
+
+
+def comparisons(before: Ahead, after: Ahead) -> list[Paired]:
+    """Compare two models on fitted, left-out and, where there are any, held-out manoeuvres."""
+    found = [paired(before.own, after.own), paired(before.left_out, after.left_out)]
+    return [*found, paired(before.held, after.held)] if before.held.errors else found
+
+
+def better_ahead(shooting: ShootingRange, base: Ahead, effects: Sequence[Effect]) -> Choice | None:
+    """Return the models with one effect more that predict clearly better than ``base``, None where none does.
+
+    Parameters
+    ----------
+    effects : sequence of Effect
+        To be tried.
+    """
+    found = shooting.screened(base, effects)[:_REFITS]
+    worth = [effect for foreseen, effect in found if foreseen < (1.0 - LEAST_FALL) * base.fit.cost]
+    tried = [made for made in (shooting.with_effect(base, effect) for effect in worth) if made is not None]
+    good = [one for one in tried if not (at_bound(one) or worsens(base, one))]
+    if not good:
+        return None
+    best = min(good, key=lambda one: one.left_out.mean)
+    if not falls(base, best):
+        return None
+    close = [one for one in good if one is best or _alike(base, best, one)]
+    close.sort(key=lambda one: one.left_out.mean)
+    return Choice(tuple(close), _stability(good, close))
+
+
+def _alike(base: Ahead, best: Ahead, other: Ahead) -> bool:
+    """Return whether a model makes the error fall too, and is not clearly behind the best one."""
+    return paired(base.left_out, other.left_out).fall > LEAST_FALL and paired(best.left_out, other.left_out).t > -ALIKE
+
+
+def _stability(good: Sequence[Ahead], close: Sequence[Ahead]) -> float:
+    """Return the share of repetitions without one manoeuvre each in which the best is one of ``close``."""
+    misfits = np.array([one.left_out.misfits for one in good])
+    rest = misfits.sum(axis=1, keepdims=True) - misfits
+    chosen = np.argmin(rest, axis=0)
+    return float(np.mean([any(good[k] is one for one in close) for k in chosen]))

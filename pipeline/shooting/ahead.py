@@ -1,0 +1,211 @@
+"""Models of a vessel judged one leg ahead: fitted by shooting, each manoeuvre predicted by what the others say."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun, spread
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.shooting import shooting_fit
+from kempf.pipeline.shooting.left_out import LeftOut, left_out
+from kempf.pipeline.shooting.reduced import Scales
+from kempf.pipeline.shooting.scales import scaled
+from kempf.pipeline.shooting.shooting_fit import ShootingFit, alone
+from kempf.pipeline.shooting.shot_run import N_HULL, ShotRun
+from kempf.pipeline.shooting.windows import Windows, leg_s, windows_of
+from kempf.schemas.effect import Effect
+from kempf.schemas.model_spec import ModelSpec
+
+
+@dataclass(frozen=True, eq=False)
+class Ahead:
+    """One model, and how it predicts one leg ahead."""
+
+    fit: ShootingFit
+    #: Of the fitted manoeuvres, each by the parameters of the others.
+    left_out: LeftOut
+    #: held, held_windows: Of the held-out manoeuvres.
+    held: LeftOut
+    held_windows: tuple[Windows, ...]
+    #: Shape (3,). Spread of v, r and psi as measured; NaN where not measured.
+    motion: Float
+    #: How far ahead, s.
+    horizon_s: float
+
+    @property
+    def model(self) -> EffectModel:
+        """The model."""
+        return self.fit.shots[0].model
+
+    @property
+    def names(self) -> frozenset[str]:
+        """Names of its effects."""
+        return frozenset(effect.name for effect in self.model.effects)
+
+    @property
+    def own(self) -> LeftOut:
+        """Of the fitted manoeuvres by the parameters fitted to them."""
+        return LeftOut(self.fit.errors, tuple(part.errors for part in self.fit.parts))
+
+    def percent(self, errors: LeftOut) -> Float:
+        """Return the error of every manoeuvre, mean over channels, per cent of the motion; infinite where it diverges.
+
+        Parameters
+        ----------
+        errors : LeftOut
+            One of those of this model.
+        """
+        found = []
+        for one in errors.errors:
+            known = np.flatnonzero(~np.isnan(one).all(axis=0))
+            mean = np.sqrt(np.nanmean(one[:, known], axis=0))
+            found.append(100.0 * float(np.mean(mean * self.fit.scales.error[known] / self.motion[known])))
+        return np.array(found)
+
+
+@dataclass(frozen=True, eq=False)
+class ShootingRange:
+    """The manoeuvres of a vessel in windows, with the units that errors are measured in."""
+
+    spec: ModelSpec
+    #: Length of a window.
+    horizon_s: float
+    fitted: tuple[Windows, ...]
+    held: tuple[Windows, ...]
+    scales: Scales
+    motion: Float
+    #: Without effects.
+    plain: Ahead
+    workers: Executor
+
+    def refitted(self, model: EffectModel, shared: Float, near: Ahead) -> Ahead:
+        """Fit a model from somewhere, the states of a model near it."""
+        shots = [ShotRun(windows, model, self.spec) for windows in self.fitted]
+        begin = [part.at for part in near.fit.parts]
+        return self.judged(shooting_fit.fit(shots, shared, self.scales, self.workers, begin))
+
+    def judged(self, fit: ShootingFit) -> Ahead:
+        """Let a fitted model predict what it has not seen."""
+        model = fit.shots[0].model
+        shots = [ShotRun(windows, model, self.spec) for windows in self.held]
+        made = list(self.workers.map(lambda shot: alone(shot, fit.shared, self.scales), shots))
+        held = LeftOut(np.array([m for m, _, _ in made]), tuple(e for _, _, e in made))
+        return Ahead(fit, left_out(fit, self.workers), held, self.held, self.motion, self.horizon_s)
+
+    def of(self, model: EffectModel, shared: Float, near: Ahead) -> tuple[LeftOut, LeftOut]:
+        """Return how given parameters predict the fitted and the held-out manoeuvres, nothing shared being fitted."""
+        fitted = [ShotRun(windows, model, self.spec) for windows in self.fitted]
+        held = [ShotRun(windows, model, self.spec) for windows in self.held]
+        begin = [part.at for part in near.fit.parts] + [None] * len(held)
+        made = list(
+            self.workers.map(
+                lambda pair: alone(pair[0], shared, self.scales, pair[1]), zip([*fitted, *held], begin, strict=True)
+            )
+        )
+        both = [made[: len(fitted)], made[len(fitted) :]]
+        one, two = (LeftOut(np.array([m for m, _, _ in part]), tuple(e for _, _, e in part)) for part in both)
+        return one, two
+
+    def with_effect(self, base: Ahead, effect: Effect) -> Ahead | None:
+        """Fit a model with one effect more; None where it runs away at every size that is tried."""
+        model = base.model.with_effect(effect)
+        tried = []
+        for size in _sizes(effect):
+            made = self._begun(model, base, size)
+            if made is not None:
+                tried.append((made[0], made[1]))
+        if not tried:
+            return None
+        _, shared = min(tried, key=lambda pair: pair[0])
+        return self.refitted(model, shared, base)
+
+    def without(self, base: Ahead, effect: Effect) -> Ahead:
+        """Fit a model with one effect less."""
+        at = dict(zip(base.model.names, base.fit.values, strict=True))
+        model = EffectModel(tuple(e for e in base.model.effects if e.name != effect.name))
+        shared = np.concatenate([base.fit.hull, [at[name] for name in model.names]])
+        return self.refitted(model, shared, base)
+
+    def screened(self, base: Ahead, effects: Iterable[Effect]) -> list[tuple[float, Effect]]:
+        """Return what the sum of squares would fall to with each effect, by linearisation, the smallest first."""
+        found = []
+        for effect in effects:
+            model = base.model.with_effect(effect)
+            made = [one for one in (self._begun(model, base, size) for size in _sizes(effect)) if one is not None]
+            if made:
+                found.append((min(cost for cost, _ in made), effect))
+        return sorted(found, key=lambda pair: (pair[0], pair[1].name))
+
+    def _begun(self, model: EffectModel, base: Ahead, size: Float) -> tuple[float, Float] | None:
+        """Return what the sum of squares should fall to from a size of the last effect, and where to begin."""
+        shared = np.concatenate([base.fit.shared, size])
+        shots = [ShotRun(windows, model, self.spec) for windows in self.fitted]
+        at = [replace(part.at, shared=shared) for part in base.fit.parts]
+        fall = shooting_fit.foreseen(shots, at, self.scales, self.workers)
+        return None if fall is None else (fall, shared)
+
+
+def shooting_range(
+    runs: Sequence[GridRun], held: Sequence[GridRun], spec: ModelSpec, workers: Executor
+) -> ShootingRange:
+    """Cut the manoeuvres of a vessel into windows of one leg and fit the plain model to them.
+
+    Parameters
+    ----------
+    runs, held : sequence of GridRun
+        To fit, and not to.
+    """
+    horizon = leg_s([*runs, *held])
+    fitted, unseen = (tuple(windows_of(run, horizon) for run in part) for part in (runs, held))
+    motion = np.mean([spread(run.measured) for run in runs], axis=0)
+    measured = np.isfinite(np.concatenate([run.measured for run in runs])).any(axis=0)
+    motion = np.where(measured, motion, np.nan)
+    plain = scaled([ShotRun(windows, EffectModel(), spec) for windows in fitted], workers)
+    made = ShootingRange(spec, horizon, fitted, unseen, plain.scales, motion, None, workers)  # type: ignore[arg-type]
+    return replace(made, plain=made.judged(plain))
+
+
+def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Executor) -> tuple[Ahead | None, ...]:
+    """Return models one leg ahead, each begun from the sizes that the likelihood gives its effects.
+
+    Parameters
+    ----------
+    fits : sequence of PooledFit
+        Of the same manoeuvres, each with one effect more than the one before.
+    held : sequence of GridRun
+        Held out.
+    """
+    first = fits[0]
+    if len(first.runs) < 2:
+        return (None,) * len(fits)
+    shooting = shooting_range([filtered.run for filtered in first.runs], held, first.runs[0].spec, workers)
+    made: list[Ahead] = []
+    for fit in fits:
+        near = made[-1] if made else shooting.plain
+        if not fit.model.effects:
+            made.append(near)
+            continue
+        made.append(shooting.refitted(fit.model, np.concatenate([near.fit.hull, fit.values]), near))
+    return tuple(made)
+
+
+def _sizes(effect: Effect) -> list[Float]:
+    """Return sizes of an effect to begin with: none of it, where its slope shows there, else over its steps."""
+    choices = [
+        p.steps if (k == 0 and len(p.steps) > 1) or p.shapes else (p.absent,) for k, p in enumerate(effect.parameters)
+    ]
+    return [np.array(size, dtype=np.float64) for size in product(*choices)]
+
+
+def at_bound(ahead: Ahead) -> bool:
+    """Return whether a parameter of the last effect ended at a bound."""
+    last = len(ahead.model.effects[-1].parameters)
+    low, high = ahead.model.at_bounds(ahead.fit.shared[N_HULL:])
+    return bool(np.any((low | high)[-last:]))

@@ -1,0 +1,145 @@
+"""A ship let run over windows of a manoeuvre, several sets of parameters at once, compiled.
+
+Equation (16) with effects, without noise and without covariance: between instants the mean moves by the classical
+fourth-order Runge-Kutta rule, as in the extended filter (`kempf.pipeline.estimate.filters.ekf`), from the state at
+which each window begins. Sets of parameters stand in lanes (`kempf.pipeline.model.batch`).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.compiled import FILLING, njit
+from kempf.pipeline.estimate.filters.ekf import ROWS, SUBSTEPS
+from kempf.pipeline.model.batch import each
+from kempf.pipeline.model.chain import PSI, R, V
+from kempf.pipeline.model.dynamics import (
+    N_AFTER,
+    ON_LATERAL,
+    PARAMETER,
+    RDOT,
+    SHIP,
+    SPEED,
+    VDOT,
+    add_programs,
+    dynamics,
+)
+from kempf.pipeline.model.terms.program import DEPTH
+
+
+@njit(**FILLING)
+def _substep(x, rows, rudders, h, ship, table, values, slopes, stack, by, total, room, lanes):  # type: ignore[no-untyped-def]
+    """Move the means over one substep."""
+    k1, k2, k3, k4, xs, J = room
+    width = k1.shape[0]
+    dynamics(x, rows[0], rudders[0], ship, width, 0, table, values, slopes, stack, by, total, k1, J, lanes)
+    for i in range(width):
+        for b in range(each(lanes)):
+            xs[i, b] = x[i, b] + 0.5 * h * k1[i, b]
+    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k2, J, lanes)
+    for i in range(width):
+        for b in range(each(lanes)):
+            xs[i, b] = x[i, b] + 0.5 * h * k2[i, b]
+    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k3, J, lanes)
+    for i in range(width):
+        for b in range(each(lanes)):
+            xs[i, b] = x[i, b] + h * k3[i, b]
+    dynamics(xs, rows[2], rudders[2], ship, width, 0, table, values, slopes, stack, by, total, k4, J, lanes)
+    for i in range(width):
+        for b in range(each(lanes)):
+            x[i, b] += h / 6.0 * (k1[i, b] + 2.0 * k2[i, b] + 2.0 * k3[i, b] + k4[i, b])
+
+
+@njit(**FILLING)
+def _measured(  # type: ignore[no-untyped-def]
+    x, row, rudder, offset_s, current_row, ship, table, values, slopes, stack, by, total, k1, J, out, lanes
+):
+    """Fill ``out``, shape (3, lanes), with what would be measured at one instant."""
+    width, n = k1.shape[0], x.shape[0]
+    dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, k1, J, lanes)
+    for i in range(width):
+        for b in range(each(lanes)):
+            values[i, b] = x[i, b]
+    for b in range(each(lanes)):
+        values[VDOT, b], values[RDOT, b] = k1[V, b], k1[R, b]
+    for channel in range(3):
+        state, late = (V, R, PSI)[channel], offset_s[channel]
+        for b in range(each(lanes)):
+            out[channel, b] = x[state, b] + late * k1[state, b]
+            if channel == 0:
+                out[channel, b] += current_row[0] * x[n - 3, b] + current_row[1] * x[n - 2, b]
+            elif channel == 1:
+                out[channel, b] += x[n - 1, b]
+        if add_programs(ON_LATERAL + channel, 0, table, values, slopes, stack, by, 0, total, lanes):
+            for b in range(each(lanes)):
+                out[channel, b] += total[0, b]
+
+
+@njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
+def shoot(  # type: ignore[no-untyped-def]
+    hull,
+    parameters,
+    step_s,
+    inputs,
+    rudder,
+    offset_s,
+    current_row,
+    constants_of_ship,
+    begins,
+    ends,
+    starts,
+    table,
+    predicted,
+    lanes,
+):
+    """Let a ship run over windows of one run; what would be measured goes to ``predicted``.
+
+    Parameters
+    ----------
+    hull : ndarray, shape (6, lanes)
+        a11, a12, a21, a22, b1, b2.
+    parameters : ndarray, shape (p, lanes)
+        Of the effects, in the order of their programs' variables.
+    step_s, inputs, rudder, offset_s, current_row, constants_of_ship, table, lanes
+        See `kempf.pipeline.estimate.filters.ekf.extended`.
+    begins, ends : ndarray of int, shape (w,)
+        First and last instant of every window.
+    starts : ndarray, shape (w, 9 + k, lanes)
+        State at the beginning of every window.
+    predicted : ndarray, shape (m, 3, lanes)
+        To be filled, window after window, m their instants.
+    """
+    size, width, B = starts.shape[1], starts.shape[1] - N_AFTER, each(lanes)
+    arm, length, draught, V0, n0, exponent = constants_of_ship
+    ship = (hull, (arm, 0.0, 0.0, 0.0, exponent, V0))
+    m = PARAMETER + parameters.shape[0]
+    values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
+    values[SHIP : SHIP + 6] = hull
+    values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
+    values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
+    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros((2, B)), np.zeros((width + 1, B))
+    J, x = np.zeros((width, width, B)), np.zeros((size, B))
+    k1, k2, k3, k4, xs = (
+        np.zeros((width, B)),
+        np.zeros((width, B)),
+        np.zeros((width, B)),
+        np.zeros((width, B)),
+        np.zeros((width, B)),
+    )
+    room = (k1, k2, k3, k4, xs, J)
+    row = 0
+    for w in range(begins.shape[0]):
+        x[:] = starts[w]
+        for k in range(begins[w], ends[w] + 1):
+            if k > begins[w]:
+                for sub in range(SUBSTEPS):
+                    i = ROWS * (k - 1) + 2 * sub
+                    _substep(
+                        *(x, inputs[i : i + 3], rudder[i : i + 3], step_s / SUBSTEPS, ship),
+                        *(table, values, slopes, stack, by, total, room, lanes),
+                    )
+            _measured(
+                *(x, inputs[ROWS * k], rudder[ROWS * k], offset_s[k], current_row[k], ship),
+                *(table, values, slopes, stack, by, total, k1, J, predicted[row], lanes),
+            )
+            row += 1

@@ -1,0 +1,40 @@
+"""Whether one model predicts better than another: their errors paired, window by window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from kempf.pipeline.shooting.left_out import LeftOut
+
+
+@dataclass(frozen=True)
+class Paired:
+    """Two models side by side on manoeuvres that neither was fitted to."""
+
+    #: Part of the first one's misfit by which the second one's is smaller; negative where it is larger.
+    fall: float
+    #: The mean difference in its standard errors; windows overlap by half, so every other one counts.
+    t: float
+    #: Manoeuvres that the second one predicts better.
+    better: int
+    manoeuvres: int
+
+
+def paired(first: LeftOut, second: LeftOut) -> Paired:
+    """Compare two models of the same manoeuvres."""
+    a, b = (np.concatenate([np.nansum(e, axis=1) for e in one.errors]) for one in (first, second))
+    if not np.all(np.isfinite(b)) or not np.all(np.isfinite(a)):
+        sign = float(np.all(np.isfinite(b))) - float(np.all(np.isfinite(a)))
+        better = int(np.sum(np.nan_to_num(second.misfits, nan=np.inf) < np.nan_to_num(first.misfits, nan=np.inf)))
+        return Paired(float(np.sign(sign)), float(np.inf) * sign if sign else 0.0, better, len(first.errors))
+    difference = a - b
+    error = float(np.std(difference, ddof=1)) / np.sqrt(max(difference.size / 2.0, 1.0)) if difference.size > 1 else 0.0
+    mean = float(np.mean(difference))
+    return Paired(
+        fall=1.0 - second.mean / first.mean if first.mean > 0.0 else 0.0,
+        t=mean / error if error > 0.0 else 0.0,
+        better=int(np.sum(second.misfits < first.misfits)),
+        manoeuvres=first.misfits.size,
+    )

@@ -1,0 +1,157 @@
+"""One manoeuvre under one model, shot window by window: what is predicted, and how it moves with every unknown."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.model.batch import LANES, MOST
+from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.shooting.kernel import shoot
+from kempf.pipeline.shooting.windows import Windows
+from kempf.schemas.model_spec import ModelSpec
+
+N_HULL = 6
+#: what may be off nothing for a whole manoeuvre, parts of the ship's own scales: F, M, c_1, c_2, b
+_OWN = 5
+#: F in U^2/L, M in U^2/L^2, current in U, bias of the rate gyro in U/L
+_OWN_STD = np.array([0.05, 0.1, 0.3, 0.3, 0.02])
+#: v, r, psi
+_STATES = 3
+_STEP = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Unknowns:
+    """Where the unknowns of one manoeuvre stand."""
+
+    #: Shape (6 + p,). Hull and effects, shared by all manoeuvres.
+    shared: Float
+    #: Shape (5,). Constant F, M, c_1, c_2, b.
+    own: Float
+    #: Shape (w, 3). v, r, psi at the beginning of every window.
+    starts: Float
+
+
+@dataclass(frozen=True, eq=False)
+class ShotRun:
+    """A manoeuvre in windows, and a model."""
+
+    windows: Windows
+    model: EffectModel
+    spec: ModelSpec
+
+    @cached_property
+    def own_std(self) -> Float:
+        """How far the constants of the manoeuvre may lie from nothing, shape (5,), 0 for one that there is not."""
+        run, spec = self.windows.run, self.spec
+        U, L = run.approach_m_s, run.ship.length_m
+        unit = np.array([U**2 / L, U**2 / L**2, U, U, U / L])
+        current = spec.current != "none"
+        bias = spec.rate_bias and bool(np.isfinite(run.measured[:, 1:]).any(axis=0).all())
+        there = [True, True, current, current and spec.current == "earth", bias]
+        return np.where(there, _OWN_STD * unit, 0.0)
+
+    @cached_property
+    def used(self) -> NDArray[np.int64]:
+        """Which of the constants of the manoeuvre there are."""
+        return np.flatnonzero(self.own_std)
+
+    def begin(self, shared: Float) -> Unknowns:
+        """Return unknowns to begin with: states as measured, nothing acting on the ship."""
+        return Unknowns(shared, np.zeros(_OWN), np.nan_to_num(self.windows.start))
+
+    def predicted(self, shared: Float, own: Float, starts: Float) -> Float:
+        """Let the ship run over every window.
+
+        Parameters
+        ----------
+        shared : ndarray, shape (6 + p, k)
+        own : ndarray, shape (5, k)
+        starts : ndarray, shape (w, 3, k)
+
+        Returns
+        -------
+        ndarray, shape (m, 3, k)
+            What would be measured, window after window.
+        """
+        run, ship = self.windows.run, self.windows.run.ship
+        k, extra = shared.shape[1], self.model.extra
+        many = -(-k // MOST) * MOST
+        at = np.minimum(np.arange(many), k - 1)
+        shared, own, starts = shared[:, at], own[:, at], starts[..., at]
+        w = starts.shape[0]
+        x0 = np.zeros((w, N_BEFORE + extra + N_AFTER, many))
+        x0[:, :3], x0[:, 3], x0[:, 4] = starts, own[0], own[1]
+        x0[:, -3:] = own[None, 2:]
+        constants = np.array(
+            [
+                *(ship.arm_per_m, ship.length_m, ship.draught_m, run.approach_m_s, run.approach_per_s),
+                self.spec.rudder_speed_exponent,
+            ]
+        )
+        rudder = self._rudders(shared[N_HULL:])
+        found = np.empty((self.windows.rows.size, 3, many))
+        for first in range(0, many, MOST):
+            lanes = slice(first, first + MOST)
+            part = np.empty((found.shape[0], 3, MOST))
+            shoot(
+                *(np.ascontiguousarray(shared[:N_HULL, lanes]), np.ascontiguousarray(shared[N_HULL:, lanes])),
+                *(run.step_s, run.inputs, np.ascontiguousarray(rudder[:, lanes]), run.offset_s, run.current_row),
+                *(constants, self.windows.begins, self.windows.ends, np.ascontiguousarray(x0[..., lanes])),
+                *(self.model.table, part, LANES),
+            )
+            found[..., lanes] = part
+        return found[..., :k]
+
+    def _rudders(self, values: Float) -> Float:
+        """Return the rudder as the effects have it for every set of their parameters, shape (rows, k)."""
+        run = self.windows.run
+        measured, between = run.inputs[:, 1], run.rudder_between[:, None]
+        if all(effect.rudder_course is None for effect in self.model.effects):
+            return np.repeat(measured[:, None] + between, values.shape[1], axis=1)
+        own, of = np.unique(values, axis=1, return_inverse=True)
+        courses = [self.model.rudder(run.fine_time_s, measured, one) for one in own.T]
+        return np.ascontiguousarray((np.stack(courses, axis=-1) + between)[:, of])
+
+    def steps(self, at: Unknowns, scale: Float) -> Float:
+        """Return the steps of the differences: shared, constants that there are, states; shape (6 + p + d + 3,)."""
+        L = self.windows.run.ship.length_m
+        hull = 1e-4 * np.maximum(np.abs(at.shared[:N_HULL]), 0.05 * np.abs(mariner_like(L).array()))
+        effects = [
+            (-1.0 if value + 1e-2 * abs(p.steps[0]) > p.high else 1.0) * 1e-2 * abs(p.steps[0])
+            for (_, p), value in zip(self.model.parameters, at.shared[N_HULL:], strict=True)
+        ]
+        return np.concatenate([hull, effects, _STEP * self.own_std[self.used], _STEP * scale])
+
+    def moved(self, at: Unknowns, scale: Float) -> tuple[Float, Float]:
+        """Return what is predicted, shape (m, 3), and its derivatives, shape (m, 3, 6 + p + d + 3).
+
+        Parameters
+        ----------
+        scale : ndarray, shape (3,)
+            Of an error of v, r and psi.
+        """
+        by = self.steps(at, scale)
+        shared, own, starts = self._stepped(at, by)
+        found = self.predicted(shared, own, starts)
+        return found[..., 0], (found[..., 1:] - found[..., :1]) / by
+
+    def _stepped(self, at: Unknowns, by: Float) -> tuple[Float, Float, Float]:
+        many = by.size + 1
+        shared, own = np.tile(at.shared[:, None], many), np.tile(at.own[:, None], many)
+        starts = np.tile(at.starts[..., None], many)
+        first, d = at.shared.size, self.used.size
+        for j in range(first):
+            shared[j, 1 + j] += by[j]
+        for j, k in enumerate(self.used):
+            own[k, 1 + first + j] += by[first + j]
+        for j in range(_STATES):
+            starts[:, j, 1 + first + d + j] += by[first + d + j]
+        return shared, own, starts
