@@ -8,6 +8,9 @@ import numpy as np
 
 from kempf.pipeline.shooting.left_out import LeftOut
 
+#: part of the median error below which errors are not told apart
+_LEAST = 0.1
+
 
 @dataclass(frozen=True)
 class Paired:
@@ -15,7 +18,8 @@ class Paired:
 
     #: Part of the first one's misfit by which the second one's is smaller; negative where it is larger.
     fall: float
-    #: The mean difference in its standard errors; windows overlap by half, so every other one counts.
+    #: The mean logarithm of the errors' ratio, window by window, in its standard errors; windows overlap by half, so
+    #: every other one counts. Positive where the second one predicts better.
     t: float
     #: Manoeuvres that the second one predicts better.
     better: int
@@ -29,7 +33,9 @@ def paired(first: LeftOut, second: LeftOut) -> Paired:
         sign = float(np.all(np.isfinite(b))) - float(np.all(np.isfinite(a)))
         better = int(np.sum(np.nan_to_num(second.misfits, nan=np.inf) < np.nan_to_num(first.misfits, nan=np.inf)))
         return Paired(float(np.sign(sign)), float(np.inf) * sign if sign else 0.0, better, len(first.errors))
-    difference = a - b
+    # beside a small part of the usual error, so that a window that is predicted to a hair does not decide
+    least = _LEAST * float(np.median(np.concatenate([a, b])))
+    difference = np.log((a + least) / (b + least)) if least > 0.0 else a - b
     error = float(np.std(difference, ddof=1)) / np.sqrt(max(difference.size / 2.0, 1.0)) if difference.size > 1 else 0.0
     mean = float(np.mean(difference))
     return Paired(

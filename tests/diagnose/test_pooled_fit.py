@@ -116,6 +116,6 @@ def test_the_gains_of_a_candidate_are_those_over_what_was_asked_of_the_base_befo
 
 def test_a_rung_by_itself_has_the_free_runs_of_its_manoeuvres_in_their_order() -> None:
     ship = sailed("none")
-    found = step_of(fit_of(ship, 3, EffectModel()), ship.runs[2:])
+    found = step_of(fit_of(ship, 3, EffectModel()), ship.runs[2:], None)
     assert [one.name for one in found.fitted] == ["run 0", "run 1"]
     assert [one.name for one in found.held] == [run.name for run in ship.runs[2:]]

@@ -321,6 +321,8 @@ def extended(  # type: ignore[no-untyped-def]
     drive[0], drive[3], drive[4] = levels[0] ** 2, levels[2] ** 2, 2.0 * rates[3] * P0[E, E]
     if P0[M, M] > 0.0:
         drive[1] = levels[1] ** 2
+    # what does not move acts all the same: a constant force in a free run
+    room[4][:] = x[:width]
     log_likelihood = np.zeros(B)
     for k in range(measured.shape[0]):
         if k > 0:

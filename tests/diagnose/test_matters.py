@@ -1,0 +1,66 @@
+"""Two questions of every effect: is it there, and does it matter."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.diagnose.immaterial import Weight
+from kempf.pipeline.diagnose.legs import in_std
+from kempf.pipeline.diagnose.matters import falls, worsens
+from kempf.pipeline.shooting.ahead import Ahead
+from kempf.pipeline.shooting.left_out import LeftOut
+
+
+def ahead(level: float, spread: float = 0.1, seed: int = 1, *, held: float | None = None) -> Ahead:
+    """A model whose errors lie about a level in every window of four manoeuvres."""
+
+    def errors(mean: float) -> LeftOut:
+        windows = tuple(
+            np.abs(np.random.default_rng([seed, k]).normal(mean, spread * mean, (12, 3))) / 3.0 for k in range(4)
+        )
+        return LeftOut(np.array([w.sum(axis=1).mean() for w in windows]), windows)
+
+    none = LeftOut(np.zeros(0), ())
+    made = SimpleNamespace(left_out=errors(level), own=errors(level), held=none if held is None else errors(held))
+    return cast("Ahead", made)
+
+
+def test_an_error_that_falls_in_most_manoeuvres_is_a_fall() -> None:
+    assert falls(ahead(2.0), ahead(1.0, seed=2))
+    assert not falls(ahead(1.0), ahead(2.0, seed=2)) and worsens(ahead(1.0), ahead(2.0, seed=2))
+    # by two per cent nobody is served, however sure that is
+    assert not falls(ahead(1.0, 1e-4), ahead(0.98, 1e-4, seed=2))
+    assert not worsens(ahead(1.0, 0.5), ahead(1.02, 0.5, seed=2))
+
+
+def test_what_helps_the_fitted_and_harms_the_held_out_is_refused() -> None:
+    before, after = ahead(2.0, held=1.0), ahead(1.0, seed=2, held=3.0)
+    assert worsens(before, after) and not falls(before, after)
+
+
+@pytest.mark.parametrize(
+    ("fall", "t", "shift", "matters"),
+    [
+        (0.3, 5.0, 0.1, True),
+        (0.3, 1.0, 0.1, False),
+        (0.001, 5.0, 0.1, False),
+        (-0.001, -1.0, 2.5, True),
+        (np.nan, np.nan, 0.0, True),
+    ],
+)
+def test_an_effect_matters_where_a_prediction_or_the_hull_moves(
+    fall: float, t: float, shift: float, matters: bool
+) -> None:
+    assert Weight(fall, t, shift).matters is matters
+
+
+def test_sums_that_hang_together_are_less_sure_than_their_parts() -> None:
+    independent = np.random.default_rng(5).normal(0.3, 1.0, 400)
+    blocks = np.repeat(np.random.default_rng(6).normal(0.3, 1.0, 20), 20)
+    assert in_std(independent) == pytest.approx(6.0, abs=1.5)
+    assert in_std(blocks.reshape(20, 20).sum(axis=1)) < 0.5 * in_std(blocks)
+    assert in_std(np.array([3.0])) == 0.0
