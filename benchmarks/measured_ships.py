@@ -54,11 +54,11 @@ def boat(data: Path) -> Ship:
     return _ship("usv_open_water", [_PROFILES / "usv_open_water.yaml"], list(folder.glob("*_xy.csv")), folder)
 
 
-def fleet(data: Path) -> list[Ship]:
-    """The eight ships of the trial logs."""
-    folders = sorted(p.parent for p in (data / "trials").glob("*/particulars.json"))
+def fleet(data: Path, trials: str = "trials") -> list[Ship]:
+    """The ships of the trial logs: the eight of ``trials``, or the six of ``trials_as_sold``."""
+    where = data / trials
+    folders = sorted(p.parent for p in where.glob("*/particulars.json"))
     if not folders:
-        where = data / "trials"
         raise NotFound("no_measured_data", f"There are no trial logs in {where}.", "Say where with --data FOLDER.")
     return [
         _ship(f.name, [f / "particulars.json", _PROFILES / "trial_logger.yaml"], list(f.glob("2*")), f) for f in folders

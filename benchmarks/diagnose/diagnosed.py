@@ -31,8 +31,9 @@ def section(told: Mapping[str, Any]) -> list[str]:
     lines = [f"## {told['vessel']}: {told['verdict'].replace('_', ' ')}", ""]
     lines += [f"- {sentence}" for sentence in told["sentences"]]
     lines += ["", *result_page.table(_LADDER, [_rung(told, one) for one in told["ladder"]]), ""]
-    shown = [c for c in told["candidates"] if c["verdict"] == "present"]
-    shown += [c for c in told["candidates"] if c["verdict"] != "present" and c["score"] is not None][:_SHOWN]
+    found = ("present", "immaterial", "suspected")
+    shown = [c for c in told["candidates"] if c["verdict"] in found]
+    shown += [c for c in told["candidates"] if c["verdict"] not in found and c["score"] is not None][:_SHOWN]
     rows = [
         [c["effect"], _number(c["score"], ".1f"), _change(c), _number(c["absorption"], ".4f"), c["verdict"], c["why"]]
         for c in shown
@@ -45,7 +46,8 @@ def section(told: Mapping[str, Any]) -> list[str]:
 
 
 _LADDER = (
-    *("step", "added", "fitted, %", "held out, %", "yaw rate, deg/s", "heading, deg", "lateral speed, m/s"),
+    *("step", "added", "a leg ahead: fitted, %", "left out, %", "held out, %", "left out, worst, %"),
+    *("free run: fitted, %", "held out, %", "yaw rate, deg/s", "heading, deg", "lateral speed, m/s"),
     *("wind, m/s²/√s", "log-likelihood"),
 )
 
@@ -59,6 +61,7 @@ def _rung(told: Mapping[str, Any], one: Mapping[str, Any]) -> list[str]:
     return [
         str(one["step"]),
         one["added"] or "plain model",
+        *_ahead(one["one_leg_ahead"]),
         _percent(one["in_sample_error"], one["in_sample"]),
         _percent(one["held_out_error"], one["held_out"]),
         f"{rms['yaw_rate'] * _DEG:.4f}",
@@ -67,6 +70,14 @@ def _rung(told: Mapping[str, Any], one: Mapping[str, Any]) -> list[str]:
         f"{one['disturbance_intensity']['wind_force_m_s2_per_sqrt_s']:.2g}",
         f"{one['log_likelihood']:.1f}",
     ]
+
+
+def _ahead(one: Mapping[str, Any] | None) -> list[str]:
+    if one is None:
+        return ["", "", "", ""]
+    samples = [list(one[f"{name}_percent"].values()) for name in ("fitted", "left_out", "held_out")]
+    means = ["" if not s else "diverges" if None in s else f"{sum(s) / len(s):.2f}" for s in samples]
+    return [*means, "diverges" if None in samples[1] else f"{max(samples[1]):.2f}"]
 
 
 def _percent(error: float | None, runs: Mapping[str, Any]) -> str:

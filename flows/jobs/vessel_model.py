@@ -198,6 +198,7 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
             *(f"left out: {name} ({why})" for name, why in sorted(skipped.items())),
             *alone,
             *(() if effects else _disagreement(plain)),
+            *_ahead_disagrees(step.ahead),
             *made.warnings,
         ),
         parent=request.parent,
@@ -228,6 +229,16 @@ def _pooling(plain: PlainFit) -> dict[str, Any]:
             for one in plain.alone
         ],
     }
+
+
+def _ahead_disagrees(ahead: Ahead | None) -> tuple[str, ...]:
+    if ahead is None or ahead.disagrees is None:
+        return ()
+    return (
+        f"fits one step and one leg ahead disagree, so the model lacks something: the misfit one leg "
+        f"({ahead.horizon_s:.3g} s) ahead is {100.0 * ahead.disagrees.falls_by:.0f} % smaller with parameters fitted "
+        "to legs, which predictions of manoeuvres take (one_leg_ahead)",
+    )
 
 
 def _disagreement(plain: PlainFit) -> tuple[str, ...]:

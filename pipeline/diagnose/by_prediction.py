@@ -77,6 +77,6 @@ def _idle(ladder: Ladder, steps: Sequence[Step]) -> Effect | None:
     for step in steps[1:-1]:
         assert step.added is not None
         found = paired(ladder.shooting.without(now, step.added).left_out, now.left_out)
-        if found.t < ALIKE and found.fall < LEAST_FALL:
+        if found.in_std < ALIKE and found.falls_by < LEAST_FALL:
             return step.added
     return None

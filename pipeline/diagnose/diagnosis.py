@@ -134,7 +134,9 @@ def _claimed(steps: Sequence[Step]) -> int:
 
 def _begun(shooting: ShootingRange | None, base: PooledFit) -> Ahead | None:
     """Return the model that a diagnosis begins from one leg ahead."""
-    if shooting is None or not base.model.effects:
-        return None if shooting is None else shooting.plain
-    shared = np.concatenate([shooting.plain.fit.hull, base.values])
-    return shooting.refitted(base.model, shared, shooting.plain)
+    if shooting is None:
+        return None
+    made = shooting.plain
+    if base.model.effects:
+        made = shooting.refitted(base.model, np.concatenate([made.fit.hull, base.values]), made)
+    return shooting.beside(made, base)

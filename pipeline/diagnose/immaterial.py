@@ -61,4 +61,4 @@ def weighed(before: Ahead | None, after: Ahead | None, plain: PooledFit, fitted:
     if before is None or after is None:
         return Weight(np.nan, np.nan, shift)
     found = paired(before.left_out, after.left_out)
-    return Weight(found.fall, found.t, shift)
+    return Weight(found.falls_by, found.in_std, shift)

@@ -67,6 +67,8 @@ class Ladder:
         candidate, best = close[0]
         self.announce(f"screening beside {candidate.effect.title}")
         screened = screen(best.fit, self.effects, self.workers)
+        if self.shooting is not None and ahead is not None:
+            ahead = self.shooting.beside(ahead, best.fit)
         made = make_step(best.fit, candidate.effect, close, others, self.held, screened, self.workers, ahead)
         return replace(made, stability=stability)
 

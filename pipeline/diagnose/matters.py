@@ -45,16 +45,16 @@ def falls(before: Ahead, after: Ahead) -> bool:
     """Return whether a model predicts manoeuvres left out clearly better than another, and no others worse."""
     found = paired(before.left_out, after.left_out)
     return bool(
-        found.t > FALLS
-        and found.fall > LEAST_FALL
-        and found.better >= _MOST * found.manoeuvres
+        found.in_std > FALLS
+        and found.falls_by > LEAST_FALL
+        and found.better >= _MOST * found.of
         and not worsens(before, after)
     )
 
 
 def worsens(before: Ahead, after: Ahead) -> bool:
     """Return whether a model predicts fitted, left-out or held-out manoeuvres worse than another, beyond the error."""
-    return any(one.t < -WORSE for one in comparisons(before, after))
+    return any(one.in_std < -WORSE for one in comparisons(before, after))
 
 
 def comparisons(before: Ahead, after: Ahead) -> list[Paired]:
@@ -87,7 +87,10 @@ def better_ahead(shooting: ShootingRange, base: Ahead, effects: Sequence[Effect]
 
 def _alike(base: Ahead, best: Ahead, other: Ahead) -> bool:
     """Return whether a model makes the error fall too, and is not clearly behind the best one."""
-    return paired(base.left_out, other.left_out).fall > LEAST_FALL and paired(best.left_out, other.left_out).t > -ALIKE
+    return (
+        paired(base.left_out, other.left_out).falls_by > LEAST_FALL
+        and paired(best.left_out, other.left_out).in_std > -ALIKE
+    )
 
 
 def _stability(good: Sequence[Ahead], close: Sequence[Ahead]) -> float:

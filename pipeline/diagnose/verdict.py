@@ -262,6 +262,12 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
     share = share_explained(diagnosis)
     if share is not None:
         said.append(f"Of the misfit one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained.")
+    if last.disagrees is not None:
+        said.append(
+            f"Fits one step and one leg ahead still disagree: with parameters fitted to legs the misfit is "
+            f"{100.0 * last.disagrees.falls_by:.0f} % smaller, so that something is still lacking; predictions of "
+            "manoeuvres take those."
+        )
     return said
 
 

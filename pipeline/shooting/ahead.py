@@ -15,6 +15,7 @@ from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.shooting import shooting_fit
 from kempf.pipeline.shooting.left_out import LeftOut, left_out
+from kempf.pipeline.shooting.paired import Paired, paired
 from kempf.pipeline.shooting.reduced import Scales
 from kempf.pipeline.shooting.scales import scaled
 from kempf.pipeline.shooting.shooting_fit import ShootingFit, alone
@@ -22,6 +23,9 @@ from kempf.pipeline.shooting.shot_run import N_HULL, ShotRun
 from kempf.pipeline.shooting.windows import Windows, leg_s, windows_of
 from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import ModelSpec
+
+#: standard errors, and least part of the misfit, by which fits one step and one leg ahead disagree
+_DISAGREE, _LEAST = 3.0, 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +42,19 @@ class Ahead:
     motion: Float
     #: How far ahead, s.
     horizon_s: float
+    #: Of the fitted manoeuvres by the parameters that the likelihood gives one step ahead; None where not known.
+    one_step: LeftOut | None = None
+
+    @property
+    def disagrees(self) -> Paired | None:
+        """How much better legs are predicted by the parameters fitted to them than by the likelihood's, one step ahead.
+
+        None where they predict alike: then the likelihood's, which uses all that the readings say, are the better ones.
+        """
+        if self.one_step is None:
+            return None
+        found = paired(self.one_step, self.own)
+        return found if found.in_std > _DISAGREE and found.falls_by > _LEAST else None
 
     @property
     def model(self) -> EffectModel:
@@ -99,19 +116,12 @@ class ShootingRange:
         held = LeftOut(np.array([m for m, _, _ in made]), tuple(e for _, _, e in made))
         return Ahead(fit, left_out(fit, self.workers), held, self.held, self.motion, self.horizon_s)
 
-    def of(self, model: EffectModel, shared: Float, near: Ahead) -> tuple[LeftOut, LeftOut]:
-        """Return how given parameters predict the fitted and the held-out manoeuvres, nothing shared being fitted."""
-        fitted = [ShotRun(windows, model, self.spec) for windows in self.fitted]
-        held = [ShotRun(windows, model, self.spec) for windows in self.held]
-        begin = [part.at for part in near.fit.parts] + [None] * len(held)
-        made = list(
-            self.workers.map(
-                lambda pair: alone(pair[0], shared, self.scales, pair[1]), zip([*fitted, *held], begin, strict=True)
-            )
-        )
-        both = [made[: len(fitted)], made[len(fitted) :]]
-        one, two = (LeftOut(np.array([m for m, _, _ in part]), tuple(e for _, _, e in part)) for part in both)
-        return one, two
+    def beside(self, ahead: Ahead, fit: PooledFit) -> Ahead:
+        """Return a model with how the likelihood's parameters of it predict legs, nothing shared being fitted."""
+        shared = np.concatenate([fit.hull, fit.values])
+        pairs = [(shot, part.at) for shot, part in zip(ahead.fit.shots, ahead.fit.parts, strict=True)]
+        made = list(self.workers.map(lambda pair: alone(pair[0], shared, self.scales, pair[1]), pairs))
+        return replace(ahead, one_step=LeftOut(np.array([m for m, _, _ in made]), tuple(e for _, _, e in made)))
 
     def with_effect(self, base: Ahead, effect: Effect) -> Ahead | None:
         """Fit a model with one effect more; None where it runs away at every size that is tried."""
@@ -189,10 +199,9 @@ def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Execut
     made: list[Ahead] = []
     for fit in fits:
         near = made[-1] if made else shooting.plain
-        if not fit.model.effects:
-            made.append(near)
-            continue
-        made.append(shooting.refitted(fit.model, np.concatenate([near.fit.hull, fit.values]), near))
+        if fit.model.effects:
+            near = shooting.refitted(fit.model, np.concatenate([near.fit.hull, fit.values]), near)
+        made.append(shooting.beside(near, fit))
     return tuple(made)
 
 

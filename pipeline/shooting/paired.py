@@ -17,13 +17,13 @@ class Paired:
     """Two models side by side on manoeuvres that neither was fitted to."""
 
     #: Part of the first one's misfit by which the second one's is smaller; negative where it is larger.
-    fall: float
+    falls_by: float
     #: The mean logarithm of the errors' ratio, window by window, in its standard errors; windows overlap by half, so
     #: every other one counts. Positive where the second one predicts better.
-    t: float
+    in_std: float
     #: Manoeuvres that the second one predicts better.
     better: int
-    manoeuvres: int
+    of: int
 
 
 def paired(first: LeftOut, second: LeftOut) -> Paired:
@@ -39,8 +39,8 @@ def paired(first: LeftOut, second: LeftOut) -> Paired:
     error = float(np.std(difference, ddof=1)) / np.sqrt(max(difference.size / 2.0, 1.0)) if difference.size > 1 else 0.0
     mean = float(np.mean(difference))
     return Paired(
-        fall=1.0 - second.mean / first.mean if first.mean > 0.0 else 0.0,
-        t=mean / error if error > 0.0 else 0.0,
+        falls_by=1.0 - second.mean / first.mean if first.mean > 0.0 else 0.0,
+        in_std=mean / error if error > 0.0 else 0.0,
         better=int(np.sum(second.misfits < first.misfits)),
-        manoeuvres=first.misfits.size,
+        of=first.misfits.size,
     )

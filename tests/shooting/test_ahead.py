@@ -69,8 +69,8 @@ def test_the_drag_is_found_with_its_error(dragged: tuple[Sailed, ShootingRange, 
     value, std = float(found.fit.values[0]), float(np.sqrt(found.fit.covariance[6, 6]))
     assert 0.0 < std < 0.3 * ship.c and abs(value - ship.c) < 3.5 * std
     beside = paired(shooting.plain.left_out, found.left_out)
-    assert beside.t > 3.0 and beside.fall > 0.3 and beside.better == beside.manoeuvres == 3
-    assert paired(found.left_out, shooting.plain.left_out).t == pytest.approx(-beside.t)
+    assert beside.in_std > 3.0 and beside.falls_by > 0.3 and beside.better == beside.of == 3
+    assert paired(found.left_out, shooting.plain.left_out).in_std == pytest.approx(-beside.in_std)
     # fitted, left out and held out fall together
     assert found.own.mean < 0.7 * shooting.plain.own.mean
     assert found.held.mean < 0.7 * shooting.plain.held.mean
@@ -103,11 +103,11 @@ def test_a_model_that_runs_away_is_no_number_and_no_crash(dragged: tuple[Sailed,
     error, _, errors = shooting_fit.alone(found.fit.shots[0], wild, shooting.scales)
     assert error == np.inf
     away = LeftOut(np.full(3, np.inf), (errors, *found.left_out.errors[1:]))
-    assert paired(found.left_out, away).t == -np.inf and paired(away, found.left_out).t == np.inf
+    assert paired(found.left_out, away).in_std == -np.inf and paired(away, found.left_out).in_std == np.inf
 
 
 def test_the_same_bits_twice(dragged: tuple[Sailed, ShootingRange, Ahead]) -> None:
-    ship, shooting, found = dragged
+    ship, _, found = dragged
     again = shooting_range(ship.runs[:3], ship.runs[3:], ship.spec, WORKERS)
     other = again.with_effect(again.plain, DRAG)
     assert other is not None

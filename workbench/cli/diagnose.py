@@ -9,7 +9,7 @@ from typing import Any
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.ladder import free_run_percent
+from kempf.workbench.cli.ladder import FREE, LEG, free_run_percent, leg_percent
 from kempf.workbench.cli.options import beginning_options, json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_table, progress_bar
 
@@ -100,17 +100,18 @@ def _print_diagnosis(document: Mapping[str, Any], *, everything: bool) -> None:
         [
             str(one["step"]),
             one["added"] or first,
+            *leg_percent(one),
             free_run_percent(one["in_sample_error"], one["in_sample"]),
             free_run_percent(one["held_out_error"], one["held_out"]),
             number(one["disturbance_intensity"]["wind_force_m_s2_per_sqrt_s"], 2),
         ]
         for one in document["ladder"]
     ]
-    print_table(["step", "added", "fitted, %", "held out, %", "wind, m/s^2/s^0.5"], ladder, "Free-run error")
+    print_table(["step", "added", *LEG, *FREE, "wind, m/s^2/s^0.5"], ladder, "Error one leg ahead and of free runs, %")
     shown = [
         one
         for one in document["candidates"]
-        if everything or one["verdict"] in ("present", "negligible") or one["score"] is not None
+        if everything or one["verdict"] in ("present", "immaterial", "negligible") or one["score"] is not None
     ]
     shown = shown if everything else shown[:_SHOWN]
     rows = [

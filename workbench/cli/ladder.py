@@ -13,6 +13,10 @@ from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
 
+#: columns of the error one leg ahead, and of that of free runs
+LEG = ("leg: fitted", "left out", "held out")
+FREE = ("free: fitted", "held out")
+
 
 @click.command("ladder", cls=GivenOnce)
 @vessel_option(required=True)
@@ -56,14 +60,24 @@ def print_rungs(rungs: list[dict[str, Any]], vessel: str) -> None:
                 str(rung["step"]),
                 rung["added"] or "plain model",
                 ", ".join(sizes) or "-",
+                *leg_percent(rung),
                 free_run_percent(rung["in_sample_error"], rung["in_sample"]),
                 free_run_percent(rung["held_out_error"], rung["held_out"]),
                 number(wind, 2),
                 ids[rung["parameter_set_id"]],
             ]
         )
-    head = ["step", "added", "size, ± 1 s.e.", "fitted", "held out", "wind, m/s^2/s^0.5", "set"]
-    print_table(head, rows, f"{vessel}: free-run error, % of the motion")
+    head = ["step", "added", "size, ± 1 s.e.", *LEG, *FREE, "wind, m/s^2/s^0.5", "set"]
+    print_table(head, rows, f"{vessel}: error, % of the motion")
+
+
+def leg_percent(rung: Mapping[str, Any]) -> list[str]:
+    """Return the error one leg ahead of fitted, left-out and held-out manoeuvres as percent of the motion."""
+    ahead = rung.get("one_leg_ahead")
+    if ahead is None:
+        return ["-", "-", "-"]
+    samples = [list(ahead[f"{name}_percent"].values()) for name in ("fitted", "left_out", "held_out")]
+    return ["-" if not s else "diverges" if None in s else number(sum(s) / len(s), 3) for s in samples]
 
 
 def free_run_percent(error: float | None, runs: Mapping[str, Any]) -> str:

@@ -1,6 +1,7 @@
 """The words of a report, all of one verdict: headline, advice, names of the models, titles and leads of the sections.
 
-Nothing else in the report says what the model lacks: only ``explained`` and ``ambiguous`` claim an effect.
+Nothing else in the report says what the model lacks: only ``explained``, ``ambiguous`` and ``partly_explained`` claim
+an effect.
 """
 
 from __future__ import annotations
@@ -14,9 +15,11 @@ from kempf.schemas.diagnosis_evidence import DiagnosisEvidence
 from kempf.schemas.enumeration import listed
 
 #: the verdicts that claim an effect
-CLAIMING = ("explained", "ambiguous")
+CLAIMING = ("explained", "ambiguous", "partly_explained")
 _EFFECT_VERDICTS = {
     "present": "present",
+    "immaterial": "certain but immaterial",
+    "suspected": "suspected",
     "negligible": "too small to matter",
     "not_testable": "cannot be tested",
     "absent": "not confirmed",
@@ -101,8 +104,14 @@ def _headline(verdict: str, content: Mapping[str, Any], first: str) -> str:
         "adequate": f"The {first} is adequate: no effect that was tried predicts unfitted manoeuvres better.",
         "explained": f"The {first} lacks {effects}. With it included, no systematic misfit remains.",
         "ambiguous": f"The {first} lacks {effects}; these data cannot distinguish between them.",
+        "partly_explained": f"The {first} lacks {effects}{_share(content)}; something else remains beside it.",
         "unexplained": f"Not explained: a systematic misfit of the {first} remains that no known effect accounts for.",
     }[verdict]
+
+
+def _share(content: Mapping[str, Any]) -> str:
+    share = content.get("share_explained")
+    return "" if share is None else f", which explains {100.0 * share:.0f} % of the misfit one leg ahead"
 
 
 def _next_steps(
@@ -111,7 +120,7 @@ def _next_steps(
     name, titles, steps = quote(vessel), _titles(content), []
     if verdict == "insufficient_data":
         steps.append("Sail at least three zigzags, to both sides, at two rudder angles and on two headings.")
-    if verdict == "unexplained":
+    if verdict in ("unexplained", "partly_explained"):
         steps.append(
             "See where the misfit remains: one-step errors, correlations and unmodelled acceleration below. Then try a "
             f'term of your own: kempf effects try "yaw: r*abs(r)" --vessel {name}.'
