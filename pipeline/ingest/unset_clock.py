@@ -31,8 +31,8 @@ _DAMAGED = 100
 _NOTE = (
     "The times are of 1970: the logger's clock was not set, or counts from when it was switched on. They stay, and the "
     "log is listed in 1970; what another such log holds at the same time is another manoeuvre. To give the date, write "
-    "the instant of the clock's zero into the profile's source, such as time: {start: 2025-05-03T06:00:00Z}, beside the "
-    "column and its unit where there are any."
+    "the instant of the clock's zero into the profile's source, such as time: {start: 2025-05-03T06:00:00Z}, beside "
+    "the column and its unit where there are any."
 )
 
 

@@ -112,7 +112,8 @@ def _set_right(stamp_ns: Nanoseconds, times: _LineTimes, notes: list[str]) -> Na
     both = unset & times.dated & (times.full >= CLOCK_FIRST_NS)
     if not both.any():
         return stamp_ns
-    lag = np.int64(np.round(np.median((times.full - stamp_ns)[both])))
+    lags = np.sort((times.full - stamp_ns)[both])
+    lag = lags[lags.size // 2]  # exact: a mean of two would be rounded to a float's nanoseconds
     notes.append(
         f"The logger's clock was not set: {int(unset.sum())} stamps were put right by the receiver's UTC, "
         f"by {lag / SECOND_NS:.3f} s."
