@@ -94,8 +94,9 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
         return RowTimes(instant, good, told, notes)
     first = _first_row(name, instant[good], row[good], column.interval_s)
     every = np.ones(row.size, dtype=np.bool_)
-    said = f"The rows are taken for evenly spaced by {column.interval_s:g} s, as the profile says; the column agrees."
-    return RowTimes(_counted(row, column.interval_s) + first, every, every, [*notes, said])
+    said = f"The rows are taken for evenly spaced by {column.interval_s:g} s, as the profile says"
+    shown = f"; the column agrees within {_resolution_s(instant[good]):.4g} s." if np.ptp(instant[good]) else "."
+    return RowTimes(_counted(row, column.interval_s) + first, every, every, [*notes, said + shown])
 
 
 def _counted(row: Index, interval_s: float) -> Nanoseconds:
@@ -109,14 +110,22 @@ def _first_row(name: str, instant: Nanoseconds, row: Index, interval_s: float) -
     A stamp that is cut or rounded to its resolution lies within that of the row's own time, and a logger may be late by
     a row.
     """
-    step = np.abs(np.diff(instant))
-    slack = float(np.median(step[step > 0]) if step.any() else 0) + interval_s * SECOND_NS
+    if not np.ptp(instant):
+        # of a single stamp nobody knows how coarse it is
+        return int(instant[0] - _counted(row[:1], interval_s)[0])
+    slack = (_resolution_s(instant) + interval_s) * SECOND_NS
     off = (instant - instant[0] - _counted(row, interval_s)).astype(np.float64)
     low, high = np.quantile(off, [_DAMAGED, 1.0 - _DAMAGED])
     if high - low > slack:
         raise _contradiction(name, instant, row, interval_s)
     sound = int(np.argmax(np.abs(off - np.median(off)) <= slack))
     return int(instant[sound] - _counted(row[sound : sound + 1], interval_s)[0])
+
+
+def _resolution_s(instant: Nanoseconds) -> float:
+    """Return the usual step of stamps that are not all the same, s."""
+    step = np.abs(np.diff(instant))
+    return float(np.median(step[step > 0])) / SECOND_NS
 
 
 def _contradiction(name: str, instant: Nanoseconds, row: Index, interval_s: float) -> DataRejected:
