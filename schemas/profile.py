@@ -185,10 +185,13 @@ class VesselProfile(_Grown):
     wind_arm_per_m: float | None = None
     #: what her magnetic headings lack to true north where no sentence says it, deg, east positive
     variation_deg: float | None = Field(default=None, ge=-180, le=180)
+    #: what acts on her beside the rudder, which the model has where none is named: see `surroundings.default_model`;
+    #: None: the sea
+    surroundings: Literal["tank", "pond", "sea"] | None = None
     antenna: Antenna = Antenna()
     sources: list[Source] = Field(default_factory=list)
 
-    _later: ClassVar[frozenset[str]] = frozenset({"variation_deg"})
+    _later: ClassVar[frozenset[str]] = frozenset({"variation_deg", "surroundings"})
 
     def source_for(self, file_name: str) -> Source | None:
         """Return the first source whose pattern matches the file's name (without its folder), or None."""

@@ -50,7 +50,7 @@ def poolable(warehouse: Warehouse, vessel: str, request: Request, outcomes: Sequ
     if request.spec.current != "none" and any(without_log(segment) for segment in chosen.segments):
         return (
             "the zigzags have no speed through the water, and in a current that over ground is another; in still water "
-            "a model with `current: none` pools them: --model FILE"
+            "`surroundings: pond` of the profile, or a model with `current: none` (--model FILE), pools them"
         )
     return chosen
 

@@ -12,6 +12,7 @@ from functools import partial
 
 from kempf.flows.fleet.state import VesselState, fleet_state
 from kempf.flows.jobs.chosen_manoeuvres import choose, out_of_date
+from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_segments
 from kempf.flows.jobs.pending import Waiting, store
 from kempf.flows.jobs.pool_vessel import pool_segments
@@ -270,7 +271,7 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
             continue
         request = Request(ModelSpec.model_validate(spec), estimator, own=Own.from_json(own))
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
-    return [asked[key] for key in sorted(asked)] if known else [Request()]
+    return [asked[key] for key in sorted(asked)] if known else [Request(default_model_of(warehouse, vessel))]
 
 
 def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:

@@ -48,15 +48,15 @@ def command(
 
     What was identified before from the same inputs, with the same code and settings, is not computed again.
     """
+    from kempf.flows.jobs.default_model import default_model_of
     from kempf.flows.jobs.identify_vessel import Request, identify_vessel
     from kempf.flows.jobs.standing_model import Own
-    from kempf.schemas.model_spec import ModelSpec
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import named_model, read_effect_files
 
     warehouse = Warehouse(uri)
     mine = Own(files=read_effect_files(files))
-    spec, own = named_model(warehouse, vessel, model, mine) if model else (ModelSpec(), Own())
+    spec, own = named_model(warehouse, vessel, model, mine) if model else (default_model_of(warehouse, vessel), Own())
     request = Request(spec, estimator, own=own.beside(mine))
     with progress_bar() as progress:
         outcomes = identify_vessel(warehouse, vessel, request, progress=progress)

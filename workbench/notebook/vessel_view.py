@@ -71,14 +71,18 @@ class VesselView:
         KempfError
             No zigzag could be identified from, or there is none.
         """
+        from kempf.flows.jobs.default_model import default_model_of
         from kempf.flows.jobs.identify_vessel import Request, identify_vessel
         from kempf.flows.jobs.pool_vessel import pool_vessel
         from kempf.flows.jobs.standing_model import Own
-        from kempf.schemas.model_spec import ModelSpec
         from kempf.workbench.chosen_model import named_model
 
         name = None if model is None else os.fspath(model)
-        spec, own = named_model(self.warehouse, self.name, name) if name else (ModelSpec(), Own())
+        spec, own = (
+            named_model(self.warehouse, self.name, name)
+            if name
+            else (default_model_of(self.warehouse, self.name), Own())
+        )
         request = Request(spec, estimator, own=own)
         outcomes = identify_vessel(self.warehouse, self.name, request)
         failed = [outcome.error for outcome in outcomes if outcome.error is not None]
@@ -149,10 +153,10 @@ class VesselView:
 
     def diagnose(self) -> DiagnosisView:
         """Find which physical effect the plain model of eq. (16) lacks, and say how sure that is."""
+        from kempf.flows.jobs.default_model import default_model_of
         from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-        from kempf.flows.jobs.standing_model import PLAIN
 
-        return DiagnosisView(diagnose_vessel(self.warehouse, self.name, PLAIN)[0])
+        return DiagnosisView(diagnose_vessel(self.warehouse, self.name, default_model_of(self.warehouse, self.name))[0])
 
     def add_effect(self, name: str) -> pl.DataFrame:
         """Add an effect of the catalogue to her model and refit; return the ladder from the plain model to this one."""
