@@ -65,6 +65,7 @@ def test_on_a_pond_zigzags_without_a_log_are_pooled_by_its_model(tmp_path: Path)
         stored = parameter_sets.get(warehouse, one["parameter_set_id"])
         assert stored.model_spec == expected.model_dump(mode="json") and stored.model_name == "pond"
         assert "not_pooled" not in one
+        assert not any("trial speed" in warning for warning in stored.warnings)
     # the model is recorded: another word in the profile changes no set that is there
     (tmp_path / "sea.yaml").write_text(yaml.safe_dump({**content, "surroundings": "sea"}), encoding="utf-8")
     assert kempf("vessels", "set", "mariner", "--profile", tmp_path / "sea.yaml", *asked[2:]).code == 0
