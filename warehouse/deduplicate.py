@@ -9,8 +9,8 @@ from kempf.warehouse.segments import Segment
 #: executes this close in two logs are one
 _SAME_INSTANT_S = 2.0
 
-#: executes and overshoots this close are those of one signal, sampled twice: repeated runs differ by more
-_SAME_SAMPLE_S, _SAME_ANGLE_DEG = 0.1, 0.02
+#: executes and overshoots this close are those of one signal, written twice: repeated runs differ by more somewhere
+_SAME_SAMPLE_S, _SAME_ANGLE_DEG = 0.05, 0.005
 
 
 def once(found: Sequence[Segment], twins: Callable[[Segment, Segment], bool]) -> tuple[list[Segment], dict[str, str]]:
@@ -61,6 +61,6 @@ def _apart_s(one: Segment, other: Segment) -> float:
 
 
 def _measured_alike(one: Segment, other: Segment) -> bool:
-    """Tell whether two segments have the same overshoots, to what another sampling of one signal leaves."""
+    """Tell whether two segments have the same overshoots, to what another rounding of one signal leaves."""
     pairs = zip(one.overshoots_deg, other.overshoots_deg, strict=False)
     return len(one.overshoots_deg) == len(other.overshoots_deg) and all(abs(a - b) < _SAME_ANGLE_DEG for a, b in pairs)

@@ -149,9 +149,9 @@ def test_where_a_log_has_its_own_time_the_executes_decide(other: Segment, twins:
 @pytest.mark.parametrize(
     ("other", "twins"),
     [
-        (put_over("b", 0.05, (8.01, 9.0), own_time=False), True),
+        (put_over("b", 0.03, (8.004, 9.0), own_time=False), True),
         (put_over("b", 0.5, own_time=False), False),
-        (put_over("b", 0.0, (8.0, 9.1), own_time=False), False),
+        (put_over("b", 0.0, (8.0, 9.02), own_time=False), False),
         (put_over("b", 0.0, (8.0,), own_time=False), False),
     ],
 )

@@ -138,6 +138,15 @@ def test_an_interval_that_the_column_contradicts_is_refused_with_what_was_found(
     assert error.value.code == "interval_contradicts_times" and "interval_s" in error.value.next_step
 
 
+def test_the_interval_is_held_against_a_date_beside_a_time_of_day_too() -> None:
+    rows = [f"2025-05-03,07:47:{int(1 + k * INTERVAL_S):02d},{k}\n" for k in range(300)]
+    time = {"date": "day", "time": "at", "interval_s": INTERVAL_S}
+    readings = read("day,at,hdg\n" + "".join(rows), time)
+    assert readings.tally.records_kept == 300
+    assert readings.frame["time_utc_ns"].to_list() == [WANTED + k * 135_200_000 for k in range(300)]
+    assert any("agrees within 1 s" in note for note in readings.notes)
+
+
 def test_a_damaged_stamp_does_not_contradict_the_interval() -> None:
     lines = coarse(1000).splitlines(keepends=True)
     lines[500], lines[700] = lines[500].replace(lines[500].split(",")[0], "9e6"), "x" + lines[700]
