@@ -8,17 +8,40 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from datetime import datetime
 from fnmatch import fnmatch
-from typing import Any, Literal
+from typing import Any, ClassVar, Literal
 
-from pydantic import AwareDatetime, Field, ValidationError, field_validator, model_validator
+from pydantic import (
+    AwareDatetime,
+    Field,
+    SerializerFunctionWrapHandler,
+    ValidationError,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import UsageError
 from kempf.schemas.faults import faults_of
 from kempf.schemas.frozen import Frozen
 from kempf.schemas.units import factor_to_si
+
+#: yyyy or yy, mm and dd in any order, with one sign between them or none
+_DATE_FORM = re.compile(r"(?=.*y)(?=.*m)(?=.*d)(?:yyyy|yy|mm|dd)([-./ ]?)(?:yyyy|yy|mm|dd)\1(?:yyyy|yy|mm|dd)")
+
+
+class _Grown(Frozen):
+    """A part of the profile to which keys were added: it is stored, and hashed, as it was where they are not used."""
+
+    _later: ClassVar[frozenset[str]] = frozenset()
+
+    @model_serializer(mode="wrap")
+    def _as_before(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        content: dict[str, Any] = handler(self)
+        return {key: value for key, value in content.items() if value is not None or key not in self._later}
 
 
 class ChannelMap(Frozen):
@@ -58,14 +81,24 @@ class ChannelMap(Frozen):
         return self.offset * factor_to_si(self.unit, CHANNELS[self.channel].unit, self.channel)
 
 
-class TimeColumn(Frozen):
-    """Where the time of a delimited log stands: UTC text, or elapsed time since a stated start."""
+class TimeColumn(_Grown):
+    """Where the time of a log stands: UTC text, a date and a time of day, or elapsed time since a stated start."""
 
-    column: str
-    #: None for ISO 8601 text; else the unit of an elapsed or epoch number
+    #: column of the whole instant; one of its own, or ``date`` and ``time``, or rows that are counted
+    column: str | None = None
+    #: date, time: columns of the date and of the time of day, where they stand apart
+    date: str | None = None
+    time: str | None = None
+    #: how the date is written, such as dd.mm.yyyy; None for ISO 8601, yyyy-mm-dd or yyyymmdd
+    date_form: str | None = None
+    #: None for ISO 8601 text; else the unit of an elapsed or epoch number, or of seconds since midnight
     unit: Literal["s", "ms", "us", "ns"] | None = None
     #: start of the elapsed time; without it a number counts from 1970-01-01 UTC
     start: AwareDatetime | None = None
+    #: seconds between two rows, where they are evenly spaced and the column is too coarse or not there
+    interval_s: float | None = Field(default=None, gt=0, le=3600)
+
+    _later: ClassVar[frozenset[str]] = frozenset({"date", "time", "date_form", "interval_s"})
 
     @field_validator("start")
     @classmethod
@@ -73,6 +106,37 @@ class TimeColumn(Frozen):
         if value is not None and not 1970 <= value.year < 2200:
             raise ValueError("start lies between the years 1970 and 2200")
         return value
+
+    @field_validator("date_form")
+    @classmethod
+    def _a_form(cls, value: str | None) -> str | None:
+        if value is not None and not _DATE_FORM.fullmatch(value):
+            raise ValueError("date_form has yyyy or yy, mm and dd, once each, such as dd.mm.yyyy, mm/dd/yyyy or ddmmyy")
+        return value
+
+    @model_validator(mode="after")
+    def _one_way(self) -> TimeColumn:
+        if (self.date is None) != (self.time is None):
+            raise ValueError("date and time are given together: the columns of the date and of the time of day")
+        if self.date is not None and self.column is not None:
+            raise ValueError("column is that of the whole instant; with date and time leave it out")
+        if self.date is not None and self.start is not None:
+            raise ValueError("start is that of an elapsed time; the column of the date says the day")
+        if self.date_form is not None and self.date is None:
+            raise ValueError("date_form is that of the column date")
+        if self.column is None and self.date is None and self.interval_s is None and self.start is None:
+            raise ValueError("give column, or date and time, or interval_s")
+        return self
+
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """Columns that it names."""
+        return tuple(name for name in (self.column, self.date, self.time) if name is not None)
+
+    @property
+    def stated(self) -> bool:
+        """Whether the profile states when a log begins, rather than the log: several may share that."""
+        return self.start is not None or not self.columns
 
 
 class Source(Frozen):
@@ -106,7 +170,7 @@ class Antenna(Frozen):
     up_m: float = 0.0
 
 
-class VesselProfile(Frozen):
+class VesselProfile(_Grown):
     """A ship's particulars and the sources of her logs."""
 
     vessel: str | None = None
@@ -119,8 +183,15 @@ class VesselProfile(Frozen):
     trial_speed_std_m_s: float | None = Field(default=None, gt=0)
     #: l of eq. (16): yaw acceleration per unit of lateral acceleration that the wind causes, 1/m
     wind_arm_per_m: float | None = None
+    #: what her magnetic headings lack to true north where no sentence says it, deg, east positive
+    variation_deg: float | None = Field(default=None, ge=-180, le=180)
+    #: what acts on her beside the rudder, which the model has where none is named: see `surroundings.default_model`;
+    #: None: the sea
+    surroundings: Literal["tank", "pond", "sea"] | None = None
     antenna: Antenna = Antenna()
     sources: list[Source] = Field(default_factory=list)
+
+    _later: ClassVar[frozenset[str]] = frozenset({"variation_deg", "surroundings"})
 
     def source_for(self, file_name: str) -> Source | None:
         """Return the first source whose pattern matches the file's name (without its folder), or None."""

@@ -9,6 +9,9 @@ from kempf.warehouse.segments import Segment
 #: executes this close in two logs are one
 _SAME_INSTANT_S = 2.0
 
+#: executes and overshoots this close are those of one signal, written twice: repeated runs differ by more somewhere
+_SAME_SAMPLE_S, _SAME_ANGLE_DEG = 0.05, 0.005
+
 
 def once(found: Sequence[Segment], twins: Callable[[Segment, Segment], bool]) -> tuple[list[Segment], dict[str, str]]:
     """Return each manoeuvre once, and why the others are left out.
@@ -39,9 +42,25 @@ def _overlap(one: Segment, other: Segment) -> bool:
 def same(one: Segment, other: Segment) -> bool:
     """Tell whether two segments are one manoeuvre: at the same time, to the same side, executes at the same instants.
 
-    The time alone does not decide: logs of a tank count from one stated start.
+    Where neither log has a time of its own, since both count from a start that the profile states or from the moment
+    at which the logger was switched on, the time says nothing: runs of a tank share their start. They are one only
+    where what was measured is the same, as in two exports of one run.
     """
-    if not _overlap(one, other):
+    if not _overlap(one, other) or one.first_side != other.first_side:
         return False
-    late = [float(min(abs(theirs - ns) for theirs in other.executes_utc_ns)) * 1e-9 for ns in one.executes_utc_ns]
-    return one.first_side == other.first_side and max(late, default=0.0) < _SAME_INSTANT_S
+    late = _apart_s(one, other)
+    if one.own_time or other.own_time:
+        return late < _SAME_INSTANT_S
+    return max(late, _apart_s(other, one)) < _SAME_SAMPLE_S and _measured_alike(one, other)
+
+
+def _apart_s(one: Segment, other: Segment) -> float:
+    """Return the longest time between an execute of the one and the nearest of the other, s."""
+    apart = [float(min(abs(theirs - ns) for theirs in other.executes_utc_ns)) * 1e-9 for ns in one.executes_utc_ns]
+    return max(apart, default=0.0)
+
+
+def _measured_alike(one: Segment, other: Segment) -> bool:
+    """Tell whether two segments have the same overshoots, to what another rounding of one signal leaves."""
+    pairs = zip(one.overshoots_deg, other.overshoots_deg, strict=False)
+    return len(one.overshoots_deg) == len(other.overshoots_deg) and all(abs(a - b) < _SAME_ANGLE_DEG for a, b in pairs)

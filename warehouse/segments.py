@@ -57,6 +57,11 @@ class Segment:
         object.__setattr__(self, "executes_utc_ns", tuple(int(t) for t in self.executes_utc_ns))
         object.__setattr__(self, "overshoots_deg", tuple(float(a) for a in self.overshoots_deg))
 
+    @property
+    def own_time(self) -> bool:
+        """Whether her log tells the time itself, rather than counting from a stated start or from being switched on."""
+        return self.detail.get("own_time") is not False
+
     def show(self, file_name: str) -> dict[str, Any]:
         """Return the segment as the command line's JSON object.
 

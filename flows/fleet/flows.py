@@ -30,15 +30,17 @@ from kempf.flows.fleet import report as fleet_report
 from kempf.flows.fleet.diagnosis_summary import summary
 from kempf.flows.fleet.state import responsible_code
 from kempf.flows.jobs import ingest_logs
+from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.pool_vessel import pool_vessel
-from kempf.flows.jobs.standing_model import PLAIN
+from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
 from kempf.flows.process.wrap_error import wrapped
+from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import vessels as vessel_table
 from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
 
@@ -85,11 +87,18 @@ def ingest(
 @task(name="identify-vessel", retries=1, retry_delay_seconds=5)
 def identify_task(warehouse: str, vessel: str, estimator: str, spec: dict[str, Any]) -> list[dict[str, Any]]:
     """Identify every manoeuvre of one vessel."""
-    request = Request(ModelSpec.model_validate(spec), estimator)
+    request = Request(_model(warehouse, vessel, spec), estimator)
     run = flow_run.get_id()
     run_id = str(run) if run else None
     outcomes = identify_vessel(Warehouse(warehouse), vessel, request, flow_run=run_id)
-    pool_vessel(Warehouse(warehouse), vessel, request, outcomes, flow_run=run_id)
+    pooled: ParameterSet | KempfError | None
+    try:
+        found = pool_vessel(Warehouse(warehouse), vessel, request, outcomes, flow_run=run_id)
+        pooled = found[0] if found else None
+    except KempfError as error:
+        # that zigzags have nothing in common is no failure of the separate sets
+        pooled = error
+    alone = not_pooled(Warehouse(warehouse), vessel, request, outcomes, pooled)
     return [
         {
             "segment": o.segment.segment_id,
@@ -97,6 +106,7 @@ def identify_task(warehouse: str, vessel: str, estimator: str, spec: dict[str, A
             "parameter_set": o.parameter_set.parameter_set_id if o.parameter_set else None,
             "converged": bool(o.parameter_set and o.parameter_set.convergence.get("converged")),
             "error": o.error.message if o.error else "",
+            "not_pooled": alone.get(o.segment.segment_id, ""),
         }
         for o in outcomes
     ]
@@ -117,11 +127,16 @@ def identify(
     estimator : str, optional
         One of `kempf.pipeline.estimate.names.NAMES`.
     spec : dict, optional
-        Model specification.
+        Model specification; by default the plain one, or that of her surroundings.
     """
     rows = identify_task(warehouse, vessel, estimator, spec or {})
     create_table_artifact(key="kempf-identify", table=rows, description=vessel)
     return rows
+
+
+def _model(warehouse: str, vessel: str, spec: dict[str, Any]) -> ModelSpec:
+    """Return the model that is asked for, where none is that of the vessel's surroundings."""
+    return ModelSpec.model_validate(spec) if spec else default_model_of(Warehouse(warehouse), vessel)
 
 
 def _names(warehouse: str, vessels: Sequence[str] | None) -> list[str]:
@@ -243,10 +258,10 @@ def _percent(done: int, total: int) -> float:
 @task(name="diagnose-batch", retries=1, retry_delay_seconds=5)
 def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any]) -> list[dict[str, Any]]:
     """Diagnose vessels one after the other, each on all cores; one that fails is reported, the others are done."""
-    model, documents = ModelSpec.model_validate(spec), []
+    documents = []
     for vessel in vessels:
         try:
-            found, _ = diagnose_vessel(Warehouse(warehouse), vessel, model)
+            found, _ = diagnose_vessel(Warehouse(warehouse), vessel, _model(warehouse, vessel, spec))
             documents.append(found.show())
         except Exception as error:  # noqa: BLE001 - whatever it is, the next vessel must not pay for it
             documents.append({"vessel": vessel, "verdict": "failed", "error": wrapped(error).to_json()["error"]})
@@ -267,7 +282,7 @@ def diagnose(
     vessels : list of str, optional
         Only these; the whole fleet by default.
     spec : dict, optional
-        Model to begin from; the plain one by default.
+        Model to begin from; by default the plain one, or that of the vessel's surroundings.
 
     Returns
     -------
@@ -275,6 +290,6 @@ def diagnose(
         One row an effect and vessel, see `kempf.flows.fleet.diagnosis_summary.summary`.
     """
     names = _names(warehouse, vessels)
-    rows = summary(diagnose_batch(warehouse, names, spec or PLAIN.model_dump(mode="json")))
+    rows = summary(diagnose_batch(warehouse, names, spec or {}))
     create_table_artifact(key="kempf-diagnose", table=rows, description="What the models of the fleet lack")
     return rows

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Mapping
 from dataclasses import dataclass
+from types import MappingProxyType
 
-from kempf.flows.jobs.refresh_logs import refresh_logs
+from kempf.flows.jobs.refresh_logs import Refreshed, refresh_logs
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import logs, segments
@@ -29,6 +30,7 @@ class Chosen:
     ingests: dict[str, str]
     #: By log.
     file_names: dict[str, str]
+    #: Why a segment does not count, by its id: of every one that the current reading of the logs holds.
     skipped: dict[str, str]
 
 
@@ -37,31 +39,36 @@ def without_log(segment: Segment) -> bool:
     return segment.detail.get("has_log") is False
 
 
-def choose(warehouse: Warehouse, vessel: str, failed: Collection[str] = ()) -> Chosen:
+def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = MappingProxyType({})) -> Chosen:
     """Choose the zigzags of a vessel, as they are stored: each manoeuvre once, all read with one profile.
 
     Parameters
     ----------
-    failed : collection of str, optional
-        Ingests that are out of date and could not be brought up to date: they do not count.
+    failed : mapping of str to str, optional
+        Ingests whose zigzags do not count, and why.
 
     Raises
     ------
     NotFound
         ``no_segments``.
     """
-    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel) if row.ingest_id not in failed}
-    manoeuvres = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
+    rows = {row.ingest_id: row for row in logs.current(warehouse, vessel)}
+    every = [s for s in segments.current(warehouse, vessel) if s.ingest_id in rows]
+    manoeuvres = [s for s in every if s.ingest_id not in failed]
+    left = {s.segment_id: failed[s.ingest_id] for s in every if s.ingest_id in failed}
     if not manoeuvres:
         raise NotFound(
             "no_segments",
-            f"No zigzag was found in the {len(rows)} logs of {vessel!r}.",
+            f"No zigzag was found in the {len(rows)} logs of {vessel!r}."
+            if not left
+            else f"None of the {len(left)} zigzags of {vessel!r} counts: {'; '.join(sorted(set(left.values())))}.",
             "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
-            {"vessel": vessel},
+            {"vessel": vessel, **({"skipped": left} if left else {})},
         )
     profile_sha256 = rows[max(manoeuvres, key=lambda s: s.start_utc_ns).ingest_id].profile_sha256
     # a broken-off zigzag stays: its rudder moved too
-    kept, skipped = once([s for s in manoeuvres if rows[s.ingest_id].profile_sha256 == profile_sha256], same)
+    kept, twins = once([s for s in manoeuvres if rows[s.ingest_id].profile_sha256 == profile_sha256], same)
+    skipped = left | twins
     for segment in manoeuvres:
         if rows[segment.ingest_id].profile_sha256 != profile_sha256:
             skipped[segment.segment_id] = "its log is read with an older profile"
@@ -89,4 +96,9 @@ def choose_refreshed(warehouse: Warehouse, vessel: str, progress: Progress = sil
     NotFound
         ``no_warehouse``, ``no_vessel``, ``no_segments``.
     """
-    return choose(warehouse, vessel, refresh_logs(warehouse, vessel, progress).failed)
+    return choose(warehouse, vessel, out_of_date(refresh_logs(warehouse, vessel, progress)))
+
+
+def out_of_date(refreshed: Refreshed) -> dict[str, str]:
+    """Return for each ingest that could not be brought up to date why its zigzags do not count."""
+    return {ingest: f"its log cannot be read anew: {error.message}" for ingest, error in refreshed.failed.items()}

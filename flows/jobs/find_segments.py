@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.no_log.companions import has_log, shaft_speed
+from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.pipeline.segment.imo import judge
 from kempf.pipeline.segment.lateral import lateral_summary
@@ -17,11 +18,12 @@ from kempf.warehouse.segments import Segment, segment_id
 
 @dataclass(frozen=True)
 class Ingest:
-    """Whose log it is, and the ids of the log and of this reading of it."""
+    """Whose log it is, the ids of the log and of this reading of it, and the name of its file."""
 
     vessel: str
     log_id: str
     ingest_id: str
+    file_name: str
 
 
 def find_segments(
@@ -81,5 +83,13 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
             # which other zigzags may help one without a log is decided before any is read again
             "has_log": has_log(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
             "shaft_speed_per_s": shaft_speed(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
+            **({} if _own_time(zigzag, ingest, profile) else {"own_time": False}),
         },
     )
+
+
+def _own_time(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile) -> bool:
+    """Tell whether the log tells the time itself; one of before `CLOCK_FIRST_NS` has a clock that was never set."""
+    source = profile.source_for(ingest.file_name)
+    stated = source is not None and source.time is not None and source.time.stated
+    return not stated and zigzag.start_utc_ns >= CLOCK_FIRST_NS

@@ -220,7 +220,7 @@ class ReadLog:
 def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfile, readings: LogReadings) -> ReadLog:
     """Find the zigzags of a log that was read, and compare its channels."""
     code = code_version.fingerprint("ingest")
-    this_ingest = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code))
+    this_ingest = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code), file_name)
     instruments = from_readings(readings.lazy())
     give_back(readings.tally.records_read)
     searched = search(this_ingest, profile, file_name, readings.format, instruments, readings.tally.records_read)

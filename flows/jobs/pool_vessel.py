@@ -10,6 +10,7 @@ from kempf.flows.jobs.pending import Waiting, waiting
 from kempf.flows.jobs.standing_model import SINGLE
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.process.progress import Progress, silent
+from kempf.schemas.errors import KempfError
 from kempf.warehouse import logs
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -40,7 +41,8 @@ def poolable(warehouse: Warehouse, vessel: str, request: Request, outcomes: Sequ
     usable = {o.segment.ingest_id for o in outcomes if o.parameter_set is not None}
     if not usable:
         return "no zigzag could be identified"
-    chosen = choose(warehouse, vessel, {row.ingest_id for row in logs.current(warehouse, vessel)} - usable)
+    unusable = {row.ingest_id for row in logs.current(warehouse, vessel)} - usable
+    chosen = choose(warehouse, vessel, dict.fromkeys(unusable, "no zigzag of its log could be identified"))
     if len(chosen.segments) < 2:
         others = "; ".join(sorted(set(chosen.skipped.values())))
         return "there is one zigzag that counts" + (f", of the others: {others}" if others else "")
@@ -48,7 +50,7 @@ def poolable(warehouse: Warehouse, vessel: str, request: Request, outcomes: Sequ
     if request.spec.current != "none" and any(without_log(segment) for segment in chosen.segments):
         return (
             "the zigzags have no speed through the water, and in a current that over ground is another; in still water "
-            "a model with `current: none` pools them: --model FILE"
+            "`surroundings: pond` of the profile, or a model with `current: none` (--model FILE), pools them"
         )
     return chosen
 
@@ -98,3 +100,34 @@ def pool_segments(
     if made.convergence.get("converged") and new.may_move(request.spec, adopt=adopt):
         new.point(made.parameter_set_id)
     return made, is_new
+
+
+def not_pooled(
+    warehouse: Warehouse,
+    vessel: str,
+    request: Request,
+    outcomes: Sequence[IdentifyOutcome],
+    pooled: ParameterSet | KempfError | None,
+) -> dict[str, str]:
+    """Say of every zigzag that the pooled set is not fitted to, by segment, why.
+
+    Parameters
+    ----------
+    pooled : ParameterSet, KempfError or None
+        What came of `pool_vessel`.
+
+    Returns
+    -------
+    dict of str to str
+        Empty for a vessel with a single zigzag: there is nothing to pool.
+    """
+    names = [outcome.segment.segment_id for outcome in outcomes]
+    if len(names) < 2:
+        return {}
+    if isinstance(pooled, KempfError):
+        return dict.fromkeys(names, pooled.message)
+    chosen = poolable(warehouse, vessel, request, outcomes)
+    if isinstance(chosen, str):
+        return dict.fromkeys(names, chosen)
+    left = chosen.skipped | dict(pooled.convergence.get("left_out") or {}) if pooled else chosen.skipped
+    return {name: left[name] for name in names if name in left}

@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from functools import partial
 
 from kempf.flows.fleet.state import VesselState, fleet_state
-from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.chosen_manoeuvres import choose, out_of_date
+from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_segments
 from kempf.flows.jobs.pending import Waiting, store
 from kempf.flows.jobs.pool_vessel import pool_segments
@@ -232,7 +233,7 @@ class _Reprocessing:
             # identified and pooled just now
             return
         try:
-            chosen = choose(self.warehouse, work.vessel, work.refreshed.failed if work.refreshed else ())
+            chosen = choose(self.warehouse, work.vessel, out_of_date(work.refreshed) if work.refreshed else {})
             made, new = store_model(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
         except KempfError as error:
             work.report.fail(aliases.CURRENT, error)
@@ -270,7 +271,7 @@ def _requests(warehouse: Warehouse, vessel: str, default: Request | None) -> lis
             continue
         request = Request(ModelSpec.model_validate(spec), estimator, own=Own.from_json(own))
         asked.setdefault(f"{request.spec.sha256} {request.estimator}", request)
-    return [asked[key] for key in sorted(asked)] if known else [Request()]
+    return [asked[key] for key in sorted(asked)] if known else [Request(default_model_of(warehouse, vessel))]
 
 
 def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:

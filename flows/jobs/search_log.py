@@ -69,7 +69,7 @@ def search_again(warehouse: Warehouse, row: LogRow) -> SearchedLog:
         ``no_profile``: the profile that it was read with is lost.
     """
     profile = vessels.get(warehouse, row.profile_sha256)
-    log = Ingest(row.vessel, row.log_id, row.ingest_id)
+    log = Ingest(row.vessel, row.log_id, row.ingest_id, row.file_name)
     instruments = channels_of(warehouse, row.ingest_id)
     return search(log, profile, row.file_name, row.format, instruments, row.tally.records_read)
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.default_model import default_model_of
 from kempf.schemas import effects
 from kempf.schemas.effect import Effect
 from kempf.schemas.effect_file import read
@@ -150,9 +151,9 @@ def model_of(stored: ParameterSet) -> tuple[ModelSpec, Own]:
 
 
 def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:
-    """Return a vessel's current model, the plain one where she has none with effects yet."""
+    """Return a vessel's current model, the plain one or that of her surroundings where she has none yet."""
     now = standing(warehouse, vessel)
-    return model_of(now) if now else (PLAIN, Own())
+    return model_of(now) if now else (default_model_of(warehouse, vessel), Own())
 
 
 def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:

@@ -8,16 +8,15 @@ from statistics import median
 
 import numpy as np
 import polars as pl
-from numpy.typing import NDArray
 
-from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Nanoseconds, Reason, Values
+from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Decoded, Flag, Reason, Values
 from kempf.pipeline.ingest.mapping import check_once
 from kempf.pipeline.ingest.sniff import SAMPLE, separator_of
-from kempf.pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, spans_of, trimmed
+from kempf.pipeline.ingest.spans import Bytes, Index, Spans, as_bytes, is_blank, lines_of, trimmed
 from kempf.pipeline.ingest.text.cells import number
-from kempf.pipeline.ingest.text.times import decimal_times, iso_instants
+from kempf.pipeline.ingest.text.row_times import row_times
 from kempf.schemas.errors import DataRejected, UsageError
-from kempf.schemas.profile import Source, TimeColumn, start_ns
+from kempf.schemas.profile import Source
 
 _QUOTE, _TAB, _FEED = 34, 9, 10
 
@@ -29,9 +28,6 @@ _LONGEST_ROW, _BLOCK = 1 << 20, 4 << 20
 
 #: Most names of columns that a message lists.
 _SHOWN = 40
-
-#: Largest count of nanoseconds that is added to a start, so that the sum is an int64.
-_FARTHEST = 1 << 62
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,12 +77,13 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     UsageError
         The encoding is unknown.
     DataRejected
-        A column that the profile maps is not in the file, or two columns bear its name.
+        A column that the profile maps is not in the file, two columns bear its name, or the rows are not spaced as the
+        profile says.
     """
-    if source.time is None:
+    if source.time is None or not (source.time.columns or source.time.interval_s):
         raise UsageError("no_time_column", f"The source for {name} names no time column.", "Add 'time' to the source.")
     layout = _layout(data, source)
-    wanted = [source.time.column, *source.channels]
+    wanted = list(dict.fromkeys([*source.time.columns, *source.channels]))
     _check_columns(name, layout, wanted)
     check_once(name, source.channels)
     whole, cells = _cells(layout, wanted)
@@ -94,11 +91,10 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     reason = np.zeros(n, dtype=np.int8)
     reason[~whole] = CODE[Reason.MALFORMED]
     record = np.flatnonzero(whole)
-    text = cells[source.time.column]
-    instant, good, notes = _times(text, source.time)
+    timed = row_times(name, cells, record, layout.rows.take(record), source.time)
     time = np.full(n, NO_TIME, dtype=np.int64)
-    time[record[good]] = instant[good]
-    reason[record[~good & text.is_not_null().to_numpy()]] = CODE[Reason.MALFORMED]
+    time[record[timed.good]] = timed.time_utc_ns[timed.good]
+    reason[record[~timed.good & timed.told]] = CODE[Reason.MALFORMED]
     channels: dict[str, Values] = {}
     for column, mapped in source.channels.items():
         value = cells[column]
@@ -106,7 +102,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
         values = channels.setdefault(mapped.channel, Values.empty(n))
         values.put(record[there], (number(value) * mapped.factor + mapped.offset_si)[there])
     rows, sources = np.arange(n, dtype=np.int64), np.zeros(n, dtype=np.int64)
-    return Decoded(rows, layout.rows, layout.rows, time, sources, ("row",), reason, channels, notes)
+    return Decoded(rows, layout.rows, layout.rows, time, sources, ("row",), reason, channels, timed.notes)
 
 
 def columns_found(data: bytes, source: Source | None, most: int | None = _SHOWN) -> list[str]:
@@ -300,15 +296,3 @@ def _one_tab(buffer: Bytes, rows: Spans) -> tuple[Bytes, Spans]:
     start, stop = before[rows.start], before[rows.stop]
     slim[stop] = _FEED
     return slim, Spans(slim, start, stop)
-
-
-def _times(text: pl.Series, column: TimeColumn) -> tuple[Nanoseconds, NDArray[np.bool_], list[str]]:
-    """Read the time column; return UTC nanoseconds, which are good, and notes."""
-    if column.unit is None:
-        instant, good, zoned = iso_instants(spans_of(text))
-        bare = bool(np.any(good & ~zoned))
-        return instant, good, ["Times without a zone are taken as UTC."] if bare else []
-    elapsed, good = decimal_times(text, column.unit)
-    start = start_ns(column.start) if column.start is not None else 0
-    good &= np.abs(elapsed) < _FARTHEST
-    return np.where(good, elapsed, 0) + start, good, []

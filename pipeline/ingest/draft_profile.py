@@ -36,7 +36,10 @@ _NAMES: tuple[tuple[str, str, str], ...] = (
     (r"roll|heel|phi", "roll", "deg"),
     (r"pitch|trim|theta", "pitch", "deg"),
 )
-_TIME = re.compile(r"utc|t|time( ?stamp)?|date ?time|datetime|epoch|gps ?time|time utc")
+_TIME = re.compile(
+    r"utc|t|time( ?stamp)?|date ?time|datetime|epoch|gps ?time|(time|time of day) utc|utc time|time of day"
+)
+_DATE = re.compile(r"((utc|gps) ?)?(date|day)( utc)?")
 _UNIT = {re.sub(r"[^a-z]", "", unit.lower()): unit for unit in TO_SI} | {"degs": "deg/s", "knots": "kn", "kts": "kn"}
 
 
@@ -53,15 +56,18 @@ def draft_profile(file_name: str, columns: Sequence[str], titled: Titled | None 
     if titled is not None:
         columns = titled.names or [f"column {k}" for k in range(1, titled.count + 1)]
     words = [_words(column) for column in columns]
-    clock = next((c for c, (name, _) in zip(columns, words, strict=True) if _TIME.fullmatch(name)), None)
+    day, clock = (
+        next((c for c, (name, _) in zip(columns, words, strict=True) if kind.fullmatch(name)), None)
+        for kind in (_DATE, _TIME)
+    )
     lines = [
         *_head(file_name, "columns"),
         *_table(titled, columns),
-        f"    time: {{column: {json.dumps((clock or '') + '?')}}}  # with a unit if it is a number of seconds",
+        _time(day, clock),
         "    channels:",
     ]
     for column, (name, unit) in zip(columns, words, strict=True):
-        if column != clock:
+        if column not in (day, clock):
             channel, usual = _guess(name)
             lines.append(_entry(column, channel, unit or usual))
     return "\n".join(lines) + "\n"
@@ -100,6 +106,15 @@ def _head(file_name: str, what: str) -> list[str]:
         "sources:",
         f"  - match: {json.dumps(file_name)}",
     ]
+
+
+def _time(day: str | None, clock: str | None) -> str:
+    """Return where the time stands: a column of its own, or a date beside a time of day."""
+    if day is None or clock is None:
+        column = json.dumps((clock or day or "") + "?")
+        return f"    time: {{column: {column}}}  # with a unit if it is a number of seconds"
+    both = ", ".join(f"{key}: {json.dumps(column + '?')}" for key, column in (("date", day), ("time", clock)))
+    return f"    time: {{{both}}}  # with date_form: dd.mm.yyyy or the like if the date is not yyyy-mm-dd"
 
 
 def _table(titled: Titled | None, columns: Sequence[str]) -> list[str]:

@@ -60,7 +60,7 @@ def nmea_corrections(name: str, source: Source | None) -> dict[str, dict[str, tu
         A key of the source is not of that form, or maps to another channel.
     """
     corrections: dict[str, dict[str, tuple[float, float]]] = {}
-    if source is None or source.time is not None:
+    if source is None or (source.time is not None and not (source.time.start and not source.time.columns)):
         # a source with a time column describes delimited text that happens to share the pattern
         return corrections
     for key, mapped in source.channels.items():

@@ -14,6 +14,7 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import Readings, Tally, joined
 from kempf.pipeline.ingest.screen import Screen
 from kempf.pipeline.ingest.unpack import unpack
+from kempf.pipeline.ingest.unset_clock import dated_parts
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.profile import Source, VesselProfile
 
@@ -80,8 +81,20 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
             "Export the log as one of these. " + _SEE_PROFILE,
             {"name": name},
         )
-    screen, clocks, summary = Screen(log_format), OwnClocks(source), _Summary()
-    for decoded in _decode(log_format, name, file, profile, source):
+    if log_format == "mcap" and source and source.time and (source.time.date or source.time.interval_s):
+        raise UsageError(
+            "time_not_of_this_format",
+            f"{name} is an MCAP file; the source for it has date and time, or interval_s, which are of delimited text.",
+            "Name log_time, publish_time or a field of the messages as the column of 'time', or leave 'time' out.",
+            {"name": name},
+        )
+
+    def decoding() -> Iterator[Decoded]:
+        return _decode(log_format, name, file, profile, source)
+
+    dated = dated_parts(decoding, source.time if source else None)
+    screen, clocks, summary = Screen(log_format, dated.first_ns), OwnClocks(source), _Summary()
+    for decoded in dated.parts:
         checked = screen.part(decoded)
         summary.add(checked)
         if not decoded.ends:
@@ -89,7 +102,7 @@ def read_parts(name: str, log: bytes | LogFile, profile: VesselProfile) -> Itera
             continue
         if summary.tally.records_kept == 0:
             raise _nothing(name, checked, summary)
-        yield replace(clocks.set_right(checked), notes=(*notes, *checked.notes, *clocks.notes()))
+        yield replace(clocks.set_right(checked), notes=(*notes, *dated.notes, *checked.notes, *clocks.notes()))
 
 
 class _Summary:
@@ -116,7 +129,7 @@ def _decode(
         from kempf.pipeline.ingest.mapping import nmea_corrections
         from kempf.pipeline.ingest.nmea.decode import decode as nmea
 
-        yield nmea(_whole(name, log), nmea_corrections(name, source))
+        yield nmea(_whole(name, log), nmea_corrections(name, source), profile.variation_deg)
     elif log_format == "mcap":
         from kempf.pipeline.ingest.mcap.decode import decode as mcap
 
@@ -169,7 +182,8 @@ def _nothing(name: str, last: Readings, summary: _Summary) -> DataRejected:
         since, until = map(_year, summary.unset)
         years = f" Its times lie in {since}." if since == until else f" Its times lie between {since} and {until}."
     step = {
-        "clock_unset": "The logger's clock was not set: correct the times in a copy of the log, or ingest another log.",
+        "clock_unset": "The logger's clock was not set, or the unit of the time column is another: correct the unit in "
+        "the profile or the times in a copy of the log, or ingest another log.",
         "no_time": "No sentence gives the time: log RMC or ZDA too, or let the logger stamp the lines.",
         "checksum": "The lines are damaged, or their checksums were cut off: export the log again.",
         "no_channel": "The log holds none of the canonical channels: check that it is the right file.",

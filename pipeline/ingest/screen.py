@@ -6,6 +6,8 @@ as a whole is the doctor's question, not one of this room.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import polars as pl
 import pyarrow as pa
@@ -16,6 +18,7 @@ from kempf.pipeline.ingest.decoded import CODE, NO_TIME, REASONS, Decoded, Reaso
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, Readings, Tally
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, days_since_1970
+from kempf.pipeline.ingest.turns import Turns
 from kempf.schemas.channels import CHANNELS
 
 Code = NDArray[np.int8]
@@ -31,15 +34,18 @@ class Screen:
     """The checks of one log, which comes in one part or in several; what they find does not depend on where it is cut.
 
     What a record that comes later can still decide is held back, and comes out with the next part: of each source the
-    last record, and those that share the latest instant.
+    last record, and those that share the latest instant, and angles beyond one turn that may be nonsense.
 
     Parameters
     ----------
     log_format : {"delimited", "mcap", "nmea"}
+    first_ns : int, optional
+        Earliest time that is taken for one, UTC nanoseconds.
     """
 
-    def __init__(self, log_format: str) -> None:
-        self._format = log_format
+    def __init__(self, log_format: str, first_ns: int = CLOCK_FIRST_NS) -> None:
+        self._format, self._first_ns = log_format, first_ns
+        self._turns = Turns()
         self._clocks: dict[int, Clock] = {}
         self._held: Decoded | None = None
         self._settled = np.empty(0, dtype=np.bool_)
@@ -61,24 +67,36 @@ class Screen:
         work = decoded if self._held is None else decoded.behind(self._held)
         settled = np.concatenate([self._settled, np.zeros(len(decoded), dtype=np.bool_)])
         reason = work.reason.copy()
-        held, settled = self._check_clocks(work, reason, settled)
+        held, settled, sources = self._check_clocks(work, reason, settled)
+        sources = _kept(sources, (reason == 0) & ~held)
+        waits = self._turns.undecided(work, sources)
+        if waits.any():
+            held |= waits
+            sources = _kept(sources, ~held)
+        work = replace(work, channels=self._turns.wrapped(work, sources))
         if held.any():
             self._held, self._settled = work.take(np.flatnonzero(held)), settled[held]
             left = np.flatnonzero(~held)
             work, reason = work.take(left), reason[left]
         else:
             self._held, self._settled = None, settled[:0]
+        if work.ends:
+            work = replace(work, notes=[*work.notes, *self._turns.notes()])
         return _checked(work, reason, self._format)
 
-    def _check_clocks(self, work: Decoded, reason: Code, settled: Flag) -> tuple[Flag, Flag]:
-        """Refuse what the clock forbids; return which records are held back, and of which the clock is settled."""
+    def _check_clocks(self, work: Decoded, reason: Code, settled: Flag) -> tuple[Flag, Flag, dict[int, Index]]:
+        """Refuse what the clock forbids.
+
+        Return which records are held back, of which the clock is settled, and what was looked at by source.
+        """
         time = work.time_utc_ns
         reason[(reason == 0) & (time == NO_TIME)] = CODE[Reason.NO_TIME]
-        unset = (time < CLOCK_FIRST_NS) | (time >= CLOCK_LAST_NS)
+        unset = (time < self._first_ns) | (time >= CLOCK_LAST_NS)
         reason[(reason == 0) & unset] = CODE[Reason.CLOCK_UNSET]
         held = np.zeros(reason.shape, dtype=np.bool_)
-        for own in _by_source(work, reason):
-            clock = self._clocks.setdefault(int(work.source[own[0]]), Clock())
+        sources = {int(work.source[own[0]]): own for own in _by_source(work, reason)}
+        for source, own in sources.items():
+            clock = self._clocks.setdefault(source, Clock())
             fresh = own[~settled[own]]
             back = clock.goes_back(time[fresh], ends=work.ends)
             known = fresh[: back.size]
@@ -87,7 +105,11 @@ class Screen:
             if not work.ends:
                 held[fresh[back.size :]] = True
                 held[own[settled[own] & (reason[own] == 0) & (time[own] == clock.latest)]] = True
-        return held, settled
+        return held, settled, sources
+
+
+def _kept(sources: dict[int, Index], mask: Flag) -> dict[int, Index]:
+    return {source: own[mask[own]] for source, own in sources.items()}
 
 
 def _checked(decoded: Decoded, reason: Code, log_format: str) -> Readings:

@@ -51,7 +51,7 @@ def read(vessel: str) -> Readings:
 
 def test_every_example_reads_its_log_whole() -> None:
     behind = [text for (kind, text), (following, _) in itertools.pairwise(BLOCKS) if following == "text"]
-    assert len(behind) == 5
+    assert len(behind) == 7
     for text in behind:
         vessel = yaml.safe_load(text)["vessel"]
         readings = read(vessel)
@@ -72,6 +72,15 @@ def test_delimited_example_turns_the_rudder_and_corrects_the_compass() -> None:
 def test_elapsed_example_counts_from_its_start() -> None:
     times = read("model_a").frame["time_utc_ns"].to_list()
     assert times == [1_746_252_000_000_000_000, 1_746_252_000_050_000_000]
+
+
+def test_date_and_time_of_day_are_joined() -> None:
+    assert read("coaster").frame["time_utc_ns"].to_list() == [1_746_252_000_000_000_000, 1_746_252_000_500_000_000]
+
+
+def test_rows_of_one_second_are_counted() -> None:
+    times = read("launch").frame["time_utc_ns"].to_list()
+    assert times == [1_746_252_000_000_000_000 + k * 135_200_000 for k in range(3)]
 
 
 def test_velocities_become_speed_and_course() -> None:

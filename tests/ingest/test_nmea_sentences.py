@@ -12,7 +12,9 @@ from hypothesis import strategies as st
 
 from kempf.pipeline.ingest.decoded import CODE, Reason
 from kempf.pipeline.ingest.nmea.decode import decode
+from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.ingest.screen import Screen
+from kempf.schemas.profile import parse
 
 SHARED = Path(__file__).parents[2].parent / "shared"
 DEG, KN = math.pi / 180, 1852 / 3600
@@ -294,3 +296,27 @@ def test_what_is_left_aside_is_counted():
     )
     notes = Screen("nmea").part(decode((line * 2 + good).encode())).notes
     assert notes == ("Sentences without a channel: AIVDM, PGRMC; of them 1 proprietary, 2 AIS or encapsulated.",)
+
+
+MAGNETIC = ("HCHDG,10.0,1.0,W,,", "HCHDM,20.0,M", "HCHDG,30.0,,,,")
+
+
+def test_magnetic_headings_take_the_variation_of_the_profile_where_no_sentence_gives_it():
+    log = "".join(f"2025-05-03T07:47:0{k}.000Z {sentence(body)}\n" for k, body in enumerate(MAGNETIC)).encode()
+    readings = read_log("a.nmea", log, parse({"variation_deg": -14.5}, "p"))
+    assert np.degrees(column(readings, "heading_rad")) == pytest.approx([354.5, 5.5, 15.5])
+    assert sum("by the profile's variation of -14.5 deg" in note for note in readings.notes) == 2
+    # what the log says comes first
+    own = log + f"2025-05-03T07:47:05.000Z {sentence('HCHDG,40.0,,,3.0,E')}\n".encode()
+    readings = read_log("a.nmea", own, parse({"variation_deg": -14.5}, "p"))
+    assert np.degrees(column(readings, "heading_rad")) == pytest.approx([12.0, 23.0, 33.0, 43.0])
+    assert not any("profile's variation" in note for note in readings.notes)
+
+
+def test_magnetic_headings_without_any_variation_are_counted_with_what_to_write():
+    fix = "GPRMC,074701.15,A,5954.0003,N,02435.9999,E,17.64,13.43,030525,,,A"
+    readings = read(fix, *MAGNETIC)
+    assert readings.tally.by_reason == {"no_channel": 3}
+    notes = " ".join(readings.notes)
+    assert "2 magnetic headings of HDG" in notes and "1 magnetic headings of HDM" in notes
+    assert "variation_deg: 7.5" in notes

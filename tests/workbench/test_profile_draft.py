@@ -47,6 +47,15 @@ def test_units_behind_a_name_and_columns_of_no_known_name() -> None:
     assert channels["x: 1"] == {"channel": "?", "unit": "?"}
 
 
+def test_a_date_beside_a_time_of_day_is_recognised() -> None:
+    for day, clock in (("Date", "Time"), ("UTC date", "UTC time"), ("date_utc", "time_utc")):
+        (source,) = yaml.safe_load(draft_profile("day.csv", [day, clock, "heading"]))["sources"]
+        assert source["time"] == {"date": f"{day}?", "time": f"{clock}?"}
+        assert list(source["channels"]) == ["heading"]
+    (source,) = yaml.safe_load(draft_profile("day.csv", ["date", "heading"]))["sources"]
+    assert source["time"] == {"column": "date?"}
+
+
 def test_what_describes_itself_needs_no_draft(logs: Path, tmp_path: Path) -> None:
     refused(kempf("profile", "draft", logs / "mariner.nmea.gz", "--json"), 2, "no_draft")
     refused(kempf("profile", "draft", logs / "none.csv", "--json"), 4, "no_such_file")

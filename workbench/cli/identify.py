@@ -14,6 +14,7 @@ from kempf.schemas.errors import KempfError, NotFound
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
 from kempf.workbench.parameter_set_table import tell_set
+from kempf.workbench.ranked_warnings import MOST
 from kempf.workbench.terminal import counted, print_json, progress_bar
 
 if TYPE_CHECKING:
@@ -47,31 +48,28 @@ def command(
 
     What was identified before from the same inputs, with the same code and settings, is not computed again.
     """
+    from kempf.flows.jobs.default_model import default_model_of
     from kempf.flows.jobs.identify_vessel import Request, identify_vessel
     from kempf.flows.jobs.standing_model import Own
-    from kempf.schemas.model_spec import ModelSpec
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.chosen_model import named_model, read_effect_files
 
     warehouse = Warehouse(uri)
     mine = Own(files=read_effect_files(files))
-    spec, own = named_model(warehouse, vessel, model, mine) if model else (ModelSpec(), Own())
+    spec, own = named_model(warehouse, vessel, model, mine) if model else (default_model_of(warehouse, vessel), Own())
     request = Request(spec, estimator, own=own.beside(mine))
     with progress_bar() as progress:
         outcomes = identify_vessel(warehouse, vessel, request, progress=progress)
-        pooled = _pooled(warehouse, vessel, request, outcomes, progress)
+        pooled, alone = _pooled(warehouse, vessel, request, outcomes, progress)
     if as_json:
-        print_json([*(_show(outcome) for outcome in outcomes), *([pooled.show()] if pooled else [])])
+        print_json([*(_show(outcome, alone) for outcome in outcomes), *([pooled.show()] if pooled else [])])
     else:
         if pooled is not None:
             held = len(pooled.convergence.get("held_out", ()))
             title = f"{counted(len(pooled.segment_ids) - held, 'zigzag')} pooled"
             title += f", {held} held out: {pooled.parameter_set_id}" if held else f": {pooled.parameter_set_id}"
             tell_set(pooled, title, verbose=verbose)
-            out = len(outcomes) - len(pooled.segment_ids)
-            if out:
-                why = "without a speed log, in another log, too, or read with an older profile"
-                click.echo(f"  not in it: {counted(out, 'zigzag')} {why}")
+            _print_alone(alone, verbose=verbose)
         for outcome in outcomes:
             _print_outcome(outcome, verbose=verbose)
         _print_current(warehouse, vessel, pooled)
@@ -83,18 +81,31 @@ def command(
 
 def _pooled(
     warehouse: Warehouse, vessel: str, request: Request, outcomes: list[IdentifyOutcome], progress: Progress
-) -> ParameterSet | None:
-    """Return the set that all manoeuvres share; where they share none the reason goes to stderr."""
-    from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
+) -> tuple[ParameterSet | None, dict[str, str]]:
+    """Return the set that all manoeuvres share, and why each of the others is not in it.
+
+    Where they share none the reason goes to stderr.
+    """
+    from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
 
     try:
         pooled = pool_vessel(warehouse, vessel, request, outcomes, progress=progress)
     except KempfError as error:
         click.echo(f"not pooled [{error.code}] {error}", err=True)
-        return None
-    if pooled is None and request.estimator == "ml" and len(outcomes) > 1:
-        click.echo(f"not pooled: {poolable(warehouse, vessel, request, outcomes)}", err=True)
-    return pooled[0] if pooled else None
+        return None, not_pooled(warehouse, vessel, request, outcomes, error)
+    alone = not_pooled(warehouse, vessel, request, outcomes, pooled[0] if pooled else None)
+    for why in dict.fromkeys(alone.values()) if pooled is None else ():
+        click.echo(f"not pooled: {why}", err=True)
+    return (pooled[0] if pooled else None), alone
+
+
+def _print_alone(alone: dict[str, str], *, verbose: bool) -> None:
+    """Say which zigzags are not in the pooled set, those of one reason together."""
+    for why in dict.fromkeys(alone.values()):
+        names = [name for name, reason in alone.items() if reason == why]
+        more = f" and {len(names) - MOST} more" if len(names) > MOST and not verbose else ""
+        shown = names if verbose else names[:MOST]
+        click.echo(f"  not in it: {counted(len(names), 'zigzag')}, {', '.join(shown)}{more}: {why}")
 
 
 def _print_current(warehouse: Warehouse, vessel: str, pooled: ParameterSet | None) -> None:
@@ -113,11 +124,13 @@ def _print_current(warehouse: Warehouse, vessel: str, pooled: ParameterSet | Non
         click.echo(f"  it stays; to have the pooled one: kempf params alias current {pooled.parameter_set_id}")
 
 
-def _show(outcome: IdentifyOutcome) -> object:
+def _show(outcome: IdentifyOutcome, alone: dict[str, str]) -> object:
+    name = outcome.segment.segment_id
+    why = {"not_pooled": alone[name]} if name in alone else {}
     if outcome.parameter_set is not None:
-        return outcome.parameter_set.show()
+        return {**outcome.parameter_set.show(), **why}
     assert outcome.error is not None
-    return {"segment_id": outcome.segment.segment_id, **outcome.error.to_json()}
+    return {"segment_id": name, **outcome.error.to_json(), **why}
 
 
 def _print_outcome(outcome: IdentifyOutcome, *, verbose: bool) -> None:

@@ -64,21 +64,26 @@ class VesselView:
         -------
         polars.DataFrame
             One row a parameter of a set, with its value and its standard error ``std`` in ``unit``; the sets of single
-            zigzags in order of time, the pooled one last. A zigzag that gave no set has a row with its ``error``.
+            zigzags in order of time, then the pooled one. A zigzag that gave no set has a row with its ``error``; those
+            that are not pooled have one at the end that says why.
 
         Raises
         ------
         KempfError
             No zigzag could be identified from, or there is none.
         """
+        from kempf.flows.jobs.default_model import default_model_of
         from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-        from kempf.flows.jobs.pool_vessel import pool_vessel
+        from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
         from kempf.flows.jobs.standing_model import Own
-        from kempf.schemas.model_spec import ModelSpec
         from kempf.workbench.chosen_model import named_model
 
         name = None if model is None else os.fspath(model)
-        spec, own = named_model(self.warehouse, self.name, name) if name else (ModelSpec(), Own())
+        spec, own = (
+            named_model(self.warehouse, self.name, name)
+            if name
+            else (default_model_of(self.warehouse, self.name), Own())
+        )
         request = Request(spec, estimator, own=own)
         outcomes = identify_vessel(self.warehouse, self.name, request)
         failed = [outcome.error for outcome in outcomes if outcome.error is not None]
@@ -88,8 +93,11 @@ class VesselView:
         try:
             pooled = pool_vessel(self.warehouse, self.name, request, outcomes)
             rows += _parameters(pooled[0], pooled[0].segment_ids) if pooled else []
+            alone = not_pooled(self.warehouse, self.name, request, outcomes, pooled[0] if pooled else None)
         except KempfError as error:
-            rows += _parameters(None, [o.segment.segment_id for o in outcomes], error)
+            alone = not_pooled(self.warehouse, self.name, request, outcomes, error)
+        for why in dict.fromkeys(alone.values()):
+            rows += _parameters(None, [name for name, reason in alone.items() if reason == why], f"not pooled: {why}")
         return frame_of(rows, _PARAMETER)
 
     def parameter_sets(self) -> pl.DataFrame:
@@ -149,10 +157,10 @@ class VesselView:
 
     def diagnose(self) -> DiagnosisView:
         """Find which physical effect the plain model of eq. (16) lacks, and say how sure that is."""
+        from kempf.flows.jobs.default_model import default_model_of
         from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-        from kempf.flows.jobs.standing_model import PLAIN
 
-        return DiagnosisView(diagnose_vessel(self.warehouse, self.name, PLAIN)[0])
+        return DiagnosisView(diagnose_vessel(self.warehouse, self.name, default_model_of(self.warehouse, self.name))[0])
 
     def add_effect(self, name: str) -> pl.DataFrame:
         """Add an effect of the catalogue to her model and refit; return the ladder from the plain model to this one."""
@@ -194,7 +202,7 @@ class VesselView:
 
 
 def _parameters(
-    found: ParameterSet | None, segment_ids: Sequence[str], error: KempfError | None = None
+    found: ParameterSet | None, segment_ids: Sequence[str], error: KempfError | str | None = None
 ) -> list[dict[str, Any]]:
     """Return one row a parameter of a set, or one that says why there is no set."""
     if found is None:

@@ -139,7 +139,9 @@ def identify_without_log(
             for r, run, v in zip(order, moving, speed.speed_m_s, strict=True)
         ]
     result = _combined(estimates, found, own, rounds, converged=converged, no_log=known)
-    return replace(result, warnings=(*result.warnings, *said, *left_out))
+    # in still water the speed over ground along the bow is the speed, whatever the trial speed
+    told = () if spec.current == "none" else said
+    return replace(result, warnings=(*result.warnings, *told, *left_out))
 
 
 def _first_fits(

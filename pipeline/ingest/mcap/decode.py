@@ -163,7 +163,7 @@ class _DecodeJob:
         self.owners = self._owners()
         time = source.time if source else None
         self.clock = time.column if time and time.column in _TIMES else _TIMES[0]
-        self.time_field = time if time and time.column not in _TIMES else None
+        self.time_field = time if time and time.column and time.column not in _TIMES else None
         self.routes: dict[int, Route | None] = {}
         self.made: dict[McapChannel, Route | None] = {}
         self.refused: dict[str, str] = {}

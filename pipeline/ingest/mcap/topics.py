@@ -64,6 +64,7 @@ class Route:
         check_once(channel.topic, mapped)
         self.mapped = mapped
         self._time = time
+        self._clock = (time.column if time else None) or ""
         self._void = VOID_WHERE_NEGATIVE.get(plain_name(schema.name), ()) if schema else ()
         wanted = dict.fromkeys(mapped)
         for key in mapped:
@@ -71,7 +72,7 @@ class Route:
         for _, test in self._void:
             wanted[test] = None
         if time is not None:
-            wanted |= dict.fromkeys([time.column, *(f"{time.column}.{p}" for pair in _STAMPS for p in pair)])
+            wanted |= dict.fromkeys([self._clock, *(f"{self._clock}.{p}" for pair in _STAMPS for p in pair)])
         self._wanted = list(wanted)
         self._reader = _reader(channel, schema, self._wanted)
         lacks = self._reader.missing
@@ -110,15 +111,13 @@ class Route:
         assert self._time is not None
         time = np.full(columns.good.size, -1, dtype=np.int64)
         start = start_ns(self._time.start) if self._time.start else 0
-        value, present = self._of(columns, self._time.column)
+        value, present = self._of(columns, self._clock)
         scale = _NS_PER[self._time.unit or "s"]
         with np.errstate(invalid="ignore"):
             usable = present & (value >= 0) & (value * scale + start < _LAST)
         time[usable] = _nanoseconds(value[usable], scale) + start
         for whole, rest in _STAMPS:
-            (second, has_second), (nano, has_nano) = (
-                self._of(columns, f"{self._time.column}.{p}") for p in (whole, rest)
-            )
+            (second, has_second), (nano, has_nano) = (self._of(columns, f"{self._clock}.{p}") for p in (whole, rest))
             with np.errstate(invalid="ignore"):
                 usable = has_second & has_nano & (second >= 0) & (second < _LAST / 1e9) & (nano >= 0) & (nano < 1e9)
             time[usable] = second[usable].astype(np.int64) * 1_000_000_000 + nano[usable].astype(np.int64)

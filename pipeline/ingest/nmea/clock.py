@@ -9,6 +9,7 @@ import numpy as np
 from kempf.pipeline.ingest.decoded import CODE, NO_TIME, Flag, Nanoseconds, Reason
 from kempf.pipeline.ingest.nmea.fields import Said
 from kempf.pipeline.ingest.nmea.frames import Frames
+from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.ingest.spans import Index
 from kempf.pipeline.ingest.text.times import DAY_NS, SECOND_NS, date, time_of_day, year_month_day
 from kempf.schemas.nmea import SATELLITES, SENTENCES
@@ -78,15 +79,16 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
             f"{late} dates were 1024 weeks or twice that too early (the overflow of GPS weeks) and were put right."
         )
     if frames.stamped:
-        both = times.dated & (frames.stamp_ns != NO_TIME)
-        lead = np.median((frames.stamp_ns - times.full)[both]) if both.any() else np.float64(0.0)
-        near = np.where(frames.stamp_ns != NO_TIME, frames.stamp_ns - np.int64(np.round(lead)), NO_TIME)
+        stamp_ns = _set_right(frames.stamp_ns, times, notes)
+        both = times.dated & (stamp_ns != NO_TIME)
+        lead = np.median((stamp_ns - times.full)[both]) if both.any() else np.float64(0.0)
+        near = np.where(stamp_ns != NO_TIME, stamp_ns - np.int64(np.round(lead)), NO_TIME)
         own = _nearest_day(times, near, notes)
         if abs(lead) > _LEAD_S * SECOND_NS:
             ahead = "ahead of" if lead > 0 else "behind"
             seconds = abs(float(lead)) / SECOND_NS
             notes.append(f"The logger's stamps are {seconds:.3f} s {ahead} the receiver's UTC (median).")
-        return NmeaClock(np.where(own != NO_TIME, own, frames.stamp_ns), notes)
+        return NmeaClock(np.where(own != NO_TIME, own, stamp_ns), notes)
     speaks = _of_a_dated_talker(frames, times.dated) & times.timed
     own = _nearest_day(times, _by_counting_days(times, speaks), notes)
     follows = _follows(said)
@@ -99,6 +101,24 @@ def clock_of(frames: Frames, said: dict[str, Said]) -> NmeaClock:
     return NmeaClock(
         np.where(own != NO_TIME, own, carried + _delays(frames, said, own, fix, carried, follows, notes)), notes
     )
+
+
+def _set_right(stamp_ns: Nanoseconds, times: _LineTimes, notes: list[str]) -> Nanoseconds:
+    """Return the stamps, those of a clock that was never set put right by the dates of a receiver where there are any.
+
+    Such a clock counts on from the moment at which the logger was switched on; the median of its lag is all it lacks.
+    """
+    unset = (stamp_ns != NO_TIME) & (stamp_ns < CLOCK_FIRST_NS)
+    both = unset & times.dated & (times.full >= CLOCK_FIRST_NS)
+    if not both.any():
+        return stamp_ns
+    lags = np.sort((times.full - stamp_ns)[both])
+    lag = lags[lags.size // 2]  # exact: a mean of two would be rounded to a float's nanoseconds
+    notes.append(
+        f"The logger's clock was not set: {int(unset.sum())} stamps were put right by the receiver's UTC, "
+        f"by {lag / SECOND_NS:.3f} s."
+    )
+    return np.where(unset, stamp_ns + np.where(unset, lag, 0), stamp_ns)
 
 
 def _delays(

@@ -25,22 +25,24 @@ _MOVES = 2.0 * _DEGREE
 _FOLLOWS = (0.5, 2.0)
 
 
-def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
+def make_true(frames: Frames, said: dict[str, Said], variation_deg: float | None = None) -> list[str]:
     """Add the variation to the headings of HDG and HDM, in place.
 
     A heading whose sentence lacks the variation is given the latest that one other source has sent, or the first where
-    none was sent yet: it changes by less than a degree a day's sail. Where the log has none, a magnetic heading is no
-    channel.
+    none was sent yet: it changes by less than a degree a day's sail. Where the log has none, it is that of the profile;
+    without either a magnetic heading is no channel.
 
     Parameters
     ----------
     said : dict of str to Said
         What the sentences say, by type.
+    variation_deg : float, optional
+        Of the profile, deg, east positive.
 
     Returns
     -------
     list of str
-        A note where a variation was carried from one sentence to another.
+        Notes where a variation was not that of the sentence itself, and where there was none.
     """
     notes: list[str] = []
     if not {"HDG", "HDM"} & set(said):
@@ -54,9 +56,21 @@ def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
         if name == "HDG":
             variation, own = _variation(said[name].fields, name)
         lacking = np.flatnonzero(there & ~own)
-        if carried is None:
+        if carried is None and variation_deg is not None and lacking.size:
+            variation[lacking] = variation_deg * _DEGREE
+            notes.append(
+                f"Magnetic headings of {name} were made true by the profile's variation of {variation_deg:g} deg; her "
+                "deviation, and what it is off, is a constant error of the heading."
+            )
+        elif carried is None:
             reason = said[name].reason
-            reason[lacking] = np.where(reason[lacking] == 0, CODE[Reason.NO_CHANNEL], reason[lacking])
+            refused = lacking[reason[lacking] == 0]
+            reason[refused] = CODE[Reason.NO_CHANNEL]
+            if refused.size:
+                notes.append(
+                    f"{refused.size} magnetic headings of {name} were refused: no sentence gives the variation. Write "
+                    "it into the profile, deg, east positive, such as variation_deg: 7.5"
+                )
         elif lacking.size:
             at, value, teller = carried
             latest = np.searchsorted(at, said[name].record[lacking], side="right") - 1
@@ -66,10 +80,10 @@ def make_true(frames: Frames, said: dict[str, Said]) -> list[str]:
             notes.append(
                 f"Magnetic headings of {name} were made true by the variation that {teller} sends: {shown} deg."
             )
-        # what is no heading stays as it is, to be refused: on the circle it would look like one
+        # what is beyond one turn is not brought onto the circle here: nonsense would look like a heading
         known = (magnetic >= CHANNELS["heading"].low) & (magnetic <= CHANNELS["heading"].high)
         made = np.mod(np.where(known, magnetic, 0.0) + variation, 2.0 * np.pi)
-        said[name].values["heading"] = (np.where(known, made, magnetic), there)
+        said[name].values["heading"] = (np.where(known, made, magnetic + variation), there)
     return notes
 
 

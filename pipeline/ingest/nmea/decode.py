@@ -20,7 +20,7 @@ Corrections = Mapping[str, Mapping[str, tuple[float, float]]]
 _NONE: Corrections = {}
 
 
-def decode(data: bytes, corrections: Corrections = _NONE) -> Decoded:
+def decode(data: bytes, corrections: Corrections = _NONE, variation_deg: float | None = None) -> Decoded:
     """Decode an NMEA 0183 log.
 
     A record is a line that is not blank. RMC, ZDA, GGA and GLL have their own time; any other sentence has that of its
@@ -34,6 +34,8 @@ def decode(data: bytes, corrections: Corrections = _NONE) -> Decoded:
         The whole file, decompressed.
     corrections : mapping, optional
         What the profile gives another unit, sign or offset, see `kempf.pipeline.ingest.mapping.nmea_corrections`.
+    variation_deg : float, optional
+        Of the magnetic headings, deg, east positive, where no sentence gives it.
     """
     frames = frames_of(as_bytes(data))
     n = len(frames.lines)
@@ -48,7 +50,7 @@ def decode(data: bytes, corrections: Corrections = _NONE) -> Decoded:
         if last > first:
             said[letters] = read_type(frames, read[first:last], letters)
     reason[(kind < 0) & (reason == 0)] = CODE[Reason.NO_CHANNEL]
-    notes = [*both_rudders(frames, said), *make_true(frames, said)]
+    notes = [*both_rudders(frames, said), *make_true(frames, said, variation_deg)]
     channels: dict[str, Values] = {}
     for what in said.values():
         reason[what.record] = what.reason
