@@ -29,9 +29,8 @@ def predicting_better(ladder: Ladder, steps: list[Step]) -> list[Step]:
         last = steps[-1]
         assert last.ahead is not None
         ladder.announce(f"step {len(steps)}: predicting one leg ahead")
-        # what does not show one step ahead, where every error counts, does not show a leg ahead
-        level = ladder.settings.level
-        screened = {c.effect.name: c for c in last.screened if c.p_adjusted < level and not np.isnan(c.score)}
+        # also what disturbances carry one step ahead, so that the likelihood does not see it
+        screened = {c.effect.name: c for c in last.screened if not (c.missing or c.measured_by)}
         choice = better_ahead(ladder.shooting, last.ahead, [c.effect for c in screened.values()])
         if choice is None or choice.stability < STABLE:
             break

@@ -14,8 +14,10 @@ from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.pipeline.shooting.ahead import Ahead
 from kempf.pipeline.shooting.paired import paired
 
-#: standard errors by which an effect must change a parameter or a prediction to matter, and least part of the misfit
-_MATTERS, _LEAST_PART = 2.0, 0.01
+#: part of the misfit one leg ahead, and standard errors, by which an effect that is there must change it to matter
+LEAST_PART, _CHANGES = 0.02, 1.0
+#: or part by which a parameter of the hull must move, and standard errors
+LEAST_SHIFT, _MOVES = 0.03, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,14 +28,17 @@ class Weight:
     #: no manoeuvre can be left out.
     fall: float
     t: float
-    #: Largest change of a parameter of the hull, standard errors that allow for errors that hang together.
+    #: Largest change of a parameter of the hull that moves by more than its error, part of it.
     shift: float
+    #: Largest of those changes in its standard error, which allows for errors that hang together.
+    shift_in_std: float
 
     @property
     def matters(self) -> bool:
-        """Whether a prediction or a parameter changes by more than its error."""
-        predicts = self.t > _MATTERS and self.fall > _LEAST_PART
-        return bool(np.isnan(self.fall) or predicts or self.shift > _MATTERS)
+        """Whether predictions or parameters change by what anybody would notice, and by more than their errors."""
+        predicts = self.t > _CHANGES and self.fall > LEAST_PART
+        moves = self.shift > LEAST_SHIFT and self.shift_in_std > _MOVES
+        return bool(np.isnan(self.fall) or predicts or moves)
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,8 +62,12 @@ def weighed(before: Ahead | None, after: Ahead | None, plain: PooledFit, fitted:
     """
     with np.errstate(invalid="ignore", divide="ignore"):
         std = np.sqrt(np.diag(uncertainty_of(fitted).covariance))[:N_HULL]
-        shift = float(np.nanmax(np.abs(fitted.hull - plain.hull) / std, initial=0.0))
+        moved = np.abs(fitted.hull - plain.hull)
+        known = np.abs(fitted.hull) > 3.0 * std
+        in_std = np.where(known, moved / std, 0.0)
+        part = np.where(known & (in_std > _MOVES), moved / np.abs(fitted.hull), 0.0)
+    shift = (float(np.max(part, initial=0.0)), float(np.max(in_std, initial=0.0)))
     if before is None or after is None:
-        return Weight(np.nan, np.nan, shift)
+        return Weight(np.nan, np.nan, *shift)
     found = paired(before.left_out, after.left_out)
-    return Weight(found.falls_by, found.in_std, shift)
+    return Weight(found.falls_by, found.in_std, *shift)

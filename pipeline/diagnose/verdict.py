@@ -111,8 +111,8 @@ def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
 def _changes(one: Immaterial) -> str:
     """Say how little an effect changes."""
     return (
-        f"the error one leg ahead falls by {100.0 * one.weight.fall:.1f} % with it, and no parameter of the hull moves "
-        f"by more than {one.weight.shift:.1f} standard errors"
+        f"with it the misfit one leg ahead falls by {100.0 * one.weight.fall:.1f} %, and no parameter of the hull "
+        f"moves by more than {100.0 * one.weight.shift:.1f} % beyond its error"
     )
 
 
@@ -328,7 +328,8 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
                 "effects": [c.effect.name for c, _ in one.chosen_from],
                 "error_ahead_falls_by": one.weight.fall,
                 "in_std": one.weight.t,
-                "hull_changes_by_std": one.weight.shift,
+                "hull_changes_by": one.weight.shift,
+                "hull_changes_by_std": one.weight.shift_in_std,
                 "refits": [_refit(c, k) for c, k in one.chosen_from],
             }
             for one in diagnosis.immaterial

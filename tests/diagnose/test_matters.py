@@ -43,19 +43,21 @@ def test_what_helps_the_fitted_and_harms_the_held_out_is_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    ("fall", "t", "shift", "matters"),
+    ("fall", "t", "shift", "in_std", "matters"),
     [
-        (0.3, 5.0, 0.1, True),
-        (0.3, 1.0, 0.1, False),
-        (0.001, 5.0, 0.1, False),
-        (-0.001, -1.0, 2.5, True),
-        (np.nan, np.nan, 0.0, True),
+        (0.3, 5.0, 0.0, 0.1, True),
+        (0.3, 0.5, 0.0, 0.1, False),
+        (0.001, 5.0, 0.0, 0.1, False),
+        (-0.001, -1.0, 0.1, 2.5, True),
+        # a gyro that reads 0.3 % low: sure of it, and nobody would notice
+        (-0.001, -1.0, 0.003, 9.0, False),
+        (np.nan, np.nan, 0.0, 0.0, True),
     ],
 )
 def test_an_effect_matters_where_a_prediction_or_the_hull_moves(
-    fall: float, t: float, shift: float, matters: bool
+    fall: float, t: float, shift: float, in_std: float, matters: bool
 ) -> None:
-    assert Weight(fall, t, shift).matters is matters
+    assert Weight(fall, t, shift, in_std).matters is matters
 
 
 def test_sums_that_hang_together_are_less_sure_than_their_parts() -> None:
