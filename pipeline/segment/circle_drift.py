@@ -1,0 +1,81 @@
+"""The drift of a turning circle: how far the ship is set between two passages of one heading, turn after turn.
+
+A uniform current sets her so, and a steady wind; which of the two it was a track does not say.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi, sqrt
+
+import numpy as np
+
+from kempf.pipeline.segment.turn_track import TurnTrack
+
+#: Heading change from which on passages are compared, and the one a record must reach, rad: the last pair of passages
+#: lies 360 deg apart, and 60 deg of pairs are needed to see how far they agree.
+_FROM_RAD = pi
+SHORTEST_RAD = _FROM_RAD + 2.0 * pi + pi / 3
+
+_STEP_RAD = float(np.deg2rad(2.0))
+
+
+@dataclass(frozen=True)
+class CircleDrift:
+    """A uniform stream and its standard error a component."""
+
+    #: north_m_s, east_m_s: Where it sets, m/s.
+    north_m_s: float
+    east_m_s: float
+    #: Standard error of either, m/s.
+    std_m_s: float
+
+
+def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> CircleDrift | None:
+    """Estimate by how much a circle drifts.
+
+    Parameters
+    ----------
+    track : TurnTrack
+        Over ground.
+    execute_s : float
+        Instant of the execute, s.
+    course_rad : float
+        Heading of the approach, rad.
+
+    Returns
+    -------
+    CircleDrift or None
+        None for a heading change of less than 600 deg.
+
+    Notes
+    -----
+    A circle that still widens or narrows adds to each pair a step along its heading. Over pairs of a whole turn it
+    averages out; over fewer the standard error is as large as that step, which the spread of the pairs shows.
+
+    References
+    ----------
+    ITTC 7.5-04-02-01, Full scale manoeuvring trials, correction for current; MSC/Circ.1053.
+    """
+    after = track.time_s >= execute_s
+    change = track.heading_rad[after] - course_rad
+    side = 1.0 if change[-1] >= 0 else -1.0
+    turned = np.maximum.accumulate(side * change)
+    if turned[-1] < SHORTEST_RAD:
+        return None
+    # a heading at rest has no inverse
+    rising = np.concatenate([[True], np.diff(turned) > 0])
+    turned, time_s = turned[rising], track.time_s[after][rising]
+    angle = np.arange(_FROM_RAD, turned[-1] - 2.0 * pi, _STEP_RAD)
+    begin, end = (np.interp(angle + shift, turned, time_s) for shift in (0.0, 2.0 * pi))
+    set_m_s = np.column_stack(
+        [
+            (np.interp(end, track.time_s, column) - np.interp(begin, track.time_s, column)) / (end - begin)
+            for column in (track.north_m, track.east_m)
+        ]
+    )
+    mean = np.mean(set_m_s, axis=0)
+    spread = float(np.sqrt(np.mean((set_m_s - mean) ** 2)))
+    # a vector that turns through an arc deviates from its mean by its length times the arc through the root of twelve
+    arc = float(angle[-1] - angle[0])
+    return CircleDrift(float(mean[0]), float(mean[1]), spread * sqrt(12.0) / min(arc, sqrt(12.0)))
