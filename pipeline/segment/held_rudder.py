@@ -1,7 +1,7 @@
 """Stretches over which the rudder is held at one angle, whatever the angle.
 
-`legs` looks for two angles that alternate; here each stretch stands for itself, as in a turning circle, a pull-out or the
-steps of a spiral.
+`legs` looks for two angles that alternate; here each stretch stands for itself, as in a turning circle, a pull-out or
+the steps of a spiral.
 """
 
 from __future__ import annotations

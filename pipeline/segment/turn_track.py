@@ -14,7 +14,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 
-Source = Literal["positions", "speed and course over ground", "speed through the water and heading"]
+Source = Literal["positions", "speed and course over ground", "speed through the water and heading", "heading alone"]
 
 #: Semi-major axis of the earth, m, and the square of its eccentricity (WGS 84).
 _EARTH_M, _EARTH_E2 = 6378137.0, 6.69437999014e-3
@@ -37,7 +37,7 @@ class TurnTrack:
     east_m: Float
     #: Shape (n,). Unwrapped heading, rad.
     heading_rad: Float
-    #: Shape (n,). Speed along the track, m/s.
+    #: Shape (n,). Speed along the track, m/s; NaN, as the positions, where there is the heading alone.
     speed_m_s: Float
     #: Shape (n,). Heading minus course, rad; NaN where the log has neither course nor positions.
     drift_rad: Float
@@ -63,9 +63,7 @@ class TurnTrack:
         )
 
 
-def track_of(
-    instruments: Instruments, origin_ns: int, start_s: float, end_s: float, quarter_s: float
-) -> TurnTrack | None:
+def track_of(instruments: Instruments, origin_ns: int, start_s: float, end_s: float, quarter_s: float) -> TurnTrack:
     """Make the track of a turn.
 
     Parameters
@@ -81,13 +79,16 @@ def track_of(
 
     Returns
     -------
-    TurnTrack or None
-        None where no position and no speed is recorded throughout.
+    TurnTrack
+        Of the heading alone where no position and no speed is recorded throughout.
+
+    Raises
+    ------
+    ValueError
+        There is no heading.
     """
-    heading = instruments.get("heading")
-    assert heading is not None
     cut = {
-        name: series.between(origin_ns + round((start_s - quarter_s) * SECOND_NS), _ns(origin_ns, end_s + quarter_s))
+        name: series.between(_ns(origin_ns, start_s - quarter_s), _ns(origin_ns, end_s + quarter_s))
         for name in (
             "heading",
             "latitude",
@@ -101,7 +102,7 @@ def track_of(
     cut = {name: series for name, series in cut.items() if len(series) >= 5}
     periods = [cut[name].period_s for name in cut]
     if "heading" not in cut:
-        return None
+        raise ValueError("a track needs the heading, and the log has none there")
     step_s = max(min(periods), quarter_s / 500)
     time_s = np.arange(start_s, end_s + step_s / 2, step_s)
     stamps = origin_ns + np.round(time_s * SECOND_NS).astype(np.int64)
@@ -124,7 +125,10 @@ def track_of(
             continue
         rows = slice(int(inside[0]), int(inside[-1]) + 1)
         return _made(source, time_s[rows], {k: v[rows] for k, v in columns.items()}, cut, quarter_s)  # type: ignore[arg-type]
-    return None
+    there = np.isfinite(columns["heading"])
+    time_s, heading = time_s[there], columns["heading"][there]
+    nothing = np.full(time_s.size, np.nan)
+    return TurnTrack(time_s, nothing, nothing, heading, nothing, nothing, "heading alone", float("nan"), 0.0)
 
 
 def _ns(origin_ns: int, second: float) -> int:

@@ -67,7 +67,7 @@ def _turn(heading_s: Float, heading: Float, first: int, last: int) -> Turn:
 
 
 def regions(turns: list[Turn], begin_s: float, end_s: float) -> list[tuple[float, float]]:
-    """Return the parts of a record about its turns: each with its own length before and behind it, joined where they meet.
+    """Return the parts of a record about its turns, with their own length before and behind; those that meet join.
 
     Parameters
     ----------
