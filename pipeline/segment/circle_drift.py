@@ -1,12 +1,13 @@
 """The drift of a turning circle: how far the ship is set between two passages of one heading, turn after turn.
 
-A uniform current sets her so, and a steady wind; which of the two it was a track does not say.
+A uniform current sets her so, and a steady wind. A current sets her in the approach too, by as much; a wind, which she
+meets there at full speed, hardly does: only a drift that the approach shows as well is one of the water.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import pi, sqrt
+from math import hypot, pi, sqrt
 
 import numpy as np
 
@@ -16,6 +17,10 @@ from kempf.pipeline.segment.turn_track import TurnTrack
 #: lies 360 deg apart, and 60 deg of pairs are needed to see how far they agree.
 _FROM_RAD = pi
 SHORTEST_RAD = _FROM_RAD + 2.0 * pi + pi / 3
+
+#: Largest difference between the set of the approach and the one of the circle, as a share of the latter, and the
+#: standard error of a heading over it, rad: both are allowed for.
+_APART_SHARE, _HEADING_STD_RAD = 1.0 / 3.0, float(np.deg2rad(0.5))
 
 _STEP_RAD = float(np.deg2rad(2.0))
 
@@ -79,3 +84,33 @@ def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> Circl
     # a vector that turns through an arc deviates from its mean by its length times the arc through the root of twelve
     arc = float(angle[-1] - angle[0])
     return CircleDrift(float(mean[0]), float(mean[1]), spread * sqrt(12.0) / min(arc, sqrt(12.0)))
+
+
+def is_current(drift: CircleDrift, track: TurnTrack, execute_s: float) -> bool:
+    """Whether the approach was set across its heading as the circle is.
+
+    Parameters
+    ----------
+    drift : CircleDrift
+        Of the circle.
+    track : TurnTrack
+        Over ground; what lies before the execute is a steady approach.
+    execute_s : float
+        Instant of the execute, s.
+
+    Returns
+    -------
+    bool
+        False where both differ by more than a third of the drift and by more than two standard errors. What sets along
+        the approach is not seen there, and not contradicted.
+    """
+    before = track.time_s <= execute_s
+    heading = float(np.mean(track.heading_rad[before]))
+    across = -track.speed_m_s[before] * np.sin(track.drift_rad[before])
+    expected = drift.east_m_s * np.cos(heading) - drift.north_m_s * np.sin(heading)
+    # neighbouring values say the same: four of them count
+    error = hypot(
+        drift.std_m_s, float(np.std(across)) / 2.0, _HEADING_STD_RAD * float(np.mean(track.speed_m_s[before]))
+    )
+    apart = abs(float(np.mean(across)) - float(expected))
+    return apart <= max(_APART_SHARE * hypot(drift.north_m_s, drift.east_m_s), 2.0 * error)

@@ -10,7 +10,7 @@ from math import nan, pi
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.segment.circle_drift import CircleDrift, circle_drift
+from kempf.pipeline.segment.circle_drift import CircleDrift, circle_drift, is_current
 from kempf.pipeline.segment.figure import Figure
 from kempf.pipeline.segment.turn_track import TurnTrack
 from kempf.pipeline.segment.turning_figures import TurningFigures, steady_span, turning_figures
@@ -37,8 +37,10 @@ class CircleFigures:
     over_ground: Mapping[str, float | None]
     #: What the track was made of; "heading alone" where there is none.
     track: str
-    #: Uniform stream that was taken off; None where it could not be seen.
-    stream: CircleDrift | None
+    #: By how much the circle drifts over ground; None where that could not be seen.
+    drift: CircleDrift | None
+    #: Whether it was taken off as of a current.
+    corrected: bool
     #: Mean speed of the approach, as the figures have it, m/s; NaN where none is recorded.
     approach_speed_m_s: float
     #: Change of the recorded speed over the approach, percent of its mean; NaN where there is no approach.
@@ -88,18 +90,24 @@ def circle_figures(
     before = track.time_s <= begin
     course = float(np.mean(track.heading_rad[before]))
     through_water = source == "speed through the water and heading"
-    stream = None if source == "heading alone" or through_water else circle_drift(track, begin, course)
+    drift = None if source == "heading alone" or through_water else circle_drift(track, begin, course)
+    # only a steady approach, whose scatter is known, can confirm that it is the water that moves
+    agreed = drift is not None and bool(np.isfinite(course_std_rad)) and is_current(drift, track, begin)
+    stream = drift if agreed else None
     raw = turning_figures(*_columns(track), begin)
     corrected = track if stream is None else track.without(stream.north_m_s, stream.east_m_s)
     made = turning_figures(*_columns(corrected), begin)
     if through_water:
         reasons.append("The track is made of the log's speed along the heading: the drift angle is left out.")
-    elif source != "heading alone" and stream is None:
+    elif source != "heading alone" and drift is None:
         reasons.append("The figures are over ground: less than 600 deg were turned, a current cannot be seen.")
-    elif stream is not None:
+    elif drift is not None:
+        towards_deg = float(np.rad2deg(np.arctan2(drift.east_m_s, drift.north_m_s))) % 360.0
+        size = f"{float(np.hypot(drift.north_m_s, drift.east_m_s)):.3g} m/s towards {towards_deg:.0f} deg"
         reasons.append(
-            f"A drift of {np.hypot(stream.north_m_s, stream.east_m_s):.3g} m/s towards "
-            f"{np.rad2deg(np.arctan2(stream.east_m_s, stream.north_m_s)) % 360.0:.0f} deg is taken off, as of a current."
+            f"The circle drifts by {size}, and the approach does so too: it is taken off as of a current."
+            if agreed
+            else f"The circle drifts by {size}, the approach does not: as in wind; the figures are over ground."
         )
     if track.bridged_share > 0:
         reasons.append(f"The course over ground was impossible in {100 * track.bridged_share:.1f} % of the record.")
@@ -121,7 +129,8 @@ def circle_figures(
         figures=figures,
         over_ground={} if stream is None else {k: _finite(v) for k, v in asdict(raw).items() if k in figures},
         track=source,
-        stream=stream,
+        drift=drift,
+        corrected=agreed,
         approach_speed_m_s=float(np.mean(corrected.speed_m_s[before])),
         approach_speed_trend_percent=_trend_percent(track.time_s[before], track.speed_m_s[before]),
         reasons=tuple(reasons),
