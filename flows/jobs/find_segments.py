@@ -135,6 +135,7 @@ def _of_kind(
             {
                 "figures": {name: asdict(figure) for name, figure in made.figures.items()},
                 "figures_over_ground": made.over_ground,
+                "figures_less_drift": made.less_drift,
                 "track": made.track,
                 "circle_drift": asdict(made.drift) if made.drift else None,
                 "corrected_for_current": made.corrected,

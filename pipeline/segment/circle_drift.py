@@ -1,7 +1,7 @@
 """The drift of a turning circle: how far the ship is set between two passages of one heading, turn after turn.
 
-A uniform current sets her so, and a steady wind. A current sets her in the approach too, by as much; a wind, which she
-meets there at full speed, hardly does: only a drift that the approach shows as well is one of the water.
+A uniform current sets her so, and a steady wind. A log tells one from the other: over ground she is faster than through
+the water when she heads with a current, while a wind changes both speeds alike.
 """
 
 from __future__ import annotations
@@ -18,9 +18,8 @@ from kempf.pipeline.segment.turn_track import TurnTrack
 _FROM_RAD = pi
 SHORTEST_RAD = _FROM_RAD + 2.0 * pi + pi / 3
 
-#: Largest difference between the set of the approach and the one of the circle, as a share of the latter, and the
-#: standard error of a heading over it, rad: both are allowed for.
-_APART_SHARE, _HEADING_STD_RAD = 1.0 / 3.0, float(np.deg2rad(0.5))
+#: Largest difference between the current that the log shows and the drift of the circle, as a share of the latter.
+_APART_SHARE = 1.0 / 3.0
 
 _STEP_RAD = float(np.deg2rad(2.0))
 
@@ -87,30 +86,30 @@ def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> Circl
 
 
 def is_current(drift: CircleDrift, track: TurnTrack, execute_s: float) -> bool:
-    """Whether the approach was set across its heading as the circle is.
+    """Whether the log shows that it is the water that drifts.
 
     Parameters
     ----------
     drift : CircleDrift
         Of the circle.
     track : TurnTrack
-        Over ground; what lies before the execute is a steady approach.
+        Over ground, with the log's speed.
     execute_s : float
         Instant of the execute, s.
 
     Returns
     -------
     bool
-        False where both differ by more than a third of the drift and by more than two standard errors. What sets along
-        the approach is not seen there, and not contradicted.
+        True where the difference between the speed over ground along the bow and the log's goes with the heading as the
+        drift says, to within a third of it or two standard errors; False also where there is no log.
     """
-    before = track.time_s <= execute_s
-    heading = float(np.mean(track.heading_rad[before]))
-    across = -track.speed_m_s[before] * np.sin(track.drift_rad[before])
-    expected = drift.east_m_s * np.cos(heading) - drift.north_m_s * np.sin(heading)
-    # neighbouring values say the same: four of them count
-    error = hypot(
-        drift.std_m_s, float(np.std(across)) / 2.0, _HEADING_STD_RAD * float(np.mean(track.speed_m_s[before]))
-    )
-    apart = abs(float(np.mean(across)) - float(expected))
-    return apart <= max(_APART_SHARE * hypot(drift.north_m_s, drift.east_m_s), 2.0 * error)
+    known = (track.time_s >= execute_s) & np.isfinite(track.log_m_s)
+    if np.count_nonzero(known) < 20:
+        return False
+    heading = track.heading_rad[known]
+    difference = track.speed_m_s[known] * np.cos(track.drift_rad[known]) - track.log_m_s[known]
+    # the constant and the speed itself are the log's bias and scale
+    basis = np.column_stack([np.cos(heading), np.sin(heading), np.ones(heading.size), track.log_m_s[known]])
+    north, east, *_ = np.linalg.lstsq(basis, difference, rcond=None)[0]
+    apart = hypot(float(north) - drift.north_m_s, float(east) - drift.east_m_s)
+    return apart <= max(_APART_SHARE * hypot(drift.north_m_s, drift.east_m_s), 2.0 * drift.std_m_s)

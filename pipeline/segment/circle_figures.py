@@ -33,8 +33,10 @@ class CircleFigures:
 
     #: By the names of `TurningFigures`, and ``steady_diameter_of_track_m`` where there are positions.
     figures: Mapping[str, Figure]
-    #: The same without the correction, where there is one; empty otherwise.
+    #: over_ground, less_drift: The same over ground and less the drift of the circle, whichever ``figures`` has; empty
+    #: where the drift is not known.
     over_ground: Mapping[str, float | None]
+    less_drift: Mapping[str, float | None]
     #: What the track was made of; "heading alone" where there is none.
     track: str
     #: By how much the circle drifts over ground; None where that could not be seen.
@@ -91,12 +93,11 @@ def circle_figures(
     course = float(np.mean(track.heading_rad[before]))
     through_water = source == "speed through the water and heading"
     drift = None if source == "heading alone" or through_water else circle_drift(track, begin, course)
-    # only a steady approach, whose scatter is known, can confirm that it is the water that moves
-    agreed = drift is not None and bool(np.isfinite(course_std_rad)) and is_current(drift, track, begin)
+    agreed = drift is not None and is_current(drift, track, begin)
     stream = drift if agreed else None
-    raw = turning_figures(*_columns(track), begin)
-    corrected = track if stream is None else track.without(stream.north_m_s, stream.east_m_s)
-    made = turning_figures(*_columns(corrected), begin)
+    freed = track if drift is None else track.without(drift.north_m_s, drift.east_m_s)
+    corrected = freed if agreed else track
+    over_ground, less_drift, made = (turning_figures(*_columns(one), begin) for one in (track, freed, corrected))
     if through_water:
         reasons.append("The track is made of the log's speed along the heading: the drift angle is left out.")
     elif source != "heading alone" and drift is None:
@@ -105,9 +106,9 @@ def circle_figures(
         towards_deg = float(np.rad2deg(np.arctan2(drift.east_m_s, drift.north_m_s))) % 360.0
         size = f"{float(np.hypot(drift.north_m_s, drift.east_m_s)):.3g} m/s towards {towards_deg:.0f} deg"
         reasons.append(
-            f"The circle drifts by {size}, and the approach does so too: it is taken off as of a current."
+            f"The circle drifts by {size}, and so does the water, as the log shows: it is taken off."
             if agreed
-            else f"The circle drifts by {size}, the approach does not: as in wind; the figures are over ground."
+            else f"The circle drifts by {size}; no log shows that it is a current: the figures are over ground."
         )
     if track.bridged_share > 0:
         reasons.append(f"The course over ground was impossible in {100 * track.bridged_share:.1f} % of the record.")
@@ -127,7 +128,8 @@ def circle_figures(
         figures["steady_diameter_of_track_m"] = _fitted_diameter(corrected, begin, short)
     return CircleFigures(
         figures=figures,
-        over_ground={} if stream is None else {k: _finite(v) for k, v in asdict(raw).items() if k in figures},
+        over_ground={} if drift is None else _named(over_ground),
+        less_drift={} if drift is None else _named(less_drift),
         track=source,
         drift=drift,
         corrected=agreed,
@@ -255,5 +257,5 @@ def _trend_percent(time_s: Float, speed: Float) -> float:
     return 100.0 * slope * float(time_s[-1] - time_s[0]) / float(np.mean(speed))
 
 
-def _finite(value: float) -> float | None:
-    return value if np.isfinite(value) else None
+def _named(made: TurningFigures) -> dict[str, float | None]:
+    return {name: value if np.isfinite(value) else None for name, value in asdict(made).items()}

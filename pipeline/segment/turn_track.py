@@ -41,6 +41,8 @@ class TurnTrack:
     speed_m_s: Float
     #: Shape (n,). Heading minus course, rad; NaN where the log has neither course nor positions.
     drift_rad: Float
+    #: Shape (n,). Speed of the log, m/s; NaN where there is none.
+    log_m_s: Float
     #: What it was made of.
     source: Source
     #: Standard error of a distance between two positions, m; NaN where it is integrated.
@@ -128,7 +130,7 @@ def track_of(instruments: Instruments, origin_ns: int, start_s: float, end_s: fl
     there = np.isfinite(columns["heading"])
     time_s, heading = time_s[there], columns["heading"][there]
     nothing = np.full(time_s.size, np.nan)
-    return TurnTrack(time_s, nothing, nothing, heading, nothing, nothing, "heading alone", float("nan"), 0.0)
+    return TurnTrack(time_s, nothing, nothing, heading, nothing, nothing, nothing, "heading alone", float("nan"), 0.0)
 
 
 def _ns(origin_ns: int, second: float) -> int:
@@ -164,7 +166,8 @@ def _made(
     if source != "positions":
         along = heading - (drift if course is not None else 0.0)
         north, east = (_integral(time_s, speed * turned) for turned in (np.cos(along), np.sin(along)))
-    return TurnTrack(time_s, north, east, heading, speed, drift, source, distance_std, bridged)
+    log = columns.get("speed_through_water", np.full(time_s.size, np.nan))
+    return TurnTrack(time_s, north, east, heading, speed, drift, log, source, distance_std, bridged)
 
 
 def _plane(latitude: Float, longitude: Float) -> tuple[Float, Float]:
