@@ -7,19 +7,23 @@ the water when she heads with a current, while a wind changes both speeds alike.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from math import hypot, pi, sqrt
+from math import hypot, pi, sin, sqrt
 
 import numpy as np
 
 from kempf.pipeline.segment.turn_track import TurnTrack
 
-#: Heading change from which on passages are compared, and the one a record must reach, rad: the last pair of passages
-#: lies 360 deg apart, and 60 deg of pairs are needed to see how far they agree.
+#: Heading change from which on passages are compared, at most over the last two turns, and the one a record must reach,
+#: rad: the last pair of passages lies 360 deg apart, and 60 deg of pairs are needed to see how far they agree.
 _FROM_RAD = pi
 SHORTEST_RAD = _FROM_RAD + 2.0 * pi + pi / 3
 
 #: Largest difference between the current that the log shows and the drift of the circle, as a share of the latter.
 _APART_SHARE = 1.0 / 3.0
+
+#: Factor on the standard error, since the step of a circle that narrows dies away, and the smallest share of the spread
+#: that is left over pairs of a whole turn.
+_DYING, _SMALLEST_SHARE = 1.5, 0.25
 
 _STEP_RAD = float(np.deg2rad(2.0))
 
@@ -33,6 +37,16 @@ class CircleDrift:
     east_m_s: float
     #: Standard error of either, m/s.
     std_m_s: float
+
+    @property
+    def size_m_s(self) -> float:
+        """Its size, m/s."""
+        return hypot(self.north_m_s, self.east_m_s)
+
+    @property
+    def seen(self) -> bool:
+        """Whether it is larger than two standard errors."""
+        return self.size_m_s > 2.0 * self.std_m_s
 
 
 def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> CircleDrift | None:
@@ -55,7 +69,8 @@ def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> Circl
     Notes
     -----
     A circle that still widens or narrows adds to each pair a step along its heading. Over pairs of a whole turn it
-    averages out; over fewer the standard error is as large as that step, which the spread of the pairs shows.
+    averages out; over fewer the standard error is what is left of it, which the spread of the pairs shows. The step dies
+    away meanwhile, hence half as much again, and never less than three eighths of the spread.
 
     References
     ----------
@@ -70,7 +85,7 @@ def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> Circl
     # a heading at rest has no inverse
     rising = np.concatenate([[True], np.diff(turned) > 0])
     turned, time_s = turned[rising], track.time_s[after][rising]
-    angle = np.arange(_FROM_RAD, turned[-1] - 2.0 * pi, _STEP_RAD)
+    angle = np.arange(max(_FROM_RAD, float(turned[-1]) - 4.0 * pi), turned[-1] - 2.0 * pi, _STEP_RAD)
     begin, end = (np.interp(angle + shift, turned, time_s) for shift in (0.0, 2.0 * pi))
     set_m_s = np.column_stack(
         [
@@ -80,9 +95,12 @@ def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> Circl
     )
     mean = np.mean(set_m_s, axis=0)
     spread = float(np.sqrt(np.mean((set_m_s - mean) ** 2)))
-    # a vector that turns through an arc deviates from its mean by its length times the arc through the root of twelve
-    arc = float(angle[-1] - angle[0])
-    return CircleDrift(float(mean[0]), float(mean[1]), spread * sqrt(12.0) / min(arc, sqrt(12.0)))
+    # of a vector of constant length that turns through an arc the mean is this share, the deviation what is missing to 1
+    half_arc = float(angle[-1] - angle[0]) / 2.0
+    share = abs(sin(half_arc)) / half_arc
+    return CircleDrift(
+        float(mean[0]), float(mean[1]), _DYING * spread * max(share / sqrt(1.0 - share**2), _SMALLEST_SHARE)
+    )
 
 
 def is_current(drift: CircleDrift, track: TurnTrack, execute_s: float) -> bool:
@@ -112,4 +130,4 @@ def is_current(drift: CircleDrift, track: TurnTrack, execute_s: float) -> bool:
     basis = np.column_stack([np.cos(heading), np.sin(heading), np.ones(heading.size), track.log_m_s[known]])
     north, east, *_ = np.linalg.lstsq(basis, difference, rcond=None)[0]
     apart = hypot(float(north) - drift.north_m_s, float(east) - drift.east_m_s)
-    return apart <= max(_APART_SHARE * hypot(drift.north_m_s, drift.east_m_s), 2.0 * drift.std_m_s)
+    return apart <= max(_APART_SHARE * drift.size_m_s, 2.0 * drift.std_m_s)

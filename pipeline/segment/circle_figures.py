@@ -93,8 +93,7 @@ def circle_figures(
     course = float(np.mean(track.heading_rad[before]))
     through_water = source == "speed through the water and heading"
     drift = None if source == "heading alone" or through_water else circle_drift(track, begin, course)
-    agreed = drift is not None and is_current(drift, track, begin)
-    stream = drift if agreed else None
+    agreed = drift is not None and drift.seen and is_current(drift, track, begin)
     freed = track if drift is None else track.without(drift.north_m_s, drift.east_m_s)
     corrected = freed if agreed else track
     over_ground, less_drift, made = (turning_figures(*_columns(one), begin) for one in (track, freed, corrected))
@@ -104,16 +103,20 @@ def circle_figures(
         reasons.append("The figures are over ground: less than 600 deg were turned, a current cannot be seen.")
     elif drift is not None:
         towards_deg = float(np.rad2deg(np.arctan2(drift.east_m_s, drift.north_m_s))) % 360.0
-        size = f"{float(np.hypot(drift.north_m_s, drift.east_m_s)):.3g} m/s towards {towards_deg:.0f} deg"
-        reasons.append(
-            f"The circle drifts by {size}, and so does the water, as the log shows: it is taken off."
-            if agreed
-            else f"The circle drifts by {size}; no log shows that it is a current: the figures are over ground."
-        )
+        size = f"{drift.size_m_s:.3g} m/s towards {towards_deg:.0f} deg"
+        if agreed:
+            reasons.append(f"The circle drifts by {size}, and so does the water, as the log shows: it is taken off.")
+        elif drift.seen:
+            reasons.append(f"The circle drifts by {size}; no log shows a current: the figures are over ground.")
+        else:
+            reasons.append(
+                f"The circle drifts by less than {2.0 * drift.std_m_s:.2g} m/s: the figures are over ground."
+            )
     if track.bridged_share > 0:
         reasons.append(f"The course over ground was impossible in {100 * track.bridged_share:.1f} % of the record.")
     spread = _steady_spread(corrected, begin, made)
-    nudged = _nudges(track, stream, begin, execute_std_s, course_std_rad)
+    uncertain = 0.0 if drift is None or (drift.seen and not agreed) else drift.std_m_s
+    nudged = _nudges(corrected, uncertain, begin, execute_std_s, course_std_rad)
     figures: dict[str, Figure] = {}
     values = asdict(made)
     for name in _FROM_EXECUTE:
@@ -144,14 +147,12 @@ def _columns(track: TurnTrack) -> tuple[Float, Float, Float, Float, Float, Float
 
 
 def _nudges(
-    track: TurnTrack, stream: CircleDrift | None, execute_s: float, execute_std_s: float, course_std_rad: float
+    track: TurnTrack, stream_std_m_s: float, execute_s: float, execute_std_s: float, course_std_rad: float
 ) -> list[tuple[TurningFigures, TurningFigures]]:
     """Return the figures with each uncertain input one standard error lower and higher."""
 
     def figures(shift_s: float = 0.0, course: float = 0.0, north: float = 0.0, east: float = 0.0) -> TurningFigures:
-        moved = track
-        if stream is not None:
-            moved = track.without(stream.north_m_s + north, stream.east_m_s + east)
+        moved = track.without(north, east) if north or east else track
         if course:
             heading = moved.heading_rad + np.where(moved.time_s <= execute_s, course, 0.0)
             moved = replace(moved, heading_rad=heading)
@@ -163,8 +164,8 @@ def _nudges(
         pairs.append((figures(shift_s=-execute_std_s), figures(shift_s=execute_std_s)))
     if np.isfinite(course_std_rad):
         pairs.append((figures(course=-course_std_rad), figures(course=course_std_rad)))
-    if stream is not None:
-        std = stream.std_m_s
+    if stream_std_m_s > 0:
+        std = stream_std_m_s
         pairs += [(figures(north=-std), figures(north=std)), (figures(east=-std), figures(east=std))]
     return pairs
 

@@ -172,11 +172,22 @@ def _execute(signals: Signals, held: HeldRudder, quarter_s: float) -> Ramp | Non
     earliest = int(np.searchsorted(time_s, held.start_s - _SLOWEST_RUDDER * quarter_s))
     if earliest >= held.first:
         return None
+    # the gear's rate: the quickest movement to the side of the turn, over two samples so that noise is not taken for it
+    moved = np.sign(held.rudder) * (rudder[earliest + 2 : held.first + 1] - rudder[earliest : held.first - 1])
+    took = time_s[earliest + 2 : held.first + 1] - time_s[earliest : held.first - 1]
+    rate = float(np.max(moved / took, initial=0.0)) or float("nan")
     begin, before = approach_before(
-        time_s, rudder, held.first, held_after=held.rudder, earliest=earliest, noise=noise, rate=float("nan")
+        time_s, rudder, held.first, held_after=held.rudder, earliest=earliest, noise=noise, rate=rate
     )
     return measure_ramp(
-        time_s, rudder, held.first, held_after=held.rudder, held_before=before, earliest=begin, noise=noise
+        time_s,
+        rudder,
+        held.first,
+        held_after=held.rudder,
+        held_before=before,
+        earliest=begin,
+        noise=noise,
+        known_rate=rate,
     )
 
 
