@@ -69,8 +69,8 @@ def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> Circl
     Notes
     -----
     A circle that still widens or narrows adds to each pair a step along its heading. Over pairs of a whole turn it
-    averages out; over fewer the standard error is what is left of it, which the spread of the pairs shows. The step dies
-    away meanwhile, hence half as much again, and never less than three eighths of the spread.
+    averages out; over fewer the standard error is what is left of it, which the spread of the pairs shows. The step
+    dies away meanwhile, hence half as much again, and never less than three eighths of the spread.
 
     References
     ----------
@@ -95,7 +95,7 @@ def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> Circl
     )
     mean = np.mean(set_m_s, axis=0)
     spread = float(np.sqrt(np.mean((set_m_s - mean) ** 2)))
-    # of a vector of constant length that turns through an arc the mean is this share, the deviation what is missing to 1
+    # of a vector of constant length that turns through an arc the mean is this share, the deviation what is left of 1
     half_arc = float(angle[-1] - angle[0]) / 2.0
     share = abs(sin(half_arc)) / half_arc
     return CircleDrift(

@@ -36,13 +36,13 @@ _STEADY_TURN, _STEADY_END = 0.2, 0.1
 
 #: How long the rudder is held amidships, in times of a heading change of 90 deg at the rate of the turn: at least, and
 #: as far as it is looked at.
-_SHORTEST, _LONGEST = 0.5, 2.0
+_SHORTEST, _LONGEST = 0.5, 4.0
 
 #: Part of the hold at whose end the rate is taken.
 _LAST_PART = 1.0 / 3.0
 
-#: Smallest difference of both residual rates that counts, as a share of the rate of the turns.
-_APART = 0.05
+#: Smallest difference of both residual rates that counts, in standard errors and as a share of the rate of the turns.
+_APART_ERRORS, _APART_SHARE = 3.0, 0.05
 
 
 @dataclass(frozen=True)
@@ -190,5 +190,5 @@ def _verdict(one: PullOut, other: PullOut) -> Verdict:
     if right.value is None or left.value is None:
         return "not judged"
     turned = [abs(p.figures["initial_yaw_rate_deg_s"].value or 0.0) for p in (one, other)]
-    apart = max(1.96 * float(np.hypot(right.std, left.std)), _APART * sum(turned) / 2)
+    apart = max(_APART_ERRORS * float(np.hypot(right.std, left.std)), _APART_SHARE * sum(turned) / 2)
     return "unstable" if right.value - left.value > apart else "no instability seen"
