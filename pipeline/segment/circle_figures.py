@@ -13,7 +13,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.segment.circle_drift import CircleDrift, circle_drift, is_current
 from kempf.pipeline.segment.figure import Figure
 from kempf.pipeline.segment.turn_track import TurnTrack
-from kempf.pipeline.segment.turning_figures import TurningFigures, steady_span, turning_figures
+from kempf.pipeline.segment.turning_figures import STEADY_FROM_RAD, TurningFigures, steady_span, turning_figures
 
 #: Standard error of an integrated distance, as a share of it: the scale of the speed. Of a free-running model whose
 #: positions were logged beside her velocities the two differ by 2 to 4 %.
@@ -114,21 +114,21 @@ def circle_figures(
             )
     if track.bridged_share > 0:
         reasons.append(f"The course over ground was impossible in {100 * track.bridged_share:.1f} % of the record.")
-    spread = _steady_spread(corrected, begin, made)
+    spread = _steady_spread(corrected, begin, course, made)
     uncertain = 0.0 if drift is None or (drift.seen and not agreed) else drift.std_m_s
     nudged = _nudges(corrected, uncertain, begin, execute_std_s, course_std_rad)
     figures: dict[str, Figure] = {}
     values = asdict(made)
     for name in _FROM_EXECUTE:
         figures[name] = _from_execute(name, values[name], nudged, track, execute_s)
-    short = "the heading changed by less than 360 deg"
+    short = "the heading changed by less than a whole turn"
     for name in _STEADY:
-        missing = "not recorded" if abs(made.heading_change_deg) >= 360.0 else short
+        missing = "not recorded" if abs(made.heading_change_deg) >= np.rad2deg(STEADY_FROM_RAD) else short
         figures[name] = Figure.of(values[name], spread[name], missing)
     if not np.isfinite(course_std_rad):
         figures["speed_loss_percent"] = Figure.of(nan, nan, "the approach was not steady or is not recorded")
     if source == "positions":
-        figures["steady_diameter_of_track_m"] = _fitted_diameter(corrected, begin, short)
+        figures["steady_diameter_of_track_m"] = _fitted_diameter(corrected, begin, course, short)
     return CircleFigures(
         figures=figures,
         over_ground={} if drift is None else _named(over_ground),
@@ -191,9 +191,9 @@ def _from_execute(
     return Figure.of(value, float(np.sqrt(variance)), "not reached")
 
 
-def _steady_spread(track: TurnTrack, execute_s: float, made: TurningFigures) -> dict[str, float]:
+def _steady_spread(track: TurnTrack, execute_s: float, course: float, made: TurningFigures) -> dict[str, float]:
     """Return the standard errors of what is steady, by name, from its values in four parts of the steady turn."""
-    parts = _parts(track, execute_s)
+    parts = _parts(track, execute_s, course)
     if parts is None:
         return dict.fromkeys(_STEADY, nan)
     rate, speed, drift = parts.T
@@ -212,11 +212,11 @@ def _error(values: Float) -> float:
     return float(np.std(values, ddof=1) / np.sqrt(values.size))
 
 
-def _parts(track: TurnTrack, execute_s: float) -> Float | None:
+def _parts(track: TurnTrack, execute_s: float, course: float) -> Float | None:
     """Return yaw rate, speed and drift in each part of the steady turn, SI, shape (4, 3)."""
     after = track.time_s >= execute_s
     time_s = track.time_s[after]
-    change = track.heading_rad[after] - track.heading_rad[after][0]
+    change = track.heading_rad[after] - course
     side = 1.0 if change[-1] >= 0 else -1.0
     start, end = steady_span(time_s, side * change)
     if not end > start:
@@ -231,10 +231,10 @@ def _parts(track: TurnTrack, execute_s: float) -> Float | None:
     return np.array(rows, dtype=np.float64)
 
 
-def _fitted_diameter(track: TurnTrack, execute_s: float, short: str) -> Figure:
+def _fitted_diameter(track: TurnTrack, execute_s: float, course: float, short: str) -> Figure:
     """Lay a circle through the positions of the steady turn; the standard error is their scatter about it."""
     after = track.time_s >= execute_s
-    change = track.heading_rad[after] - track.heading_rad[after][0]
+    change = track.heading_rad[after] - course
     start, end = steady_span(track.time_s[after], np.sign(change[-1]) * change)
     inside = (track.time_s >= start) & (track.time_s <= end)
     if np.count_nonzero(inside) < 8:

@@ -38,6 +38,9 @@ _STEADY_SHARE = 0.15
 #: Slowest movement of the rudder, as a share of the time for the first 90 deg.
 _SLOWEST_RUDDER = 0.5
 
+#: Largest share of the record in which the drift angle is an impossible one.
+_ACROSS_SHARE = 0.3
+
 #: Change of speed over the approach from which it is said, percent.
 _SPEED_TREND_PERCENT = 5.0
 
@@ -104,7 +107,8 @@ def turning_circle(
     -------
     TurningCircle or None
         None where it is none: the rudder is too small, the heading changed by less than 180 deg or away from the
-        rudder's side, or by less than 360 deg from an approach that was not steady.
+        rudder's side, or by less than 360 deg from an approach that was not steady; or she went across her bow most of
+        the time, as no ship under way does.
 
     References
     ----------
@@ -137,8 +141,11 @@ def turning_circle(
     change = side * (at_end - base)
     if change < (_HALF_TURN if start == "steady" else _WHOLE_TURN):
         return None
+    track = track_of(instruments, signals.origin_ns, approach_s, end_s, quarter_s)
+    if track.bridged_share > _ACROSS_SHARE:
+        return None
     measured = circle_figures(
-        track_of(instruments, signals.origin_ns, approach_s, end_s, quarter_s),
+        track,
         execute_s=None if ramp is None else ramp.start_s,
         execute_std_s=float("nan") if ramp is None else ramp.start_uncertainty_s,
         begin_s=begin_s,

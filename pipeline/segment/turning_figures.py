@@ -13,9 +13,9 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 
-#: Heading change from which what is steady can be read off at all, and from which it is taken over a whole turn, rad:
-#: on a whole turn what a wind or a wave does to one side is done to the other one too.
-STEADY_FROM_RAD = 2.0 * pi
+#: Heading change from which what is steady can be read off at all, a whole turn less what a helmsman ends it early by,
+#: and from which it is taken over a whole turn, rad: there what a wind does to one side it does to the other one too.
+STEADY_FROM_RAD = 2.0 * pi - pi / 18.0
 WHOLE_TURN_FROM_RAD = 3.0 * pi
 
 #: Where the steady part of a circle of less than `WHOLE_TURN_FROM_RAD` begins, rad of heading change.
@@ -77,7 +77,7 @@ def turning_figures(
     Returns
     -------
     TurningFigures
-        The steady ones need a heading change of 360 deg. They are means over the last whole turn of a record of 540 deg
+        The steady ones need a heading change of 350 deg. They are means over the last whole turn of a record of 540 deg
         and more, and from 270 deg on of a shorter one.
 
     Raises
@@ -138,7 +138,7 @@ def steady_span(time_s: Float, turned_rad: Float) -> tuple[float, float]:
     Returns
     -------
     tuple of float
-        The last whole turn of 540 deg and more, from 270 deg on of a shorter one, s; NaN for less than 360 deg.
+        The last whole turn of 540 deg and more, from 270 deg on of a shorter one, s; NaN for less than 350 deg.
     """
     last = int(np.argmax(turned_rad))
     reached = float(turned_rad[last])

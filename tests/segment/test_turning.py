@@ -117,7 +117,7 @@ def test_half_a_turn_is_a_circle_and_says_what_it_lacks() -> None:
     circle = circle_of(find_turning(instruments(trial)))
     assert circle.measured.figures["tactical_diameter_m"].value is not None
     assert circle.measured.figures["steady_diameter_m"].value is None
-    assert circle.measured.figures["steady_diameter_m"].why == "the heading changed by less than 360 deg"
+    assert circle.measured.figures["steady_diameter_m"].why == "the heading changed by less than a whole turn"
     assert any("less than 600 deg" in reason for reason in circle.quality.reasons)
     assert find_turning(instruments(sailed((SteadyCourse(300.0), Turn(35.0, 150.0)), "ferry"))) == []
 
