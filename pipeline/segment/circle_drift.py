@@ -1,6 +1,6 @@
 """The drift of a turning circle: how far the ship is set between two passages of one heading, turn after turn.
 
-A uniform current sets her so, and a steady wind. A log tells one from the other: over ground she is faster than through
+A uniform current sets her so, and a steady wind. A water log tells one from the other: over ground she is faster than through
 the water when she heads with a current, while a wind changes both speeds alike.
 """
 
@@ -18,7 +18,7 @@ from kempf.pipeline.segment.turn_track import TurnTrack
 _FROM_RAD = pi
 SHORTEST_RAD = _FROM_RAD + 2.0 * pi + pi / 3
 
-#: Largest difference between the current that the log shows and the drift of the circle, as a share of the latter.
+#: Largest difference between the current that the water log shows and the drift of the circle, as a share of the latter.
 _APART_SHARE = 1.0 / 3.0
 
 #: Factor on the standard error, since the step of a circle that narrows dies away, and the smallest share of the spread
@@ -104,29 +104,29 @@ def circle_drift(track: TurnTrack, execute_s: float, course_rad: float) -> Circl
 
 
 def is_current(drift: CircleDrift, track: TurnTrack, execute_s: float) -> bool:
-    """Whether the log shows that it is the water that drifts.
+    """Whether the water log shows that it is the water that drifts.
 
     Parameters
     ----------
     drift : CircleDrift
         Of the circle.
     track : TurnTrack
-        Over ground, with the log's speed.
+        Over ground, with the water log's speed.
     execute_s : float
         Instant of the execute, s.
 
     Returns
     -------
     bool
-        True where the difference between the speed over ground along the bow and the log's goes with the heading as the
-        drift says, to within a third of it or two standard errors; False also where there is no log.
+        True where the difference between the speed over ground along the bow and the water log's goes with the heading as the
+        drift says, to within a third of it or two standard errors; False also where there is no water log.
     """
     known = (track.time_s >= execute_s) & np.isfinite(track.log_m_s)
     if np.count_nonzero(known) < 20:
         return False
     heading = track.heading_rad[known]
     difference = track.speed_m_s[known] * np.cos(track.drift_rad[known]) - track.log_m_s[known]
-    # the constant and the speed itself are the log's bias and scale
+    # the constant and the speed itself are the water log's bias and scale
     basis = np.column_stack([np.cos(heading), np.sin(heading), np.ones(heading.size), track.log_m_s[known]])
     north, east, *_ = np.linalg.lstsq(basis, difference, rcond=None)[0]
     apart = hypot(float(north) - drift.north_m_s, float(east) - drift.east_m_s)

@@ -98,16 +98,18 @@ def circle_figures(
     corrected = freed if agreed else track
     over_ground, less_drift, made = (turning_figures(*_columns(one), begin) for one in (track, freed, corrected))
     if through_water:
-        reasons.append("The track is made of the log's speed along the heading: the drift angle is left out.")
+        reasons.append("The track is made of the water log's speed along the heading: the drift angle is left out.")
     elif source != "heading alone" and drift is None:
         reasons.append("The figures are over ground: less than 600 deg were turned, a current cannot be seen.")
     elif drift is not None:
         towards_deg = float(np.rad2deg(np.arctan2(drift.east_m_s, drift.north_m_s))) % 360.0
         size = f"{drift.size_m_s:.3g} m/s towards {towards_deg:.0f} deg"
         if agreed:
-            reasons.append(f"The circle drifts by {size}, and so does the water, as the log shows: it is taken off.")
+            reasons.append(
+                f"The circle drifts by {size}, and so does the water, as the water log shows: it is taken off."
+            )
         elif drift.seen:
-            reasons.append(f"The circle drifts by {size}; no log shows a current: the figures are over ground.")
+            reasons.append(f"The circle drifts by {size}; no water log shows a current: the figures are over ground.")
         else:
             reasons.append(
                 f"The circle drifts by less than {2.0 * drift.std_m_s:.2g} m/s: the figures are over ground."

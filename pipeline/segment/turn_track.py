@@ -1,4 +1,4 @@
-"""The track of a ship through a turn, from what her log has: positions, else speed and course, else the log's speed.
+"""The track of a ship through a turn, from what her log has: positions, else speed and course, else the water log's speed.
 
 What was measured is laid on common instants; the figures are read off in `turning_figures`.
 """
@@ -41,7 +41,7 @@ class TurnTrack:
     speed_m_s: Float
     #: Shape (n,). Heading minus course, rad; NaN where the log has neither course nor positions.
     drift_rad: Float
-    #: Shape (n,). Speed of the log, m/s; NaN where there is none.
+    #: Shape (n,). Speed of the water log, m/s; NaN where there is none.
     log_m_s: Float
     #: What it was made of.
     source: Source

@@ -74,7 +74,7 @@ def test_without_a_log_the_drift_is_said_and_left_in() -> None:
     trial = sailed((SteadyCourse(300.0), Turn(35.0, 900.0)), "ferry", STREAM)
     circle = circle_of(find_turning(instruments(trial, without=("speed_through_water",))))
     assert not circle.measured.corrected
-    assert any("no log shows a current" in reason for reason in circle.quality.reasons)
+    assert any("no water log shows a current" in reason for reason in circle.quality.reasons)
     truth = true_circle(trial, trial.truth.manoeuvres[1].start_s)
     for name in LENGTHS:
         over_ground, less_drift = circle.measured.over_ground[name], circle.measured.less_drift[name]
