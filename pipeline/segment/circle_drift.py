@@ -1,7 +1,7 @@
 """The drift of a turning circle: how far the ship is set between two passages of one heading, turn after turn.
 
-A uniform current sets her so, and a steady wind. A water log tells one from the other: over ground she is faster than through
-the water when she heads with a current, while a wind changes both speeds alike.
+A uniform current sets her so, and a steady wind. A water log tells one from the other: over ground she is faster than
+through the water when she heads with a current, while a wind changes both speeds alike.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from kempf.pipeline.segment.turn_track import TurnTrack
 _FROM_RAD = pi
 SHORTEST_RAD = _FROM_RAD + 2.0 * pi + pi / 3
 
-#: Largest difference between the current that the water log shows and the drift of the circle, as a share of the latter.
+#: Largest difference between the current that the water log shows and the drift of the circle, as a share of that.
 _APART_SHARE = 1.0 / 3.0
 
 #: Factor on the standard error, since the step of a circle that narrows dies away, and the smallest share of the spread
@@ -118,8 +118,8 @@ def is_current(drift: CircleDrift, track: TurnTrack, execute_s: float) -> bool:
     Returns
     -------
     bool
-        True where the difference between the speed over ground along the bow and the water log's goes with the heading as the
-        drift says, to within a third of it or two standard errors; False also where there is no water log.
+        True where the difference between the speed over ground along the bow and the water log's goes with the heading
+        as the drift says, to within a third of it or two standard errors; False also where there is no water log.
     """
     known = (track.time_s >= execute_s) & np.isfinite(track.log_m_s)
     if np.count_nonzero(known) < 20:

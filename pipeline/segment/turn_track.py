@@ -1,4 +1,4 @@
-"""The track of a ship through a turn, from what her log has: positions, else speed and course, else the water log's speed.
+"""The track of a ship through a turn, from what was logged: positions, else speed and course, else the water log.
 
 What was measured is laid on common instants; the figures are read off in `turning_figures`.
 """
