@@ -72,7 +72,7 @@ def held_stretches(rudder_s: Float, rudder: Float, first: int, end: int, noise: 
     Returns
     -------
     list of HeldRudder
-        In order of time; each of five samples at least.
+        In order of time; each of five samples at least. One over which the rudder creeps on is none.
     """
     values = rudder[first:end].tolist()
     pieces: list[tuple[int, int]] = []
@@ -93,7 +93,7 @@ def held_stretches(rudder_s: Float, rudder: Float, first: int, end: int, noise: 
     if values:
         pieces.append((begin, last))
     stretches = [_held(rudder_s, rudder, first + a, first + b) for a, b in pieces if b - a >= 4]
-    return _joined(rudder_s, rudder, stretches, noise)
+    return [stretch for stretch in _joined(rudder_s, rudder, stretches, noise) if _at_rest(rudder, stretch, noise)]
 
 
 def _held(rudder_s: Float, rudder: Float, first: int, last: int) -> HeldRudder:
@@ -116,6 +116,14 @@ def _joined(rudder_s: Float, rudder: Float, stretches: list[HeldRudder], noise: 
         else:
             joined.append(stretch)
     return [_trimmed(rudder_s, rudder, stretch, noise) for stretch in joined]
+
+
+def _at_rest(rudder: Float, stretch: HeldRudder, noise: float) -> bool:
+    """Whether the rudder ends where it began: one that moves slowly stays in a band for a while, too."""
+    held = rudder[stretch.first : stretch.last + 1]
+    part = max(held.size // 4, 1)
+    crept = abs(float(np.median(held[-part:]) - np.median(held[:part])))
+    return crept <= band(stretch.rudder, noise) / 2
 
 
 def _trimmed(rudder_s: Float, rudder: Float, stretch: HeldRudder, noise: float) -> HeldRudder:

@@ -35,8 +35,9 @@ _LONGEST_APPROACH, _SHORTEST_APPROACH = 1.0, 0.25
 #: Largest yaw rate at the execute, as a share of the one at the end.
 _STEADY_SHARE = 0.15
 
-#: Slowest movement of the rudder, as a share of the time for the first 90 deg.
-_SLOWEST_RUDDER = 0.5
+#: Slowest movement of the rudder, as a share of the time for the first 90 deg, and the smallest one, as a share of the
+#: held angle: a rudder that was over already was not put over.
+_SLOWEST_RUDDER, _TRAVEL_SHARE = 0.5, 0.5
 
 #: Largest share of the record in which the drift angle is an impossible one.
 _ACROSS_SHARE = 0.3
@@ -106,26 +107,26 @@ def turning_circle(
     Returns
     -------
     TurningCircle or None
-        None where it is none: the rudder is too small, the heading changed by less than 180 deg or away from the
-        rudder's side, or by less than 360 deg from an approach that was not steady; or she went across her bow most of
-        the time, as no ship under way does.
+        None where it is none: the rudder is too small or was not put over by one movement, the heading changed by less
+        than 180 deg or away from the rudder's side, or by less than 360 deg from an approach that was not steady; or
+        she went across her bow for long, as no ship under way does.
 
     References
     ----------
     IMO MSC.137(76), 4.2.1 and 5.3.1; ISO 13643-2; ITTC 7.5-04-02-01.
     """
     side = 1.0 if held.rudder > 0 else -1.0
-    if abs(held.rudder) < np.deg2rad(settings.smallest_rudder_deg):
-        return None
     first, last = np.searchsorted(signals.heading_s, [held.start_s, held.end_s])
     turned = side * (signals.heading[first:last] - signals.heading[min(first, signals.heading.size - 1)])
-    if turned.size < 10 or float(np.max(turned)) < _HALF_TURN - 0.5:
+    over = abs(held.rudder) >= np.deg2rad(settings.smallest_rudder_deg)
+    if not over or turned.size < 10 or float(np.max(turned)) < _HALF_TURN - 0.5:
         return None
     quarter_s = float(signals.heading_s[first + int(np.argmax(turned >= pi / 2))] - held.start_s)
     end_s = min(held.end_s, float(signals.heading_s[-1]))
-    if signals.longest_gap_s(held.start_s, end_s) > settings.gap_share * quarter_s:
-        return None
     ramp = _execute(signals, held, quarter_s)
+    broken = signals.longest_gap_s(held.start_s, end_s) > settings.gap_share * quarter_s
+    if broken or not _put_over(signals, held, ramp, quarter_s):
+        return None
     begin_s = max(held.start_s, float(signals.heading_s[0])) if ramp is None else ramp.start_s
     approach_s = _approach_start(signals, begin_s, quarter_s)
     steady = mean_yaw_rate(signals, (begin_s + end_s) / 2, end_s)
@@ -196,6 +197,15 @@ def _execute(signals: Signals, held: HeldRudder, quarter_s: float) -> Ramp | Non
         noise=noise,
         known_rate=rate,
     )
+
+
+def _put_over(signals: Signals, held: HeldRudder, ramp: Ramp | None, quarter_s: float) -> bool:
+    """Whether the rudder was put over by one movement, or was over when the log began."""
+    if ramp is None:
+        recorded = max(float(signals.heading_s[0]), float(signals.rudder_s[0]))
+        return held.start_s - recorded < _SHORTEST_APPROACH * quarter_s
+    travel = abs(ramp.held_after - ramp.held_before)
+    return ramp.end_s - ramp.start_s <= _SLOWEST_RUDDER * quarter_s and travel >= _TRAVEL_SHARE * abs(held.rudder)
 
 
 def _approach_start(signals: Signals, execute_s: float, quarter_s: float) -> float:

@@ -14,12 +14,15 @@ from kempf.pipeline.channels.series import Float
 #: The heading is followed in steps of this size, and a turn is over where it has gone back by two, rad.
 _STEP_RAD = float(np.deg2rad(5.0))
 
+#: Of a longer record only so many samples are looked at: turns of a voyage last longer than their distance.
+_ENOUGH = 200_000
+
 
 @dataclass(frozen=True)
 class Turn:
     """One way of the heading, between two reversals."""
 
-    #: start_s, end_s: From the last reversal before it to the first one after it, to within a step of the heading, s.
+    #: start_s, end_s: Between the straight courses or reversals before and behind it, to within 5 deg of heading, s.
     start_s: float
     end_s: float
     #: Heading change, starboard positive, rad.
@@ -43,6 +46,8 @@ def find_turns(heading_s: Float, heading: Float, smallest_rad: float) -> list[Tu
     """
     if heading_s.size < 2:
         return []
+    thinned = slice(None, None, max(heading_s.size // _ENOUGH, 1))
+    heading_s, heading = heading_s[thinned], heading[thinned]
     level = np.floor(heading / _STEP_RAD)
     moved = np.concatenate([[0], np.flatnonzero(np.diff(level)) + 1, [level.size - 1]])
     turns: list[Turn] = []
@@ -63,6 +68,12 @@ def find_turns(heading_s: Float, heading: Float, smallest_rad: float) -> list[Tu
 
 
 def _turn(heading_s: Float, heading: Float, first: int, last: int) -> Turn:
+    """Return a turn without the straight courses before and behind it."""
+    way = np.sign(heading[last] - heading[first])
+    turned = way * (heading[first : last + 1] - heading[first])
+    at_first, at_last = np.flatnonzero(turned <= _STEP_RAD), np.flatnonzero(turned >= turned[-1] - _STEP_RAD)
+    if at_last[0] > at_first[-1]:
+        first, last = first + int(at_first[-1]), first + int(at_last[0])
     return Turn(float(heading_s[first]), float(heading_s[last]), float(heading[last] - heading[first]))
 
 

@@ -305,3 +305,13 @@ def test_coarse_and_slow_instruments() -> None:
     assert circle.delta0_deg == 20.0
     assert circle.execute_utc_ns is not None
     assert (circle.execute_utc_ns - 1_750_000_000_000_000_000) / 1e9 == pytest.approx(200.0, abs=2.0)
+
+
+def test_a_rudder_that_creeps_is_never_held() -> None:
+    """Slowly over from side to side: she turns through whole circles, and nobody ordered an angle."""
+    ship = Ship()
+    ship.wait(0.0, 60.0)
+    begin = ship.now
+    while ship.now < 4000.0:
+        ship.wait(20.0 * float(np.sin(2 * np.pi * (ship.now - begin) / 1500.0)), 0.5)
+    assert tiny(ship) == []
