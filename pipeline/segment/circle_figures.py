@@ -201,7 +201,8 @@ def _steady_spread(track: TurnTrack, execute_s: float, course: float, made: Turn
     rate, speed, drift = parts.T
     approach = track.speed_m_s[track.time_s <= execute_s]
     share = 1.0 - made.speed_loss_percent / 100.0
-    loss = np.hypot(_error(speed) / np.mean(speed), np.std(approach) / np.mean(approach)) if approach.size else nan
+    moving = bool(np.mean(speed) > 0 and np.mean(approach) > 0)
+    loss = np.hypot(_error(speed) / np.mean(speed), np.std(approach) / np.mean(approach)) if moving else nan
     return {
         "steady_diameter_m": _error(2.0 * speed / rate),
         "steady_yaw_rate_deg_s": float(np.rad2deg(_error(rate))),

@@ -39,6 +39,9 @@ _STEADY_SHARE = 0.15
 #: held angle: a rudder that was over already was not put over.
 _SLOWEST_RUDDER, _TRAVEL_SHARE = 0.5, 0.5
 
+#: Fewest values of the heading in a turn.
+_FEWEST = 10
+
 #: Largest share of the record in which the drift angle is an impossible one.
 _ACROSS_SHARE = 0.3
 
@@ -119,7 +122,7 @@ def turning_circle(
     first, last = np.searchsorted(signals.heading_s, [held.start_s, held.end_s])
     turned = side * (signals.heading[first:last] - signals.heading[min(first, signals.heading.size - 1)])
     over = abs(held.rudder) >= np.deg2rad(settings.smallest_rudder_deg)
-    if not over or turned.size < 10 or float(np.max(turned)) < _HALF_TURN - 0.5:
+    if not over or turned.size < _FEWEST or float(np.max(turned)) < _HALF_TURN - 0.5:
         return None
     quarter_s = float(signals.heading_s[first + int(np.argmax(turned >= pi / 2))] - held.start_s)
     end_s = min(held.end_s, float(signals.heading_s[-1]))
@@ -143,7 +146,7 @@ def turning_circle(
     if change < (_HALF_TURN if start == "steady" else _WHOLE_TURN):
         return None
     track = track_of(instruments, signals.origin_ns, approach_s, end_s, quarter_s)
-    if track.bridged_share > _ACROSS_SHARE:
+    if track.bridged_share > _ACROSS_SHARE or track.time_s.size < _FEWEST:
         return None
     measured = circle_figures(
         track,

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.instruments import Instruments as Channels
+from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo_turning import judge_circle
@@ -315,3 +316,17 @@ def test_a_rudder_that_creeps_is_never_held() -> None:
     while ship.now < 4000.0:
         ship.wait(20.0 * float(np.sin(2 * np.pi * (ship.now - begin) / 1500.0)), 0.5)
     assert tiny(ship) == []
+
+
+def test_speeds_of_nought_and_a_compass_that_fails_stop_nothing() -> None:
+    ship = Ship()
+    ship.wait(0.0, 100.0)
+    ship.wait(25.0, 600.0)
+    heading, rudder = measure(ship, Instruments())
+    still = Series(heading.time_utc_ns, np.zeros(len(heading)))
+    channels = {"heading": heading, "rudder_angle": rudder, "speed_over_ground": still, "course_over_ground": still}
+    for one in find_turning(Channels(channels, {}, ())):
+        assert isinstance(one, TurningCircle)
+        assert one.measured.figures["speed_loss_percent"].value is None
+    early = heading.between(START_NS, START_NS + 150_000_000_000)
+    assert find_turning(Channels({"heading": early, "rudder_angle": rudder}, {}, ())) == []
