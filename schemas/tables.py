@@ -150,8 +150,10 @@ _ALL = (
             _INGEST,
             Column("segment_id", "text", "hash of the log and the bounds"),
             _LOG,
-            Column("kind", "text", "zigzag, zigzag_broken_off, ..."),
-            Column("psi0_deg", "real", "nominal heading deviation at which the rudder is reversed", "deg"),
+            Column("kind", "text", "zigzag, zigzag_broken_off, turning_circle, pull_out, spiral"),
+            Column(
+                "psi0_deg", "real", "nominal heading deviation at which the rudder is reversed; NaN: no zigzag", "deg"
+            ),
             Column("delta0_deg", "real", "nominal rudder angle", "deg"),
             Column("first_side", "text", "side of the first execute: starboard or port"),
             Column("base_heading_deg", "real", "heading before the first execute", "deg"),
@@ -161,7 +163,7 @@ _ALL = (
             Column("overshoots_deg", "reals", "overshoot angles beyond the nominal heading deviation", "deg"),
             Column("imo_json", "text", "criteria of IMO MSC.137(76): value, limit, passed"),
             Column("quality_json", "text", "how well the manoeuvre was carried out"),
-            Column("detail_json", "text", "phases and measured values"),
+            Column("detail_json", "text", "phases and measured values; figures of what is no zigzag"),
             _CODE,
         ),
         partition_by=("vessel_key",),

@@ -43,7 +43,8 @@ STAGES: dict[Stage, Entry] = {
     "segment": Entry(
         (
             *("channels.instruments", "channels.doctor.examine", "channels.doctor.corrections"),
-            *("channels.doctor.verdict", "segment.find", "segment.imo", "segment.lateral"),
+            *("channels.doctor.verdict", "segment.find", "segment.find_turning"),
+            *("segment.imo", "segment.imo_turning", "segment.lateral"),
             "estimate.no_log.companions",
         ),
         ("ingest",),

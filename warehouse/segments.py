@@ -18,6 +18,9 @@ from kempf.warehouse.store import Warehouse
 
 _JSON = ("imo", "quality", "detail")
 
+#: Kinds a model is fitted to; every other one is kept to be looked at and to validate on.
+_ZIGZAGS = ("zigzag", "zigzag_broken_off")
+
 
 def segment_id(log_id: str, kind: str, start_utc_ns: int, end_utc_ns: int) -> str:
     """Return the id of a segment, ``seg-`` and 16 hex digits: the log, what it is, and its bounds."""
@@ -33,7 +36,7 @@ class Segment:
     log_id: str
     ingest_id: str
     kind: str
-    #: psi0_deg, delta0_deg: Nominal heading deviation and rudder angle, deg.
+    #: psi0_deg, delta0_deg: Nominal heading deviation and rudder angle, deg. Only a zigzag has the first, NaN else.
     psi0_deg: float
     delta0_deg: float
     first_side: str
@@ -61,6 +64,11 @@ class Segment:
     def own_time(self) -> bool:
         """Whether her log tells the time itself, rather than counting from a stated start or from being switched on."""
         return self.detail.get("own_time") is not False
+
+    @property
+    def is_zigzag(self) -> bool:
+        """Whether it is a zigzag, complete or not: what models are fitted to."""
+        return self.kind in _ZIGZAGS
 
     def show(self, file_name: str) -> dict[str, Any]:
         """Return the segment as the command line's JSON object.
@@ -142,7 +150,27 @@ def replace(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segme
 
 
 def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
-    """Return the segments found in the current ingest of each log, sorted by start then id.
+    """Return the zigzags found in the current ingest of each log, sorted by start then id.
+
+    Whatever is fitted, pooled, diagnosed or compared asks here, so that no turning circle is ever fitted by accident.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Where they are.
+    vessel : str, optional
+        Of this vessel only; of all by default.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    return [segment for segment in every(warehouse, vessel) if segment.is_zigzag]
+
+
+def every(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
+    """Return the manoeuvres of every kind found in the current ingest of each log, sorted by start then id.
 
     Parameters
     ----------
@@ -177,14 +205,14 @@ def by_ids(warehouse: Warehouse, vessel: str, names: Collection[str]) -> dict[st
 
 
 def get(warehouse: Warehouse, name: str) -> Segment:
-    """Return a segment of a current ingest by its id.
+    """Return a segment of a current ingest by its id, of whatever kind.
 
     Raises
     ------
     NotFound
         ``no_warehouse``, ``no_segment``.
     """
-    found = [segment for segment in current(warehouse) if segment.segment_id == name]
+    found = [segment for segment in every(warehouse) if segment.segment_id == name]
     if not found:
         raise NotFound(
             "no_segment",

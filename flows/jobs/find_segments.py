@@ -1,15 +1,22 @@
-"""The job that finds the zigzags of one ingest, as they are stored."""
+"""The job that finds the manoeuvres of one ingest, as they are stored: zigzags, and what is kept to validate on."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
+from math import nan
+from typing import Any
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.no_log.companions import has_log, shaft_speed
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
 from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo import judge
+from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.lateral import lateral_summary
+from kempf.pipeline.segment.pull_out import PullOut
+from kempf.pipeline.segment.spiral import Spiral
+from kempf.pipeline.segment.turning_circle import TurningCircle
 from kempf.pipeline.segment.zigzag import Zigzag
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version
@@ -29,7 +36,7 @@ class Ingest:
 def find_segments(
     ingest: Ingest, profile: VesselProfile, instruments: Instruments
 ) -> tuple[list[Segment], tuple[str, ...]]:
-    """Find the zigzags of one ingest; nothing is stored.
+    """Find the manoeuvres of one ingest; nothing is stored.
 
     Parameters
     ----------
@@ -39,6 +46,7 @@ def find_segments(
     Returns
     -------
     list of Segment
+        The zigzags, and behind them what else was found.
     tuple of str
         What a person should know: choices made in normalising, or the channel whose absence forbids the search.
     """
@@ -49,8 +57,10 @@ def find_segments(
         note = f"no {missing} in this log: zigzags cannot be looked for; map it in the profile if the log has it"
         return [], (*instruments.notes, note)
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
-    manoeuvres = [_segment(zigzag, ingest, profile, instruments) for zigzag in find_manoeuvres(heading, rudder, speed)]
-    return manoeuvres, instruments.notes
+    zigzags = find_manoeuvres(heading, rudder, speed)
+    manoeuvres = [_segment(zigzag, ingest, profile, instruments) for zigzag in zigzags]
+    others = [_kept_aside(one, ingest, profile) for one in find_turning(instruments, zigzags)]
+    return manoeuvres + others, instruments.notes
 
 
 def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
@@ -93,3 +103,70 @@ def _own_time(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile) -> bool:
     source = profile.source_for(ingest.file_name)
     stated = source is not None and source.time is not None and source.time.stated
     return not stated and zigzag.start_utc_ns >= CLOCK_FIRST_NS
+
+
+def _kept_aside(one: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: VesselProfile) -> Segment:
+    """Return a manoeuvre that no model is fitted to, with its figures."""
+    kind, executes, imo, quality, detail = _of_kind(one, profile)
+    return Segment(
+        segment_id=segment_id(ingest.log_id, kind, one.start_utc_ns, one.end_utc_ns),
+        vessel=ingest.vessel,
+        log_id=ingest.log_id,
+        ingest_id=ingest.ingest_id,
+        kind=kind,
+        psi0_deg=nan,
+        delta0_deg=one.delta0_deg,
+        first_side=one.side,
+        base_heading_deg=one.base_heading_deg,
+        start_utc_ns=one.start_utc_ns,
+        end_utc_ns=one.end_utc_ns,
+        executes_utc_ns=executes,
+        overshoots_deg=(),
+        code_version=code_version.fingerprint("segment"),
+        imo=imo,
+        quality=quality,
+        detail={"length_m": profile.length_m, **detail},
+    )
+
+
+def _of_kind(
+    one: TurningCircle | PullOut | Spiral, profile: VesselProfile
+) -> tuple[str, tuple[int, ...], dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """Return what differs between the kinds: its name, executes, criteria, quality and detail."""
+    if isinstance(one, TurningCircle):
+        made = one.measured
+        criteria = judge_circle(one, profile.length_m, profile.trial_speed_m_s)
+        executes = () if one.execute_utc_ns is None else (one.execute_utc_ns,)
+        return (
+            "turning_circle",
+            executes,
+            {shown.pop("name"): shown for shown in map(asdict, criteria)},
+            asdict(one.quality),
+            {
+                "figures": {name: asdict(figure) for name, figure in made.figures.items()},
+                "figures_over_ground": made.over_ground,
+                "figures_less_drift": made.less_drift,
+                "track": made.track,
+                "circle_drift": asdict(made.drift) if made.drift else None,
+                "corrected_for_current": made.corrected,
+                "delta0_measured_deg": one.delta0_measured_deg,
+                "execute_uncertainty_s": one.execute_uncertainty_s,
+                "heading_change_deg": one.heading_change_deg,
+                "approach_speed_m_s": made.approach_speed_m_s,
+                "approach_speed_trend_percent": made.approach_speed_trend_percent,
+            },
+        )
+    figures = {name: asdict(figure) for name, figure in one.figures.items()}
+    quality = {"reasons": one.reasons}
+    if isinstance(one, PullOut):
+        detail = {
+            "figures": figures,
+            "delta0_measured_deg": one.delta0_measured_deg,
+            "rudder_after_deg": one.rudder_after_deg,
+            "partner_start_utc_ns": one.partner_start_utc_ns,
+            "verdict": one.verdict,
+        }
+        return "pull_out", (one.start_utc_ns,), {}, quality, detail
+    points = [asdict(point) for point in one.points]
+    detail = {"figures": figures, "loop": one.loop, "n_ways": one.n_ways, "points": points}
+    return "spiral", tuple(point.start_utc_ns for point in one.points), {}, quality, detail

@@ -45,8 +45,10 @@ class IngestOutcome:
     tally: Tally | None = None
     #: How it was read, and why zigzags could not be looked for, where that is so.
     notes: tuple[str, ...] = ()
-    #: Found in this log.
+    #: Zigzags found in this log.
     segments: tuple[Segment, ...] = ()
+    #: Manoeuvres of other kinds found in it.
+    others: tuple[Segment, ...] = ()
     #: What of a damaged log could not be read.
     lost: tuple[LostStretch, ...] = ()
     #: What the channel doctor found in it.
@@ -68,6 +70,7 @@ class IngestOutcome:
             "partial": bool(self.lost),
             "lost": as_json(self.lost),
             "segments": [segment.segment_id for segment in self.segments],
+            "other_manoeuvres": [{"segment_id": s.segment_id, "kind": s.kind} for s in self.others],
             "channels": _channels(self.examination),
             **(self.error.to_json() if self.error else {}),
         }
@@ -176,7 +179,7 @@ def ingest_log(
         row = logs.of_ingest(warehouse, there.ingest_id)
         if unsearched(warehouse, [row]):
             search_log.store(warehouse, [search_log.search_again(warehouse, row)])
-        stored_segments = tuple(s for s in segments.current(warehouse, vessel) if s.ingest_id == there.ingest_id)
+        stored_segments = tuple(s for s in segments.every(warehouse, vessel) if s.ingest_id == there.ingest_id)
         seen = examinations.of_ingests(warehouse, [row.ingest_id])[row.ingest_id]
         return _outcome(warehouse, path, "unchanged", row, stored_segments, seen)
     with spooled(file_name, log, profile) as readings:
@@ -203,7 +206,8 @@ def _outcome(
         row.ingest_id,
         row.tally,
         (*row.notes, *examination.notes),
-        found_segments,
+        tuple(segment for segment in found_segments if segment.is_zigzag),
+        tuple(segment for segment in found_segments if not segment.is_zigzag),
         lost=lost.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id, ()),
         examination=examination,
     )
@@ -218,7 +222,7 @@ class ReadLog:
 
 
 def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfile, readings: LogReadings) -> ReadLog:
-    """Find the zigzags of a log that was read, and compare its channels."""
+    """Find the manoeuvres of a log that was read, and compare its channels."""
     code = code_version.fingerprint("ingest")
     this_ingest = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code), file_name)
     instruments = from_readings(readings.lazy())

@@ -1,4 +1,4 @@
-"""The job that looks through the readings of a log: its zigzags, and what the channel doctor says of its channels."""
+"""The job that looks through the readings of a log: its manoeuvres, and what the doctor says of its channels."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ class SearchedLog:
 def search(
     log: Ingest, profile: VesselProfile, file_name: str, log_format: str, instruments: Instruments, records: int
 ) -> SearchedLog:
-    """Find the zigzags in the channels of a log, and examine the channels.
+    """Find the manoeuvres in the channels of a log, and examine the channels.
 
-    Should the doctor fail, that is the verdict, and the zigzags count all the same.
+    Should the doctor fail, that is the verdict, and the manoeuvres count all the same.
 
     Parameters
     ----------
@@ -42,7 +42,7 @@ def search(
     records : int
         Of the log.
     """
-    zigzags, notes = find_segments(log, profile, instruments)
+    found, notes = find_segments(log, profile, instruments)
     give_back(records)
     try:
         content = examine_instruments(instruments, profile, file_name, log_format).content
@@ -57,7 +57,7 @@ def search(
         tuple(finding["words"] for finding in content["findings"]),
         {**content, "notes": list(notes)},
     )
-    return SearchedLog(tuple(zigzags), examination)
+    return SearchedLog(tuple(found), examination)
 
 
 def search_again(warehouse: Warehouse, row: LogRow) -> SearchedLog:
@@ -77,5 +77,5 @@ def search_again(warehouse: Warehouse, row: LogRow) -> SearchedLog:
 def store(warehouse: Warehouse, searched: Sequence[SearchedLog]) -> None:
     """Put what was found in some logs in place of what is stored of them, in one commit a table."""
     segments.replace(warehouse, {(f.examination.vessel, f.examination.ingest_id): f.segments for f in searched})
-    # behind the zigzags: from the examination on the log counts as looked through
+    # behind the manoeuvres: from the examination on the log counts as looked through
     examinations.replace(warehouse, [f.examination for f in searched])

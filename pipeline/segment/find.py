@@ -54,8 +54,11 @@ def find_manoeuvres(
             for switching in zigzags_in(chain, settings)
             if is_trial(signals, chain, switching, window_s)
         ]
-    # the same manoeuvre is seen at several rudder bands: the longest view of it, then the most regular one
-    candidates.sort(key=lambda c: (c[1].first - c[1].last, c[1].scatter, _span(c[0], c[1])))
+    # the same manoeuvre is seen at several rudder bands: the longest view of it, then the most regular one; few legs
+    # from an approach that was not steady say least, and take nothing from the others
+    candidates.sort(
+        key=lambda c: (_says_least(c[1], settings), c[1].first - c[1].last, c[1].scatter, _span(c[0], c[1]))
+    )
     taken: list[tuple[Chain, Switching, float]] = []
     for candidate in candidates:
         begin, end = _span(candidate[0], candidate[1])
@@ -67,6 +70,11 @@ def find_manoeuvres(
         describe(signals, chain, switching, window_s, speed=speed, settings=settings)
         for chain, switching, window_s in taken
     ]
+
+
+def _says_least(switching: Switching, settings: SegmentSettings) -> bool:
+    """Whether a zigzag has few legs and an approach that was not steady."""
+    return switching.start == "turning" and switching.last - switching.first < settings.switchings_without_approach
 
 
 def _span(chain: Chain, switching: Switching) -> tuple[float, float]:

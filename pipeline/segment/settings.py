@@ -45,3 +45,6 @@ class SegmentSettings:
     #: Switchings that must agree where no steady approach gives K0: K0 and psi0 are two unknowns, and four leave two
     #: checks.
     switchings_without_approach: int = 4
+    #: Switchings that must agree where the ship was still turning at K0: that heading is one check more, angles as they
+    #: are ordered for a trial are another.
+    switchings_from_turning: int = 3

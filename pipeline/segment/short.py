@@ -1,8 +1,9 @@
-"""Whether two or three legs are a short zigzag, or hand steering and course changes that look like one.
+"""Whether few legs are a short zigzag, or hand steering and course changes that look like one.
 
 Three legs hold two switchings, which nearly always lie symmetric about something, and two legs only one, which agrees
 with itself. So more is asked: round angles, as they are ordered for a trial, and of two legs that the second one is
-held until the ship has swung back. On a new course the counter rudder is taken off when the swing stops.
+held until the ship has swung back. On a new course the counter rudder is taken off when the swing stops. Four legs from
+a course on which the ship was still turning are asked for round angles too.
 """
 
 from __future__ import annotations
@@ -42,11 +43,12 @@ def is_trial(signals: Signals, chain: Chain, switching: Switching, window_s: flo
     Returns
     -------
     bool
-        True for more than three legs. For fewer, where rudder and heading change are customary angles; for two,
-        where moreover no other leg follows, the approach is steady, both rudder angles are alike, and the ship swung
-        back past where the rudder was reversed, but no farther than in a zigzag.
+        True for more than three legs, and for more than four where the ship was still turning at K0. For fewer, where
+        rudder and heading change are customary angles; for two, where moreover no other leg follows, the approach is
+        steady, both rudder angles are alike, and the ship swung back past where the rudder was reversed, but no farther
+        than in a zigzag.
     """
-    if switching.last - switching.first > 2:
+    if switching.last - switching.first > (3 if switching.start == "turning" else 2):
         return True
     psi0, delta0, late = measured_angles(chain, switching)
     if not (is_customary(delta0, 0.0, RUDDER_TOLERANCE) and is_customary(psi0, late, HEADING_TOLERANCE)):

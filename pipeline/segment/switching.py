@@ -7,6 +7,7 @@ when a ship that no longer obeys is given the next order. Overshoots and phases 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -58,11 +59,16 @@ class Switching:
     scatter: float
 
 
+#: Chooses among the zigzags that begin with one leg; None where none starts in the way that is looked for.
+_Rule = Callable[[list["Switching"], SegmentSettings], "Switching | None"]
+
+
 def zigzags_in(chain: Chain, settings: SegmentSettings) -> list[Switching]:
     """Find the zigzags in a chain, from the left, each as long as it goes.
 
     One that starts from a steady approach is looked for first. What is left over may be one whose approach was not
-    steady or not recorded; since K0 then follows from the switchings alone, more of them must agree.
+    steady or not recorded; since K0 then follows from the switchings alone, more of them must agree. Last come those of
+    fewer switchings that start from K0 with the ship still turning.
 
     Parameters
     ----------
@@ -76,22 +82,24 @@ def zigzags_in(chain: Chain, settings: SegmentSettings) -> list[Switching]:
     list of Switching
         In order of time, without common legs.
     """
-    steady = _scan(chain, 0, len(chain.legs) - 1, settings, steady=True)
-    borders = [-1, *(k for s in steady for k in (s.first, s.last)), len(chain.legs)]
-    others = [
-        zigzag
-        for begin, end in zip(borders[::2], borders[1::2], strict=True)
-        for zigzag in _scan(chain, begin + 1, end - 1, settings, steady=False)
-    ]
-    return sorted(steady + others, key=lambda s: s.first)
+    found: list[Switching] = []
+    for look_for in (_from_steady, _of_many_switchings, _from_turning):
+        borders = [-1, *(k for s in found for k in (s.first, s.last)), len(chain.legs)]
+        found += [
+            zigzag
+            for begin, end in zip(borders[::2], borders[1::2], strict=True)
+            for zigzag in _scan(chain, begin + 1, end - 1, settings, look_for)
+        ]
+        found.sort(key=lambda s: s.first)
+    return found
 
 
-def _scan(chain: Chain, first: int, last: int, settings: SegmentSettings, *, steady: bool) -> list[Switching]:
+def _scan(chain: Chain, first: int, last: int, settings: SegmentSettings, look_for: _Rule) -> list[Switching]:
     """Go through a range of legs and take the longest zigzag that starts at each."""
     zigzags: list[Switching] = []
     leg = first
     while leg < last:
-        best = _longest(chain, leg, last, settings, steady=steady)
+        best = look_for(_candidates(chain, leg, last, settings), settings)
         if best is None:
             leg += 1
             continue
@@ -100,8 +108,8 @@ def _scan(chain: Chain, first: int, last: int, settings: SegmentSettings, *, ste
     return zigzags
 
 
-def _longest(chain: Chain, leg: int, last: int, settings: SegmentSettings, *, steady: bool) -> Switching | None:
-    """Return the longest zigzag from a leg on, if it starts in the way that is looked for."""
+def _candidates(chain: Chain, leg: int, last: int, settings: SegmentSettings) -> list[Switching]:
+    """Return the zigzags from a leg on, from the shortest to the longest."""
     candidates: list[Switching] = []
     for end in range(leg + 1, last + 1):
         if not chain.unbroken[end - 1] or not np.isfinite(chain.heading[end]):
@@ -111,12 +119,32 @@ def _longest(chain: Chain, leg: int, last: int, settings: SegmentSettings, *, st
             candidates.append(candidate)
         elif end >= leg + 3:
             break
-    from_steady = [c for c in candidates if c.start == "steady"]
+    return candidates
+
+
+def _is_long(candidates: list[Switching], settings: SegmentSettings) -> bool:
+    """Whether the longest one has switchings enough to give K0, and starts otherwise than from a steady course."""
+    if not candidates or candidates[-1].start == "steady":
+        return False
+    return candidates[-1].last - candidates[-1].first >= settings.switchings_without_approach
+
+
+def _from_steady(candidates: list[Switching], settings: SegmentSettings) -> Switching | None:
+    """Choose the longest from a steady course."""
+    steady = [c for c in candidates if c.start == "steady"]
     # a long zigzag from a course that was not quite steady is not cut down to a short one that was
-    long = bool(candidates) and candidates[-1].last - leg >= settings.switchings_without_approach
-    if long and candidates[-1].start != "steady":
-        return None if steady else candidates[-1]
-    return from_steady[-1] if steady and from_steady else None
+    return steady[-1] if steady and not _is_long(candidates, settings) else None
+
+
+def _of_many_switchings(candidates: list[Switching], settings: SegmentSettings) -> Switching | None:
+    """Choose the longest where its switchings give K0 whatever the approach was."""
+    return candidates[-1] if _is_long(candidates, settings) else None
+
+
+def _from_turning(candidates: list[Switching], settings: SegmentSettings) -> Switching | None:
+    """Choose the longest from K0 with the ship still turning: the switchings must lie symmetric about where she was."""
+    turning = [c for c in candidates if c.start == "turning" and c.last - c.first >= settings.switchings_from_turning]
+    return turning[-1] if turning else None
 
 
 def _judge(chain: Chain, first: int, last: int, settings: SegmentSettings) -> Switching | None:

@@ -120,6 +120,40 @@ class TurningCircle:
 
 
 @dataclass(frozen=True)
+class HeldRudder:
+    """Hold one rudder angle: amidships behind a turning circle it is a pull-out, many in a row are a spiral.
+
+    Parameters
+    ----------
+    rudder_deg : float
+        Starboard positive.
+    duration_s : float
+        How long, with the time in which the rudder goes there.
+    """
+
+    rudder_deg: float
+    duration_s: float
+    kind: ClassVar[str] = "held_rudder"
+
+    def steering(self, hull: SimulatedHull, heading_rad: float, random: np.random.Generator) -> Steering:
+        """Return the step for the kernel; ``heading_rad`` is the heading at its beginning, not wrapped."""
+        return Steering(FIXED, np.array([radians(self.rudder_deg), inf]), np.empty(0), self.duration_s)
+
+
+def direct_spiral(angles_deg: tuple[float, ...], hold_s: float) -> tuple[HeldRudder, ...]:
+    """Return the steps of a direct spiral: the angles from side to side, and back over the same ones.
+
+    Parameters
+    ----------
+    angles_deg : tuple of float
+        From one side to the other, starboard positive.
+    hold_s : float
+        How long each is held.
+    """
+    return tuple(HeldRudder(angle, hold_s) for angle in (*angles_deg, *angles_deg[-2::-1]))
+
+
+@dataclass(frozen=True)
 class HandSteering:
     """Random rudder in a band: a sum of sinusoids of equal size, random phase and logarithmic spacing.
 
@@ -151,7 +185,7 @@ class HandSteering:
         return Steering(ORDERS, np.zeros(5), limited, self.duration_s)
 
 
-Step = SteadyCourse | CourseChange | ZigzagTest | TurningCircle | HandSteering
+Step = SteadyCourse | CourseChange | ZigzagTest | TurningCircle | HeldRudder | HandSteering
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,12 @@ def boat(tmp_path_factory: pytest.TempPathFactory) -> Voyage:
 
 
 @pytest.fixture(scope="session")
+def pond(tmp_path_factory: pytest.TempPathFactory) -> Voyage:
+    require("data", "esso_osaka")
+    return sail(measured_ships.pond(SHARED), Warehouse(str(tmp_path_factory.mktemp("pond"))))
+
+
+@pytest.fixture(scope="session")
 def fleet(tmp_path_factory: pytest.TempPathFactory) -> list[Voyage]:
     require("trials")
     warehouse = Warehouse(str(tmp_path_factory.mktemp("fleet")))

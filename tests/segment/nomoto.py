@@ -1,4 +1,7 @@
-"""A tiny ship for the tests: first-order Nomoto with a rate-limited rudder, stepped at 0.02 s, and her instruments."""
+"""A tiny ship for the tests: first-order Nomoto with a rate-limited rudder, stepped at 0.02 s, and her instruments.
+
+With ``straight`` below zero she is unstable on a straight course, and the cube of her yaw rate holds her (Norrbin).
+"""
 
 from __future__ import annotations
 
@@ -22,6 +25,8 @@ class Ship:
     rudder_rate_deg_s: float = 2.5
     scale: float = 1.0
     drift_deg_s: float = 0.0
+    straight: float = 1.0
+    cubic: float = 0.0
     heading: float = 0.0
     yaw_rate: float = 0.0
     rudder: float = 0.0
@@ -37,7 +42,8 @@ class Ship:
             move = self.rudder_rate_deg_s * STEP_S
             self.rudder += min(max(order - self.rudder, -move), move)
             push = self.gain_per_s * self.rudder + self.drift_deg_s
-            self.yaw_rate += STEP_S * (push - self.yaw_rate) / self.time_constant_s
+            resistance = self.straight * self.yaw_rate + self.cubic * self.yaw_rate**3
+            self.yaw_rate += STEP_S * (push - resistance) / self.time_constant_s
             self.heading += STEP_S * self.yaw_rate
             self.log.append((self.heading, self.rudder))
 

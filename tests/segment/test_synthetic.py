@@ -271,3 +271,24 @@ def test_an_hour_at_ten_hertz_is_quick() -> None:
         assert len(find_manoeuvres(*series)) == 1
         times.append(perf_counter() - start)
     assert min(times) < 0.5
+
+
+@pytest.mark.parametrize("before", [(8.0, 25.0, 0.0), (-8.0, 25.0, 0.0), (-10.0, 25.0, 3.0), (15.0, 60.0, 12.0)])
+def test_four_legs_from_an_approach_that_was_not_steady_are_kept_and_labelled(
+    before: tuple[float, float, float],
+) -> None:
+    vessel = Ship()
+    vessel.wait(0.0, 100.0)
+    rudder, held_s, amidships_s = before
+    vessel.wait(rudder, held_s)
+    vessel.wait(0.0, amidships_s)
+    executes = vessel.zigzag(20.0, 20.0, 1, 4)
+    vessel.wait(0.0, 60.0)
+    (zigzag,) = find_manoeuvres(*measure(vessel, Instruments()))
+    assert (zigzag.kind, zigzag.psi0_deg, zigzag.delta0_deg) == ("zigzag", 20.0, 20.0)
+    assert zigzag.quality.start == "turning"
+    assert any("not steady" in reason for reason in zigzag.quality.reasons)
+    late = np.abs(errors(zigzag, executes))
+    assert np.max(late[1:]) < 0.5
+    # a rudder that comes amidships for a moment and goes on is one movement
+    assert late[0] < amidships_s + 0.5

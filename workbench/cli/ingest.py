@@ -75,7 +75,7 @@ def _print_outcome(outcome: IngestOutcome) -> None:
         assert outcome.error is not None
         click.echo(f"{name}: {click.style('failed', fg='red')} [{outcome.error.code}] {outcome.error}", err=True)
         return
-    click.echo(f"{name}: {outcome.outcome}, {_ledger(outcome.tally)}; {_zigzags(outcome)}")
+    click.echo(f"{name}: {outcome.outcome}, {_ledger(outcome.tally)}; {_found(outcome)}")
     if outcome.lost:
         from kempf.flows.jobs.unreadable_stretches import as_json
 
@@ -111,9 +111,12 @@ def _print_channels(outcome: IngestOutcome, *, named: bool = False) -> None:
         click.echo(f"  next: kempf doctor {outcome.log_id[:12]}")
 
 
-def _zigzags(outcome: IngestOutcome) -> str:
+def _found(outcome: IngestOutcome) -> str:
+    """Say which zigzags were found, and behind them what else."""
     found = [
         f"{s.psi0_deg:g}/{s.delta0_deg:g} to {s.first_side}{' (broken off)' if s.kind != 'zigzag' else ''}"
         for s in outcome.segments
     ]
-    return f"{counted(len(found), 'zigzag')}: {', '.join(found)}" if found else "no zigzag"
+    zigzags = f"{counted(len(found), 'zigzag')}: {', '.join(found)}" if found else "no zigzag"
+    others = [f"{s.kind.replace('_', ' ')} with {s.delta0_deg:.3g} deg to {s.first_side}" for s in outcome.others]
+    return "; ".join([zigzags, *([f"kept for validation: {', '.join(others)}"] if others else [])])

@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, one_line, print_json, print_note, print_table, short_ids
+
+if TYPE_CHECKING:
+    from kempf.warehouse.segments import Segment
 
 
 @click.command("segments", cls=GivenOnce)
@@ -14,17 +20,16 @@ from kempf.workbench.terminal import number, one_line, print_json, print_note, p
 @warehouse_option
 @json_option
 def command(vessel: str | None, uri: str, as_json: bool) -> None:
-    """List the manoeuvres found, with their executes, overshoots and IMO criteria."""
+    """List the manoeuvres found: zigzags with overshoots and IMO criteria, and what is kept for validation."""
     from kempf.flows.jobs.out_of_date import said_of_logs
     from kempf.warehouse import examinations, logs, segments
-    from kempf.warehouse.instant import iso_utc
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     warehouse.require()
     names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
     # another process may read a log anew between the two questions
-    found = [segment for segment in segments.current(warehouse, vessel) if segment.ingest_id in names]
+    found = [segment for segment in segments.every(warehouse, vessel) if segment.ingest_id in names]
     said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
     contradictions = {name: list(one.findings) for name, one in said.items() if one.findings}
     print_note(said_of_logs(warehouse, vessel))
@@ -34,10 +39,24 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
             [{**one, "channels": contradictions.get(s.ingest_id, [])} for one, s in zip(shown, found, strict=True)]
         )
         return
-    if not found:
+    short = short_ids(segment.segment_id for segment in found)
+    zigzags = [segment for segment in found if segment.is_zigzag]
+    if zigzags:
+        _print_zigzags(zigzags, short)
+    else:
         click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
-        return
-    short = short_ids(s.segment_id for s in found)
+    for segment in found:
+        if not segment.is_zigzag:
+            _print_other(segment, short[segment.segment_id])
+    for ingest, findings in contradictions.items():
+        for words in findings:
+            click.echo(f"warning: {one_line(names[ingest])}: {one_line(words)}")
+
+
+def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str]) -> None:
+    """Print a table, a zigzag a row."""
+    from kempf.warehouse.instant import iso_utc
+
     rows = [
         [
             short[s.segment_id],
@@ -49,14 +68,22 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
             " ".join(f"{angle:.1f}" for angle in s.overshoots_deg[:4]),
             _imo(s.imo),
         ]
-        for s in found
+        for s in zigzags
     ]
     head = ["segment", "vessel", "zigzag", "first side", "K0 deg", "start UTC"]
     print_table([*head, "overshoots deg", "IMO"], rows)
     click.echo("zigzag: heading at which the rudder is reversed / rudder angle, deg; K0: heading before it")
-    for ingest, findings in contradictions.items():
-        for words in findings:
-            click.echo(f"warning: {one_line(names[ingest])}: {one_line(words)}")
+
+
+def _print_other(segment: Segment, short: str) -> None:
+    """Print a manoeuvre that no model is fitted to: what it was, then a figure a line, 95 % intervals in brackets."""
+    from kempf.warehouse.instant import iso_utc
+    from kempf.workbench.cli.manoeuvre_words import figures, headline
+
+    start = iso_utc(segment.start_utc_ns)[:16]
+    click.echo(f"{short} {segment.vessel} {start}, kept for validation: {headline(segment)}")
+    for line in figures(segment):
+        click.echo(f"  {line}")
 
 
 def _imo(criteria: object) -> str:

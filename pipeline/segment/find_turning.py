@@ -1,0 +1,85 @@
+"""The manoeuvres of one log beside its zigzags: turning circles, pull-outs and spirals, found without being told.
+
+Turns of the heading say where to look (`turns`), the rudder held meanwhile what it was (`held_rudder`). A manoeuvre
+that overlaps a zigzag is not reported again.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.segment.held_rudder import HeldRudder, held_stretches
+from kempf.pipeline.segment.measured import Signals
+from kempf.pipeline.segment.pull_out import PullOut, paired, pull_out
+from kempf.pipeline.segment.settings import SegmentSettings
+from kempf.pipeline.segment.spiral import Spiral, find_spirals
+from kempf.pipeline.segment.turning_circle import TurningCircle, turning_circle
+from kempf.pipeline.segment.turns import find_turns, regions
+from kempf.pipeline.segment.zigzag import Zigzag
+
+_DEFAULT = SegmentSettings()
+
+#: Smallest turn about which circles, pull-outs and spirals are looked for, rad.
+_SMALLEST_TURN_RAD = float(np.pi / 3)
+
+
+def find_turning(
+    instruments: Instruments, zigzags: Sequence[Zigzag] = (), settings: SegmentSettings = _DEFAULT
+) -> list[TurningCircle | PullOut | Spiral]:
+    """Find every turning circle, pull-out and direct spiral in a log.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        Series of the log: heading and rudder angle, and for lengths positions or speeds.
+    zigzags : sequence of Zigzag, optional
+        What was found before: nothing that overlaps one is reported.
+    settings : SegmentSettings, optional
+        Thresholds.
+
+    Returns
+    -------
+    list of TurningCircle, PullOut or Spiral
+        In order of time; empty where there is none, or heading or rudder are missing. A step of a spiral is no circle
+        and no pull-out.
+
+    References
+    ----------
+    IMO MSC.137(76) and MSC/Circ.1053; ISO 13643-2 and 13643-3; ITTC 7.5-04-02-01.
+    """
+    heading, rudder = instruments.get("heading"), instruments.get("rudder_angle")
+    if heading is None or rudder is None or len(heading) < 5 or len(rudder) < 5:
+        return []
+    signals = Signals.of(heading, rudder)
+    begin_s = max(float(signals.heading_s[0]), float(signals.rudder_s[0]))
+    end_s = min(float(signals.heading_s[-1]), float(signals.rudder_s[-1]))
+    turns = find_turns(signals.heading_s, signals.heading, _SMALLEST_TURN_RAD)
+    found: list[TurningCircle | PullOut | Spiral] = []
+    pull_outs: list[PullOut] = []
+    for start, end in regions(turns, begin_s, end_s):
+        first, behind = np.searchsorted(signals.rudder_s, [start, end + 1e-9])
+        stretches = held_stretches(signals.rudder_s, signals.rudder, int(first), int(behind), signals.rudder_noise)
+        free = [stretch for stretch in stretches if not _in_zigzag(signals, stretch, zigzags)]
+        spirals = find_spirals(signals, free, settings)
+        found += spirals
+        left = [s for s in free if not any(spiral.holds(signals.utc_ns(s.start_s)) for spiral in spirals)]
+        for k, stretch in enumerate(left):
+            circle = turning_circle(signals, instruments, stretch, settings)
+            if circle is not None:
+                found.append(circle)
+            if k:
+                pulled = pull_out(signals, left[k - 1], stretch, settings)
+                if pulled is not None:
+                    pull_outs.append(pulled)
+    return sorted([*found, *paired(pull_outs)], key=lambda one: (one.start_utc_ns, one.end_utc_ns))
+
+
+def _in_zigzag(signals: Signals, stretch: HeldRudder, zigzags: Sequence[Zigzag]) -> bool:
+    """Whether a stretch overlaps what lies between a zigzag's first execute and its end."""
+    start, end = signals.utc_ns(stretch.start_s), signals.utc_ns(stretch.end_s)
+    return any(
+        start < zigzag.end_utc_ns and end > (zigzag.executes_utc_ns or (zigzag.start_utc_ns,))[0] for zigzag in zigzags
+    )

@@ -1,0 +1,332 @@
+"""Turning circles, pull-outs and spirals that were sailed, and steering that is none of them."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.channels.instruments import Instruments as Channels
+from kempf.pipeline.channels.series import Series
+from kempf.pipeline.segment.find import find_manoeuvres
+from kempf.pipeline.segment.find_turning import find_turning
+from kempf.pipeline.segment.imo_turning import judge_circle
+from kempf.pipeline.segment.pull_out import PullOut
+from kempf.pipeline.segment.spiral import Spiral
+from kempf.pipeline.segment.turning_circle import TurningCircle
+from kempf.pipeline.simulate.disturbances import CALM, Disturbance, Environment
+from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, direct_spiral
+from kempf.pipeline.simulate.manoeuvre import TurningCircle as Turn
+from tests.segment.nomoto import Instruments, Ship, measure
+from tests.segment.sailed import START_NS, instruments, sailed, true_circle
+
+STREAM = Environment(current_north=Disturbance(0.5), current_east=Disturbance(-0.4))
+LENGTHS = ("advance_m", "transfer_m", "tactical_diameter_m")
+
+#: Norrbin's ship: K delta = -a r + c r^3, unstable between the folds.
+UNSTABLE = {"straight": -0.5, "cubic": 1.0, "gain_per_s": 0.06}
+
+
+def circle_of(found: list[TurningCircle | PullOut | Spiral]) -> TurningCircle:
+    (circle,) = found
+    assert isinstance(circle, TurningCircle)
+    return circle
+
+
+def tiny(ship: Ship, instruments: Instruments | None = None) -> list[TurningCircle | PullOut | Spiral]:
+    heading, rudder = measure(ship, instruments or Instruments())
+    return find_turning(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()))
+
+
+@pytest.mark.parametrize(("hull", "rudder"), [("ferry", 35.0), ("mariner", -20.0), ("usv", 20.0)])
+@pytest.mark.parametrize("environment", [CALM, STREAM])
+def test_figures_hold_the_truth_through_the_water(hull: str, rudder: float, environment: Environment) -> None:
+    trial = sailed((SteadyCourse(60.0 if hull == "usv" else 300.0), Turn(rudder, 900.0)), hull, environment, seed=3)
+    execute_s = trial.truth.manoeuvres[1].start_s
+    circle = circle_of(find_turning(instruments(trial)))
+    assert circle.execute_utc_ns is not None
+    assert (circle.execute_utc_ns - START_NS) / 1e9 == pytest.approx(execute_s, abs=0.3)
+    assert (circle.side, circle.delta0_deg) == ("starboard" if rudder > 0 else "port", abs(rudder))
+    assert circle.base_heading_deg == pytest.approx(70.0, abs=0.5)
+    assert abs(circle.heading_change_deg) == pytest.approx(900.0, abs=10.0)
+    assert circle.measured.track == "positions"
+    assert circle.measured.corrected is (environment is STREAM)
+    figures, truth = circle.measured.figures, true_circle(trial, execute_s)
+    for name in LENGTHS:
+        figure = figures[name]
+        assert figure.value is not None
+        # three standard errors: eighteen figures are asked
+        assert abs(figure.value - truth[name]) < 3.0 * figure.std, name
+        assert figure.std < (0.25 if hull == "usv" else 0.1) * figure.value, name
+    path = trial.truth.trajectory
+    whole = np.abs(path.column("psi")[-1] - path.column("psi")) <= 2.0 * np.pi
+    rate = float(np.rad2deg(np.mean(path.column("r")[whole])))
+    assert figures["steady_yaw_rate_deg_s"].value == pytest.approx(rate, rel=0.02)
+    assert figures["steady_diameter_m"].value == pytest.approx(figures["steady_diameter_of_track_m"].value, rel=0.06)
+    speed = np.hypot(path.column("V"), path.column("v"))
+    lost = 100.0 * (1.0 - float(np.mean(speed[whole])) / float(speed[int(execute_s / path.step_s)]))
+    assert figures["speed_loss_percent"].value == pytest.approx(lost, abs=3.0)
+    drift = abs(float(np.rad2deg(np.mean(np.arctan2(path.column("v"), path.column("V"))[whole]))))
+    assert figures["steady_drift_deg"].value == pytest.approx(drift, abs=1.5)
+
+
+def test_without_a_log_the_drift_is_said_and_left_in() -> None:
+    trial = sailed((SteadyCourse(300.0), Turn(35.0, 900.0)), "ferry", STREAM)
+    circle = circle_of(find_turning(instruments(trial, without=("speed_through_water",))))
+    assert not circle.measured.corrected
+    assert any("no water log shows a current" in reason for reason in circle.quality.reasons)
+    truth = true_circle(trial, trial.truth.manoeuvres[1].start_s)
+    for name in LENGTHS:
+        over_ground, less_drift = circle.measured.over_ground[name], circle.measured.less_drift[name]
+        assert circle.measured.figures[name].value == over_ground
+        assert less_drift is not None
+        assert less_drift == pytest.approx(truth[name], rel=0.04)
+    assert circle.measured.over_ground["tactical_diameter_m"] != pytest.approx(truth["tactical_diameter_m"], rel=0.04)
+
+
+def test_velocities_without_positions_give_the_same_circle() -> None:
+    trial = sailed((SteadyCourse(300.0), Turn(-35.0, 900.0)), "ferry")
+    positions = circle_of(find_turning(instruments(trial)))
+    velocities = circle_of(find_turning(instruments(trial, without=("latitude", "longitude"))))
+    assert velocities.measured.track == "speed and course over ground"
+    for name in LENGTHS:
+        one, other = positions.measured.figures[name].value, velocities.measured.figures[name].value
+        assert other == pytest.approx(one, rel=0.02)
+
+
+def test_the_log_alone_and_the_compass_alone() -> None:
+    trial = sailed((SteadyCourse(300.0), Turn(20.0, 560.0)), "ferry")
+    gnss = ("latitude", "longitude", "speed_over_ground", "course_over_ground")
+    logged = circle_of(find_turning(instruments(trial, without=gnss)))
+    assert logged.measured.track == "speed through the water and heading"
+    assert logged.measured.figures["advance_m"].value is not None
+    assert logged.measured.figures["advance_m"].low is None
+    assert logged.measured.figures["steady_drift_deg"].value is None
+    alone = circle_of(find_turning(instruments(trial, without=(*gnss, "speed_through_water"))))
+    assert alone.measured.track == "heading alone"
+    assert alone.measured.figures["steady_yaw_rate_deg_s"].value == pytest.approx(
+        logged.measured.figures["steady_yaw_rate_deg_s"].value, rel=1e-3
+    )
+    for name in (*LENGTHS, "steady_diameter_m", "speed_loss_percent"):
+        assert alone.measured.figures[name].value is None
+        assert alone.measured.figures[name].why
+
+
+def test_half_a_turn_is_a_circle_and_says_what_it_lacks() -> None:
+    trial = sailed((SteadyCourse(300.0), Turn(35.0, 200.0)), "ferry")
+    circle = circle_of(find_turning(instruments(trial)))
+    assert circle.measured.figures["tactical_diameter_m"].value is not None
+    assert circle.measured.figures["steady_diameter_m"].value is None
+    assert circle.measured.figures["steady_diameter_m"].why == "the heading changed by less than a whole turn"
+    assert any("less than 600 deg" in reason for reason in circle.quality.reasons)
+    assert find_turning(instruments(sailed((SteadyCourse(300.0), Turn(35.0, 150.0)), "ferry"))) == []
+
+
+def test_the_criteria_ask_for_the_full_rudder_a_length_and_an_approach() -> None:
+    trial = sailed((SteadyCourse(300.0), Turn(35.0, 560.0)), "ferry")
+    circle = circle_of(find_turning(instruments(trial)))
+    judged = {c.name: c for c in judge_circle(circle, 140.0, 10.0)}
+    truth = true_circle(trial, trial.truth.manoeuvres[1].start_s)
+    assert judged["advance"].value_lengths == pytest.approx(truth["advance_m"] / 140.0, rel=0.03)
+    assert [judged[name].passed for name in ("advance", "tactical diameter")] == [True, True]
+    assert judge_circle(circle, 101.0, 10.0)[0].passed is (truth["advance_m"] / 101.0 <= 4.5)
+    assert "length" in judge_circle(circle, None, 10.0)[0].why
+    assert "m long" in judge_circle(circle, 99.0, 10.0)[0].why
+    assert "below 90 %" in judge_circle(circle, 140.0, 12.0)[0].why
+    small = circle_of(find_turning(instruments(sailed((SteadyCourse(300.0), Turn(20.0, 560.0)), "ferry"))))
+    assert "asks for 35 deg" in judge_circle(small, 140.0, 10.0)[0].why
+
+
+def test_a_log_that_begins_in_the_turn_has_no_advance() -> None:
+    whole = instruments(sailed((SteadyCourse(300.0), Turn(35.0, 900.0)), "ferry"))
+    late_ns = START_NS + 330_000_000_000
+    cut = Channels({k: s.between(late_ns, s.time_utc_ns[-1]) for k, s in whole.series.items()}, {}, ())
+    circle = circle_of(find_turning(cut))
+    assert circle.quality.start == "unknown"
+    assert circle.execute_utc_ns is None
+    assert circle.measured.figures["advance_m"].value is None
+    assert circle.measured.figures["speed_loss_percent"].value is None
+    complete = circle_of(find_turning(whole))
+    assert circle.measured.figures["steady_yaw_rate_deg_s"].value == pytest.approx(
+        complete.measured.figures["steady_yaw_rate_deg_s"].value, rel=0.01
+    )
+
+
+def test_zigzags_are_not_touched_and_nothing_is_found_twice() -> None:
+    ship = Ship()
+    ship.wait(0.0, 100.0)
+    ship.zigzag(20.0, 20.0, 1, 6)
+    ship.wait(0.0, 100.0)
+    ship.wait(25.0, 500.0)
+    ship.wait(0.0, 100.0)
+    heading, rudder = measure(ship, Instruments())
+    zigzags = find_manoeuvres(heading, rudder)
+    found = find_turning(Channels({"heading": heading, "rudder_angle": rudder}, {}, ()), zigzags)
+    assert [z.kind for z in zigzags] == ["zigzag"]
+    assert [type(one) for one in found] == [TurningCircle, PullOut]
+    spans = [(z.start_utc_ns, z.end_utc_ns) for z in [*zigzags, *found]]
+    assert all(end <= start for (_, end), (start, _) in pairwise(sorted(spans)))
+
+
+def test_pull_outs_of_a_stable_ship_end_alike() -> None:
+    steps = [(SteadyCourse(300.0), Turn(side * 20.0, 400.0), HeldRudder(0.0, 200.0)) for side in (1.0, -1.0)]
+    trial = sailed((*steps[0], *steps[1]), "ferry")
+    found = find_turning(instruments(trial))
+    assert [type(one) for one in found] == [TurningCircle, PullOut] * 2
+    first, second = (one for one in found if isinstance(one, PullOut))
+    assert (first.side, second.side) == ("starboard", "port")
+    assert first.verdict == second.verdict == "no instability seen"
+    assert first.partner_start_utc_ns == second.start_utc_ns
+    release_s = trial.truth.manoeuvres[2].start_s
+    assert (first.start_utc_ns - START_NS) / 1e9 == pytest.approx(release_s, abs=1.0)
+    for one in (first, second):
+        residual = one.figures["residual_yaw_rate_deg_s"]
+        assert residual.value == pytest.approx(0.0, abs=max(3.0 * residual.std, 0.01))
+        assert abs(one.figures["initial_yaw_rate_deg_s"].value or 0.0) > 1.0
+
+
+def test_pull_outs_of_an_unstable_ship_do_not() -> None:
+    ship = Ship(**UNSTABLE)
+    for side in (1.0, -1.0):
+        ship.wait(side * 20.0, 200.0)
+        ship.wait(0.0, 300.0)
+    found = [one for one in tiny(ship) if isinstance(one, PullOut)]
+    assert [one.verdict for one in found] == ["unstable", "unstable"]
+    left = np.sqrt(0.5)  # where a r = c r^3
+    values = [one.figures["residual_yaw_rate_deg_s"].value for one in found]
+    assert values == pytest.approx([left, -left], abs=0.02)
+
+
+def test_one_pull_out_is_not_judged_and_a_short_one_is_none() -> None:
+    ship = Ship()
+    ship.wait(0.0, 100.0)
+    ship.wait(20.0, 150.0)
+    ship.wait(0.0, 150.0)
+    (one,) = tiny(ship)
+    assert isinstance(one, PullOut)
+    assert one.verdict == "not judged"
+    hasty = Ship()
+    hasty.wait(0.0, 100.0)
+    hasty.wait(20.0, 150.0)
+    hasty.wait(0.0, 10.0)
+    hasty.wait(-10.0, 60.0)
+    assert tiny(hasty) == []
+
+
+def test_spiral_of_a_stable_ship_has_no_loop() -> None:
+    angles = (15.0, 10.0, 5.0, 2.0, 0.0, -2.0, -5.0, -10.0, -15.0)
+    trial = sailed((SteadyCourse(120.0), *direct_spiral(angles, 150.0)), "ferry")
+    (spiral,) = find_turning(instruments(trial))
+    assert isinstance(spiral, Spiral)
+    assert (spiral.loop, spiral.n_ways, spiral.side) == ("none seen", 2, "starboard")
+    assert [p.rudder_deg for p in spiral.points] == pytest.approx([*angles, *angles[-2::-1]], abs=0.2)
+    path = trial.truth.trajectory
+    for point, record in zip(spiral.points, trial.truth.manoeuvres[1:], strict=True):
+        row = int(record.end_s / path.step_s) - 5
+        rate = point.yaw_rate_deg_s
+        assert rate.value == pytest.approx(float(np.rad2deg(path.column("r")[row])), abs=max(3.0 * rate.std, 0.01))
+        assert point.steady
+
+
+def test_spiral_of_an_unstable_ship_shows_her_loop() -> None:
+    ship = Ship(**UNSTABLE)
+    angles = (15.0, 10.0, 6.0, 4.0, 2.0, 0.0, -2.0, -4.0, -6.0, -10.0, -15.0)
+    for angle in (*angles, *angles[-2::-1]):
+        ship.wait(angle, 250.0)
+    (spiral,) = tiny(ship)
+    assert isinstance(spiral, Spiral)
+    assert spiral.loop == "seen"
+    fold = np.sqrt(0.5 / 3.0)
+    width = 2.0 * (0.5 * fold - fold**3) / 0.06
+    figure = spiral.figures["loop_width_deg"]
+    assert figure.low is not None
+    assert figure.high is not None
+    assert figure.low <= width <= figure.high
+    assert spiral.figures["loop_height_deg_s"].value == pytest.approx(2.0 * np.sqrt(0.5), rel=0.1)
+
+
+def test_one_way_of_a_spiral_cannot_show_a_loop() -> None:
+    ship = Ship()
+    for angle in (20.0, 10.0, 5.0, 0.0, -5.0, -10.0, -20.0):
+        ship.wait(angle, 180.0)
+    (spiral,) = tiny(ship)
+    assert isinstance(spiral, Spiral)
+    assert spiral.loop == "not judged"
+    assert spiral.figures["loop_width_deg"].why == "the rudder went one way only"
+
+
+@pytest.mark.parametrize("seed", range(25))
+def test_hand_steering_is_nothing(seed: int) -> None:
+    """A helmsman who holds any angle for any time, about a course."""
+    random = np.random.default_rng(seed)
+    ship = Ship()
+    ship.wait(0.0, 60.0)
+    while ship.now < 1500.0:
+        towards = -1.0 if ship.heading > 0 else 1.0
+        ship.wait(towards * float(random.uniform(-3.0, 12.0)), float(random.uniform(6.0, 35.0)))
+    assert tiny(ship) == []
+
+
+def test_course_changes_are_nothing() -> None:
+    ship = Ship()
+    for course in (0.0, 90.0, -70.0, 100.0, 0.0, 160.0):
+        ship.autopilot(course, 300.0)
+    for sign in (1, -1, 1):
+        goal = ship.heading + sign * 150.0
+        ship.steer(sign * 15.0, lambda sign=sign, goal=goal: sign * (goal - ship.heading) <= 10.0)  # type: ignore[misc]
+        ship.steer(-sign * 15.0, lambda sign=sign: sign * ship.yaw_rate <= 0.0)  # type: ignore[misc]
+        ship.wait(0.0, 120.0)
+    assert tiny(ship) == []
+
+
+@pytest.mark.parametrize("side", [1, -1])
+def test_williamson_turn_is_no_circle(side: int) -> None:
+    ship = Ship()
+    ship.wait(0.0, 60.0)
+    ship.steer(side * 35.0, lambda: side * ship.heading >= 60.0)
+    ship.steer(-side * 35.0, lambda: side * ship.heading <= -160.0)
+    ship.autopilot(-side * 180.0, 200.0)
+    assert tiny(ship) == []
+
+
+def test_a_rudder_of_the_wrong_sign_turns_no_circle() -> None:
+    ship = Ship(gain_per_s=-0.06)
+    ship.wait(0.0, 100.0)
+    ship.wait(25.0, 600.0)
+    assert tiny(ship) == []
+
+
+def test_coarse_and_slow_instruments() -> None:
+    ship = Ship()
+    ship.wait(0.0, 200.0)
+    ship.wait(20.0, 600.0)
+    coarse = Instruments(heading_s=1.0, rudder_s=2.0, heading_noise_deg=0.3, rudder_noise_deg=0.4, rudder_step_deg=1.0)
+    circle = circle_of(tiny(ship, coarse))
+    assert circle.delta0_deg == 20.0
+    assert circle.execute_utc_ns is not None
+    assert (circle.execute_utc_ns - 1_750_000_000_000_000_000) / 1e9 == pytest.approx(200.0, abs=2.0)
+
+
+def test_a_rudder_that_creeps_is_never_held() -> None:
+    """Slowly over from side to side: she turns through whole circles, and nobody ordered an angle."""
+    ship = Ship()
+    ship.wait(0.0, 60.0)
+    begin = ship.now
+    while ship.now < 4000.0:
+        ship.wait(20.0 * float(np.sin(2 * np.pi * (ship.now - begin) / 1500.0)), 0.5)
+    assert tiny(ship) == []
+
+
+def test_speeds_of_nought_and_a_compass_that_fails_stop_nothing() -> None:
+    ship = Ship()
+    ship.wait(0.0, 100.0)
+    ship.wait(25.0, 600.0)
+    heading, rudder = measure(ship, Instruments())
+    still = Series(heading.time_utc_ns, np.zeros(len(heading)))
+    channels = {"heading": heading, "rudder_angle": rudder, "speed_over_ground": still, "course_over_ground": still}
+    for one in find_turning(Channels(channels, {}, ())):
+        assert isinstance(one, TurningCircle)
+        assert one.measured.figures["speed_loss_percent"].value is None
+    early = heading.between(START_NS, START_NS + 150_000_000_000)
+    assert find_turning(Channels({"heading": early, "rudder_angle": rudder}, {}, ())) == []

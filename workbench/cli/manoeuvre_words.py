@@ -1,0 +1,87 @@
+"""What ``kempf segments`` says of a manoeuvre that is no zigzag: its figures in metres and lengths, with intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+from kempf.workbench.terminal import number
+
+if TYPE_CHECKING:
+    from kempf.warehouse.segments import Segment
+
+#: Names of the figures in words, in the order in which they are said.
+_WORDS = {
+    "advance_m": "advance",
+    "transfer_m": "transfer",
+    "tactical_diameter_m": "tactical diameter",
+    "steady_diameter_m": "steady diameter",
+    "steady_yaw_rate_deg_s": "steady yaw rate",
+    "steady_drift_deg": "steady drift angle",
+    "speed_loss_percent": "speed loss",
+    "initial_yaw_rate_deg_s": "yaw rate of the turn",
+    "residual_yaw_rate_deg_s": "residual yaw rate",
+    "loop_width_deg": "width of the loop",
+    "loop_height_deg_s": "height of the loop",
+}
+
+#: Units by the end of a name.
+_UNITS = {"_deg_s": "deg/s", "_percent": "%", "_deg": "deg", "_m": "m"}
+
+_DIGITS = 3
+
+
+def headline(segment: Segment) -> str:
+    """Return which manoeuvre it was, in words."""
+    rudder = f"{segment.delta0_deg:.3g} deg to {segment.first_side}"
+    if segment.kind == "turning_circle":
+        turned = abs(float(segment.detail["heading_change_deg"]))
+        return f"turning circle, rudder {rudder}, turned {turned:.0f} deg, track from {segment.detail['track']}"
+    if segment.kind == "pull_out":
+        verdict = segment.detail["verdict"]
+        pair = {
+            "unstable": "the pair shows: unstable on a straight course",
+            "no instability seen": "the pair shows no instability",
+        }
+        return f"pull-out from {rudder}; {pair.get(verdict, 'not judged: it takes one to each side')}"
+    loop = {"seen": "loop seen", "none seen": "no loop seen", "not judged": "one way only, a loop cannot be seen"}
+    points = segment.detail["points"]
+    return f"spiral, {len(points)} steps from {rudder}; {loop[segment.detail['loop']]}"
+
+
+def figures(segment: Segment) -> list[str]:
+    """Return its figures, one sentence each, and what is to be known before trusting them."""
+    length = segment.detail.get("length_m")
+    lines = [
+        _figure(_WORDS[name], name, segment.detail["figures"][name], length)
+        for name in _WORDS
+        if name in segment.detail["figures"]
+    ]
+    for point in segment.detail.get("points", ()):
+        rate = point["yaw_rate_deg_s"]
+        steady = "" if point["steady"] else ", not steady yet"
+        lines.append(f"{point['rudder_deg']:+.1f} deg: {_with_interval(rate)} deg/s{steady}")
+    criteria = {name: _criterion(name, one) for name, one in segment.imo.items()}
+    return [*lines, *criteria.values(), *segment.quality["reasons"]]
+
+
+def _figure(words: str, name: str, figure: Mapping[str, Any], length_m: float | None) -> str:
+    if figure["value"] is None:
+        return f"{words}: not known, {figure['why']}"
+    unit = next(unit for end, unit in _UNITS.items() if name.endswith(end))
+    lengths = f", {figure['value'] / length_m:.2f} L" if unit == "m" and length_m else ""
+    why = f", {figure['why']}" if figure["low"] is None and figure["why"] else ""
+    return f"{words}: {_with_interval(figure)} {unit}{lengths}{why}"
+
+
+def _with_interval(figure: Mapping[str, Any]) -> str:
+    value = number(figure["value"], _DIGITS)
+    if figure["low"] is None:
+        return value
+    return f"{value} ({number(figure['low'], _DIGITS)} to {number(figure['high'], _DIGITS)})"
+
+
+def _criterion(name: str, one: Mapping[str, Any]) -> str:
+    if one["passed"] is None:
+        return f"IMO {name} n/a: {one['why']}"
+    return f"IMO {name} {'passed' if one['passed'] else 'FAILED'}: at most {one['limit_lengths']:g} L"
