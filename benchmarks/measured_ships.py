@@ -48,17 +48,23 @@ def tank(data: Path) -> Ship:
     return _ship("hsva_kvlcc2", [_PROFILES / "hsva_kvlcc2.yaml"], list(folder.glob("*.dat")), folder)
 
 
+def pond(data: Path) -> Ship:
+    """The Esso Osaka model on a pond."""
+    folder = data / "data" / "esso_osaka"
+    return _ship("esso_osaka", [_PROFILES / "esso_osaka.yaml"], list(folder.glob("*.csv.gz")), folder)
+
+
 def boat(data: Path) -> Ship:
     """The small unmanned vessel at sea."""
     folder = data / "data" / "usv_open_water"
     return _ship("usv_open_water", [_PROFILES / "usv_open_water.yaml"], list(folder.glob("*_xy.csv")), folder)
 
 
-def fleet(data: Path) -> list[Ship]:
-    """The eight ships of the trial logs."""
-    folders = sorted(p.parent for p in (data / "trials").glob("*/particulars.json"))
+def fleet(data: Path, folder: str = "trials") -> list[Ship]:
+    """The eight ships of the trial logs; or those of another folder of the same form, such as ``trials_as_sold``."""
+    where = data / folder
+    folders = sorted(p.parent for p in where.glob("*/particulars.json"))
     if not folders:
-        where = data / "trials"
         raise NotFound("no_measured_data", f"There are no trial logs in {where}.", "Say where with --data FOLDER.")
     return [
         _ship(f.name, [f / "particulars.json", _PROFILES / "trial_logger.yaml"], list(f.glob("2*")), f) for f in folders
