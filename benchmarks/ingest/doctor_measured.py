@@ -1,7 +1,7 @@
 """What the channel doctor says of every measured log at hand: ``python -m benchmarks.ingest.doctor_measured``.
 
-Each log is read with its own profile, which is right as far as is known; what is true of an instrument all the same, such
-as an antenna that is not mounted along the bow, stands in `KNOWN`. ``--store FILE`` keeps what is said as JSON,
+Each log is read with its own profile, which is right as far as is known; what is true of an instrument all the same,
+such as an antenna that is not mounted along the bow, stands in `KNOWN`. ``--store FILE`` keeps what is said as JSON,
 ``--before FILE`` puts what an earlier version said beside it.
 """
 
@@ -23,6 +23,8 @@ from kempf.schemas.profile import VesselProfile
 KNOWN = {
     "rtk_usv_202412051751.txt": "the antenna baseline is not mounted along the bow",
     "rtk_usv_202412071206_dropouts.txt": "the antenna baseline is not mounted along the bow",
+    "20250710T0622.csv.gz": "the simulated ship capsizes: 61 m/s, 11,588 deg/min, a roll of thousands of degrees",
+    "20251008T1001.mcap": "the simulated ship capsizes: 61 m/s, 11,588 deg/min, a roll of thousands of degrees",
 }
 
 
@@ -82,8 +84,7 @@ def page(found: list[Said], before: dict[str, dict[str, object]] | None) -> list
     accused = [one for one in found if one.verdict in ("faults", "refused", "failed")]
     false = [one for one in accused if one.file_name not in KNOWN]
     lines = [
-        "Every measured and every trial log at hand, each read with its own profile, in which nothing is known to be wrong. "
-        "Agree and cannot be tested: the number of checks with that result.",
+        "Every measured and every trial log at hand, each read with its own profile. Agree and cannot be tested: the number of checks with that result.",
         "",
         f"{len(found)} logs; {len(accused)} with a finding, {len(false)} of them false.",
     ]

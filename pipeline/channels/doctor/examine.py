@@ -10,6 +10,7 @@ from kempf.pipeline.channels.doctor import (
     heading_course,
     heading_rate,
     misalignment,
+    plausible,
     rudder_order,
     rudder_turn,
     standstill,
@@ -35,6 +36,7 @@ class Check(Protocol):
 
 #: Every check.
 CHECKS: tuple[Check, ...] = (
+    plausible.examine,
     heading_rate.examine,
     heading_course.examine,
     misalignment.examine,
@@ -86,7 +88,7 @@ class Examination:
         """``clean``, ``faults`` or ``untested``: nothing could be tested."""
         if self.findings:
             return "faults"
-        return "clean" if any(o.state == "agree" for o in self.outcomes) else "untested"
+        return "clean" if any(o.state == "agree" and not o.alone for o in self.outcomes) else "untested"
 
 
 def ask(log: Log) -> list[list[Outcome]]:
@@ -138,14 +140,15 @@ def examine(log: Log) -> Examination:
         findings.append(ChannelFinding(faults, tuple(before[name] for name in corrected)))
         log, answers = faults[0].corrected(log), answers_then
     left = tuple(_wrong(answers).values())
-    if left:
-        findings.append(ChannelFinding((), left))
+    findings += [ChannelFinding((), (one,)) for one in left if one.claim]
+    if compared := tuple(one for one in left if not one.claim):
+        findings.append(ChannelFinding((), compared))
     outcomes = tuple(_by_name(first).values())
     return Examination(tuple(findings), outcomes, _untested(original, outcomes))
 
 
 def _untested(log: Log, outcomes: tuple[Outcome, ...]) -> tuple[str, ...]:
-    tested = {c for o in outcomes if o.state != "untestable" for c in o.channels}
+    tested = {c for o in outcomes if o.state != "untestable" and not o.alone for c in o.channels}
     return tuple(sorted(set(log.series) - tested))
 
 

@@ -8,7 +8,8 @@ from kempf.pipeline.channels.doctor.align import LONGEST_S, Alignment, align
 from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
 from kempf.pipeline.channels.doctor.faults import UNITS, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, integral
-from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.motion import does_not_move
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import reach
 
 #: Slopes that are no fault: rate-of-turn indicators are allowed 5 % (IMO A.526(13)), and the filters of many do worse.
@@ -37,6 +38,8 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     heading, turned = log.series["heading"], integral(log.series["yaw_rate"])
     late = 1.0 + heading.period_s + turned.period_s
     names = ("heading_rate", "heading_rate_clock") if thorough else ("heading_rate",)
+    if does_not_move(log):
+        return [untestable(name, _CHANNELS, STILL) for name in names]
     if max(reach(heading.value), reach(turned.value)) < _LEAST_TURN:
         return [untestable(name, _CHANNELS, "the ship hardly turned") for name in names]
     found = align(heading, turned, (-late, late), longest_s=LONGEST_S if thorough else 0.0)

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault
-from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD, stream_std
+from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity, turning
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.motion import moves, stream_std
+from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
@@ -41,11 +42,13 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     heading = log.series.get("heading")
     if heading is None:
         return []
-    return [_compare(kind, heading, velocity) for kind, velocity in log.velocities(track=thorough)]
+    return [_compare(log, kind, heading, velocity) for kind, velocity in log.velocities(track=thorough)]
 
 
-def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
+def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> Outcome:
     name, channels = f"legs_{kind}", ("heading", *velocity.channels)
+    if not moves(velocity, log):
+        return untestable(name, channels, STILL)
     if velocity.blurred(heading):
         return untestable(name, channels, "the position fixes are too coarse to resolve the turns")
     seen = _seen_from_the_bow(kind, heading, velocity)
@@ -54,7 +57,7 @@ def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
     relative, bow, rate, duration = seen
     speed = quantile(np.abs(relative), 0.5)
     fast = max(quantile(np.abs(rate), 0.95), 1e-6)
-    prior = np.array([np.inf, np.inf, *[stream_std(speed)] * 2, *[DRIFT_RAD * speed / fast] * 2])
+    prior = np.array([np.inf, np.inf, *[stream_std(log, speed)] * 2, *[DRIFT_RAD * speed / fast] * 2])
     noise = speed * np.hypot(_SECTOR_STD, _SECOND_STD / np.sqrt(duration))
     observed, noise = np.concatenate([relative.real, relative.imag]), np.concatenate([noise, noise])
     fitted = posterior(_columns(bow, rate), observed, noise, prior)

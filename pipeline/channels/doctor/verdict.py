@@ -87,8 +87,11 @@ def _figure(figure: Figure) -> dict[str, Any]:
 def sentence(finding: ChannelFinding) -> str:
     """Return a finding as one sentence."""
     if not finding.faults:
+        if finding.evidence[0].claim:
+            return finding.evidence[0].claim
         which = "one" if len(finding.channels) == 2 else "at least one"
-        return f"{listed(finding.channels)} disagree; {which} of them is wrong, and no known fault explains it"
+        whose = f"{listed(finding.channels)} disagree; {which} of them is wrong"
+        return f"{whose}, and no single correction takes the contradiction away"
     if len(finding.faults) == 1:
         return words(finding.faults[0])
     return "one of these: " + "; or ".join(words(fault) for fault in finding.faults)
