@@ -84,7 +84,8 @@ def page(found: list[Said], before: dict[str, dict[str, object]] | None) -> list
     accused = [one for one in found if one.verdict in ("faults", "refused", "failed")]
     false = [one for one in accused if one.file_name not in KNOWN]
     lines = [
-        "Every measured and every trial log at hand, each read with its own profile. Agree and cannot be tested: the number of checks with that result.",
+        "Every measured and every trial log at hand, each read with its own profile. Agree and cannot be tested: the "
+        "number of checks with that result.",
         "",
         f"{len(found)} logs; {len(accused)} with a finding, {len(false)} of them false.",
     ]

@@ -221,7 +221,7 @@ def _tried(log: Log, fault: Fault, by: set[int], answers: list[list[Outcome]]) -
     now, wrong = _by_name(after), _wrong(answers)
     corrects = frozenset(name for name in wrong if name not in now or now[name].state != "disagree")
     # a check that is only silenced is not corrected, unless it has gone with the channels it compared
-    if not any(name in now and now[name].state == "agree" for name in corrects) and fault.kind not in _REMOVES:
+    if not any(name in now and now[name].consistent for name in corrects) and fault.kind not in _REMOVES:
         return None
     return _Trial(fault, corrects, after)
 
@@ -247,7 +247,7 @@ def _asked_again(
             return None
         if (
             fault.kind not in _REMOVES
-            and not any(o.state == "agree" for o in after[k])
+            and not any(o.consistent for o in after[k])
             and any(o.state == "agree" for o in answers[k])
         ):
             return None  # it silenced what agreed

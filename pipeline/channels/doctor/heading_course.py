@@ -26,8 +26,8 @@ DRIFT_RAD = 0.45
 _LEAST_TURN = float(np.deg2rad(20.0))
 #: How far before the point about which the bow turns an antenna is mounted, in ship lengths.
 _LEADS = 0.25
-#: What is left over of two motions that go together.
-_TOGETHER = 0.6
+#: What is left over of two motions that go together; else a steady turn shows a slope, if so far at least, rad.
+_TOGETHER, _STEADY_TURN = 0.6, 1.5
 
 
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
@@ -69,12 +69,15 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorou
     # the antenna may be ahead of the point about which she turns: then the course leads
     honest = (-late - _LEADS * own, late + own)
     both = align(heading, direction, honest, circle=True, longest_s=LONGEST_S if thorough else 0.0)
-    if both is None:
-        return [untestable(name, channels, "the channels hardly overlap in time") for name in names]
-    std = float(np.hypot(both.slope_std, 0.5 * stream_std(log, speed) / speed))
+    steady = both is not None and both.varying > _TOGETHER
+    if both is None or (steady and both.turned < _STEADY_TURN):
+        why = "the channels hardly overlap in time" if both is None else "the two motions are not correlated"
+        return [untestable(name, channels, why) for name in names]
+    slope, own_std = (both.whole, both.whole_std) if steady else (both.slope, both.slope_std)
+    std = float(np.hypot(own_std, 0.5 * stream_std(log, speed) / speed))
     low, high = _BODY_SLOPES if kind == "body" else SLOPES
-    figure = Figure("change of direction of the velocity over change of heading", both.slope, std, low, high)
-    words = f"the {_WORDS[kind]} changes by {both.slope:.2f} ± {std:.2g} (1 s.e.) times the change of heading"
+    figure = Figure("change of direction of the velocity over change of heading", slope, std, low, high)
+    words = f"the {_WORDS[kind]} changes by {slope:.2f} ± {std:.2g} (1 s.e.) times the change of heading"
     state = figure.state
     if both.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
         state = "untestable"  # a slope through noise

@@ -8,7 +8,7 @@ from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity, turning
 from kempf.pipeline.channels.doctor.motion import moves, stream_std
-from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
@@ -24,6 +24,8 @@ _SECOND_STD = 0.3
 #: Where the fit leaves more than this share of the velocity, heading and course do not go together at all.
 _TOGETHER = 0.5
 _FEWEST = 12
+#: Times that the axis of the way is put right.
+_ROUNDS = 3
 
 
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
@@ -59,15 +61,23 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> Outcom
     fast = max(quantile(np.abs(rate), 0.95), 1e-6)
     prior = np.array([np.inf, np.inf, *[stream_std(log, speed)] * 2, *[DRIFT_RAD * speed / fast] * 2])
     noise = speed * np.hypot(_SECTOR_STD, _SECOND_STD / np.sqrt(duration))
-    observed, noise = np.concatenate([relative.real, relative.imag]), np.concatenate([noise, noise])
-    fitted = posterior(_columns(bow, rate), observed, noise, prior)
-    ahead, across = fitted.value[:2]
+    # speed that she loses and gathers again is no stream: along the way it adds to the error, across it does not
+    along = np.hypot(noise, _varies(np.abs(relative)))
+    axis = np.angle(np.sum(relative))
+    for _ in range(_ROUNDS):
+        seen_so = relative * np.exp(-1j * axis)
+        observed, noises = np.concatenate([seen_so.real, seen_so.imag]), np.concatenate([along, noise])
+        fitted = posterior(_columns(bow + axis, rate), observed, noises, prior)
+        ahead, across = fitted.value[:2]
+        axis += float(np.arctan2(across, ahead))
     way = float(np.hypot(ahead, across))
     if way < 0.3 * speed or fitted.left_over > _TOGETHER:
         return untestable(name, channels, "heading and direction of the velocity are not correlated")
-    angle = float(np.arctan2(across, ahead))
+    angle = float(np.angle(np.exp(1j * axis)))
     # of A's standard errors, the part across A
     own = float(np.hypot(fitted.std[1] * ahead / way, fitted.std[0] * across / way)) / way
+    if own > 1.0 / SURE:
+        return untestable(name, channels, "the way that she makes herself cannot be told from a stream")
     std = float(np.hypot(own, _LEEWAY_RAD))
     what = "angle of the velocity from the bow" if kind == "body" else "course minus heading"
     figure = Figure(what, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg")
@@ -84,6 +94,11 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> Outcom
     else:
         suspects += [Fault("swap", velocity.channels), *(Fault("sign", (one,)) for one in velocity.channels)]
     return Outcome(name, channels, figure.state, words, (figure,), fitted.left_over, tuple(suspects))
+
+
+def _varies(speed: Float) -> float:
+    """Return the standard deviation of speeds, from their median size beside the median, m/s."""
+    return 1.4826 * quantile(np.abs(speed - quantile(speed, 0.5)), 0.5)
 
 
 def _columns(bow: Float, rate: Float) -> Float:

@@ -75,6 +75,12 @@ class Outcome:
     alone: bool = False
 
     @property
+    def consistent(self) -> bool:
+        """Whether it agrees, or every figure lies where it should, though too uncertain to have shown a fault."""
+        within = bool(self.figures) and all(figure.outside <= DOUBTFUL for figure in self.figures)
+        return self.state == "agree" or (self.state == "untestable" and within)
+
+    @property
     def doubtful(self) -> bool:
         """Whether a figure lies well outside what is expected, and no figure is sure to."""
         return self.state != "disagree" and any(figure.outside > DOUBTFUL for figure in self.figures)

@@ -12,8 +12,8 @@ from dataclasses import replace
 import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import unit_faults
-from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
-from kempf.pipeline.channels.doctor.motion import speed_of, stream_std
+from kempf.pipeline.channels.doctor.log import VELOCITIES, Log, integral
+from kempf.pipeline.channels.doctor.motion import speed_of, stream_std, under_way
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, State, worst
 from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
 from kempf.pipeline.channels.series import Float
@@ -22,8 +22,8 @@ from kempf.schemas.channels import CHANNELS
 #: Share of a channel's values that may lie outside its physical range: damaged lines make one in some hundred.
 _DAMAGED = 0.05
 _FEWEST = 10
-#: What the readings may reach all but one time in fifty, SI: no displacement ship makes 35 m/s, none turns by 60 degrees
-#: a second, and no rudder or ship lies over so far.
+#: What the readings may reach all but one time in fifty, SI: no displacement ship makes 35 m/s or turns by 60 deg
+#: in a second, and no rudder or ship lies over so far.
 _REACH = {
     **dict.fromkeys(
         ("speed_over_ground", "speed_through_water", *VELOCITIES["earth"], *VELOCITIES["body"]), 35.0
@@ -42,14 +42,16 @@ _GRAVITY_M_S2 = 9.80665
 #: Froude number, rate of turn times length over speed, and the same for each rad of rudder, that no ship leaves: of
 #: displacement ships 0.1 to 0.4, at most about 1, and 0.5 to 2.
 _FROUDE, _TURN, _TURN_OF_RUDDER = (0.0, 1.0), (0.0, 2.5), (0.25, 4.0)
-#: One standard error of these figures as a share of them; less rudder than this says nothing of the last, rad.
-_SHARE, _LEAST_RUDDER = 0.07, float(np.deg2rad(10.0))
+#: One standard error of these figures as a share of them; less rudder and less
+#: of a turn than this say nothing, rad.
+_SHARE, _LEAST_RUDDER, _LEAST_TURN = 0.07, float(np.deg2rad(10.0)), float(np.deg2rad(30.0))
 #: Logarithms of what the three and the share of the trial speed usually are, and how they vary from ship to ship.
 _USUAL = {"speed": (0.0, 0.25), "froude": (np.log(0.2), 0.5), "turn": (np.log(0.6), 0.5), "rudder": (0.0, 0.45)}
 #: What each of them is multiplied by, as a power, where length, speed or trial speed are too large by a factor.
+_SPEED = "the speed"
 _POWERS = {
     "length_m of the profile": {"froude": -0.5, "turn": 1.0, "rudder": 1.0},
-    "the speed": {"speed": 1.0, "froude": 1.0, "turn": -1.0, "rudder": -1.0},
+    _SPEED: {"speed": 1.0, "froude": 1.0, "turn": -1.0, "rudder": -1.0},
     "trial_speed_m_s of the profile": {"speed": -1.0},
     "the turn": {"turn": 1.0, "rudder": 1.0},
 }
@@ -151,11 +153,13 @@ def _size_and_speed(log: Log) -> list[Outcome]:
         for figure in figures if figure.state == "disagree"
     )  # fmt: skip
     words = f"up to {max(speeds.values()):.3g} m/s{_of_whom(log)}: {said}"
+    likely = _likely(seen)
     suspects = tuple(
         replace(fault, simplicity=2) for name in speeds for fault in unit_faults(_CHANNELS.get(name, (name,)), "m/s")
-    )
+        if likely is None or list(likely) == [_SPEED]
+    )  # fmt: skip
     outcome = Outcome("size_and_speed", channels, "disagree", words, tuple(figures), _left(seen), suspects,
-                      claim=_cause(seen))  # fmt: skip
+                      claim=_claimed(likely))  # fmt: skip
     return [outcome]
 
 
@@ -178,16 +182,16 @@ def _turning(log: Log, length: float, seen: dict[str, float]) -> Iterator[Figure
     if rate is None or speed is None:
         return
     at = speed.at(rate.time_utc_ns, np.inf)
-    mostly = quantile(speed.value, 0.5)
-    known = at > 0.5 * mostly
-    if np.count_nonzero(known) < _FEWEST:
+    known = np.concatenate([under_way(speed, rate.time_utc_ns), [False]]) & np.isfinite(at)
+    if np.count_nonzero(known) < _FEWEST or reach(integral(rate).value[known]) < _LEAST_TURN:
         return
-    turned: Float = rate.value[known]
-    own = length / mostly
-    seen["turn"] = quantile(np.abs(turned), 0.99) * own
+    turned: Float = rate.value[known] * length / at[known]
+    seen["turn"] = quantile(np.abs(turned), 0.99)
     yield _figure("rate of turn times length over speed", seen["turn"], _TURN)
-    if rudder is not None and reach(rudder.value) > _LEAST_RUDDER and seen["turn"] > 0.0:
-        seen["rudder"] = reach(turned) / reach(rudder.value) * own
+    put = None if rudder is None else rudder.at(rate.time_utc_ns[known], np.inf)
+    put = None if put is None else put[np.isfinite(put)]
+    if put is not None and put.size >= _FEWEST and reach(put) > _LEAST_RUDDER and seen["turn"] > 0.0:
+        seen["rudder"] = reach(turned) / reach(put)
         yield _figure("the same over the rudder angle", seen["rudder"], _TURN_OF_RUDDER)
 
 
@@ -213,8 +217,8 @@ def _left(seen: dict[str, float]) -> float:
     return min(sum(off**2 for off in _scaled(seen).values()) / 100.0, 1.0)
 
 
-def _cause(seen: dict[str, float]) -> str:
-    """Say which of the profile's figures or of the channels is likely off, and by what factor it would fit.
+def _likely(seen: dict[str, float]) -> dict[str, float] | None:
+    """Return which of the profile's figures or of the channels may be off, and by what factor; None where none fits.
 
     One of them is taken to be wrong by a factor: what it then leaves over of the logarithms, in squares of how these
     vary from ship to ship, is compared with what the others would.
@@ -228,10 +232,13 @@ def _cause(seen: dict[str, float]) -> str:
             along = sum(off[name] * way[name] for name in off) / size
             left[cause], factor[cause] = total - along**2 * size, float(np.exp(along))
     best = min(left.values())
-    if best > _FITS:
+    return {c: factor[c] for c, what in left.items() if what - best < _LIKELIER} if best <= _FITS else None
+
+
+def _claimed(likely: dict[str, float] | None) -> str:
+    if likely is None:
         return "speeds, turns, length and trial speed are not those of one ship"
-    likely = [cause for cause, what in left.items() if what - best < _LIKELIER]
-    each = " or ".join(f"{cause} ({_times(factor[cause])})" for cause in likely)
+    each = " or ".join(f"{cause} ({_times(factor)})" for cause, factor in likely.items())
     return f"{each} is likely wrong"
 
 

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from kempf.pipeline.channels.doctor import heading_rate
 from kempf.pipeline.channels.doctor.align import edges_of
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log, integral, turning
@@ -71,37 +72,33 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         each = [
             _compare(f"{rudder}_{name}", (rudder, *how), log, turned, thorough=thorough) for name, how, turned in turns
         ]
-        found += _of_one_mind(each, [turned[0] for _, _, turned in turns])
+        found += _of_one_mind(log, each, thorough=thorough)
     return found
 
 
-def _of_one_mind(each: list[list[Outcome]], angles: list[Series]) -> list[Outcome]:
+def _of_one_mind(log: Log, each: list[list[Outcome]], *, thorough: bool) -> list[Outcome]:
     """Return the outcomes with heading and with yaw rate; what only one of the two holds against the rudder is nothing.
 
-    Unless the two turn in opposite senses: then one of them is wrong, and its checks say so.
+    Unless heading and yaw rate disagree themselves: then it is evidence which of them is wrong.
     """
-    if len(each) == 2 and _same_sense(*angles):
-        for k, other in ((0, 1), (1, 0)):
-            fine = {o.check.removeprefix(_common(each[other])) for o in each[other] if o.state == "agree"}
-            each[k] = [
-                untestable(o.check, o.channels, f"{o.words}, but not by the other channel that shows the turn")
-                if o.state == "disagree" and o.check.removeprefix(_common(each[k])) in fine
-                else o
-                for o in each[k]
-            ]
-    return [outcome for some in each for outcome in some]
+    whole = [outcome for some in each for outcome in some]
+    state = {outcome.check: outcome.state for outcome in whole}
+    alone = {o.check for o in whole if o.state == "disagree" and state.get(_other(o.check)) == "agree"}
+    if not alone:
+        return whole
+    between = {o.check: o.state for o in heading_rate.examine(log, thorough=thorough)}
+    return [
+        untestable(o.check, o.channels, f"{o.words}, but not by the other channel that shows the turn")
+        if o.check in alone and between.get(f"heading_rate{'_clock' * o.check.endswith('_clock')}") != "disagree"
+        else o
+        for o in whole
+    ]
 
 
-def _common(outcomes: list[Outcome]) -> str:
-    return outcomes[0].check
-
-
-def _same_sense(first: Series, second: Series) -> bool:
-    beside = first.at(second.time_utc_ns, gap_limit_s(first))
-    known = np.isfinite(beside)
-    if np.count_nonzero(known) < _FEWEST or np.ptp(beside[known]) == 0.0 or np.ptp(second.value[known]) == 0.0:
-        return False
-    return float(np.corrcoef(beside[known], second.value[known])[0, 1]) > 0.0
+def _other(check: str) -> str:
+    """Return the name of the same check with the other channel that shows the turn."""
+    there, here = ("_rate", "_heading") if "_heading" in check else ("_heading", "_rate")
+    return check.replace(here, there)
 
 
 def _turns(log: Log, *, all_of_them: bool) -> list[tuple[str, tuple[str, ...], tuple[Series, Series]]]:
