@@ -49,7 +49,7 @@ class Alignment:
     #: whole, whole_std: The slope by the changes as they are, a steady turn included, which a bias of a rate falsifies.
     whole: float
     whole_std: float
-    #: How far the first turns in all, to and fro, rad.
+    #: How far the first turns in all, rad.
     turned: float
     #: Size of what this lag leaves over that a lag between the bounds of sound clocks would leave; 1 for the same.
     explains: float
@@ -242,4 +242,4 @@ def _as_it_is(x: Float, y: Float, long: Float, found: RobustLine) -> tuple[float
     assert steady is not None
     assert whole is not None
     varying = min(found.left_over / max(steady.left_over, 1e-12), 1.0)
-    return varying, float(whole.value[0]), float(whole.std[0]), float(np.sum(np.abs(x[known])))
+    return varying, float(whole.value[0]), float(whole.std[0]), abs(float(np.sum(x[known])))

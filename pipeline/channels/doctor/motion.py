@@ -18,7 +18,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 #: tried in, and half of what the ship makes herself - in a faster one nobody tests her.
 STREAM_STD_M_S, STREAM_SHARE = 0.6, 0.125
 #: Slower than this, m/s, a boat may only drift, and all of her way be the stream's.
-_DRIFTS_M_S = 1.2
+_DRIFTS_M_S = 2.0
 #: A speed is a mean over so long, s: noise of a GNSS velocity, filtered or not, is gone by then, a manoeuvre is not.
 _MEAN_S = 10.0
 #: The slowest way that measured velocities show where no GNSS is concerned (tank, pond), m/s.
@@ -43,21 +43,27 @@ def stream_std(log: Log, speed_m_s: float) -> float:
         That she makes over ground. A slow one may be nothing but the stream, unless a turning shaft or a log says that
         she makes way herself; in a tank or a pond there is none.
     """
-    if speed_m_s < _DRIFTS_M_S and at_sea(log) and not _makes_own_way(log, speed_m_s):
-        return STREAM_STD_M_S
-    return min(STREAM_STD_M_S, STREAM_SHARE * speed_m_s)
+    return STREAM_STD_M_S if may_drift(log, speed_m_s) else min(STREAM_STD_M_S, STREAM_SHARE * speed_m_s)
 
 
-def _makes_own_way(log: Log, speed_m_s: float) -> bool:
+def may_drift(log: Log, speed_m_s: float) -> bool:
+    """Return whether nothing says that a ship of that speed over ground makes way herself."""
+    if speed_m_s > _DRIFTS_M_S or not at_sea(log):
+        return False
     shaft, water = log.series.get("shaft_speed"), log.series.get("speed_through_water")
     turns = shaft is not None and quantile(np.abs(shaft.value), 0.5) > 0.0
-    return turns or (water is not None and quantile(np.abs(water.value), 0.5) > 0.5 * speed_m_s)
+    return not turns and (water is None or quantile(np.abs(water.value), 0.5) < 0.5 * speed_m_s)
 
 
 def moves(velocity: Velocity, log: Log) -> bool:
     """Return whether a velocity is more than the noise of one that stands still."""
     slowest = SLOWEST_M_S if at_sea(log) else _SLOWEST_INDOORS_M_S
     return _mostly(velocity.time_utc_ns, velocity.value) > slowest
+
+
+def makes_way(water: Series, log: Log) -> bool:
+    """Return whether a log's speed through the water is more than the noise of one that stands still."""
+    return _moving(water.time_utc_ns, water.value, log)
 
 
 def does_not_move(log: Log) -> bool:

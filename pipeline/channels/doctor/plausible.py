@@ -13,7 +13,7 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import unit_faults
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log, integral
-from kempf.pipeline.channels.doctor.motion import speed_of, stream_std, under_way
+from kempf.pipeline.channels.doctor.motion import may_drift, speed_of, stream_std, under_way
 from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, State, worst
 from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
 from kempf.pipeline.channels.series import Float
@@ -179,8 +179,8 @@ def _fast_speeds(log: Log) -> Iterator[tuple[str, float]]:
 def _turning(log: Log, length: float, seen: dict[str, float]) -> Iterator[Figure]:
     """Yield the figures of the rate of turn while she is under way."""
     rate, speed, rudder = log.series.get("yaw_rate"), speed_of(log), log.series.get("rudder_angle")
-    if rate is None or speed is None:
-        return
+    if rate is None or speed is None or may_drift(log, quantile(speed.value, _MOSTLY)):
+        return  # one that drifts may turn as she likes
     at = speed.at(rate.time_utc_ns, np.inf)
     known = np.concatenate([under_way(speed, rate.time_utc_ns), [False]]) & np.isfinite(at)
     if np.count_nonzero(known) < _FEWEST or reach(integral(rate).value[known]) < _LEAST_TURN:

@@ -6,7 +6,7 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity
-from kempf.pipeline.channels.doctor.motion import STREAM_STD_M_S, moves
+from kempf.pipeline.channels.doctor.motion import STREAM_STD_M_S, makes_way, moves
 from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
@@ -44,6 +44,8 @@ def _compare(log: Log, kind: str, water: Series, velocity: Velocity) -> Outcome:
     name, channels = f"water_speed_{kind}", ("speed_through_water", *speed_channels)
     if not moves(velocity, log):
         return untestable(name, channels, STILL)
+    if not makes_way(water, log):
+        return untestable(name, channels, "the log shows no way through the water")
     way = velocity.under_way
     own = water.at(velocity.time_utc_ns, gap_limit_s(water))
     fast = quantile(np.abs(water.value), 0.98)
