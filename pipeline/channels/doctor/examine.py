@@ -19,7 +19,7 @@ from kempf.pipeline.channels.doctor import (
 )
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
-from kempf.pipeline.channels.doctor.outcome import Outcome
+from kempf.pipeline.channels.doctor.outcome import STILL, Outcome
 
 
 class Check(Protocol):
@@ -52,6 +52,11 @@ _MOST_FAULTS = 4
 _WORSE = 1.15
 #: Faults whose correction takes channels out, and the checks of these with them.
 _REMOVES = ("frame", "stuck")
+#: What no check shows, by the channel that it is about.
+_CANNOT_SEE = {
+    "rudder_angle": "the scale of rudder_angle: a rudder that reads too much or too little by a factor contradicts no "
+    "other channel, and the rudder's parameters are out by it",
+}
 #: Readings of a channel that a short examination looks at, at most.
 _FEW = 400
 
@@ -82,6 +87,17 @@ class Examination:
     outcomes: tuple[Outcome, ...]
     #: Channels that no check could test, by name.
     untested: tuple[str, ...]
+
+    @property
+    def still(self) -> bool:
+        """Whether she does not move, so that motions could not be compared."""
+        return any(outcome.words == STILL for outcome in self.outcomes)
+
+    @property
+    def cannot_see(self) -> tuple[str, ...]:
+        """What could be wrong with the channels of this log without any check showing it, one sentence each."""
+        there = {c for o in self.outcomes for c in o.channels} | set(self.untested)
+        return tuple(words for channel, words in _CANNOT_SEE.items() if channel in there)
 
     @property
     def verdict(self) -> str:

@@ -30,13 +30,16 @@ def as_content(
     Returns
     -------
     dict
-        ``verdict``, ``findings``, ``checks``, ``untested``.
+        ``verdict``, ``findings``, ``checks``, ``untested``; ``moves``: false where she does not, and motions could not
+        be compared; ``cannot_see``: what could be wrong without any check showing it.
     """
     return {
         "verdict": examination.verdict,
         "findings": [_finding(one, known, log_format) for one in examination.findings],
         "checks": [_outcome(one) for one in examination.outcomes],
         "untested": list(examination.untested),
+        "moves": not examination.still,
+        "cannot_see": list(examination.cannot_see),
     }
 
 
