@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from kempf.pipeline.channels.doctor import (
@@ -147,6 +147,11 @@ def examine(log: Log) -> Examination:
     first = answers = ask(log)
     original = log
     findings: list[ChannelFinding] = []
+    doubts = tuple(one for one in _wrong(answers).values() if one.distrusts_length)
+    if doubts:
+        findings.append(ChannelFinding((), doubts))
+        log = replace(log, length_m=None)
+        answers = ask(log)
     for _ in range(_MOST_FAULTS):
         explained = _explained(log, answers)
         if explained is None:

@@ -35,7 +35,6 @@ _REACH = {
     "pitch": float(np.deg2rad(45.0)),
 }  # fmt: skip
 _MOSTLY = 0.98
-_UNIT_FAULTS = ("m/s", "rad/s")
 #: What a ship's fast speed is of her trial speed, at most.
 _OF_TRIAL = 1.5
 _GRAVITY_M_S2 = 9.80665
@@ -48,9 +47,9 @@ _SHARE, _LEAST_RUDDER, _LEAST_TURN = 0.07, float(np.deg2rad(10.0)), float(np.deg
 #: Logarithms of what the three and the share of the trial speed usually are, and how they vary from ship to ship.
 _USUAL = {"speed": (0.0, 0.25), "froude": (np.log(0.2), 0.5), "turn": (np.log(0.6), 0.5), "rudder": (0.0, 0.45)}
 #: What each of them is multiplied by, as a power, where length, speed or trial speed are too large by a factor.
-_SPEED = "the speed"
+_LENGTH, _SPEED = "length_m of the profile", "the speed"
 _POWERS = {
-    "length_m of the profile": {"froude": -0.5, "turn": 1.0, "rudder": 1.0},
+    _LENGTH: {"froude": -0.5, "turn": 1.0, "rudder": 1.0},
     _SPEED: {"speed": 1.0, "froude": 1.0, "turn": -1.0, "rudder": -1.0},
     "trial_speed_m_s of the profile": {"speed": -1.0},
     "the turn": {"turn": 1.0, "rudder": 1.0},
@@ -90,21 +89,14 @@ def _ranges(log: Log) -> Iterator[Outcome]:
             share = refused / (refused + kept)
             std = float(np.sqrt(max(share * (1.0 - share), 1e-12) / (refused + kept)))
             figures.append(Figure("share of the values outside the channel's range", share, std, 0.0, _DAMAGED))
-            most = (
-                ""
-                if channel is None
-                else f" ({_shown(channel.low, channel.unit)} to {_shown(channel.high, channel.unit)})"
-            )
-            words.append(f"{refused} of {refused + kept} values lie outside the physical range{most} and were refused")
+            words.append(f"{refused} of {refused + kept} values lie outside its physical range{_limits(name)}: refused")
         if series is not None and channel is not None and name in _REACH and kept >= _FEWEST:
             fast = quantile(np.abs(series.value), _MOSTLY)
             figures.append(Figure("size of the values", fast, 0.0, 0.0, _REACH[name], channel.unit))
             words.append(f"one in fifty values is beyond {_shown(fast, channel.unit)}")
         if any(figure.state == "disagree" for figure in figures):
             said = " and ".join(w for w, figure in zip(words, figures, strict=True) if figure.state == "disagree")
-            unit = None if channel is None else channel.unit
-            suspects = tuple(unit_faults((name,), unit)) if unit in _UNIT_FAULTS else ()
-            yield Outcome(f"range_{name}", (name,), "disagree", said, tuple(figures), 1.0, suspects,
+            yield Outcome(f"range_{name}", (name,), "disagree", said, tuple(figures), 1.0,
                           claim=f"{name} has values that no ship has")  # fmt: skip
         elif figures:
             yield Outcome(f"range_{name}", (name,), "agree", f"{name} is within its range", tuple(figures),
@@ -159,7 +151,7 @@ def _size_and_speed(log: Log) -> list[Outcome]:
         if likely is None or list(likely) == [_SPEED]
     )  # fmt: skip
     outcome = Outcome("size_and_speed", channels, "disagree", words, tuple(figures), _left(seen), suspects,
-                      claim=_claimed(likely))  # fmt: skip
+                      claim=_claimed(likely), distrusts_length=list(likely or ()) == [_LENGTH])  # fmt: skip
     return [outcome]
 
 

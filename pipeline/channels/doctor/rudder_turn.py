@@ -195,9 +195,10 @@ class _Answer:
     #: By how much the rudder is read earlier than logged, s, and what it explains of the change of the rate then.
     shift_s: float
     explains: float
-    #: One fit and one best shift a stretch.
-    parts: tuple[RobustLine | None, ...]
-    part_shifts_s: tuple[float, ...]
+    #: What was fitted, for its stretches: the windows, the rudder at each shift, shape (n_shifts, n), the shifts, s.
+    windows: _Windows
+    put: Float
+    shifts: Float
     #: Correlation of rudder and rate of turn, at the same time.
     together: float
     #: Whether a rudder of the other sign at a shift that no gear makes does far better than any at a usual one.
@@ -254,17 +255,16 @@ def _best(windows: _Windows, rudder: Series, shifts: Float) -> _Answer | None:
     if not np.isfinite(whole[1 + k]):
         return None
     found = _fitted(windows, put[k], np.isfinite(windows.jump))
-    usual = _fitted(windows, put[_chosen(whole[1:], shifts, far_better=0.0)], np.isfinite(windows.jump))
+    near = _chosen(whole[1:], shifts, far_better=0.0)
+    usual = found if near == k else _fitted(windows, put[near], np.isfinite(windows.jump))
     if found is None or usual is None:
         return None
-    parts = _parts(windows)
-    shifted = [float(shifts[_chosen(_left(put, windows, part), shifts)]) for part in parts] if shifts.size > 3 else []
     known = np.isfinite(windows.jump)
     rate = windows.turn[known] / windows.long[known]
     together = float(np.corrcoef(windows.rudder[known], rate)[0, 1]) if np.ptp(windows.rudder[known]) > 0.0 else 0.0
-    each = tuple(_fitted(windows, put[k], part) for part in parts)
-    return _Answer(found, float(shifts[k]), 1.0 - float(whole[1 + k] / whole[0]), each, tuple(shifted), together,
-                   bool(found.value[0] * usual.value[0] < 0.0))  # fmt: skip
+    explains = 1.0 - float(whole[1 + k] / whole[0])
+    ambiguous = bool(found.value[0] * usual.value[0] < 0.0)
+    return _Answer(found, float(shifts[k]), explains, windows, put, shifts, together, ambiguous)
 
 
 def _chosen(left: Float, shifts: Float, far_better: float = _FAR_BETTER) -> int:
@@ -319,7 +319,7 @@ def _clock(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
     figure = Figure("delay of the rudder channel behind the yaw response", shift, _SHIFT_STD_S, *USUAL_S, "s")
     when = "earlier" if shift > 0 else "later"
     words = f"the yaw response fits best with the rudder put over {abs(shift):.0f} s {when} than logged"
-    if figure.state == "disagree" and any(abs(one - shift) > _SAME_S for one in answered.part_shifts_s):
+    if figure.state == "disagree" and not _same_shift(answered):
         return untestable(name, channels, f"{words}, but not in every stretch of the log")
     middle = 0.5 * (USUAL_S[0] + USUAL_S[1])
     late, std, half = shift - middle, 0.5 * (USUAL_S[1] - USUAL_S[0]), "half the usual range"
@@ -328,6 +328,12 @@ def _clock(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
         Fault("latency", channels[1:], -late, "early" if late > 0 else "late", std, spread=half),
     )
     return Outcome(name, channels, figure.state, words, (figure,), min(1.0 - answered.explains, 1.0), suspects)
+
+
+def _same_shift(answered: _Answer) -> bool:
+    """Return whether she answers best at this shift in each stretch of the log."""
+    left = [_left(answered.put, answered.windows, part) for part in _parts(answered.windows)]
+    return all(abs(answered.shifts[_chosen(one, answered.shifts)] - answered.shift_s) <= _SAME_S for one in left)
 
 
 def _judged(name: str, channels: tuple[str, ...], answered: _Answer) -> Outcome:
@@ -373,7 +379,9 @@ def _repeated(answered: _Answer, neutral: float) -> bool:
     if sense < 0.0 and (answered.together > 0.0 or answered.explains < _PROVES):
         return False
     sure = 0
-    for one in answered.parts:
+    put = answered.put[int(np.argmin(np.abs(answered.shifts - answered.shift_s)))]
+    for part in _parts(answered.windows):
+        one = _fitted(answered.windows, put, part)
         if one is None:
             continue
         answer, std = float(one.value[0]), float(one.std[0])
