@@ -147,9 +147,7 @@ def examine(log: Log) -> Examination:
     first = answers = ask(log)
     original = log
     findings: list[ChannelFinding] = []
-    doubts = tuple(one for one in _wrong(answers).values() if one.distrusts_length)
-    if doubts:
-        findings.append(ChannelFinding((), doubts))
+    if any(one.distrusts_length for one in _wrong(answers).values()):
         log = replace(log, length_m=None)
         answers = ask(log)
     for _ in range(_MOST_FAULTS):
@@ -160,6 +158,9 @@ def examine(log: Log) -> Examination:
         before = _by_name(answers)
         findings.append(ChannelFinding(faults, tuple(before[name] for name in corrected)))
         log, answers = faults[0].corrected(log), answers_then
+    if log.length_m != original.length_m:
+        # a corrected channel may have made the length right
+        answers[CHECKS.index(plausible.examine)] = plausible.examine(replace(log, length_m=original.length_m))
     left = tuple(_wrong(answers).values())
     findings += [ChannelFinding((), (one,)) for one in left if one.claim]
     if compared := tuple(one for one in left if not one.claim):

@@ -71,7 +71,7 @@ class Outcome:
     suspects: tuple[Fault, ...] = field(default=(), repr=False)
     #: What it says where it disagrees and no correction of a channel is known; empty for a comparison of channels.
     claim: str = ""
-    #: Whether it says that the length in the profile is wrong: then no other check is to use it.
+    #: Whether length and speed do not belong together: then no other check is to use the length.
     distrusts_length: bool = False
     #: Whether no two channels were compared: then agreement confirms nothing.
     alone: bool = False

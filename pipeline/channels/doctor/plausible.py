@@ -40,12 +40,12 @@ _OF_TRIAL = 1.5
 _GRAVITY_M_S2 = 9.80665
 #: Froude number, rate of turn times length over speed, and the same for each rad of rudder, that no ship leaves: of
 #: displacement ships 0.1 to 0.4, at most about 1, and 0.5 to 2.
-_FROUDE, _TURN, _TURN_OF_RUDDER = (0.0, 1.0), (0.0, 2.5), (0.25, 4.0)
+_FROUDE, _TURN, _TURN_OF_RUDDER = (0.0, 1.0), (0.0, 2.5), (0.4, 4.5)
 #: One standard error of these figures as a share of them; less rudder and less
 #: of a turn than this say nothing, rad.
 _SHARE, _LEAST_RUDDER, _LEAST_TURN = 0.07, float(np.deg2rad(10.0)), float(np.deg2rad(30.0))
 #: Logarithms of what the three and the share of the trial speed usually are, and how they vary from ship to ship.
-_USUAL = {"speed": (0.0, 0.25), "froude": (np.log(0.2), 0.5), "turn": (np.log(0.6), 0.5), "rudder": (0.0, 0.45)}
+_USUAL = {"speed": (0.0, 0.25), "froude": (np.log(0.2), 0.8), "turn": (np.log(0.6), 0.5), "rudder": (0.0, 0.45)}
 #: What each of them is multiplied by, as a power, where length, speed or trial speed are too large by a factor.
 _LENGTH, _SPEED = "length_m of the profile", "the speed"
 _POWERS = {
@@ -151,7 +151,7 @@ def _size_and_speed(log: Log) -> list[Outcome]:
         if likely is None or list(likely) == [_SPEED]
     )  # fmt: skip
     outcome = Outcome("size_and_speed", channels, "disagree", words, tuple(figures), _left(seen), suspects,
-                      claim=_claimed(likely), distrusts_length=list(likely or ()) == [_LENGTH])  # fmt: skip
+                      claim=_claimed(likely), distrusts_length=True)  # fmt: skip
     return [outcome]
 
 
@@ -206,7 +206,7 @@ def _scaled(seen: dict[str, float]) -> dict[str, float]:
 
 
 def _left(seen: dict[str, float]) -> float:
-    return min(sum(off**2 for off in _scaled(seen).values()) / 100.0, 1.0)
+    return min(sum(off**2 for off in _scaled(seen).values()) / 25.0, 1.0)
 
 
 def _likely(seen: dict[str, float]) -> dict[str, float] | None:

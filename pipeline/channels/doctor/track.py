@@ -19,7 +19,7 @@ _ASTRAY = 0.15
 #: least.
 _MOST, _OVER, _CLEAR, _FEWEST = 240, 4.0, 30.0, 8
 #: The way within a window, m, at least: noise of a fix that remembers what it was does not show from fix to fix.
-_CLEAR_M = 15.0
+_CLEAR_M = 5.0
 #: The log is so many windows long at least.
 _LEAST_WINDOWS = 2.5
 
