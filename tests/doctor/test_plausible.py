@@ -117,7 +117,7 @@ def test_what_ingest_refused_is_counted_and_no_clean_log() -> None:
     assert found.content["verdict"] == "faults"
     (finding,) = found.content["findings"]
     assert finding["words"] == "yaw_rate has values that no ship has"
-    assert "outside its physical range (-114.6 deg/s to 114.6 deg/s)" in finding["evidence"][0]["words"]
+    assert "outside its range (-114.6 deg/s to 114.6 deg/s)" in finding["evidence"][0]["words"]
 
 
 def test_a_record_that_was_refused_whole_counts_for_the_channels_of_its_source() -> None:

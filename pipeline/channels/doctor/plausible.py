@@ -89,13 +89,13 @@ def _ranges(log: Log) -> Iterator[Outcome]:
             share = refused / (refused + kept)
             std = float(np.sqrt(max(share * (1.0 - share), 1e-12) / (refused + kept)))
             figures.append(Figure("share of the values outside the channel's range", share, std, 0.0, _DAMAGED))
-            words.append(f"{refused} of {refused + kept} values lie outside its physical range{_limits(name)}: refused")
+            words.append(f"{refused} of {refused + kept} values lie outside its range{_limits(name)} and were refused")
         if series is not None and channel is not None and name in _REACH and kept >= _FEWEST:
             fast = quantile(np.abs(series.value), _MOSTLY)
             figures.append(Figure("size of the values", fast, 0.0, 0.0, _REACH[name], channel.unit))
             words.append(f"one in fifty values is beyond {_shown(fast, channel.unit)}")
         if any(figure.state == "disagree" for figure in figures):
-            said = " and ".join(w for w, figure in zip(words, figures, strict=True) if figure.state == "disagree")
+            said = "; ".join(w for w, figure in zip(words, figures, strict=True) if figure.state == "disagree")
             yield Outcome(f"range_{name}", (name,), "disagree", said, tuple(figures), 1.0,
                           claim=f"{name} has values that no ship has")  # fmt: skip
         elif figures:
