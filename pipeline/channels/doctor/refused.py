@@ -6,7 +6,8 @@ from collections.abc import Iterable, Mapping
 
 import polars as pl
 
-from kempf.pipeline.ingest.decoded import Reason
+#: The reason as it stands in the ledger of what was refused.
+_OUT_OF_RANGE = "out_of_range"
 
 
 def count(rejections: Iterable[pl.DataFrame]) -> dict[tuple[str, str | None], int]:
@@ -19,7 +20,7 @@ def count(rejections: Iterable[pl.DataFrame]) -> dict[tuple[str, str | None], in
     """
     found: dict[tuple[str, str | None], int] = {}
     for part in rejections:
-        beyond = part.filter((pl.col("reason") == str(Reason.OUT_OF_RANGE)) & pl.col("source").is_not_null())
+        beyond = part.filter((pl.col("reason") == _OUT_OF_RANGE) & pl.col("source").is_not_null())
         for source, channel, many in beyond.group_by("source", "channel").len().iter_rows():
             found[source, channel] = found.get((source, channel), 0) + many
     return found
