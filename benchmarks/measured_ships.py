@@ -48,6 +48,12 @@ def tank(data: Path) -> Ship:
     return _ship("hsva_kvlcc2", [_PROFILES / "hsva_kvlcc2.yaml"], list(folder.glob("*.dat")), folder)
 
 
+def pond(data: Path) -> Ship:
+    """The Esso Osaka model on a pond."""
+    folder = data / "data" / "esso_osaka"
+    return _ship("esso_osaka", [_PROFILES / "esso_osaka.yaml"], list(folder.glob("*.csv.gz")), folder)
+
+
 def boat(data: Path) -> Ship:
     """The small unmanned vessel at sea."""
     folder = data / "data" / "usv_open_water"

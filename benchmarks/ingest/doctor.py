@@ -1,7 +1,7 @@
 """How often the channel doctor finds a lie, and how often it cries wolf: ``python -m benchmarks.ingest.doctor``.
 
 The thresholds are those of the instruments' and ships' physics; what was tuned at all was tuned on seeds below 1000.
-Here are the real traps, simulated logs of seeds from 1000 on, and the trial logs of eight ships.
+Here are the real traps, simulated logs of seeds from 1000 on, and the trial logs of seven ships.
 """
 
 from __future__ import annotations
@@ -203,7 +203,7 @@ def page(data: Path, many: int) -> list[str]:
         "",
         *result_page.table(["trap", "logs", "testable", "named alone", "then silent", "line"], traps_found),
         "",
-        f"## Lies told about honest logs: {many} simulated ones and {len(logs) - many} of eight ships",
+        f"## Lies told about honest logs: {many} simulated ones and {len(logs) - many} of seven ships",
         "",
         "Found: the right fault of the right channel is named, alone or as one of these. Accused: another channel is "
         "named alone. By correlations: medians and correlations of pairs, and the right channel is in a pair that "

@@ -11,6 +11,7 @@ import yaml
 
 from benchmarks import measured_ships
 from kempf.flows.jobs.examine_log import ExaminedLog, examine_instruments
+from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.profile import VesselProfile, parse
@@ -48,7 +49,8 @@ def traps(data: Path) -> list[Trap]:
 def examined(path: Path, profile: VesselProfile) -> ExaminedLog:
     """One log as it is read with a profile."""
     read = read_log(path.name, path.read_bytes(), profile)
-    return examine_instruments(from_readings(read.frame), profile, path.name, read.format)
+    refused = count(read.rejections())
+    return examine_instruments(from_readings(read.frame), profile, path.name, read.format, refused)
 
 
 def _spoilt(path: Path, spoil: Callable[[dict[str, Any]], None]) -> VesselProfile:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -12,10 +13,11 @@ from kempf.flows.jobs.spool import spooled
 from kempf.pipeline.channels.doctor.corrections import entries
 from kempf.pipeline.channels.doctor.examine import Examination, examine
 from kempf.pipeline.channels.doctor.log import Log
+from kempf.pipeline.channels.doctor.refused import by_channel, count
 from kempf.pipeline.channels.doctor.verdict import as_content
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import logs, vessels
+from kempf.warehouse import logs, readings, vessels
 from kempf.warehouse.store import Warehouse
 
 
@@ -33,7 +35,11 @@ class ExaminedLog:
 
 
 def examine_instruments(
-    instruments: Instruments, profile: VesselProfile, file_name: str, log_format: str
+    instruments: Instruments,
+    profile: VesselProfile,
+    file_name: str,
+    log_format: str,
+    refused: Mapping[tuple[str, str | None], int],
 ) -> ExaminedLog:
     """Examine the channels of one log; nothing is stored.
 
@@ -42,10 +48,13 @@ def examine_instruments(
     profile : VesselProfile
         With which they were read.
     log_format : {"delimited", "mcap", "nmea"}
+    refused : mapping of (str, str or None) to int
+        Values beyond their physical range, `kempf.pipeline.channels.doctor.refused.count`.
     """
     known = entries(profile.source_for(file_name), log_format, instruments.sources)
     units = {channel: mapped.unit for channel, (_, mapped) in known.items()}
-    log = Log.of(instruments, profile.length_m, units)
+    beyond = by_channel(refused, instruments.sources)
+    log = Log.of(instruments, profile.length_m, profile.trial_speed_m_s, units, beyond)
     examination = examine(log)
     return ExaminedLog(file_name, log_format, log, examination, as_content(examination, known, log_format))
 
@@ -59,7 +68,8 @@ def examine_file(path: Path, profile: VesselProfile) -> ExaminedLog:
         The log cannot be read.
     """
     with opened_log(path) as log, spooled(path.name, log, profile) as read:
-        return examine_instruments(from_readings(read.lazy()), profile, path.name, read.format)
+        refused = count(read.rejections())
+        return examine_instruments(from_readings(read.lazy()), profile, path.name, read.format, refused)
 
 
 def examine_held(warehouse: Warehouse, name: str) -> ExaminedLog:
@@ -75,4 +85,5 @@ def examine_held(warehouse: Warehouse, name: str) -> ExaminedLog:
     row = logs.by_prefix(warehouse, name)
     profile = vessels.get(warehouse, row.profile_sha256)
     channels = channels_of(warehouse, row.ingest_id)
-    return examine_instruments(channels, profile, row.file_name, row.format)
+    refused = count([readings.read_rejected(warehouse, row.ingest_id)])
+    return examine_instruments(channels, profile, row.file_name, row.format, refused)

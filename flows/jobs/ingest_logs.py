@@ -17,6 +17,7 @@ from kempf.flows.jobs.unreadable_stretches import as_json
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.release_memory import give_back
 from kempf.flows.process.wrap_error import wrapped
+from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.log_file import LogFile
@@ -227,7 +228,9 @@ def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfi
     this_ingest = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code), file_name)
     instruments = from_readings(readings.lazy())
     give_back(readings.tally.records_read)
-    searched = search(this_ingest, profile, file_name, readings.format, instruments, readings.tally.records_read)
+    refused = count(readings.rejections())
+    records = readings.tally.records_read
+    searched = search(this_ingest, profile, file_name, readings.format, instruments, refused, records)
     return ReadLog(Delivery(vessel, file_name, log, profile, readings, code), searched)
 
 

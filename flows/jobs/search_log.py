@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from kempf.flows.jobs.examine_log import examine_instruments
@@ -10,9 +10,10 @@ from kempf.flows.jobs.find_segments import Ingest, find_segments
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.process.release_memory import give_back
 from kempf.flows.process.wrap_error import wrapped
+from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version, examinations, segments, vessels
+from kempf.warehouse import code_version, examinations, readings, segments, vessels
 from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.segments import Segment
@@ -28,7 +29,13 @@ class SearchedLog:
 
 
 def search(
-    log: Ingest, profile: VesselProfile, file_name: str, log_format: str, instruments: Instruments, records: int
+    log: Ingest,
+    profile: VesselProfile,
+    file_name: str,
+    log_format: str,
+    instruments: Instruments,
+    refused: Mapping[tuple[str, str | None], int],
+    records: int,
 ) -> SearchedLog:
     """Find the manoeuvres in the channels of a log, and examine the channels.
 
@@ -39,13 +46,15 @@ def search(
     profile : VesselProfile
         With which it was read.
     log_format : {"delimited", "mcap", "nmea"}
+    refused : mapping of (str, str or None) to int
+        Values beyond their physical range, `kempf.pipeline.channels.doctor.refused.count`.
     records : int
         Of the log.
     """
     found, notes = find_segments(log, profile, instruments)
     give_back(records)
     try:
-        content = examine_instruments(instruments, profile, file_name, log_format).content
+        content = examine_instruments(instruments, profile, file_name, log_format, refused).content
     except Exception as error:  # noqa: BLE001 - a log is not lost because its channels could not be compared
         content = {"verdict": "failed", "findings": [], "checks": [], "untested": [], "why": str(wrapped(error))}
     examination = StoredExamination(
@@ -71,7 +80,8 @@ def search_again(warehouse: Warehouse, row: LogRow) -> SearchedLog:
     profile = vessels.get(warehouse, row.profile_sha256)
     log = Ingest(row.vessel, row.log_id, row.ingest_id, row.file_name)
     instruments = channels_of(warehouse, row.ingest_id)
-    return search(log, profile, row.file_name, row.format, instruments, row.tally.records_read)
+    refused = count([readings.read_rejected(warehouse, row.ingest_id)])
+    return search(log, profile, row.file_name, row.format, instruments, refused, row.tally.records_read)
 
 
 def store(warehouse: Warehouse, searched: Sequence[SearchedLog]) -> None:

@@ -10,6 +10,8 @@ from kempf.pipeline.channels.doctor import (
     heading_course,
     heading_rate,
     misalignment,
+    motion,
+    plausible,
     rudder_order,
     rudder_turn,
     standstill,
@@ -18,6 +20,7 @@ from kempf.pipeline.channels.doctor import (
 )
 from kempf.pipeline.channels.doctor.examine import examine
 from kempf.pipeline.channels.doctor.faults import Kind
+from kempf.pipeline.channels.doctor.log import SLOWEST_M_S
 from kempf.pipeline.channels.doctor.outcome import SURE
 from tests.docs.console import follow
 from tests.doctor import closed_form_ship
@@ -57,8 +60,16 @@ def test_thresholds_are_the_codes() -> None:
     assert f"within {rudder_order._OFFSETS_DEG[1]:g} deg" in row("rudder_order_angle")
     assert f"for {standstill._LEAST_S:.0f} s or more" in row("heading_standstill")
     assert f"at most {standstill._TURN_DEG:g} deg" in row("heading_standstill")
-    assert (SURE, heading_course.STREAM_SHARE) == (4.0, 1 / 8)
-    assert f"{heading_course.STREAM_STD_M_S:g} m/s, or an eighth" in TEXT
+    assert (SURE, motion.STREAM_SHARE) == (4.0, 1 / 8)
+    assert f"{motion.STREAM_STD_M_S:g} m/s, or an eighth" in TEXT
+    assert f"exceeds {SLOWEST_M_S:g} m/s" in TEXT
+    assert f"below {motion._DRIFTS_M_S:g} m/s at sea" in TEXT
+    assert f"at most {plausible._DAMAGED:.0%}".replace("%", " %") in row("range_")
+    size = row("size_and_speed")
+    assert f"up to {plausible._OF_TRIAL:g} times the trial speed" in size
+    assert f"Froude number up to {plausible._FROUDE[1]:g}" in size
+    assert f"over speed up to {plausible._TURN[1]:g}" in size
+    assert "{:g} to {:g}".format(*plausible._TURN_OF_RUDDER) in size
 
 
 def test_every_kind_of_fault_is_listed() -> None:

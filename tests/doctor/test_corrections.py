@@ -9,6 +9,7 @@ import pytest
 
 from kempf.flows.jobs.examine_log import ExaminedLog, examine_instruments
 from kempf.pipeline.channels.doctor.corrections import Correction, put_into
+from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.ingest.read import read_log
 from kempf.schemas.profile import ChannelMap, VesselProfile
@@ -17,7 +18,7 @@ from tests.doctor import closed_form_ship
 
 def look(data: bytes, profile: VesselProfile) -> ExaminedLog:
     read = read_log("made.csv", data, profile)
-    return examine_instruments(from_readings(read.frame), profile, "made.csv", read.format)
+    return examine_instruments(from_readings(read.frame), profile, "made.csv", read.format, count(read.rejections()))
 
 
 def mended(profile: VesselProfile, content: dict[str, Any]) -> VesselProfile:

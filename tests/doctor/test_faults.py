@@ -37,7 +37,7 @@ def test_a_sound_log_is_clean_and_every_channel_tested() -> None:
         "heading_track_clock",
         "legs_track",
     }
-    assert len(CHECKS) == 8
+    assert len(CHECKS) == 9
 
 
 FAULTS = {

@@ -69,8 +69,21 @@ def print_examination(name: str, content: dict[str, Any], *, everything: bool) -
         click.echo(one_line(content["why"])[:600])
     if everything:
         _table(content)
+    if not content.get("moves", True):
+        click.echo("she does not move: motions are not testable")
     if content["untested"]:
-        click.echo(f"cannot be tested with these channels: {', '.join(content['untested'])}")
+        click.echo(f"cannot be tested with these channels: {', '.join(_untested(content))}")
+    for words in content.get("cannot_see", ()):
+        click.echo(f"cannot be seen: {words}")
+
+
+def _untested(content: dict[str, Any]) -> list[str]:
+    """Return the channels that no check could test, each with the reason where there was a check."""
+    why: dict[str, str] = {}
+    for check in content["checks"]:
+        for channel in check["channels"] if check["state"] == "untestable" else ():
+            why.setdefault(channel, check["words"])
+    return [f"{name} ({why[name]})" if name in why else name for name in content["untested"]]
 
 
 _HEADS = {

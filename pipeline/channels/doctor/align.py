@@ -44,6 +44,13 @@ class Alignment:
     rate_std: float
     #: Size of what does not go together over the size of the second's changes.
     left_over: float
+    #: The same over the size of its changes about their mean: in a steady turn only noise is left of these.
+    varying: float
+    #: whole, whole_std: The slope by the changes as they are, a steady turn included, which a bias of a rate falsifies.
+    whole: float
+    whole_std: float
+    #: How far the first turns in all, rad.
+    turned: float
     #: Size of what this lag leaves over that a lag between the bounds of sound clocks would leave; 1 for the same.
     explains: float
 
@@ -87,7 +94,7 @@ def align(
     Returns
     -------
     Alignment or None
-        None where they have too little in common to compare.
+        None where they have too little in common to compare, or no lag is the best.
     """
     if min(len(first), len(second)) < _FEWEST:
         return None
@@ -118,7 +125,9 @@ def align(
         grown = _growing(sums, lags, span)
         if grown[2] < _BETTER * found[2]:
             found = grown
-    return _refined(x, second, edges, (found[0], found[1]), (found[2], usual), circle=circle, rounds=_ROUNDS)
+    refined = _refined(x, second, edges, (found[0], found[1]), (found[2], usual), circle=circle, rounds=_ROUNDS)
+    # beyond the lags that were looked at, a refinement has lost its way
+    return None if refined is None or abs(refined.lag_s) > longest + 3.0 * step + abs(found[1]) * span else refined
 
 
 def _read_later(edges: Nanoseconds, lag: float, rate: float) -> Nanoseconds:
@@ -221,5 +230,16 @@ def _refined(
     assert found is not None
     return Alignment(
         float(found.value[0]), float(found.std[0]), lag, float(found.std[2]), rate, float(found.std[3]),
-        found.left_over, min(left[0], found.left_over) / max(left[1], 1e-12),
+        found.left_over, *_as_it_is(x, y, long, found), min(left[0], found.left_over) / max(left[1], 1e-12),
     )  # fmt: skip
+
+
+def _as_it_is(x: Float, y: Float, long: Float, found: RobustLine) -> tuple[float, float, float, float]:
+    """Return what a fit leaves over of the changes about their mean, and slope and extent of the whole changes."""
+    known = np.isfinite(x) & np.isfinite(y)
+    steady = fit(long[:, None], y)
+    whole = fit(x[:, None], y)
+    assert steady is not None
+    assert whole is not None
+    varying = min(found.left_over / max(steady.left_over, 1e-12), 1.0)
+    return varying, float(whole.value[0]), float(whole.std[0]), abs(float(np.sum(x[known])))

@@ -59,7 +59,7 @@ def clock_outcome(
         From `clock_figures`.
     """
     channels = (*sides[0], *sides[1])
-    if found.left_over > _TOGETHER:
+    if max(found.left_over, found.varying) > _TOGETHER:
         return untestable(name, channels, "the two motions are not correlated, so no lag can be determined")
     lag, growth = figures
     far = max(lag.low - lag.value, lag.value - lag.high)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from kempf.pipeline.channels.doctor import (
     heading_course,
     heading_rate,
     misalignment,
+    plausible,
     rudder_order,
     rudder_turn,
     standstill,
@@ -18,7 +19,7 @@ from kempf.pipeline.channels.doctor import (
 )
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Log
-from kempf.pipeline.channels.doctor.outcome import Outcome
+from kempf.pipeline.channels.doctor.outcome import STILL, Outcome
 
 
 class Check(Protocol):
@@ -35,6 +36,7 @@ class Check(Protocol):
 
 #: Every check.
 CHECKS: tuple[Check, ...] = (
+    plausible.examine,
     heading_rate.examine,
     heading_course.examine,
     misalignment.examine,
@@ -50,6 +52,11 @@ _MOST_FAULTS = 4
 _WORSE = 1.15
 #: Faults whose correction takes channels out, and the checks of these with them.
 _REMOVES = ("frame", "stuck")
+#: What no check shows, by the channel that it is about.
+_CANNOT_SEE = {
+    "rudder_angle": "the scale of rudder_angle: a rudder that reads too much or too little by a factor contradicts no "
+    "other channel, and the rudder's parameters are out by it",
+}
 #: Readings of a channel that a short examination looks at, at most.
 _FEW = 400
 
@@ -82,11 +89,22 @@ class Examination:
     untested: tuple[str, ...]
 
     @property
+    def still(self) -> bool:
+        """Whether she does not move, so that motions could not be compared."""
+        return any(outcome.words == STILL for outcome in self.outcomes)
+
+    @property
+    def cannot_see(self) -> tuple[str, ...]:
+        """What could be wrong with the channels of this log without any check showing it, one sentence each."""
+        there = {c for o in self.outcomes for c in o.channels} | set(self.untested)
+        return tuple(words for channel, words in _CANNOT_SEE.items() if channel in there)
+
+    @property
     def verdict(self) -> str:
         """``clean``, ``faults`` or ``untested``: nothing could be tested."""
         if self.findings:
             return "faults"
-        return "clean" if any(o.state == "agree" for o in self.outcomes) else "untested"
+        return "clean" if any(o.state == "agree" and not o.alone for o in self.outcomes) else "untested"
 
 
 def ask(log: Log) -> list[list[Outcome]]:
@@ -129,6 +147,9 @@ def examine(log: Log) -> Examination:
     first = answers = ask(log)
     original = log
     findings: list[ChannelFinding] = []
+    if any(one.distrusts_length for one in _wrong(answers).values()):
+        log = replace(log, length_m=None)
+        answers = ask(log)
     for _ in range(_MOST_FAULTS):
         explained = _explained(log, answers)
         if explained is None:
@@ -137,15 +158,19 @@ def examine(log: Log) -> Examination:
         before = _by_name(answers)
         findings.append(ChannelFinding(faults, tuple(before[name] for name in corrected)))
         log, answers = faults[0].corrected(log), answers_then
+    if log.length_m != original.length_m:
+        # a corrected channel may have made the length right
+        answers[CHECKS.index(plausible.examine)] = plausible.examine(replace(log, length_m=original.length_m))
     left = tuple(_wrong(answers).values())
-    if left:
-        findings.append(ChannelFinding((), left))
+    findings += [ChannelFinding((), (one,)) for one in left if one.claim]
+    if compared := tuple(one for one in left if not one.claim):
+        findings.append(ChannelFinding((), compared))
     outcomes = tuple(_by_name(first).values())
     return Examination(tuple(findings), outcomes, _untested(original, outcomes))
 
 
 def _untested(log: Log, outcomes: tuple[Outcome, ...]) -> tuple[str, ...]:
-    tested = {c for o in outcomes if o.state != "untestable" for c in o.channels}
+    tested = {c for o in outcomes if o.state != "untestable" and not o.alone for c in o.channels}
     return tuple(sorted(set(log.series) - tested))
 
 
@@ -218,7 +243,7 @@ def _tried(log: Log, fault: Fault, by: set[int], answers: list[list[Outcome]]) -
     now, wrong = _by_name(after), _wrong(answers)
     corrects = frozenset(name for name in wrong if name not in now or now[name].state != "disagree")
     # a check that is only silenced is not corrected, unless it has gone with the channels it compared
-    if not any(name in now and now[name].state == "agree" for name in corrects) and fault.kind not in _REMOVES:
+    if not any(name in now and now[name].consistent for name in corrects) and fault.kind not in _REMOVES:
         return None
     return _Trial(fault, corrects, after)
 
@@ -244,7 +269,7 @@ def _asked_again(
             return None
         if (
             fault.kind not in _REMOVES
-            and not any(o.state == "agree" for o in after[k])
+            and not any(o.consistent for o in after[k])
             and any(o.state == "agree" for o in answers[k])
         ):
             return None  # it silenced what agreed

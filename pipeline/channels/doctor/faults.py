@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi
 from typing import Literal
 
@@ -73,7 +73,11 @@ class Fault:
         own = {name: log.series[name] for name in self.channels if name in log.series}
         if len(own) < len(self.channels):
             return log
-        return log.with_series(_CORRECTIONS[self.kind](self, own))
+        corrected = log.with_series(_CORRECTIONS[self.kind](self, own))
+        if self.kind not in ("unit", "scale"):
+            return corrected
+        # what was refused was refused in the wrong unit
+        return replace(corrected, refused={n: many for n, many in log.refused.items() if n not in self.channels})
 
 
 def unit_faults(channels: tuple[str, ...], dimension: str) -> Iterator[Fault]:

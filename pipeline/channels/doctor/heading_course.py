@@ -12,13 +12,11 @@ from kempf.pipeline.channels.doctor.align import LONGEST_S, align
 from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, Velocity, fastest_turn
-from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.motion import moves, stream_std
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import quantile, reach
 from kempf.pipeline.channels.series import Series
 
-#: Components of a stream that is not known, one standard deviation: four of these are faster than any that ships are
-#: tried in, and half of what the ship makes herself - in a faster one nobody tests her.
-STREAM_STD_M_S, STREAM_SHARE = 0.6, 0.125
 #: Slope of the course's changes on the heading's: drift in the quick turns of a zigzag lets the course swing further.
 SLOPES = (0.5, 2.0)
 #: A body-fixed velocity does not turn with the heading; in a turn its drift angle comes and goes.
@@ -28,8 +26,8 @@ DRIFT_RAD = 0.45
 _LEAST_TURN = float(np.deg2rad(20.0))
 #: How far before the point about which the bow turns an antenna is mounted, in ship lengths.
 _LEADS = 0.25
-#: What is left over of two motions that go together.
-_TOGETHER = 0.6
+#: What is left over of two motions that go together; else a steady turn shows a slope, if so far at least, rad.
+_TOGETHER, _STEADY_TURN = 0.6, 1.5
 
 
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
@@ -53,14 +51,11 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     return found
 
 
-def stream_std(speed_m_s: float) -> float:
-    """Return the standard deviation of each component of an unknown stream for a ship of that speed, m/s."""
-    return min(STREAM_STD_M_S, STREAM_SHARE * speed_m_s)
-
-
 def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorough: bool) -> list[Outcome]:
     names = [f"heading_{kind}", *([f"heading_{kind}_clock"] if thorough else [])]
     channels = ("heading", *velocity.channels)
+    if not moves(velocity, log):
+        return [untestable(name, channels, STILL) for name in names]
     way = velocity.under_way
     direction = Series(velocity.time_utc_ns[way], velocity.direction[way])
     turned = max(reach(heading.value), reach(direction.value)) if len(direction) else 0.0
@@ -74,12 +69,15 @@ def _compare(log: Log, kind: str, heading: Series, velocity: Velocity, *, thorou
     # the antenna may be ahead of the point about which she turns: then the course leads
     honest = (-late - _LEADS * own, late + own)
     both = align(heading, direction, honest, circle=True, longest_s=LONGEST_S if thorough else 0.0)
-    if both is None:
-        return [untestable(name, channels, "the channels hardly overlap in time") for name in names]
-    std = float(np.hypot(both.slope_std, 0.5 * stream_std(speed) / speed))
+    steady = both is not None and both.varying > _TOGETHER
+    if both is None or (steady and both.turned < _STEADY_TURN):
+        why = "the channels hardly overlap in time" if both is None else "the two motions are not correlated"
+        return [untestable(name, channels, why) for name in names]
+    slope, own_std = (both.whole, both.whole_std) if steady else (both.slope, both.slope_std)
+    std = float(np.hypot(own_std, 0.5 * stream_std(log, speed) / speed))
     low, high = _BODY_SLOPES if kind == "body" else SLOPES
-    figure = Figure("change of direction of the velocity over change of heading", both.slope, std, low, high)
-    words = f"the {_WORDS[kind]} changes by {both.slope:.2f} ± {std:.2g} (1 s.e.) times the change of heading"
+    figure = Figure("change of direction of the velocity over change of heading", slope, std, low, high)
+    words = f"the {_WORDS[kind]} changes by {slope:.2f} ± {std:.2g} (1 s.e.) times the change of heading"
     state = figure.state
     if both.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
         state = "untestable"  # a slope through noise

@@ -8,8 +8,10 @@ from kempf.pipeline.channels.doctor.align import LONGEST_S, Alignment, align
 from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
 from kempf.pipeline.channels.doctor.faults import UNITS, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, integral
-from kempf.pipeline.channels.doctor.outcome import SURE, Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.motion import does_not_move
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import reach
+from kempf.pipeline.channels.series import SECOND_NS
 
 #: Slopes that are no fault: rate-of-turn indicators are allowed 5 % (IMO A.526(13)), and the filters of many do worse.
 SLOPES = (0.8, 1.25)
@@ -17,6 +19,8 @@ SLOPES = (0.8, 1.25)
 _LEAST_TURN = float(np.deg2rad(6.0))
 #: What is left over of two motions that go together.
 _TOGETHER = 0.6
+#: A steady turn shows a slope from so far on, rad, and the bias of a rate gyro that may lie in it, rad/s.
+_STEADY_TURN, _BIAS_RAD_S = 1.5, float(np.deg2rad(0.05))
 _CHANNELS = ("heading", "yaw_rate")
 
 
@@ -37,18 +41,27 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     heading, turned = log.series["heading"], integral(log.series["yaw_rate"])
     late = 1.0 + heading.period_s + turned.period_s
     names = ("heading_rate", "heading_rate_clock") if thorough else ("heading_rate",)
+    if does_not_move(log):
+        return [untestable(name, _CHANNELS, STILL) for name in names]
     if max(reach(heading.value), reach(turned.value)) < _LEAST_TURN:
         return [untestable(name, _CHANNELS, "the ship hardly turned") for name in names]
     found = align(heading, turned, (-late, late), longest_s=LONGEST_S if thorough else 0.0)
     if found is None or reach(heading.value) == 0.0:
         # of a compass that repeats itself the check of standstills decides
         return [untestable(name, _CHANNELS, "the heading is constant, or the two hardly overlap") for name in names]
-    return [_turning(found), *([_clocks(log, found, (-late, late))] if thorough else [])]
+    span = float(heading.time_utc_ns[-1] - heading.time_utc_ns[0]) / SECOND_NS
+    return [_turning(found, span), *([_clocks(log, found, (-late, late))] if thorough else [])]
 
 
-def _turning(found: Alignment) -> Outcome:
-    figure = Figure("integrated yaw rate over change of heading", found.slope, found.slope_std, *SLOPES)
-    words = f"the integrated yaw rate is {found.slope:.3g} ± {found.slope_std:.2g} (1 s.e.) times the change of heading"
+def _turning(found: Alignment, span_s: float) -> Outcome:
+    slope, std = found.slope, found.slope_std
+    if found.varying > _TOGETHER:
+        # of a steady turn the changes about the mean are noise: the turn itself is compared, and a bias allowed for
+        if found.turned < _STEADY_TURN:
+            return untestable("heading_rate", _CHANNELS, "the two motions are not correlated")
+        slope, std = found.whole, float(np.hypot(found.whole_std, _BIAS_RAD_S * span_s / found.turned))
+    figure = Figure("integrated yaw rate over change of heading", slope, std, *SLOPES)
+    words = f"the integrated yaw rate is {slope:.3g} ± {std:.2g} (1 s.e.) times the change of heading"
     suspects = [
         Fault("sign", ("yaw_rate",)),
         Fault("sign", ("heading",)),
@@ -58,13 +71,13 @@ def _turning(found: Alignment) -> Outcome:
           for name, factor in UNITS["rad/s"].items()),
         *unit_faults(("heading",), "rad"),
     ]  # fmt: skip
-    if abs(found.slope) > 4.0 * found.slope_std and found.left_over < 0.5:
-        suspects.append(Fault("scale", ("yaw_rate",), 1.0 / found.slope, "scale", found.slope_std, simplicity=3))
+    if abs(slope) > 4.0 * std and found.left_over < 0.5:
+        suspects.append(Fault("scale", ("yaw_rate",), 1.0 / slope, "scale", std, simplicity=3))
     state = figure.state
     if found.left_over > _TOGETHER and figure.outside < 1.5 * SURE:
         state = "untestable"  # a slope through noise
     # a factor of 57.3 is distinguished from one of 60 by the slope it leaves
-    left = min(found.left_over + abs(float(np.log(max(abs(found.slope), 1e-3)))), 1.0)
+    left = min(found.left_over + abs(float(np.log(max(abs(slope), 1e-3)))), 1.0)
     return Outcome("heading_rate", _CHANNELS, state, words, (figure,), left, tuple(suspects))
 
 

@@ -25,7 +25,7 @@ VELOCITIES: dict[str, tuple[str, str]] = {
 #: A ship slower than this share of her fast speed makes no way worth a course.
 _UNDER_WAY = 0.4
 #: No GNSS gives a course below this speed, m/s.
-_SLOWEST_M_S = 0.2
+SLOWEST_M_S = 0.2
 #: Fixes that show a motion; how many times their noise the way between two of them is; the finest noise that is
 #: believed, m; 90th percentile of a second difference of places with unit noise north and east,
 #: sqrt(6) sqrt(2 ln 10).
@@ -56,7 +56,7 @@ class Velocity:
         """Where she makes so much way that the direction means something, shape (n,)."""
         speed = np.abs(self.value)
         fast = quantile(speed, 0.98) if speed.size else 0.0
-        known: NDArray[np.bool_] = speed > max(_UNDER_WAY * fast, _SLOWEST_M_S)
+        known: NDArray[np.bool_] = speed > max(_UNDER_WAY * fast, SLOWEST_M_S)
         return known
 
     def blurred(self, heading: Series) -> bool:
@@ -72,14 +72,31 @@ class Log:
     series: Mapping[str, Series]
     #: Of the ship, where it is known: how far the course may lag behind the heading in a turn.
     length_m: float | None = None
+    #: In a straight run, of the profile.
+    trial_speed_m_s: float | None = None
     #: The unit that each channel is said to be written in, where that is known: what it was taken for.
     units: Mapping[str, str] = field(default_factory=dict)
+    #: Values of each channel that ingest refused because they lie outside its physical range.
+    refused: Mapping[str, int] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, instruments: Instruments, length_m: float | None = None, units: Mapping[str, str] | None = None) -> Log:
+    def of(
+        cls,
+        instruments: Instruments,
+        length_m: float | None = None,
+        trial_speed_m_s: float | None = None,
+        units: Mapping[str, str] | None = None,
+        refused: Mapping[str, int] | None = None,
+    ) -> Log:
         """Return the channels that a log has of its own; what was computed from others confirms nothing."""
         own = {name: one for name, one in instruments.series.items() if name not in instruments.derived}
-        return cls({name: one for name, one in own.items() if len(one) > 1}, length_m, units or {})
+        return cls(
+            {name: one for name, one in own.items() if len(one) > 1},
+            length_m,
+            trial_speed_m_s,
+            units or {},
+            refused or {},
+        )
 
     def has(self, names: Iterable[str]) -> bool:
         """Return whether all these channels are there."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
 import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault
-from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD, stream_std
+from kempf.pipeline.channels.doctor.heading_course import DRIFT_RAD
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity, turning
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.motion import may_drift, moves, stream_std
+from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
@@ -23,6 +27,12 @@ _SECOND_STD = 0.3
 #: Where the fit leaves more than this share of the velocity, heading and course do not go together at all.
 _TOGETHER = 0.5
 _FEWEST = 12
+#: Times that the axis of the way is put right.
+_ROUNDS = 3
+#: A way is one from this share of the speed on; beyond this standard error of its angle, rad, it may be a stream's.
+_LEAST_WAY, _SURE_WAY = 0.3, 1.0 / SURE
+#: Stretches of the log that have to show the angle each, and by what share of it they may differ.
+_STRETCHES, _ASTRAY = 3, 0.5
 
 
 def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
@@ -41,34 +51,24 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     heading = log.series.get("heading")
     if heading is None:
         return []
-    return [_compare(kind, heading, velocity) for kind, velocity in log.velocities(track=thorough)]
+    return [_compare(log, kind, heading, velocity) for kind, velocity in log.velocities(track=thorough)]
 
 
-def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
+def _compare(log: Log, kind: str, heading: Series, velocity: Velocity) -> Outcome:
     name, channels = f"legs_{kind}", ("heading", *velocity.channels)
+    if not moves(velocity, log):
+        return untestable(name, channels, STILL)
     if velocity.blurred(heading):
         return untestable(name, channels, "the position fixes are too coarse to resolve the turns")
-    seen = _seen_from_the_bow(kind, heading, velocity)
-    if seen is None:
-        return untestable(name, channels, "too few readings under way")
-    relative, bow, rate, duration = seen
-    speed = quantile(np.abs(relative), 0.5)
-    fast = max(quantile(np.abs(rate), 0.95), 1e-6)
-    prior = np.array([np.inf, np.inf, *[stream_std(speed)] * 2, *[DRIFT_RAD * speed / fast] * 2])
-    noise = speed * np.hypot(_SECTOR_STD, _SECOND_STD / np.sqrt(duration))
-    observed, noise = np.concatenate([relative.real, relative.imag]), np.concatenate([noise, noise])
-    fitted = posterior(_columns(bow, rate), observed, noise, prior)
-    ahead, across = fitted.value[:2]
-    way = float(np.hypot(ahead, across))
-    if way < 0.3 * speed or fitted.left_over > _TOGETHER:
-        return untestable(name, channels, "heading and direction of the velocity are not correlated")
-    angle = float(np.arctan2(across, ahead))
-    # of A's standard errors, the part across A
-    own = float(np.hypot(fitted.std[1] * ahead / way, fitted.std[0] * across / way)) / way
-    std = float(np.hypot(own, _LEEWAY_RAD))
+    found = _way(log, kind, heading, velocity)
+    if found is None or found.why_not:
+        return untestable(name, channels, "too few readings under way" if found is None else found.why_not)
+    angle, std = found.angle, float(np.hypot(found.own_std, _LEEWAY_RAD))
     what = "angle of the velocity from the bow" if kind == "body" else "course minus heading"
     figure = Figure(what, float(np.rad2deg(angle)), float(np.rad2deg(std)), -_DEVIATION_DEG, _DEVIATION_DEG, "deg")
     words = f"{what} is {figure.value:+.1f} ± {figure.std:.1f} deg (1 s.e.) with current and drift removed"
+    if figure.state == "disagree" and not _repeated(log, kind, heading, velocity, angle):
+        return untestable(name, channels, f"{words}, but not in every stretch of the log")
     suspects = [Fault("offset", ("heading",), angle, "turned", std)]
     if kind == "course":
         suspects.append(Fault("offset", channels[2:], -angle, "turned", std))
@@ -80,7 +80,76 @@ def _compare(kind: str, heading: Series, velocity: Velocity) -> Outcome:
         ]
     else:
         suspects += [Fault("swap", velocity.channels), *(Fault("sign", (one,)) for one in velocity.channels)]
-    return Outcome(name, channels, figure.state, words, (figure,), fitted.left_over, tuple(suspects))
+    return Outcome(name, channels, figure.state, words, (figure,), found.left_over, tuple(suspects))
+
+
+@dataclass(frozen=True)
+class _Way:
+    """The way that a ship makes herself, seen from the bow."""
+
+    #: angle, own_std: Of it, with what noise and an unknown stream make of it, rad.
+    angle: float
+    own_std: float
+    #: Size of what is left of the velocity over the size of it.
+    left_over: float
+    #: Why it says nothing of the mounting; empty where it does.
+    why_not: str
+
+
+def _way(log: Log, kind: str, heading: Series, velocity: Velocity) -> _Way | None:
+    """Return the way A, None for too few readings under way."""
+    seen = _seen_from_the_bow(kind, heading, velocity)
+    if seen is None:
+        return None
+    relative, bow, rate, duration = seen
+    speed = quantile(np.abs(relative), 0.5)
+    fast = max(quantile(np.abs(rate), 0.95), 1e-6)
+    prior = np.array([np.inf, np.inf, *[stream_std(log, speed)] * 2, *[DRIFT_RAD * speed / fast] * 2])
+    noise = speed * np.hypot(_SECTOR_STD, _SECOND_STD / np.sqrt(duration))
+    # speed that she loses and gathers again is no stream: along the way it adds to the error, across it does not
+    along = np.hypot(noise, _varies(np.abs(relative)))
+    axis = float(np.angle(np.sum(relative)))
+    for _ in range(_ROUNDS):
+        seen_so = relative * np.exp(-1j * axis)
+        observed, noises = np.concatenate([seen_so.real, seen_so.imag]), np.concatenate([along, noise])
+        fitted = posterior(_columns(bow + axis, rate), observed, noises, prior)
+        ahead, across = fitted.value[:2]
+        axis += float(np.arctan2(across, ahead))
+    way = max(float(np.hypot(ahead, across)), 1e-12)
+    # of A's standard errors, the part across A
+    own = float(np.hypot(fitted.std[1] * ahead / way, fitted.std[0] * across / way)) / way
+    why_not = ""
+    if way < _LEAST_WAY * speed or fitted.left_over > _TOGETHER:
+        why_not = "heading and direction of the velocity are not correlated"
+    elif own > _SURE_WAY:
+        why_not = "the way that she makes herself cannot be told from a stream"
+    return _Way(float(np.angle(np.exp(1j * axis))), own, fitted.left_over, why_not)
+
+
+def _repeated(log: Log, kind: str, heading: Series, velocity: Velocity, angle: float) -> bool:
+    """Return whether each stretch of the log that determines the angle shows it, and two at least if she may drift."""
+    start, end = int(velocity.time_utc_ns[0]), int(velocity.time_utc_ns[-1])
+    edges = np.linspace(start, end, _STRETCHES + 1).astype(np.int64)
+    shown = 0
+    for first, last in pairwise(edges):
+        part = (velocity.time_utc_ns >= first) & (velocity.time_utc_ns <= last)
+        if not part.any():
+            continue
+        own = replace(velocity, time_utc_ns=velocity.time_utc_ns[part], value=velocity.value[part],
+                      direction=velocity.direction[part])  # fmt: skip
+        found = _way(log, kind, heading, own)
+        if found is None or found.why_not:
+            continue
+        off = float(np.angle(np.exp(1j * (found.angle - angle))))
+        if abs(off) > max(_ASTRAY * abs(angle), 2.0 * float(np.hypot(found.own_std, _LEEWAY_RAD))):
+            return False
+        shown += 1
+    return shown > 1 or not may_drift(log, quantile(np.abs(velocity.value), 0.5))
+
+
+def _varies(speed: Float) -> float:
+    """Return the standard deviation of speeds, from their median size beside the median, m/s."""
+    return 1.4826 * quantile(np.abs(speed - quantile(speed, 0.5)), 0.5)
 
 
 def _columns(bow: Float, rate: Float) -> Float:

@@ -14,6 +14,8 @@ State = Literal["agree", "disagree", "untestable"]
 SURE = 4.0
 #: The same for a figure too uncertain to be sure of: it is doubtful.
 DOUBTFUL = 2.0
+#: Why motions are not compared where there is none.
+STILL = "she does not move: not testable"
 
 
 @dataclass(frozen=True)
@@ -67,6 +69,18 @@ class Outcome:
     left_over: float = 0.0
     #: What could have caused a disagreement.
     suspects: tuple[Fault, ...] = field(default=(), repr=False)
+    #: What it says where it disagrees and no correction of a channel is known; empty for a comparison of channels.
+    claim: str = ""
+    #: Whether length and speed do not belong together: then no other check is to use the length.
+    distrusts_length: bool = False
+    #: Whether no two channels were compared: then agreement confirms nothing.
+    alone: bool = False
+
+    @property
+    def consistent(self) -> bool:
+        """Whether it agrees, or every figure lies where it should, though too uncertain to have shown a fault."""
+        within = bool(self.figures) and all(figure.outside <= DOUBTFUL for figure in self.figures)
+        return self.state == "agree" or (self.state == "untestable" and within)
 
     @property
     def doubtful(self) -> bool:

@@ -8,7 +8,8 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault
 from kempf.pipeline.channels.doctor.log import Log, integral
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.motion import does_not_move
+from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import reach
 from kempf.pipeline.channels.series import SECOND_NS, Series
 
@@ -36,6 +37,10 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     heading, rate, velocity = log.series.get("heading"), log.series.get("yaw_rate"), log.velocity("course")
     if heading is None or (rate is None and velocity is None):
         return []
+    if does_not_move(log):
+        others = [("yaw_rate", "heading")] if rate is not None else []
+        pairs = [("heading", "yaw_rate" if rate is not None else "course_over_ground"), *others]
+        return [untestable(f"{one}_standstill", (one, other), STILL) for one, other in pairs]
     way = None if velocity is None else Series(velocity.time_utc_ns, velocity.under_way.astype(np.float64))
     if rate is None:
         assert velocity is not None

@@ -6,7 +6,8 @@ import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import VELOCITIES, Complex, Log, fix_noise
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable, worst
+from kempf.pipeline.channels.doctor.motion import does_not_move
+from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable, worst
 from kempf.pipeline.channels.doctor.robust_regression import quantile
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
@@ -17,6 +18,8 @@ _ASTRAY = 0.15
 #: Windows: so many at most, over each other by three quarters; the way within each, in noises of a fix; so many at
 #: least.
 _MOST, _OVER, _CLEAR, _FEWEST = 240, 4.0, 30.0, 8
+#: The way within a window, m, at least: noise of a fix that remembers what it was does not show from fix to fix.
+_CLEAR_M = 5.0
 #: The log is so many windows long at least.
 _LEAST_WINDOWS = 2.5
 
@@ -37,12 +40,13 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         velocity = log.over_ground(kind)
         if velocity is None or velocity.time_utc_ns.size < _FEWEST:
             continue
-        ways = _ways(track, velocity.time_utc_ns, velocity.value)
+        still = does_not_move(log)
+        ways = None if still else _ways(track, velocity.time_utc_ns, velocity.value)
         channels = ("latitude", "longitude", *velocity.channels, *(("heading",) if kind == "body" else ()))
         pair = VELOCITIES[kind]
         speed = pair[:1] if kind == "course" else pair
         if ways is None:
-            why = "the distance between the position fixes is too short"
+            why = STILL if still else "the distance between the position fixes is too short"
             found += [untestable(f"{what}_{kind}", channels, why) for what in ("path", "bearing")]
             continue
         length_channels = channels if kind == "body" else ("latitude", "longitude", *speed)
@@ -65,7 +69,7 @@ def _ways(track: tuple[Nanoseconds, Complex], time: Nanoseconds, velocity: Compl
     # whichever of the two is in the wrong unit, the smaller speed makes the window long enough
     speed = max(min(fast, float(gone)), 1e-3)
     periods = [quantile(np.diff(t) / SECOND_NS, 0.5) for t in (track[0], time)]
-    way = _CLEAR * fix_noise(track[1])
+    way = max(_CLEAR * fix_noise(track[1]), _CLEAR_M)
     window = max(way / speed, 4.0 * max(periods))
     if span < _LEAST_WINDOWS * window:
         return None
@@ -169,6 +173,8 @@ def _without_course(log: Log, track: tuple[Nanoseconds, Complex]) -> list[Outcom
     """Compare lengths alone where the log has a speed but no course."""
     speed = log.series["speed_over_ground"]
     channels = ("latitude", "longitude", "speed_over_ground")
+    if does_not_move(log):
+        return [untestable("path_course", channels, STILL)]
     ways = _ways(track, speed.time_utc_ns, speed.value.astype(np.complex128))
     if ways is None:
         return [untestable("path_course", channels, "the distance between the position fixes is too short")]

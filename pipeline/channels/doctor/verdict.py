@@ -30,13 +30,16 @@ def as_content(
     Returns
     -------
     dict
-        ``verdict``, ``findings``, ``checks``, ``untested``.
+        ``verdict``, ``findings``, ``checks``, ``untested``; ``moves``: false where she does not, and motions could not
+        be compared; ``cannot_see``: what could be wrong without any check showing it.
     """
     return {
         "verdict": examination.verdict,
         "findings": [_finding(one, known, log_format) for one in examination.findings],
         "checks": [_outcome(one) for one in examination.outcomes],
         "untested": list(examination.untested),
+        "moves": not examination.still,
+        "cannot_see": list(examination.cannot_see),
     }
 
 
@@ -87,8 +90,11 @@ def _figure(figure: Figure) -> dict[str, Any]:
 def sentence(finding: ChannelFinding) -> str:
     """Return a finding as one sentence."""
     if not finding.faults:
+        if finding.evidence[0].claim:
+            return finding.evidence[0].claim
         which = "one" if len(finding.channels) == 2 else "at least one"
-        return f"{listed(finding.channels)} disagree; {which} of them is wrong, and no known fault explains it"
+        whose = f"{listed(finding.channels)} disagree; {which} of them is wrong"
+        return f"{whose}, and no single correction takes the contradiction away"
     if len(finding.faults) == 1:
         return words(finding.faults[0])
     return "one of these: " + "; or ".join(words(fault) for fault in finding.faults)

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.doctor.faults import Fault, unit_faults
-from kempf.pipeline.channels.doctor.heading_course import STREAM_STD_M_S
 from kempf.pipeline.channels.doctor.log import Complex, Log, Velocity
-from kempf.pipeline.channels.doctor.outcome import Figure, Outcome, untestable
+from kempf.pipeline.channels.doctor.motion import STREAM_STD_M_S, makes_way, moves
+from kempf.pipeline.channels.doctor.outcome import STILL, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import posterior, quantile
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import Float, Series
@@ -33,15 +33,19 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
     if water is None:
         return []
     return [
-        _compare(kind, water, velocity)
+        _compare(log, kind, water, velocity)
         for kind, velocity in log.velocities(track=thorough)
         if not (velocity.over_s and (heading is None or velocity.blurred(heading)))
     ]
 
 
-def _compare(kind: str, water: Series, velocity: Velocity) -> Outcome:
+def _compare(log: Log, kind: str, water: Series, velocity: Velocity) -> Outcome:
     speed_channels = velocity.channels[:1] if kind == "course" else velocity.channels
     name, channels = f"water_speed_{kind}", ("speed_through_water", *speed_channels)
+    if not moves(velocity, log):
+        return untestable(name, channels, STILL)
+    if not makes_way(water, log):
+        return untestable(name, channels, "the log shows no way through the water")
     way = velocity.under_way
     own = water.at(velocity.time_utc_ns, gap_limit_s(water))
     fast = quantile(np.abs(water.value), 0.98)
