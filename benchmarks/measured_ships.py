@@ -60,12 +60,6 @@ def boat(data: Path) -> Ship:
     return _ship("usv_open_water", [_PROFILES / "usv_open_water.yaml"], list(folder.glob("*_xy.csv")), folder)
 
 
-def pond(data: Path) -> Ship:
-    """The Esso Osaka model on a pond."""
-    folder = data / "data" / "esso_osaka"
-    return _ship("esso_osaka", [_PROFILES / "esso_osaka.yaml"], list(folder.glob("*.csv.gz")), folder)
-
-
 def fleet(data: Path, trials: str = "trials") -> list[Ship]:
     """The ships of the trial logs: the eight of ``trials``, or the six of ``trials_as_sold``."""
     where = data / trials
