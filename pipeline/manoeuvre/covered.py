@@ -40,15 +40,17 @@ class Beyond:
         return f"{words} up to {self.predicted[1]:.3g}{unit}, the logs cover {self.covered[1]:.3g}{unit}"
 
 
-def covered(runs: Sequence[GridRun]) -> Reach:
+def covered(runs: Sequence[GridRun], scale_m: float) -> Reach:
     """Return how far out manoeuvres go.
 
     Parameters
     ----------
     runs : sequence of GridRun
         Lateral speed counted from that of the approach, where the current's part in it is.
+    scale_m : float
+        See `kempf.pipeline.manoeuvre.ship.Waters`.
     """
-    found = [_of(run) for run in runs]
+    found = [_of(run, scale_m) for run in runs]
     return Reach(
         float(np.nanmax([one.drift_rad for one in found])) if any(np.isfinite(o.drift_rad) for o in found) else nan,
         float(np.nanmax([one.yaw_rate for one in found])) if any(np.isfinite(o.yaw_rate) for o in found) else nan,
@@ -58,9 +60,9 @@ def covered(runs: Sequence[GridRun]) -> Reach:
     )
 
 
-def _of(run: GridRun) -> Reach:
+def _of(run: GridRun, scale_m: float) -> Reach:
     speed = run.speed_m_s
-    own = run.ship.length_m / max(run.approach_m_s, 0.05)
+    own = scale_m / max(run.approach_m_s, 0.05)
     width = max(1, round(_PART * own / run.step_s))
     lateral, rate = (_smooth(run.measured[:, i], width) for i in (0, 1))
     if rate is None and np.isfinite(run.measured[:, 2]).mean() > 0.5:

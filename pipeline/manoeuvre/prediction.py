@@ -38,6 +38,8 @@ class OfModel:
     drawn: tuple[Sailed, ...]
     #: How many draws are none.
     no_ships: int
+    #: How many of all draws are unstable on a straight course.
+    unstable: int
 
     @property
     def figures(self) -> dict[str, Figure]:
@@ -72,6 +74,11 @@ class Prediction:
     def no_ships(self) -> int:
         """How many draws are no ships."""
         return sum(one.no_ships for one in self.models)
+
+    @property
+    def share_unstable(self) -> float:
+        """Share of all draws that are unstable on a straight course."""
+        return sum(one.unstable for one in self.models) / (len(self.drawn) + self.no_ships)
 
 
 def predict(
@@ -136,9 +143,10 @@ def _samples(models: Sequence[OfModel]) -> dict[str, Float]:
 
 
 def _of_model(model: Identified, manoeuvre: Manoeuvre, count: int) -> OfModel:
-    drawn = [manoeuvre.sailed(ship) for ship in model.ships(count)]
-    ships = tuple(one for one in drawn if one is not None)
-    return OfModel(model, manoeuvre.sailed(model.ship), ships, count - len(ships))
+    ships = list(model.ships(count))
+    drawn = tuple(one for one in map(manoeuvre.sailed, ships) if one is not None)
+    unstable = sum(ship.unstable for ship in ships)
+    return OfModel(model, manoeuvre.sailed(model.ship), drawn, count - len(drawn), unstable)
 
 
 def _no_ship(model: Identified, manoeuvre: Manoeuvre, itself: bool, lost: int, count: int) -> DataRejected:

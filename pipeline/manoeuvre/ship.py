@@ -27,6 +27,8 @@ class Waters:
     draught_m: float
     #: Of the approach, m/s.
     approach_m_s: float
+    #: Length by which her time scale goes: hers, or where the profile has none, that of a ship who answers as she does.
+    scale_m: float
     #: Power of the speed in the rudder's force.
     rudder_speed_exponent: float = 2.0
     #: Which log the ship is as in, 0 for the first: what a change of the load goes by.
@@ -35,7 +37,7 @@ class Waters:
     @property
     def own_time_s(self) -> float:
         """Time in which she sails her own length on the approach, s."""
-        return self.length_m / self.approach_m_s
+        return self.scale_m / self.approach_m_s
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,17 +49,24 @@ class Ship:
     hull: Float
     #: Shape (p,). Parameters of the effects.
     effects: Float
-    #: Shape (3,). Time constant of the speed in ship lengths, loss by (L r / V0)^2, loss by delta^2.
+    #: Shape (3,). Time constant of the speed in lengths `Waters.scale_m`, loss by (scale r / V0)^2, loss by delta^2.
     surge: Float
     rudder_rate_rad_s: float
 
     @property
     def numbers(self) -> Float:
         """What the compiled motion reads, shape (8,)."""
-        w = self.waters
-        return np.array(
-            [w.length_m, w.draught_m, w.approach_m_s, *self.surge, self.rudder_rate_rad_s, w.rudder_speed_exponent]
-        )
+        w, (tau, by_rate, by_rudder) = self.waters, self.surge
+        share = w.scale_m / w.length_m
+        surge = (tau * share, by_rate * share**2, by_rudder)
+        rest = (self.rudder_rate_rad_s, w.rudder_speed_exponent)
+        return np.array([w.length_m, w.draught_m, w.approach_m_s, *surge, *rest])
+
+    @property
+    def unstable(self) -> bool:
+        """Whether a small turn to starboard is held by less rudder than the straight course: she turns by herself."""
+        straight, turning = self.rudder_for(0.0), self.rudder_for(1e-3 / self.waters.own_time_s)
+        return straight is not None and turning is not None and turning.rudder_rad < straight.rudder_rad
 
     def _shared(self) -> tuple[Float, Float, Float, float, object, int]:
         w = self.waters

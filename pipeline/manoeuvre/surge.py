@@ -126,7 +126,7 @@ class _Log:
     @classmethod
     def of(cls, run: GridRun, length_m: float) -> _Log | None:
         speed, approach = run.speed_m_s, run.approach_m_s
-        rate = _yaw_rate(run)
+        rate = _yaw_rate(run, length_m)
         if rate is None or not approach > 0.0 or not np.all(np.isfinite(speed)) or speed.size < 20:
             return None
         shaft = np.ones(speed.size)
@@ -151,7 +151,7 @@ class _Log:
         return own, lost
 
 
-def _yaw_rate(run: GridRun) -> Float | None:
+def _yaw_rate(run: GridRun, length_m: float) -> Float | None:
     """Return the yaw rate at the instants, rad/s, without the noise that its square would be larger by."""
     rate, heading = run.measured[:, 1], run.measured[:, 2]
     known = np.isfinite(rate)
@@ -164,7 +164,7 @@ def _yaw_rate(run: GridRun) -> Float | None:
         known = np.isfinite(rate)
     laid = np.interp(time, time[known], rate[known])
     # a ship's rate does not change within a quarter of her length
-    width = max(1, round(0.25 * run.ship.length_m / max(run.approach_m_s, 0.05) / run.step_s))
+    width = max(1, round(0.25 * length_m / max(run.approach_m_s, 0.05) / run.step_s))
     window = np.ones(width) / width
     padded = np.pad(laid, (width // 2, width - 1 - width // 2), mode="edge")
     smooth: Float = np.convolve(padded, window, mode="valid")
