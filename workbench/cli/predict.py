@@ -66,6 +66,11 @@ def command(
     request = PredictRequest(manoeuvre, set_id, rudder_deg, (heading, rudder), side, speed)
     with progress_bar() as progress:
         made = predict_vessel(Warehouse(uri), vessel, request, progress)
+    if figure is not None:
+        from kempf.workbench.figures.manoeuvre import draw_manoeuvre
+
+        with writing(figure):
+            draw_manoeuvre(made.prediction, figure, _title(made))
     if as_json:
         print_json({**made.show(), "figure": str(figure) if figure else None})
     else:
@@ -86,6 +91,16 @@ def _angles(text: str) -> tuple[float, float]:
             "angles_unreadable", f"--angles {text!r} is no pair of angles.", "Give heading and rudder, such as 20/20."
         )
     return float(found[1]), float(found[2])
+
+
+def _title(made: Predicted) -> str:
+    manoeuvre = made.show()["manoeuvre"]
+    kind = manoeuvre["kind"].replace("-", " ")
+    what = f"{kind} with {manoeuvre['rudder_deg']:g} deg of rudder"
+    if kind == "zigzag":
+        what = f"{manoeuvre['heading_deg']:g}/{manoeuvre['rudder_deg']:g} zigzag"
+    side = f" to {manoeuvre['side']}" if "side" in manoeuvre else ""
+    return f"{made.vessel}, {made.parameter_set.parameter_set_id}: {what}{side} at {number(made.speed_m_s, 3)} m/s"
 
 
 #: name and unit of a figure in the table
@@ -117,17 +132,8 @@ _ROWS = {
 def _print_predicted(made: Predicted, figure: Path | None) -> None:
     shown = made.show()
     manoeuvre = shown["manoeuvre"]
-    what = f"{manoeuvre['rudder_deg']:g} deg {manoeuvre['kind']}"
-    if manoeuvre["kind"] == "zigzag":
-        what = f"{manoeuvre['heading_deg']:g}/{manoeuvre['rudder_deg']:g} zigzag"
-    if "side" in manoeuvre:
-        what += f" to {manoeuvre['side']}"
     rows = [_row(name, f, manoeuvre) for name, f in made.prediction.figures.items()]
-    print_table(
-        ["figure", "value", "95 % interval", "unit"],
-        rows,
-        f"{made.vessel}, {shown['parameter_set_id']}: {what} at {number(made.speed_m_s)} m/s",
-    )
+    print_table(["figure", "value", "95 % interval", "unit"], rows, _title(made))
     if len(shown["models"]) > 1:
         _print_models(made)
     for one in made.prediction.imo:
