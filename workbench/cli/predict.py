@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
 
 if TYPE_CHECKING:
+    from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
     from kempf.flows.jobs.predict_vessel import Predicted
     from kempf.pipeline.manoeuvre.prediction import Figure
 
@@ -37,6 +39,7 @@ _KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
     "--side", type=click.Choice(["starboard", "port"]), default="starboard", show_default=True, help="Of the turn."
 )
 @click.option("--speed", type=float, metavar="M/S", help="Of the approach; default: the mean of those that were sailed.")
+@click.option("--compare", is_flag=True, help="Lay it over the measured manoeuvres of the same kind and angles.")
 @figure_option("Draw the manoeuvre with its interval")
 @warehouse_option
 @json_option
@@ -48,6 +51,7 @@ def command(
     angles: str | None,
     side: Any,
     speed: float | None,
+    compare: bool,
     figure: Path | None,
     uri: str,
     as_json: bool,
@@ -57,6 +61,7 @@ def command(
     The intervals are those of ships that the errors of the set allow, of it and of every model that the data do not
     tell from it. What lies beyond the drift, yaw rate, rudder and speed of the logs is named.
     """
+    from kempf.flows.jobs.compare_predicted import measured_beside
     from kempf.flows.jobs.predict_vessel import PredictRequest, predict_vessel
     from kempf.warehouse.store import Warehouse
 
@@ -66,15 +71,19 @@ def command(
     request = PredictRequest(manoeuvre, set_id, rudder_deg, (heading, rudder), side, speed)
     with progress_bar() as progress:
         made = predict_vessel(Warehouse(uri), vessel, request, progress)
+        measured = measured_beside(Warehouse(uri), made, progress) if compare else None
     if figure is not None:
         from kempf.workbench.figures.manoeuvre import draw_manoeuvre
 
         with writing(figure):
             draw_manoeuvre(made.prediction, figure, _title(made))
     if as_json:
-        print_json({**made.show(), "figure": str(figure) if figure else None})
+        beside = {"measured": [one.show() for one in measured]} if measured is not None else {}
+        print_json({**made.show(), **beside, "figure": str(figure) if figure else None})
     else:
         _print_predicted(made, figure)
+        if measured is not None:
+            _print_measured(measured)
 
 
 def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | None) -> None:
@@ -173,3 +182,25 @@ def _print_models(made: Predicted) -> None:
         effects = " + ".join(effect.name for effect in one.model.waters.model.effects) or "plain"
         rows.append([effects, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit])
     print_table([f"{words} of the model", "value", "95 % interval", "unit"], rows)
+
+
+def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
+    if not measured:
+        print_paragraph("measured: no manoeuvre of this kind and these angles is in the warehouse")
+        return
+    rows = []
+    for one in measured:
+        for beside in one.figures:
+            figure, inside = beside.predicted, beside.show()["inside"]
+            base, _, place = beside.name.partition(".")
+            words = f"{_ROWS[base][0]} {int(place) + 1}" if place else _ROWS[base][0]
+            if figure.value is not None:
+                interval = f"{number(figure.low)} to {number(figure.high)}"
+                about = (one.segment_id[:12], one.side, one.sample.replace("_", " "), words)
+                verdict = "yes" if inside else "no"
+                rows.append([*about, number(beside.measured), number(figure.value), interval, verdict])
+    head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]
+    print_table(head, rows, "measured manoeuvres, each with its own approach speed, rudder and switching headings")
+    for one in measured:
+        if one.why:
+            print_paragraph(f"{one.segment_id}: {one.why}")
