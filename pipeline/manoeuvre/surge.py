@@ -30,7 +30,7 @@ TAU_MEDIAN, TAU_SPREAD = 8.0, 0.7
 _LOSS_MEAN, _LOSS_STD = np.array([2.0, 0.3]), np.array([2.0, 0.3])
 #: of V_0 about the speed of the approach, as a share of it
 _SETTLED_STD = 0.03
-_GRID = np.exp(np.linspace(np.log(0.7), np.log(90.0), 81))
+_GRID = np.exp(np.linspace(np.log(1.0), np.log(64.0), 121))
 #: no log is better than this share of the approach speed
 _LEAST_ERROR = 0.002
 #: a posterior wider than this share of the prior comes from the prior
@@ -181,13 +181,13 @@ class _Posterior:
 
 def _posterior(logs: Sequence[_Log], losses: int) -> _Posterior:
     """Return the posterior with so many kinds of loss; errors that remember count as fewer."""
-    first = [_solved(logs, tau, losses, 1.0)[0] for tau in _GRID]
-    best = int(np.argmin(first))
-    left = _left(logs, _GRID[best], losses)
-    every = np.concatenate(left)
-    error = max(float(np.sqrt(np.mean(every**2))), _LEAST_ERROR)
+    # where the logs alone are best, their errors are smallest: so large they are
+    every = [_left(logs, tau, losses) for tau in _GRID]
+    left = min(every, key=lambda parts: sum(float(e @ e) for e in parts))
+    count = sum(e.size for e in left)
+    error = max(float(np.sqrt(sum(float(e @ e) for e in left) / count)), _LEAST_ERROR)
     variance = error**2 * _memory(left)
-    independent = every.size * error**2 / variance
+    independent = count * error**2 / variance
     found = [_solved(logs, tau, losses, variance) for tau in _GRID]
     log_tau = np.log(_GRID / TAU_MEDIAN) / TAU_SPREAD
     # the area of the other parameters counts, as in any marginal likelihood
@@ -226,17 +226,18 @@ def _solved(logs: Sequence[_Log], tau: float, losses: int, variance: float) -> t
 
 
 def _left(logs: Sequence[_Log], tau: float, losses: int) -> list[Float]:
-    """Return what the model leaves of every log's speed, without priors."""
-    columns = [log.columns(tau, losses) for log in logs]
-    width = sum(own.shape[1] for own, _ in columns)
-    rows = []
-    for k, (own, lost) in enumerate(columns):
-        wide = np.zeros((own.shape[0], width + losses))
-        wide[:, 2 * k : 2 * k + 2], wide[:, width:] = own, lost
-        rows.append(wide)
-    matrix, speed = np.vstack(rows), np.concatenate([log.speed for log in logs])
-    rest = speed - matrix @ lstsq(matrix, speed, rcond=1e-10)[0]
-    return np.split(rest, np.cumsum([log.speed.size for log in logs])[:-1])
+    """Return what the model leaves of every log's speed, without priors.
+
+    V_0 and the first speed of each log are taken out first (Frisch & Waugh 1933), so that the losses alone are solved.
+    """
+    speeds, costs = [], []
+    for log in logs:
+        own, lost = log.columns(tau, losses)
+        base = np.linalg.qr(own)[0]
+        speeds.append(log.speed - base @ (base.T @ log.speed))
+        costs.append(lost - base @ (base.T @ lost))
+    found = lstsq(np.vstack(costs), np.concatenate(speeds), rcond=1e-10)[0]
+    return [speed - cost @ found for speed, cost in zip(speeds, costs, strict=True)]
 
 
 def _memory(left: Sequence[Float]) -> float:
