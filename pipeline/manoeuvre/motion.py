@@ -22,13 +22,13 @@ N_TRACK = 9
 #: how a manoeuvre ended
 SAILED, RAN_AWAY, NEVER_CAME = 0, 1, 2
 #: parts of the ship's vector, `kempf.pipeline.manoeuvre.ship.Ship.vector`
-LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE, EXPONENT = range(8)
+LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE, EXPONENT, SCALE = range(9)
 _TRUE_HEADING = 2 + SYMBOLS.index("K") - CHANNEL
 _RUN_TIME = 2 + SYMBOLS.index("t") - CHANNEL
 #: a crossing is found to this part of a step
 _HALVINGS = 48
-#: she is no ship any more: this share of the approach speed is left; so fast sideways, in approach speeds; r L / V0
-_SLOWEST, _FASTEST_SIDEWAYS, _FASTEST_TURN = 0.02, 2.0, 20.0
+#: she is no ship any more: this share of the approach speed is left; v / V; r L / V. Hulls reach 0.8 and 1.3
+_SLOWEST, _FASTEST_SIDEWAYS, _FASTEST_TURN = 0.02, 2.0, 4.0
 _ROUNDS = 40
 
 
@@ -200,7 +200,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s
 
     Parameters
     ----------
-    numbers : ndarray, shape (8,)
+    numbers : ndarray, shape (9,)
         See the constants of this file.
     hull : ndarray, shape (6, 1)
     effects : ndarray, shape (p,)
@@ -246,7 +246,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s
     room[8][0] = straight
     rates(x, s, room[8], sea, numbers, room[0], room[4])
     _record(track[0], t, x, s, reading, sea)
-    limit, V0, L = numbers[RUDDER_RATE], numbers[APPROACH], numbers[LENGTH]
+    limit, V0, scale = numbers[RUDDER_RATE], numbers[APPROACH], numbers[SCALE]
     for k in range(phases.shape[0]):
         order, side, target, longest = phases[k]
         if np.isnan(order):
@@ -282,8 +282,8 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s
             away = (
                 not np.isfinite(s[0] + x[V, 0] + x[R, 0])
                 or s[0] < _SLOWEST * V0
-                or abs(x[V, 0]) > _FASTEST_SIDEWAYS * V0
-                or abs(x[R, 0]) * L > _FASTEST_TURN * V0
+                or abs(x[V, 0]) > _FASTEST_SIDEWAYS * s[0]
+                or abs(x[R, 0]) * scale > _FASTEST_TURN * s[0]
             )
             if away or n >= track.shape[0]:
                 return (RAN_AWAY if away else NEVER_CAME), n

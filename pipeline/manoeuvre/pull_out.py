@@ -33,7 +33,7 @@ class PullOut:
     def sailed(self, ship: Ship) -> Sailed | None:
         """Sail it; the curve has columns time from the order amidships, s, and yaw rate, rad/s."""
         own, side = ship.waters.own_time_s, self.side
-        turn = [side * self.rudder_rad, side, side * 2.0 * pi, LONGEST * own]
+        turn = [side * self.rudder_rad, side, side * 3.0 * pi, LONGEST * own]
         track = ship.sail(np.array([turn, [nan, 0.0, 0.0, _WATCHED * own]]))
         if track.how != motion.SAILED:
             return None

@@ -55,11 +55,11 @@ class Ship:
 
     @property
     def numbers(self) -> Float:
-        """What the compiled motion reads, shape (8,)."""
+        """What the compiled motion reads, shape (9,)."""
         w, (tau, by_rate, by_rudder) = self.waters, self.surge
         share = w.scale_m / w.length_m
         surge = (tau * share, by_rate * share**2, by_rudder)
-        rest = (self.rudder_rate_rad_s, w.rudder_speed_exponent)
+        rest = (self.rudder_rate_rad_s, w.rudder_speed_exponent, w.scale_m)
         return np.array([w.length_m, w.draught_m, w.approach_m_s, *surge, *rest])
 
     @property

@@ -17,8 +17,8 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.sailed import Reach, Sailed
 from kempf.pipeline.manoeuvre.ship import Balance, Ship
 
-#: r L / V0 from which on no ship is looked at, and points of the curve to a side
-_FASTEST, _POINTS = 3.0, 60
+#: r L / V0 from which on no ship is looked at, and steps of the curve up to there
+_FASTEST, _STEPS = 3.0, 240
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class Spiral:
 
     #: Magnitude of the outermost rudder angle.
     rudder_rad: float
-    #: Steps of the direct spiral between them.
+    #: Step of the direct spiral between them.
     step_rad: float = radians(5.0)
     name: str = "spiral"
 
@@ -75,7 +75,7 @@ class Spiral:
         own = ship.waters.own_time_s
         found: list[Balance] = []
         start = None
-        step = _FASTEST / own / 240.0
+        step = _FASTEST / own / _STEPS
         rate = step
         while rate < _FASTEST / own:
             one = ship.rudder_for(side * rate, start)
@@ -84,7 +84,7 @@ class Spiral:
             found.append(one)
             start = one.solution
             if side * one.rudder_rad >= self.rudder_rad:
-                return found[:: max(1, len(found) // _POINTS)] + ([found[-1]] if len(found) > _POINTS else [])
+                return found
             rate += step
         return None
 

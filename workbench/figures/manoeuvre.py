@@ -32,7 +32,7 @@ def draw_manoeuvre(made: Prediction, path: Path, title: str = "") -> None:
         figure = new_figure(6.4 if isinstance(made.manoeuvre, TurningCircle) else 4.2)
         figure.set_facecolor("white")
         panel = figure.subplots()
-        panel.set_title(title)
+        figure.suptitle(title, x=0.02, ha="left", fontsize=9.5)
         if isinstance(made.manoeuvre, TurningCircle):
             _circle(panel, made)
         elif isinstance(made.manoeuvre, Zigzag):
@@ -144,5 +144,7 @@ def _spiral(panel: Any, made: Prediction) -> None:
         there = [(np.degrees(o), made.figures[f"{name}.{k}"].value) for k, o in enumerate(made.manoeuvre.orders_rad)]
         seen = [(o, value) for o, value in there if value is not None]
         panel.plot(*zip(*seen, strict=True), marker=marker, ls="", ms=4.5, color=LIMIT, label=words)
+    farthest = 1.05 * np.degrees(made.manoeuvre.rudder_rad)
+    panel.set_xlim(-farthest, farthest)
     panel.set_xlabel("rudder, deg")
     panel.set_ylabel("steady yaw rate, deg/s")
