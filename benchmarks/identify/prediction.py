@@ -1,8 +1,8 @@
-"""Do the intervals of `kempf predict` hold? Simulated ships: zigzags in wind and stream, then circles and zigzags in calm.
+"""Do the intervals of `kempf predict` hold? Simulated ships: zigzags in wind and stream, then all in calm water.
 
-Every ship has a hull of the catalogue with each parameter changed by chance, and a speed loss and surge time of her own.
-Her zigzags are identified as `kempf identify` does it; what is predicted is compared with what the simulator, which
-shares no code with the prediction, sails.
+Every ship has a hull of the catalogue with each parameter changed by chance, and her own speed loss and surge time.
+Her zigzags are identified as `kempf identify` does it; what is predicted is compared with what the simulator sails,
+which shares no code with the prediction.
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.pool_vessel import pool_vessel
 from kempf.flows.jobs.predict_vessel import PredictRequest, predict_vessel
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.manoeuvre.prediction import Figure
 from kempf.pipeline.segment.turning_figures import turning_figures
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS, HullParameters, SimulatedHull
@@ -85,7 +86,7 @@ def identify(hull: SimulatedHull, number: int, folder: Path) -> Warehouse:
 def true_circle(hull: SimulatedHull, rudder_deg: float) -> dict[str, float]:
     """Let the simulator sail a turning circle in calm water."""
     time, state = _sailed(hull, TurningCircle(rudder_deg, 540.0))
-    v, r, psi, north, east, forward = state.T
+    v, _, psi, north, east, forward = state.T
     found = turning_figures(time, north, east, psi, np.hypot(forward, v), np.arctan2(-v, forward), 0.0)
     return {name: getattr(found, name) for name in _CIRCLE}
 
@@ -113,20 +114,20 @@ def compared(number: int) -> list[Compared]:
             request = PredictRequest("turning-circle", rudder_deg=rudder, speed_m_s=speed)
             figures = predict_vessel(warehouse, hull.name, request).prediction.figures
             for name, truth in true_circle(hull, rudder).items():
-                one = figures[name]
-                if one.value is not None:
-                    found.append(Compared(f"circle, {rudder:g} deg", name, truth, one.value, one.low, one.high))
+                found += _beside(f"circle, {rudder:g} deg", name, truth, figures[name])
         for angles in ((10.0, 10.0), (20.0, 20.0)):
             request = PredictRequest("zigzag", angles_deg=angles, speed_m_s=speed)
             figures = predict_vessel(warehouse, hull.name, request).prediction.figures
             for k, truth in enumerate(true_overshoots(hull, *angles)[:2]):
-                one = figures[f"overshoots_deg.{k}"]
-                if one.value is not None:
-                    name = f"overshoot {k + 1}"
-                    found.append(
-                        Compared(f"zigzag {angles[0]:g}/{angles[1]:g}", name, truth, one.value, one.low, one.high)
-                    )
+                name = f"overshoots_deg.{k}"
+                found += _beside(f"zigzag {angles[0]:g}/{angles[1]:g}", f"overshoot {k + 1}", truth, figures[name])
     return found
+
+
+def _beside(manoeuvre: str, name: str, truth: float, one: Figure) -> list[Compared]:
+    if one.value is None or one.low is None or one.high is None:
+        return []
+    return [Compared(manoeuvre, name, truth, one.value, one.low, one.high)]
 
 
 def main() -> None:
@@ -145,7 +146,7 @@ def main() -> None:
     for manoeuvre, figure in dict.fromkeys((c.manoeuvre, c.figure) for c in every):
         hers = [c for c in every if (c.manoeuvre, c.figure) == (manoeuvre, figure)]
         inside = np.array([c.low <= c.truth <= c.high for c in hers])
-        error = np.array([100.0 * (c.value / c.truth - 1.0) for c in hers])
+        off = np.array([100.0 * (c.value / c.truth - 1.0) for c in hers])
         width = np.array([100.0 * (c.high - c.low) / abs(c.truth) for c in hers])
         rows.append(
             [
@@ -153,7 +154,7 @@ def main() -> None:
                 figure.replace("_", " "),
                 str(len(hers)),
                 f"{100.0 * inside.mean():.0f} %",
-                f"{np.median(np.abs(error)):.2f} %",
+                f"{np.median(np.abs(off)):.2f} %",
                 f"{np.median(width):.2f} %",
             ]
         )
@@ -164,12 +165,13 @@ def main() -> None:
         "predicted in calm water at her trial speed. The simulator's speed equation has the form of the estimator's, so "
         "these figures say nothing of a speed that falls in another way.",
         "",
-        f"**{share:.0f} % of all figures lie inside their 95 % interval.** {len(refused)} of {ships} ships were refused.",
+        f"**{share:.0f} % of all figures lie inside their 95 % interval.** Refused: {len(refused)} of {ships} ships.",
         "",
         *table(["manoeuvre", "figure", "ships", "inside 95 %", "median error", "median width of the interval"], rows),
         *(["", "Refused: " + "; ".join(refused)] if refused else []),
     ]
-    print(write("identify.prediction", "Predicted manoeuvres: do the intervals hold?", lines, options=f"--ships {ships}"))
+    title = "Predicted manoeuvres: do the intervals hold?"
+    print(write("identify.prediction", title, lines, options=f"--ships {ships}"))
 
 
 if __name__ == "__main__":

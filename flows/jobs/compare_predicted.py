@@ -73,8 +73,8 @@ def measured_beside(
 ) -> tuple[MeasuredManoeuvre, ...]:
     """Lay the prediction over the measured manoeuvres of the same kind and angles, to both sides.
 
-    Each is predicted with its own side, approach speed and rudder as it was held; the rudder of a zigzag is ordered over
-    at the headings at which it was, so that a late helmsman is in both numbers.
+    Each is predicted with its own side, approach speed and rudder as it was held; the rudder of a zigzag is ordered
+    over at the headings at which it was, so that a late helmsman is in both numbers.
 
     Parameters
     ----------

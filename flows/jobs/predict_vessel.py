@@ -1,5 +1,7 @@
-"""The job that predicts a standard manoeuvre from a parameter set, its rivals and the logs behind it. Nothing is fitted
-but the speed's equation, and nothing is stored."""
+"""The job that predicts a standard manoeuvre from a parameter set, its rivals and the logs behind it.
+
+Nothing is fitted but the speed's equation; what is stored are models that the data do not tell from the set.
+"""
 
 from __future__ import annotations
 
@@ -233,9 +235,7 @@ def basis_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silen
     profile = vessels.get(warehouse, str(inputs["profile_sha256"]))
     runs = assemble(instruments, profile, bounds, ModelSpec.model_validate(dict(one.model_spec)))
     scale = profile.length_m or _scale_m(one)
-    return Basis(
-        profile, runs, surge_of(runs.runs, scale), rudder_rate(runs.records), covered(runs.runs, scale), scale
-    )
+    return Basis(profile, runs, surge_of(runs.runs, scale), rudder_rate(runs.records), covered(runs.runs, scale), scale)
 
 
 def identified(ship: ShipOfSet, basis: Basis) -> Identified:
@@ -274,9 +274,7 @@ def _scale_m(one: ParameterSet) -> float:
     return float(min(max(2.5 / damping if damping > 0.0 else LENGTH_M, 0.3), 500.0))
 
 
-def _assumed(
-    request: PredictRequest, basis: Basis, models: Sequence[Identified], speed: float
-) -> tuple[str, ...]:
+def _assumed(request: PredictRequest, basis: Basis, models: Sequence[Identified], speed: float) -> tuple[str, ...]:
     said = ["calm, deep water without wind, waves or current; the engine left as on the approach"]
     if request.speed_m_s is None:
         said.append(f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres of the set")

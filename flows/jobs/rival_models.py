@@ -40,7 +40,9 @@ def rivals_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = sile
     effects = tuple(one.model_spec.get("effects", ()))
     found = [d for d in diagnoses.of_vessel(warehouse, one.vessel) if _same_data(d.inputs, one)]
     if not found:
-        return Rivals((), ("no diagnosis says which models fit as well: this one is taken alone; see `kempf diagnose`",))
+        return Rivals(
+            (), ("no diagnosis says which models fit as well: this one is taken alone; see `kempf diagnose`",)
+        )
     alike = [tuple(entry["effects"]) for entry in found[-1].content.get("sets", ()) if len(entry["effects"]) > 1]
     wanted = [
         tuple(other if name == effect else name for name in effects)

@@ -55,11 +55,11 @@ def _advance(x, s, felt, h, sea, numbers, room, xn, sn):  # type: ignore[no-unty
     rates(x, s, rudder, sea, numbers, k1, l1)
     rudder[0] = felt[1]
     for stage in range(2):
-        k, l = (k1, l1) if stage == 0 else (k2, l2)
+        k, slope = (k1, l1) if stage == 0 else (k2, l2)
         for i in range(x.shape[0]):
             xn[i, 0] = x[i, 0] + 0.5 * h * k[i, 0]
         for i in range(4):
-            sn[i] = s[i] + 0.5 * h * l[i]
+            sn[i] = s[i] + 0.5 * h * slope[i]
         if stage == 0:
             rates(xn, sn, rudder, sea, numbers, k2, l2)
         else:
@@ -195,7 +195,7 @@ def _step(x, s, begun, before, speed, h, t, sea, numbers, gear, held, room, xn, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s, track, ends):  # type: ignore[no-untyped-def]
+def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s, track, ends):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one loop
     """Sail a manoeuvre from a steady straight course on.
 
     Parameters
@@ -232,7 +232,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s
     )
     x, xn, s, sn = np.zeros(shape), np.zeros(shape), np.zeros(4), np.zeros(4)
     rest = np.zeros(2 + extra)
-    _, at_rest = balanced(numbers, hull, effects, day, table, extra, 0.0, True, rest)
+    _, at_rest = balanced(numbers, hull, effects, day, table, extra, 0.0, True, rest)  # noqa: FBT003 - compiled
     if not at_rest:
         rest[:] = 0.0
     straight = rest[1]

@@ -1,4 +1,4 @@
-"""The pull-out: from a steady turn the rudder is put amidships, and the yaw rate that is left says whether she is stable.
+"""The pull-out: out of a steady turn the rudder is put amidships; the yaw rate that is left says if she is stable.
 
 ITTC 7.5-02-06-01; Burcher (1972), "Developments in ship manoeuvrability", Trans. RINA 114. Amidships is here the rudder
 with which she holds a straight course.

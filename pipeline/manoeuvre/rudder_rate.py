@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from math import degrees, radians
 
 import numpy as np
@@ -19,7 +20,7 @@ _INNER = 0.6
 #: a way over that the readings cut into fewer steps shows no rate
 _STEPS = 2.5
 #: how well a rate is known at best
-_LEAST = 0.02
+_LEAST = 0.01
 
 
 @dataclass(frozen=True)
@@ -69,7 +70,7 @@ def _ways_over(time_s: Float, rudder_rad: Float, period_s: float) -> list[tuple[
     side = np.where(rudder_rad >= level, 1, np.where(rudder_rad <= -level, -1, 0))
     found = []
     there = np.flatnonzero(side)
-    for i, j in zip(there[:-1], there[1:], strict=True):
+    for i, j in pairwise(there.tolist()):
         if side[i] != side[j]:
             left = _crossing(time_s, rudder_rad, i, side[i] * level)
             arrived = _crossing(time_s, rudder_rad, j - 1, side[j] * level)

@@ -100,13 +100,13 @@ class Ship:
         start : ndarray, shape (2 + k,), optional
             `Balance.solution` of a turn beside it.
         """
-        return self._balance(yaw_rate_rad_s, True, start)
+        return self._balance(yaw_rate_rad_s, start, rate_given=True)
 
     def rate_by(self, rudder_rad: float, start: Float | None = None) -> Balance | None:
         """Return the steady turn that a rudder keeps up, None where there is none; an unstable one counts, too."""
-        return self._balance(rudder_rad, False, start)
+        return self._balance(rudder_rad, start, rate_given=False)
 
-    def _balance(self, given: float, rate_given: bool, start: Float | None) -> Balance | None:
+    def _balance(self, given: float, start: Float | None, *, rate_given: bool) -> Balance | None:
         z = np.zeros(2 + self.waters.model.extra) if start is None else start.copy()
         forward, found = motion.balanced(*self._shared(), float(given), rate_given, z)
         if not found:

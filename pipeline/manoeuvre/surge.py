@@ -26,13 +26,13 @@ from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 #: of tau: ships come back to their speed in some lengths to some dozens of them; median, and its logarithm's spread
 TAU_MEDIAN, TAU_SPREAD = 8.0, 0.7
-#: of k_r: with (L r / V_a)^2 of 0.1 to 0.2 in a hard turn a loss of 20 to 60 %; of k_d: 0.4 rad of rudder cost some percent
+#: of k_r: with (L r / V_a)^2 of 0.1 to 0.2 in a hard turn a loss of 20 to 60 %; of k_d: 0.4 rad cost some percent
 _LOSS_MEAN, _LOSS_STD = np.array([2.0, 0.3]), np.array([2.0, 0.3])
 #: of V_0 about the speed of the approach, as a share of it
 _SETTLED_STD = 0.03
 _GRID = np.exp(np.linspace(np.log(1.0), np.log(64.0), 121))
 #: no log is better than this share of the approach speed
-_LEAST_ERROR = 0.002
+_LEAST_ERROR = 0.0005
 #: a posterior wider than this share of the prior comes from the prior
 _FROM_PRIOR = 0.7
 _LAGS = 400
@@ -98,8 +98,7 @@ def surge_of(runs: Sequence[GridRun], length_m: float) -> SurgeFit:
     length_m : float
         Of the ship.
     """
-    logs = [_Log.of(run, length_m) for run in runs]
-    logs = [log for log in logs if log is not None]
+    logs = [log for log in (_Log.of(run, length_m) for run in runs) if log is not None]
     if not logs:
         return _prior(("the speed in turns is a guess: no log shows it",))
     plain, both = _posterior(logs, 1), _posterior(logs, 2)
@@ -222,7 +221,8 @@ def _solved(logs: Sequence[_Log], tau: float, losses: int, variance: float) -> t
     target = right + prior @ _LOSS_MEAN[:losses]
     mean = np.linalg.solve(whole, target)
     cost = constant + _LOSS_MEAN[:losses] @ prior @ _LOSS_MEAN[:losses] - target @ mean
-    return float(cost), float(logdet + slogdet(whole)[1]), mean, inv(whole)
+    covariance: Float = inv(whole)
+    return float(cost), float(logdet + slogdet(whole)[1]), mean, covariance
 
 
 def _left(logs: Sequence[_Log], tau: float, losses: int) -> list[Float]:
@@ -260,4 +260,4 @@ def _prior(remarks: tuple[str, ...]) -> SurgeFit:
     covariance = np.zeros((n, 2, 2))
     covariance[:, 0, 0] = _LOSS_STD[0] ** 2
     loss = np.tile([_LOSS_MEAN[0], 0.0], (n, 1))
-    return SurgeFit(_GRID, p / p.sum(), loss, covariance, False, float("nan"), remarks)
+    return SurgeFit(_GRID, p / p.sum(), loss, covariance, by_rudder=False, error_m_s=float("nan"), remarks=remarks)

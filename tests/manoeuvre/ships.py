@@ -37,7 +37,13 @@ def identified(ship: Ship, relative: float = 0.02, name: str = "ps-0000000000000
     estimates = np.concatenate([ship.hull, ship.effects])
     tau, *loss = ship.surge
     surge = SurgeFit(
-        np.array([tau]), np.ones(1), np.array([loss]), np.diag([(0.05 * loss[0]) ** 2, 0.0])[None], False, 0.01, ()
+        np.array([tau]),
+        np.ones(1),
+        np.array([loss]),
+        np.diag([(0.05 * loss[0]) ** 2, 0.0])[None],
+        by_rudder=False,
+        error_m_s=0.01,
+        remarks=(),
     )
     rate = RudderRate(ship.rudder_rate_rad_s, 0.02 * ship.rudder_rate_rad_s, 4, "")
     covariance = np.diag((relative * estimates) ** 2)

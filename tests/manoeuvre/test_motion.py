@@ -43,7 +43,9 @@ def test_zigzags_are_those_of_the_simulator(heading: float, rudder: float) -> No
     assert made is not None
     found = [made.figures[f"overshoots_deg.{k}"] for k in range(len(truth.overshoots_rad))]
     np.testing.assert_allclose(found, np.degrees(truth.overshoots_rad), rtol=2e-3)
-    assert made.figures["time_to_second_execute_s"] == pytest.approx(truth.executes_s[1] - truth.executes_s[0], abs=1e-3)
+    assert made.figures["time_to_second_execute_s"] == pytest.approx(
+        truth.executes_s[1] - truth.executes_s[0], abs=1e-3
+    )
 
 
 def test_the_rudder_is_ordered_over_exactly_at_the_heading() -> None:

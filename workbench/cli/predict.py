@@ -38,7 +38,9 @@ _KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
 @click.option(
     "--side", type=click.Choice(["starboard", "port"]), default="starboard", show_default=True, help="Of the turn."
 )
-@click.option("--speed", type=float, metavar="M/S", help="Of the approach; default: the mean of those that were sailed.")
+@click.option(
+    "--speed", type=float, metavar="M/S", help="Of the approach; default: the mean of those that were sailed."
+)
 @click.option("--compare", is_flag=True, help="Lay it over the measured manoeuvres of the same kind and angles.")
 @figure_option("Draw the manoeuvre with its interval")
 @warehouse_option
@@ -148,7 +150,9 @@ def _print_predicted(made: Predicted, figure: Path | None) -> None:
     for one in made.prediction.imo:
         limit = f"{number(one.limit)} {one.unit}: " if one.limit is not None else ""
         verdict = (
-            f"fulfilled with a probability of {100 * one.probability:.0f} %" if one.probability is not None else "not judged"
+            f"fulfilled with a probability of {100 * one.probability:.0f} %"
+            if one.probability is not None
+            else "not judged"
         )
         print_paragraph(f"IMO {one.name}, at most {limit}{verdict}" + (f" ({one.why})" if one.why else ""))
     for beyond in made.prediction.extrapolated:

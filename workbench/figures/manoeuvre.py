@@ -52,7 +52,9 @@ def _ships(panel: Any, made: Prediction, x: int, y: int, factors: tuple[float, f
     chosen = drawn[:: max(1, len(drawn) // _SHIPS)]
     for k, one in enumerate(chosen):
         label = "ships that the data allow" if k == 0 else None
-        panel.plot(factors[0] * one.curve[:, x], factors[1] * one.curve[:, y], color=FULL, alpha=0.12, lw=1.0, label=label)
+        panel.plot(
+            factors[0] * one.curve[:, x], factors[1] * one.curve[:, y], color=FULL, alpha=0.12, lw=1.0, label=label
+        )
     for k, model in enumerate(made.models):
         if model.sailed is not None:
             curve = model.sailed.curve
@@ -109,7 +111,9 @@ def _zigzag(panel: Any, made: Prediction, manoeuvre: Zigzag) -> None:
             continue
         at = float(curve[np.argmin(np.abs(heading - side * (nominal + figure.value))), 0])
         low, high = (side * (nominal + x) for x in (figure.low, figure.high))
-        panel.plot([at, at], [low, high], color=LIMIT, lw=4.0, solid_capstyle="butt", label=None if k else "95 % interval")
+        panel.plot(
+            [at, at], [low, high], color=LIMIT, lw=4.0, solid_capstyle="butt", label=None if k else "95 % interval"
+        )
         text = f"{figure.value:.1f}°\n({figure.low:.1f} to {figure.high:.1f})"
         panel.annotate(
             text, (at, max(high, low) if side > 0 else min(high, low)), (0, 14 * side),
