@@ -18,6 +18,9 @@ from kempf.flows.jobs.rival_models import rivals_of
 from kempf.flows.jobs.ship_model import ShipOfSet, ship_of_set
 from kempf.flows.jobs.vessel_runs import LENGTH_M, VesselRuns, assemble
 from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.record.left_out import left_out
 from kempf.pipeline.manoeuvre.covered import covered
 from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
 from kempf.pipeline.manoeuvre.prediction import Prediction, predict
@@ -28,6 +31,7 @@ from kempf.pipeline.manoeuvre.ship import Waters
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.surge import SurgeFit, surge_of
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.widening import widening
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
@@ -48,6 +52,8 @@ _TAKEN = {
     "roll": "no heel",
     "shaft_speed": "the shaft turning as on the approach",
 }
+#: a widening from which it is said
+_SAID = 1.05
 _INSTRUMENTS = {"lateral_speed", "yaw_rate", "heading"}
 
 
@@ -116,6 +122,7 @@ class Predicted:
                     "figures": _grouped({name: vars(figure) for name, figure in one.figures.items()}),
                     "draws": len(one.drawn) + one.no_ships,
                     "no_ships": one.no_ships,
+                    "errors_widened": one.model.widened,
                 }
                 for one in made.models
             ],
@@ -216,9 +223,12 @@ def basis_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silen
     """
     inputs: dict[str, Any] = dict(one.provenance.get("inputs") or {})
     rows = {row.log_id: row.ingest_id for row in logs.current(warehouse, one.vessel)}
+    every = list(inputs.get("segments", ()))
+    # a pooled set names its segments in the order of the bounds
+    names = one.settings.get("segments") or [f"{b['log_id'][:8]}-{k}" for k, b in enumerate(every)]
     bounds = [
-        (f"{b['log_id'][:8]}-{k}", Bounds(b["log_id"], b["start_utc_ns"], b["end_utc_ns"]))
-        for k, b in enumerate(inputs.get("segments", ()))
+        (name, Bounds(b["log_id"], b["start_utc_ns"], b["end_utc_ns"]))
+        for name, b in zip(names, every, strict=True)
         if b["log_id"] in rows
     ]
     if not bounds:
@@ -263,9 +273,29 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
         day=effects.day if effects is not None else 0.0,
     )
     values = effects.values if effects is not None else np.zeros(0)
+    factor = _widened(one, waters.model, basis, ship.hull.array(), values, ship.covariance)
     return Identified(
-        one.parameter_set_id, waters, ship.hull.array(), values, ship.covariance, basis.surge, basis.rudder_rate
+        name=one.parameter_set_id,
+        waters=waters,
+        hull=ship.hull.array(),
+        effects=values,
+        covariance=factor**2 * ship.covariance,
+        surge=basis.surge,
+        rudder_rate=basis.rudder_rate,
+        widened=factor,
     )
+
+
+def _widened(
+    one: ParameterSet, model: EffectModel, basis: Basis, hull: Float, values: Float, covariance: Float
+) -> float:
+    """Return how much wider than its covariance the errors of a pooled set are; 1 for a set of one manoeuvre."""
+    levels: dict[str, Any] = dict(one.convergence.get("levels") or {})
+    gross: dict[str, Any] = dict(one.convergence.get("gross_error_instants_s") or {})
+    fitted = [run for run in basis.runs.runs if run.name in levels]
+    filters = [RunFilter(left_out(run, gross.get(run.name, {})), model, basis.runs.spec) for run in fitted]
+    own = [np.exp(np.array(levels[run.name], dtype=np.float64)) for run in fitted]
+    return widening(filters, own, hull, values, covariance) if filters else 1.0
 
 
 def _scale_m(one: ParameterSet) -> float:
@@ -286,6 +316,12 @@ def _assumed(request: PredictRequest, basis: Basis, models: Sequence[Identified]
         said.append("the speed in turns is the one over ground along the bow where no log shows that through the water")
     if not all("shaft_speed" in run.channels for run in basis.runs.runs):
         said.append("no shaft speed in the logs: taken as constant in them")
+    for model in models:
+        if model.widened > _SAID:
+            said.append(
+                f"errors of {model.name} widened {model.widened:.1f} times: over a leg its prediction errors remember, "
+                "as those of a model that lacks something do"
+            )
     for effect in {e.name: e for model in models for e in model.waters.model.effects}.values():
         taken = dict.fromkeys(_TAKEN[c] for c in effect.needs if c in _TAKEN)
         if taken:

@@ -37,6 +37,8 @@ class Identified:
     covariance: Float
     surge: SurgeFit
     rudder_rate: RudderRate
+    #: Factor that is in the covariance for what the model lacks, see `kempf.pipeline.manoeuvre.widening`.
+    widened: float = 1.0
 
     @property
     def ship(self) -> Ship:

@@ -15,7 +15,7 @@ from kempf.pipeline.manoeuvre.sailed import Manoeuvre, Reach, Sailed
 from kempf.schemas.errors import DataRejected
 
 #: an interval holds 95 %; it needs so many of the ships that were drawn
-_TAIL, _ENOUGH = 2.5, 0.8
+_TAIL, ENOUGH = 2.5, 0.8
 
 
 @dataclass(frozen=True)
@@ -109,7 +109,7 @@ def predict(
     made = tuple(_of_model(model, manoeuvre, count) for model in models)
     drawn, lost = sum(len(one.drawn) for one in made), sum(one.no_ships for one in made)
     first = made[0].sailed
-    if first is None or drawn < _ENOUGH * (drawn + lost):
+    if first is None or drawn < ENOUGH * (drawn + lost):
         raise _no_ship(models[0], manoeuvre, first is None, lost, drawn + lost)
     samples = _samples(made)
     speed = models[0].waters.approach_m_s
@@ -129,7 +129,7 @@ def figures_of(sailed: Sailed | None, models: Sequence[OfModel]) -> dict[str, Fi
     for name, values in samples.items():
         there = values[np.isfinite(values)]
         value = sailed.figures[name] if sailed is not None else np.nan
-        if there.size < _ENOUGH * values.size or not np.isfinite(value):
+        if there.size < ENOUGH * values.size or not np.isfinite(value):
             found[name] = Figure(None, None, None)
         else:
             low, high = np.percentile(there, [_TAIL, 100.0 - _TAIL])

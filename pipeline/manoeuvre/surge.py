@@ -27,7 +27,7 @@ from kempf.schemas.symbols import CHANNEL_SYMBOLS
 #: of tau: ships come back to their speed in some lengths to some dozens of them; median, and its logarithm's spread
 TAU_MEDIAN, TAU_SPREAD = 8.0, 0.7
 #: of k_r: with (L r / V_a)^2 of 0.1 to 0.2 in a hard turn a loss of 20 to 60 %; of k_d: 0.4 rad cost some percent
-_LOSS_MEAN, _LOSS_STD = np.array([2.0, 0.3]), np.array([2.0, 0.3])
+LOSS_MEAN, LOSS_STD = np.array([2.0, 0.3]), np.array([2.0, 0.3])
 #: of V_0 about the speed of the approach, as a share of it
 _SETTLED_STD = 0.03
 _GRID = np.exp(np.linspace(np.log(1.0), np.log(64.0), 121))
@@ -104,10 +104,10 @@ def surge_of(runs: Sequence[GridRun], length_m: float) -> SurgeFit:
     plain, both = _posterior(logs, 1), _posterior(logs, 2)
     chosen = both if both.score < plain.score - 2.0 and both.loss_at_best[1] > 0.0 else plain
     remarks = []
-    if chosen.fit.std[1] > _FROM_PRIOR * _LOSS_STD[0]:
+    if chosen.fit.std[1] > _FROM_PRIOR * LOSS_STD[0]:
         remarks.append(
             "the logs hardly show what a turn costs of her speed: the loss is that of usual ships, "
-            f"{_LOSS_MEAN[0]:g} ± {_LOSS_STD[0]:g} (L r / V)^2"
+            f"{LOSS_MEAN[0]:g} ± {LOSS_STD[0]:g} (L r / V)^2"
         )
     return SurgeFit(**{**vars(chosen.fit), "remarks": tuple(remarks)})
 
@@ -216,12 +216,12 @@ def _solved(logs: Sequence[_Log], tau: float, losses: int, variance: float) -> t
         right += lost.T @ log.speed / variance - C.T @ solved[:, 0]
         information += lost.T @ lost / variance - C.T @ solved[:, 1:]
         logdet += slogdet(A)[1]
-    prior = np.diag(1.0 / _LOSS_STD[:losses] ** 2)
+    prior = np.diag(1.0 / LOSS_STD[:losses] ** 2)
     whole = information + prior
-    target = right + prior @ _LOSS_MEAN[:losses]
+    target = right + prior @ LOSS_MEAN[:losses]
     mean = np.linalg.solve(whole, target)
-    cost = constant + _LOSS_MEAN[:losses] @ prior @ _LOSS_MEAN[:losses] - target @ mean
-    covariance: Float = inv(whole)
+    cost = constant + LOSS_MEAN[:losses] @ prior @ LOSS_MEAN[:losses] - target @ mean
+    covariance = np.asarray(inv(whole), dtype=np.float64)
     return float(cost), float(logdet + slogdet(whole)[1]), mean, covariance
 
 
@@ -258,6 +258,6 @@ def _prior(remarks: tuple[str, ...]) -> SurgeFit:
     p = np.exp(-0.5 * (np.log(_GRID / TAU_MEDIAN) / TAU_SPREAD) ** 2)
     n = _GRID.size
     covariance = np.zeros((n, 2, 2))
-    covariance[:, 0, 0] = _LOSS_STD[0] ** 2
-    loss = np.tile([_LOSS_MEAN[0], 0.0], (n, 1))
+    covariance[:, 0, 0] = LOSS_STD[0] ** 2
+    loss = np.tile([LOSS_MEAN[0], 0.0], (n, 1))
     return SurgeFit(_GRID, p / p.sum(), loss, covariance, by_rudder=False, error_m_s=float("nan"), remarks=remarks)

@@ -205,6 +205,11 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
                 rows.append([*about, number(beside.measured), number(figure.value), interval, verdict])
     head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]
     print_table(head, rows, "measured manoeuvres, each with its own approach speed, rudder and switching headings")
+    shown = [beside.show() for one in measured for beside in one.figures]
+    judged = [one for one in shown if one["inside"] is not None]
+    if judged:
+        inside = sum(one["inside"] for one in judged)
+        print_paragraph(f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction")
     for one in measured:
         if one.why:
             print_paragraph(f"{one.segment_id}: {one.why}")
