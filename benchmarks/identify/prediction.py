@@ -162,7 +162,7 @@ def main() -> None:
     lines = [
         f"{ships} ships: a hull of the catalogue, every parameter changed by 10 % (one standard deviation), speed loss "
         "and surge time drawn. Each is identified from one 20/20 and one 10/10 zigzag in wind and stream, pooled, and "
-        "predicted in calm water at her trial speed. The simulator's speed equation has the form of the estimator's, so "
+        "predicted in calm water at her trial speed. The simulator's speed equation has the form of the estimator's: "
         "these figures say nothing of a speed that falls in another way.",
         "",
         f"**{share:.0f} % of all figures lie inside their 95 % interval.** Refused: {len(refused)} of {ships} ships.",

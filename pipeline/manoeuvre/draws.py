@@ -8,7 +8,7 @@ what is drawn from, so that a prediction is the same to the bit whenever it is m
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 
 import numpy as np
@@ -39,6 +39,8 @@ class Identified:
     rudder_rate: RudderRate
     #: Factor that is in the covariance for what the model lacks, see `kempf.pipeline.manoeuvre.widening`.
     widened: float = 1.0
+    #: Standard error of `Waters.wind_force_m_s2`, its wandering included.
+    wind_force_std_m_s2: float = 0.0
 
     @property
     def ship(self) -> Ship:
@@ -58,9 +60,13 @@ class Identified:
         # a rate is positive whatever its error
         share = self.rudder_rate.std_rad_s / self.rudder_rate.rad_s
         rate = self.rudder_rate.rad_s * np.exp(share * normal[:, -1])
+        wind = self.wind_force_std_m_s2 * np.random.Generator(np.random.PCG64([seed, 1])).standard_normal(count)
         for k in range(count):
             values = np.clip(theta[k, 6:], low, high)
-            yield Ship(self.waters, theta[k, :6], values, surge[k], float(rate[k]))
+            waters = self.waters
+            if wind[k] != 0.0:
+                waters = replace(waters, wind_force_m_s2=waters.wind_force_m_s2 + float(wind[k]))
+            yield Ship(waters, theta[k, :6], values, surge[k], float(rate[k]))
 
 
 def _root(covariance: Float) -> Float:

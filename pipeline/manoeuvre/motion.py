@@ -1,7 +1,7 @@
 """The mean motion of a ship of eq. (16) with effects, with her speed and her track, compiled.
 
 The lateral motion is that of `pipeline.model.dynamics`, by which the filter moves: no effect is written out again. The
-speed is `pipeline.manoeuvre.surge`'s. There is no wind, wave or current, and nothing random.
+speed is `pipeline.manoeuvre.surge`'s. There is no wave or current, nothing random, and no wind but a steady force.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ import numpy as np
 from kempf.pipeline.compiled import FILLING, njit
 from kempf.pipeline.manoeuvre.helm import DEAD_TIME, pass_through
 from kempf.pipeline.model.batch import ONE
-from kempf.pipeline.model.chain import PSI, R, V
+from kempf.pipeline.model.chain import PSI, F, R, V
 from kempf.pipeline.model.dynamics import CHANNEL, N_BEFORE, PARAMETER, SHIP, SPEED, dynamics
 from kempf.pipeline.model.terms.program import DEPTH
 from kempf.schemas.symbols import SYMBOLS
@@ -22,7 +22,9 @@ N_TRACK = 9
 #: how a manoeuvre ended
 SAILED, RAN_AWAY, NEVER_CAME = 0, 1, 2
 #: parts of the ship's vector, `kempf.pipeline.manoeuvre.ship.Ship.vector`
-LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE, EXPONENT, SCALE = range(9)
+LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE, EXPONENT, SCALE, FORCE, ARM = range(
+    11
+)
 _TRUE_HEADING = 2 + SYMBOLS.index("K") - CHANNEL
 _RUN_TIME = 2 + SYMBOLS.index("t") - CHANNEL
 #: a crossing is found to this part of a step
@@ -90,7 +92,7 @@ def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignor
         values[PARAMETER + i, 0] = values_of_effects[i]
     # wind speed and angle 0, shaft as on the approach, deep water, upright
     row[4], row[5], row[_RUN_TIME + 1] = 1.0, 1e12, day
-    ship = (hull, (0.0, 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
+    ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
     stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))
     return row, ship, width, table, values, slopes, stack, by, total, np.zeros((width, width, 1))
 
@@ -131,7 +133,7 @@ def balanced(numbers, hull, effects, day, table, extra, given, rate_given, start
             r, delta = (given, moved[1]) if rate_given else (moved[1], given)
             turn = L * r / V0
             s[0] = V0 * (1.0 - numbers[LOSS_BY_RATE] * turn**2 - numbers[LOSS_BY_RUDDER] * delta**2)
-            x[V, 0], x[R, 0], rudder[0] = moved[0], r, delta
+            x[V, 0], x[R, 0], x[F, 0], rudder[0] = moved[0], r, numbers[FORCE], delta
             x[N_BEFORE:, 0] = moved[2:]
             rates(x, s, rudder, sea, numbers, fx, fs)
             for i in range(n):
@@ -200,7 +202,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s
 
     Parameters
     ----------
-    numbers : ndarray, shape (9,)
+    numbers : ndarray, shape (11,)
         See the constants of this file.
     hull : ndarray, shape (6, 1)
     effects : ndarray, shape (p,)
@@ -236,7 +238,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s
     if not at_rest:
         rest[:] = 0.0
     straight = rest[1]
-    x[V, 0], s[0] = rest[0], numbers[APPROACH]
+    x[V, 0], x[F, 0], s[0] = rest[0], numbers[FORCE], numbers[APPROACH]
     x[N_BEFORE:, 0] = rest[2:]
     out, gone = np.full(m, straight), np.zeros(m)
     past = np.zeros((2 * m, track.shape[0] if np.any(kinds == DEAD_TIME) else 1))

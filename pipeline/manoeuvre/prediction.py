@@ -155,7 +155,7 @@ def _no_ship(model: Identified, manoeuvre: Manoeuvre, itself: bool, lost: int, c
         "predicts_no_ship",
         f"{model.name} predicts no {manoeuvre.name}: {whose}{lost} of {count} ships that its errors allow run away or "
         "never come to its end. An unstable hull without damping that grows with the motion turns without limit.",
-        "Sail a turning circle or a spiral beside the zigzags and let `kempf diagnose` look for the damping, or predict "
-        "with a set that has it (--set), or at less rudder.",
+        "Sail a turning circle or a spiral beside the zigzags and let `kempf diagnose` look for the damping; or "
+        "predict with a set that has it (--set), or with less rudder.",
         {"no_ships": lost, "draws": count, "estimates_sail": not itself},
     )

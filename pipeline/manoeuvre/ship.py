@@ -33,6 +33,9 @@ class Waters:
     rudder_speed_exponent: float = 2.0
     #: Which log the ship is as in, 0 for the first: what a change of the load goes by.
     day: float = 0.0
+    #: wind_force_m_s2, wind_arm_per_m: A steady wind, F and l of eq. (16); none unless one is to be compared with.
+    wind_force_m_s2: float = 0.0
+    wind_arm_per_m: float = 0.0
 
     @property
     def own_time_s(self) -> float:
@@ -55,11 +58,11 @@ class Ship:
 
     @property
     def numbers(self) -> Float:
-        """What the compiled motion reads, shape (9,)."""
+        """What the compiled motion reads, shape (11,)."""
         w, (tau, by_rate, by_rudder) = self.waters, self.surge
         share = w.scale_m / w.length_m
         surge = (tau * share, by_rate * share**2, by_rudder)
-        rest = (self.rudder_rate_rad_s, w.rudder_speed_exponent, w.scale_m)
+        rest = (self.rudder_rate_rad_s, w.rudder_speed_exponent, w.scale_m, w.wind_force_m_s2, w.wind_arm_per_m)
         return np.array([w.length_m, w.draught_m, w.approach_m_s, *surge, *rest])
 
     @property

@@ -79,7 +79,7 @@ def test_overshoots_are_a_list_and_lie_beside_the_measured_ones(warehouse: Path)
     first = measured[0]["figures"][0]
     assert first["measured"] == pytest.approx(first["value"], abs=4.0)
     table = predicted(warehouse, "zigzag", "--compare").out
-    assert "measured manoeuvres, each with its own approach speed" in table
+    assert "measured, and predicted with its own approach speed" in table
     none = predicted(warehouse, "zigzag", "--angles", "5/5", "--compare").out
     assert "no manoeuvre of this kind" in none
 

@@ -204,7 +204,9 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
                 verdict = "yes" if inside else "no"
                 rows.append([*about, number(beside.measured), number(figure.value), interval, verdict])
     head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]
-    print_table(head, rows, "measured manoeuvres, each with its own approach speed, rudder and switching headings")
+    print_table(
+        head, rows, "measured, and predicted with its own approach speed, rudder, switching headings and steady wind"
+    )
     shown = [beside.show() for one in measured for beside in one.figures]
     judged = [one for one in shown if one["inside"] is not None]
     if judged:
