@@ -13,9 +13,9 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 
-#: Heading change from which what is steady can be read off at all, and from which it is taken over a whole turn, rad:
-#: on a whole turn what a wind or a wave does to one side is done to the other one too.
-STEADY_FROM_RAD = 2.0 * pi
+#: Heading change from which what is steady can be read off at all, a whole turn less what a helmsman ends it early by,
+#: and from which it is taken over a whole turn, rad: there what a wind does to one side it does to the other one too.
+STEADY_FROM_RAD = 2.0 * pi - pi / 18.0
 WHOLE_TURN_FROM_RAD = 3.0 * pi
 
 #: Where the steady part of a circle of less than `WHOLE_TURN_FROM_RAD` begins, rad of heading change.
@@ -77,7 +77,7 @@ def turning_figures(
     Returns
     -------
     TurningFigures
-        The steady ones need a heading change of 360 deg. They are means over the last whole turn of a record of 540 deg
+        The steady ones need a heading change of 350 deg. They are means over the last whole turn of a record of 540 deg
         and more, and from 270 deg on of a shorter one.
 
     Raises
@@ -112,8 +112,7 @@ def turning_figures(
     along = north * np.cos(course) + east * np.sin(course)
     across = side * (east * np.cos(course) - north * np.sin(course))
     quarter, half = (_first_reaching(t, turned, angle) for angle in (pi / 2, pi))
-    start = _steady_start(t, turned)
-    rate, speed, drift = _steady(t, turned, speed_m_s[after], drift_rad[after], start)
+    rate, speed, drift = _steady(t, turned, speed_m_s[after], drift_rad[after])
     return TurningFigures(
         advance_m=_at(quarter, t, along),
         transfer_m=_at(quarter, t, across),
@@ -128,6 +127,27 @@ def turning_figures(
     )
 
 
+def steady_span(time_s: Float, turned_rad: Float) -> tuple[float, float]:
+    """Return from when to when a turn counts as steady.
+
+    Parameters
+    ----------
+    time_s, turned_rad : ndarray, shape (n,)
+        Instants from the execute on, s, and heading change, positive to the side of the turn, rad.
+
+    Returns
+    -------
+    tuple of float
+        The last whole turn of 540 deg and more, from 270 deg on of a shorter one, s; NaN for less than 350 deg.
+    """
+    last = int(np.argmax(turned_rad))
+    reached = float(turned_rad[last])
+    if not reached >= STEADY_FROM_RAD:
+        return nan, nan
+    begin = reached - 2.0 * pi if reached >= WHOLE_TURN_FROM_RAD else _SETTLED_RAD
+    return _first_reaching(time_s, turned_rad, begin), float(time_s[last])
+
+
 def _first_reaching(time_s: Float, turned: Float, angle: float) -> float:
     """Return when the heading has changed by an angle for the first time, s; NaN where it does not."""
     there = np.flatnonzero(turned >= angle)
@@ -140,29 +160,15 @@ def _first_reaching(time_s: Float, turned: Float, angle: float) -> float:
     return float(time_s[k - 1] + share * (time_s[k] - time_s[k - 1]))
 
 
-def _steady_start(time_s: Float, turned: Float) -> float:
-    """Return from when on the turn counts as steady, s; NaN for less than a whole turn."""
-    reached = float(np.max(turned))
-    if reached < STEADY_FROM_RAD:
-        return nan
-    return _first_reaching(time_s, turned, reached - 2.0 * pi if reached >= WHOLE_TURN_FROM_RAD else _SETTLED_RAD)
-
-
-def _steady(time_s: Float, turned: Float, speed: Float, drift: Float, start_s: float) -> tuple[float, float, float]:
+def _steady(time_s: Float, turned: Float, speed: Float, drift: Float) -> tuple[float, float, float]:
     """Return yaw rate, rad/s, to the side of the turn, speed, m/s, and drift, rad, as means over the steady part."""
-    if not np.isfinite(start_s):
+    start, end = steady_span(time_s, turned)
+    if not end > start:
         return nan, nan, nan
-    last = int(np.argmax(turned))
-    within = (time_s > start_s) & (time_s <= time_s[last])
-    t = np.concatenate([[start_s], time_s[within]])
-    if t[-1] <= start_s:
-        return nan, nan, nan
-    change = float(turned[last] - np.interp(start_s, time_s, turned))
-    means = [
-        float(np.trapezoid(np.concatenate([[np.interp(start_s, time_s, values)], values[within]]), t) / (t[-1] - t[0]))
-        for values in (speed, drift)
-    ]
-    return change / float(t[-1] - t[0]), means[0], means[1]
+    t = np.concatenate([[start], time_s[(time_s > start) & (time_s <= end)]])
+    means = [float(np.trapezoid(np.interp(t, time_s, values), t) / (end - start)) for values in (speed, drift)]
+    change = float(np.interp(end, time_s, turned) - np.interp(start, time_s, turned))
+    return change / (end - start), means[0], means[1]
 
 
 def _at(instant_s: float, time_s: Float, values: Float) -> float:
