@@ -16,10 +16,11 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.result_page import table, write
+from kempf.flows.jobs.checked_prediction import predict_checked
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.pool_vessel import pool_vessel
-from kempf.flows.jobs.predict_vessel import PredictRequest, predict_vessel
+from kempf.flows.jobs.predict_vessel import PredictRequest
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.prediction import Figure
 from kempf.pipeline.segment.turning_figures import turning_figures
@@ -112,12 +113,12 @@ def compared(number: int) -> list[Compared]:
         speed = hull.trial_speed_m_s
         for rudder in (20.0, 35.0):
             request = PredictRequest("turning-circle", rudder_deg=rudder, speed_m_s=speed)
-            figures = predict_vessel(warehouse, hull.name, request).prediction.figures
+            figures = predict_checked(warehouse, hull.name, request).prediction.figures
             for name, truth in true_circle(hull, rudder).items():
                 found += _beside(f"circle, {rudder:g} deg", name, truth, figures[name])
         for angles in ((10.0, 10.0), (20.0, 20.0)):
             request = PredictRequest("zigzag", angles_deg=angles, speed_m_s=speed)
-            figures = predict_vessel(warehouse, hull.name, request).prediction.figures
+            figures = predict_checked(warehouse, hull.name, request).prediction.figures
             for k, truth in enumerate(true_overshoots(hull, *angles)[:2]):
                 name = f"overshoots_deg.{k}"
                 found += _beside(f"zigzag {angles[0]:g}/{angles[1]:g}", f"overshoot {k + 1}", truth, figures[name])

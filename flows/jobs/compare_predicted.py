@@ -1,8 +1,8 @@
-"""The measured manoeuvres of a vessel beside what is predicted of each: its own angles, side and approach."""
+"""The measured manoeuvres of a vessel beside what is predicted of each: its own angles, side, approach and wind."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import radians
 from typing import Any
@@ -92,12 +92,28 @@ def measured_beside(
     """
     asked = predicted.prediction.manoeuvre
     wanted = [s for s in segments.current(warehouse, predicted.vessel) if _same_order(s, asked)]
-    runs = _runs(warehouse, predicted, wanted, progress) if isinstance(asked, Zigzag) else {}
+    return _all_beside(warehouse, predicted, [(segment, asked) for segment in wanted], progress)
+
+
+def own_zigzags_beside(
+    warehouse: Warehouse, predicted: Predicted, progress: Progress = silent
+) -> tuple[MeasuredManoeuvre, ...]:
+    """Lay predictions over all zigzags of the vessel, whatever their angles, each as `measured_beside` does it."""
+    every = [s for s in segments.current(warehouse, predicted.vessel) if s.kind == "zigzag"]
+    pairs = [(s, Zigzag(radians(s.psi0_deg), radians(s.delta0_deg), overshoots=2)) for s in every]
+    return _all_beside(warehouse, predicted, pairs, progress)
+
+
+def _all_beside(
+    warehouse: Warehouse, predicted: Predicted, pairs: Sequence[tuple[Segment, Manoeuvre]], progress: Progress
+) -> tuple[MeasuredManoeuvre, ...]:
+    zigzags = [segment for segment, asked in pairs if isinstance(asked, Zigzag)]
+    runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
     found = []
-    for done, segment in enumerate(wanted):
-        progress(done, len(wanted), f"predicting {segment.segment_id}")
+    for done, (segment, asked) in enumerate(pairs):
+        progress(done, len(pairs), f"predicting {segment.segment_id}")
         found.append(_beside(predicted, asked, segment, runs.get(segment.segment_id)))
-    progress(len(wanted), len(wanted), "predicted")
+    progress(len(pairs), len(pairs), "predicted")
     return tuple(found)
 
 

@@ -23,6 +23,7 @@ from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.record.left_out import left_out
 from kempf.pipeline.manoeuvre.covered import covered
 from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
+from kempf.pipeline.manoeuvre.own_zigzags import OwnZigzags
 from kempf.pipeline.manoeuvre.prediction import Prediction, predict
 from kempf.pipeline.manoeuvre.pull_out import PullOut
 from kempf.pipeline.manoeuvre.rudder_rate import RudderRate, rudder_rate
@@ -105,6 +106,8 @@ class Predicted:
     #: What was taken for granted, and what limits the answer, sentences.
     assumed: tuple[str, ...]
     limits: tuple[str, ...]
+    #: What the intervals were held against; None where that was not done.
+    own_zigzags: OwnZigzags | None = None
 
     def show(self) -> dict[str, Any]:
         """Return the prediction as the command line's JSON object."""
@@ -140,6 +143,7 @@ class Predicted:
                 "std": degrees(self.basis.rudder_rate.std_rad_s),
                 "executes": self.basis.rudder_rate.executes,
             },
+            "own_zigzags": None if self.own_zigzags is None else vars(self.own_zigzags),
             "assumed": list(self.assumed),
             "limits": list(self.limits),
         }

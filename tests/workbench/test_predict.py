@@ -44,6 +44,7 @@ def test_a_turning_circle_has_an_interval_at_every_figure_and_says_what_lies_bey
     assert by_quantity["rudder"]["covered"][1] == pytest.approx(20.0, abs=0.5)
     assert {one["name"] for one in shown["imo"]} == {"advance", "tactical diameter"}
     assert any("one model" in s or "taken alone" in s for s in shown["assumed"])
+    assert shown["own_zigzags"]["zigzags"] == 1
     again = predicted(warehouse, "turning-circle", "--json").json
     assert again == shown
 

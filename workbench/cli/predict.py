@@ -63,8 +63,9 @@ def command(
     The intervals are those of ships that the errors of the set allow, of it and of every model that the data do not
     tell from it. What lies beyond the drift, yaw rate, rudder and speed of the logs is named.
     """
+    from kempf.flows.jobs.checked_prediction import predict_checked
     from kempf.flows.jobs.compare_predicted import measured_beside
-    from kempf.flows.jobs.predict_vessel import PredictRequest, predict_vessel
+    from kempf.flows.jobs.predict_vessel import PredictRequest
     from kempf.warehouse.store import Warehouse
 
     require_figures(figure, code="cannot_write")
@@ -72,7 +73,7 @@ def command(
     heading, rudder = _angles(angles) if angles is not None else (20.0, 20.0)
     request = PredictRequest(manoeuvre, set_id, rudder_deg, (heading, rudder), side, speed)
     with progress_bar() as progress:
-        made = predict_vessel(Warehouse(uri), vessel, request, progress)
+        made = predict_checked(Warehouse(uri), vessel, request, progress)
         measured = measured_beside(Warehouse(uri), made, progress) if compare else None
     if figure is not None:
         from kempf.workbench.figures.manoeuvre import draw_manoeuvre
@@ -157,6 +158,8 @@ def _print_predicted(made: Predicted, figure: Path | None) -> None:
         print_paragraph(f"IMO {one.name}, at most {limit}{verdict}" + (f" ({one.why})" if one.why else ""))
     for beyond in made.prediction.extrapolated:
         print_paragraph(f"extrapolated: {beyond.sentence}")
+    if made.own_zigzags is not None:
+        print_paragraph(made.own_zigzags.sentence)
     for sentence in made.limits:
         print_paragraph(f"limit: {sentence}")
     for sentence in made.assumed:
