@@ -30,6 +30,7 @@ ROOMS = {
     "predict": {"compiled", "channels", "model", "estimate"},
     "compare": {"channels", "model", "estimate", "predict"},
     "diagnose": {"channels", "model", "estimate", "predict", "compare"},
+    "manoeuvre": {"compiled", "channels", "segment", "model", "estimate"},
     "steering": {"channels", "model", "estimate", "predict"},
     "history": {"channels"},
     "simulate": set(),

@@ -118,6 +118,12 @@ def find(warehouse: Warehouse, name: str) -> StoredDiagnosis | None:
     return _stored(frame.row(0, named=True)) if frame.height else None
 
 
+def of_vessel(warehouse: Warehouse, vessel: str) -> list[StoredDiagnosis]:
+    """Return the diagnoses of a vessel, those of the newest manoeuvres last."""
+    frame = delta.read(warehouse, "diagnoses", {"vessel_key": vessel_key(vessel)})
+    return [_stored(row) for row in frame.sort("start_utc_ns", "diagnosis_id").rows(named=True)]
+
+
 def _stored(r: Mapping[str, Any]) -> StoredDiagnosis:
     return StoredDiagnosis(
         r["diagnosis_id"],

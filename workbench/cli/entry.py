@@ -31,6 +31,7 @@ COMMANDS = {
     "history": "Show a vessel's parameters over time, as known now or at an earlier time.",
     "report": "Write one HTML file to send that says what a vessel's model lacks.",
     "export": "Write a parameter set, or manoeuvres with their predictions, as a file for other programs.",
+    "predict": "Predict turning circle, zigzag, pull-out or spiral, every figure with its interval.",
     "steer": "Make a course-keeping law from a parameter set and try it on the simulated ship.",
     "compare": "Put what was measured beside what a parameter set predicts; say where it fails.",
     "effects": "List and show the physical effects that a model can be given.",

@@ -1,0 +1,87 @@
+"""The criteria of IMO resolution MSC.137(76), section 5.3, on a predicted manoeuvre, each with a probability."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from math import radians
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.manoeuvre.sailed import Manoeuvre
+from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.segment.imo import SHORTEST_SHIP_M, overshoot_limits
+
+#: in ship lengths: 5.3.1 and 5.3.2
+ADVANCE, TACTICAL_DIAMETER, INITIAL_TURNING = 4.5, 5.0, 2.5
+#: 5.3.3, first overshoot of a 20/20 zigzag, deg
+TWENTY = 25.0
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One criterion."""
+
+    name: str
+    #: In the unit of the figure; None where it depends on a length that is not known.
+    limit: float | None
+    unit: str
+    #: Share of the ships that the data allow which fulfil it; None where it is not judged.
+    probability: float | None
+    #: Why it is not judged, or what has to be said of it; empty where nothing has.
+    why: str = ""
+
+
+def judge(
+    manoeuvre: Manoeuvre, samples: Mapping[str, Float], length_m: float | None, speed_m_s: float
+) -> tuple[Judged, ...]:
+    """Judge a manoeuvre by the criteria that apply to it.
+
+    Parameters
+    ----------
+    samples : mapping of str to ndarray, shape (n,)
+        Figures of all ships drawn; NaN where one has none, which fulfils nothing.
+    length_m : float or None
+        Between perpendiculars, of the profile.
+    speed_m_s : float
+        Of the approach.
+    """
+    wanted = _criteria(manoeuvre, length_m, speed_m_s)
+    short = "" if length_m is None or length_m >= SHORTEST_SHIP_M else _short(length_m)
+    return tuple(
+        Judged(name, limit, unit, float(np.mean(samples[figure] <= limit)), note or short)
+        if limit is not None
+        else Judged(name, None, unit, None, "the length of the ship is not known: give it in the profile")
+        for name, figure, limit, unit, note in wanted
+    )
+
+
+def _criteria(
+    manoeuvre: Manoeuvre, length_m: float | None, speed_m_s: float
+) -> list[tuple[str, str, float | None, str, str]]:
+    def lengths(factor: float) -> float | None:
+        return None if length_m is None else factor * length_m
+
+    if isinstance(manoeuvre, TurningCircle):
+        note = "" if manoeuvre.rudder_rad >= radians(34.9) else "the standard asks for 35 deg of rudder, or the most"
+        return [
+            ("advance", "advance_m", lengths(ADVANCE), "m", note),
+            ("tactical diameter", "tactical_diameter_m", lengths(TACTICAL_DIAMETER), "m", note),
+        ]
+    if not isinstance(manoeuvre, Zigzag):
+        return []
+    angles = tuple(round(float(np.degrees(a)), 6) for a in (manoeuvre.heading_rad, manoeuvre.rudder_rad))
+    if angles == (10.0, 10.0):
+        first, second = overshoot_limits(length_m, speed_m_s) if length_m else (None, None)
+        return [
+            ("initial turning", "initial_turning_m", lengths(INITIAL_TURNING), "m", ""),
+            ("10/10 first overshoot", "overshoots_deg.0", first, "deg", ""),
+            ("10/10 second overshoot", "overshoots_deg.1", second, "deg", ""),
+        ]
+    return [("20/20 first overshoot", "overshoots_deg.0", TWENTY, "deg", "")] if angles == (20.0, 20.0) else []
+
+
+def _short(length_m: float) -> str:
+    return f"the ship is {length_m:g} m long, the standard begins at {SHORTEST_SHIP_M:g} m"

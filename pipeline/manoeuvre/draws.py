@@ -1,0 +1,84 @@
+"""Ships that the data allow: draws from the joint covariance of hull and effects, surge and rudder rate.
+
+The draws are a scrambled Sobol sequence, whose quantiles settle with fewer ships than those of independent numbers
+(Owen 1998, "Scrambling Sobol' and Niederreiter-Xing points", Journal of Complexity 14). They are seeded by the names of
+what is drawn from, so that a prediction is the same to the bit whenever it is made.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from hashlib import sha256
+
+import numpy as np
+from scipy.stats import norm, qmc
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
+from kempf.pipeline.manoeuvre.ship import Ship, Waters
+from kempf.pipeline.manoeuvre.surge import SurgeFit
+
+#: a power of two, as the sequence wants it
+DRAWS = 256
+
+
+@dataclass(frozen=True, eq=False)
+class Identified:
+    """A model with what is known of its parameters."""
+
+    #: Of the parameter set.
+    name: str
+    waters: Waters
+    #: hull, effects: Shape (6,) and (p,). Estimates.
+    hull: Float
+    effects: Float
+    #: Shape (6 + p, 6 + p). Of both.
+    covariance: Float
+    surge: SurgeFit
+    rudder_rate: RudderRate
+    #: Factor that is in the covariance for what the model lacks, see `kempf.pipeline.manoeuvre.widening`.
+    widened: float = 1.0
+    #: Standard error of `Waters.wind_force_m_s2`, its wandering included.
+    wind_force_std_m_s2: float = 0.0
+
+    @property
+    def ship(self) -> Ship:
+        """The ship of the estimates."""
+        return Ship(self.waters, self.hull, self.effects, self.surge.best, self.rudder_rate.rad_s)
+
+    def ships(self, count: int = DRAWS) -> Iterator[Ship]:
+        """Draw ships; parameters of effects stay within what is physical."""
+        p = self.effects.size
+        seed = int.from_bytes(sha256(f"manoeuvre {self.name}".encode()).digest()[:8], "big")
+        sequence = qmc.Sobol(6 + p + 4, rng=np.random.Generator(np.random.PCG64(seed)))
+        # of the closed unit interval the ends have no normal number
+        normal = norm.ppf(np.clip(sequence.random(count), 1e-12, 1.0 - 1e-12))
+        theta = np.concatenate([self.hull, self.effects]) + normal[:, : 6 + p] @ _root(self.covariance).T
+        low, high = self.waters.model.low, self.waters.model.high
+        surge = self.surge.drawn(normal[:, 6 + p : 9 + p])
+        # a rate is positive whatever its error
+        share = self.rudder_rate.std_rad_s / self.rudder_rate.rad_s
+        rate = self.rudder_rate.rad_s * np.exp(share * normal[:, -1])
+        wind = self.wind_force_std_m_s2 * np.random.Generator(np.random.PCG64([seed, 1])).standard_normal(count)
+        for k in range(count):
+            values = np.clip(theta[k, 6:], low, high)
+            waters = self.waters
+            if wind[k] != 0.0:
+                waters = replace(waters, wind_force_m_s2=waters.wind_force_m_s2 + float(wind[k]))
+            yield Ship(waters, theta[k, :6], values, surge[k], float(rate[k]))
+
+
+def _root(covariance: Float) -> Float:
+    """Return a lower triangle whose square is the covariance, also of a parameter that has no error."""
+    std = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale = np.where(std > 0.0, std, 1.0)
+    correlation = covariance / np.outer(scale, scale)
+    jitter = 1e-12
+    while True:
+        try:
+            root: Float = np.linalg.cholesky(correlation + jitter * np.eye(std.size))
+        except np.linalg.LinAlgError:
+            jitter *= 10.0
+            continue
+        return root * scale[:, None]

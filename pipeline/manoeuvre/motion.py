@@ -1,0 +1,307 @@
+"""The mean motion of a ship of eq. (16) with effects, with her speed and her track, compiled.
+
+The lateral motion is that of `pipeline.model.dynamics`, by which the filter moves: no effect is written out again. The
+speed is `pipeline.manoeuvre.surge`'s. There is no wave or current, nothing random, and no wind but a steady force.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.compiled import FILLING, njit
+from kempf.pipeline.manoeuvre.helm import DEAD_TIME, pass_through
+from kempf.pipeline.model.batch import ONE
+from kempf.pipeline.model.chain import PSI, F, R, V
+from kempf.pipeline.model.dynamics import CHANNEL, N_BEFORE, PARAMETER, SHIP, SPEED, dynamics
+from kempf.pipeline.model.terms.program import DEPTH
+from kempf.schemas.symbols import SYMBOLS
+
+#: columns of a track: s, m, m, rad, m/s (forward, lateral), rad/s, rad (reading), m along the track
+TIME, NORTH, EAST, HEADING, FORWARD, LATERAL, RATE, RUDDER, PATH = range(9)
+N_TRACK = 9
+#: how a manoeuvre ended
+SAILED, RAN_AWAY, NEVER_CAME = 0, 1, 2
+#: parts of the ship's vector, `kempf.pipeline.manoeuvre.ship.Ship.vector`
+LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE, EXPONENT, SCALE, FORCE, ARM = range(
+    11
+)
+_TRUE_HEADING = 2 + SYMBOLS.index("K") - CHANNEL
+_RUN_TIME = 2 + SYMBOLS.index("t") - CHANNEL
+#: a crossing is found to this part of a step
+_HALVINGS = 48
+#: she is no ship any more: this share of the approach speed is left; v / V; r L / V. Hulls reach 0.8 and 1.3
+_SLOWEST, _FASTEST_SIDEWAYS, _FASTEST_TURN = 0.02, 2.0, 4.0
+_ROUNDS = 40
+
+
+@njit(**FILLING)
+def rates(x, s, rudder, sea, numbers, fx, fs):  # type: ignore[no-untyped-def]
+    """Fill dx/dt of the lateral states, and d(V, north, east, path)/dt."""
+    row, ship, width, table, values, slopes, stack, by, total, J = sea
+    row[0], row[_TRUE_HEADING] = s[0], x[PSI, 0]
+    dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, fx, J, ONE)
+    length, approach = numbers[LENGTH], numbers[APPROACH]
+    turn = length * x[R, 0] / approach
+    settled = 1.0 - numbers[LOSS_BY_RATE] * turn * turn - numbers[LOSS_BY_RUDDER] * rudder[0] * rudder[0]
+    fs[0] = (approach * settled - s[0]) * approach / (numbers[TIME_LENGTHS] * length)
+    # the speed that effects make of the logged one is the one that she has
+    u, v, cosine, sine = values[SPEED, 0], x[V, 0], np.cos(x[PSI, 0]), np.sin(x[PSI, 0])
+    fs[1], fs[2], fs[3] = u * cosine - v * sine, u * sine + v * cosine, np.hypot(u, v)
+
+
+@njit(**FILLING)
+def _advance(x, s, felt, h, sea, numbers, room, xn, sn):  # type: ignore[no-untyped-def]
+    """Write both states a step later; fourth-order Runge-Kutta with the felt rudder at beginning, middle and end."""
+    k1, k2, k3, k4, l1, l2, l3, l4, rudder = room
+    rudder[0] = felt[0]
+    rates(x, s, rudder, sea, numbers, k1, l1)
+    rudder[0] = felt[1]
+    for stage in range(2):
+        k, slope = (k1, l1) if stage == 0 else (k2, l2)
+        for i in range(x.shape[0]):
+            xn[i, 0] = x[i, 0] + 0.5 * h * k[i, 0]
+        for i in range(4):
+            sn[i] = s[i] + 0.5 * h * slope[i]
+        if stage == 0:
+            rates(xn, sn, rudder, sea, numbers, k2, l2)
+        else:
+            rates(xn, sn, rudder, sea, numbers, k3, l3)
+    rudder[0] = felt[2]
+    for i in range(x.shape[0]):
+        xn[i, 0] = x[i, 0] + h * k3[i, 0]
+    for i in range(4):
+        sn[i] = s[i] + h * l3[i]
+    rates(xn, sn, rudder, sea, numbers, k4, l4)
+    for i in range(x.shape[0]):
+        xn[i, 0] = x[i, 0] + h / 6.0 * (k1[i, 0] + 2.0 * k2[i, 0] + 2.0 * k3[i, 0] + k4[i, 0])
+    for i in range(4):
+        sn[i] = s[i] + h / 6.0 * (l1[i] + 2.0 * l2[i] + 2.0 * l3[i] + l4[i])
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignore[no-untyped-def]
+    """Return what `rates` needs of a ship in calm, deep water with her shaft turning as on the approach."""
+    width, p = N_BEFORE + extra, values_of_effects.size
+    row = np.zeros(2 + PARAMETER - CHANNEL + 1)
+    values, slopes = np.zeros((PARAMETER + p, 1)), np.zeros((PARAMETER + p, width, 1))
+    for i in range(6):
+        values[SHIP + i, 0] = hull[i, 0]
+    values[SHIP + 6, 0], values[SHIP + 7, 0] = numbers[LENGTH], numbers[DRAUGHT]
+    values[SHIP + 8, 0], values[SHIP + 9, 0] = numbers[APPROACH], 1.0
+    for i in range(p):
+        values[PARAMETER + i, 0] = values_of_effects[i]
+    # wind speed and angle 0, shaft as on the approach, deep water, upright
+    row[4], row[5], row[_RUN_TIME + 1] = 1.0, 1e12, day
+    ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
+    stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))
+    return row, ship, width, table, values, slopes, stack, by, total, np.zeros((width, width, 1))
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def balanced(numbers, hull, effects, day, table, extra, given, rate_given, start):  # type: ignore[no-untyped-def]
+    """Find a steady motion: the rudder that holds a yaw rate, or the yaw rate that a rudder comes to.
+
+    Newton's rule on f = 0 for sway, turn and the effects' states, the speed being that of the steady turn.
+
+    Parameters
+    ----------
+    given : float
+        Yaw rate in rad/s where ``rate_given``, else the rudder that the hull feels, rad.
+    start : ndarray, shape (2 + extra,)
+        Lateral speed, the other of rudder and rate, and the effects' states to start from; filled with the solution.
+
+    Returns
+    -------
+    (float, bool)
+        Forward speed, and whether a solution was found.
+    """
+    sea = _at_sea(numbers, hull, effects, day, table, extra)
+    n = 2 + extra
+    x, s, fx, fs = np.zeros((N_BEFORE + extra, 1)), np.zeros(4), np.zeros((N_BEFORE + extra, 1)), np.zeros(4)
+    rudder, A, z = np.zeros(1), np.zeros((n, n + 1)), start.copy()
+    f, moved = np.zeros(n), np.zeros(n)
+    V0, L = numbers[APPROACH], numbers[LENGTH]
+    scale = np.ones(n)
+    scale[0], scale[1] = V0, (1.0 if rate_given else V0 / L)
+    weight = np.ones(n) * L / V0**2
+    weight[1] = (L / V0) ** 2
+    for _ in range(_ROUNDS):
+        for column in range(n + 1):
+            moved[:] = z
+            if column > 0:
+                moved[column - 1] += 1e-6 * scale[column - 1]
+            r, delta = (given, moved[1]) if rate_given else (moved[1], given)
+            turn = L * r / V0
+            s[0] = V0 * (1.0 - numbers[LOSS_BY_RATE] * turn**2 - numbers[LOSS_BY_RUDDER] * delta**2)
+            x[V, 0], x[R, 0], x[F, 0], rudder[0] = moved[0], r, numbers[FORCE], delta
+            x[N_BEFORE:, 0] = moved[2:]
+            rates(x, s, rudder, sea, numbers, fx, fs)
+            for i in range(n):
+                here = fx[V, 0] if i == 0 else (fx[R, 0] if i == 1 else fx[N_BEFORE + i - 2, 0])
+                if column == 0:
+                    f[i] = here
+                    A[i, n] = -here * weight[i]
+                else:
+                    A[i, column - 1] = (here - f[i]) * weight[i] / 1e-6
+        if not _eliminate(A):
+            return s[0], False
+        largest = 0.0
+        for i in range(n):
+            largest = max(largest, abs(A[i, n]))
+        # far from a solution the linear step would leave the ship
+        share = min(1.0, 0.5 / largest) if largest > 0.0 else 1.0
+        for i in range(n):
+            z[i] += share * A[i, n] * scale[i]
+        if largest < 1e-10:
+            break
+    start[:] = z
+    r, delta = (given, z[1]) if rate_given else (z[1], given)
+    turn = L * r / V0
+    u = V0 * (1.0 - numbers[LOSS_BY_RATE] * turn**2 - numbers[LOSS_BY_RUDDER] * delta**2)
+    return u, largest < 1e-7 and u > _SLOWEST * V0
+
+
+@njit(**FILLING)
+def _eliminate(A):  # type: ignore[no-untyped-def]
+    """Solve the system whose right side is the last column, in place; return whether it can be solved."""
+    n = A.shape[0]
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(A[i, k]) > abs(A[best, k]):
+                best = i
+        if not abs(A[best, k]) > 1e-14:
+            return False
+        for j in range(n + 1):
+            A[k, j], A[best, j] = A[best, j], A[k, j]
+        for i in range(n):
+            if i != k:
+                factor = A[i, k] / A[k, k]
+                for j in range(k, n + 1):
+                    A[i, j] -= factor * A[k, j]
+    for k in range(n):
+        A[k, n] /= A[k, k]
+    return True
+
+
+@njit(**FILLING)
+def _step(x, s, begun, before, speed, h, t, sea, numbers, gear, held, room, xn, sn):  # type: ignore[no-untyped-def]
+    """Write both states a step later, while the rudder's reading moves at a speed; return the rudder that is felt."""
+    kinds, sizes, out, half, gone, past, felt = gear
+    middle, after = before + 0.5 * speed * h, before + speed * h
+    felt[0] = begun
+    felt[1] = pass_through(before, middle, 0.5 * h, t + 0.5 * h, kinds, sizes, out, half, past, held)
+    felt[2] = pass_through(middle, after, 0.5 * h, t + h, kinds, sizes, half, gone, past, held)
+    _advance(x, s, felt, h, sea, numbers, room, xn, sn)
+    return felt[2]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s, track, ends):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one loop
+    """Sail a manoeuvre from a steady straight course on.
+
+    Parameters
+    ----------
+    numbers : ndarray, shape (11,)
+        See the constants of this file.
+    hull : ndarray, shape (6, 1)
+    effects : ndarray, shape (p,)
+        Parameters of the effects.
+    day, table, extra
+        Of the effects: see `kempf.pipeline.manoeuvre.ship.Waters`.
+    kinds, sizes : ndarray, shape (m,)
+        See `kempf.pipeline.manoeuvre.helm.pass_through`.
+    phases : ndarray, shape (q, 4)
+        Rudder order, rad (NaN: the one that holds a straight course); side (+1, -1) to which the heading has to pass
+        the target that ends the phase, 0 for none; target, rad; longest duration, s.
+    step_s : float
+        Steps are no longer than this.
+    track : ndarray, shape (n, N_TRACK)
+        Filled.
+    ends : ndarray of int, shape (q,)
+        Filled with the row at which each phase ended.
+
+    Returns
+    -------
+    (int, int)
+        How it ended, and the rows of the track.
+    """
+    sea = _at_sea(numbers, hull, effects, day, table, extra)
+    shape, m = (N_BEFORE + extra, 1), kinds.size
+    room = (
+        *(np.zeros(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape)),
+        *(np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(4), np.zeros(1)),
+    )
+    x, xn, s, sn = np.zeros(shape), np.zeros(shape), np.zeros(4), np.zeros(4)
+    rest = np.zeros(2 + extra)
+    _, at_rest = balanced(numbers, hull, effects, day, table, extra, 0.0, True, rest)  # noqa: FBT003 - compiled
+    if not at_rest:
+        rest[:] = 0.0
+    straight = rest[1]
+    x[V, 0], x[F, 0], s[0] = rest[0], numbers[FORCE], numbers[APPROACH]
+    x[N_BEFORE:, 0] = rest[2:]
+    out, gone = np.full(m, straight), np.zeros(m)
+    past = np.zeros((2 * m, track.shape[0] if np.any(kinds == DEAD_TIME) else 1))
+    past[1::2, 0] = straight
+    gear = (kinds, sizes, out, np.zeros(m), gone, past, np.zeros(3))
+    reading, begun, t, n = straight, straight, 0.0, 1
+    room[8][0] = straight
+    rates(x, s, room[8], sea, numbers, room[0], room[4])
+    _record(track[0], t, x, s, reading, sea)
+    limit, V0, scale = numbers[RUDDER_RATE], numbers[APPROACH], numbers[SCALE]
+    for k in range(phases.shape[0]):
+        order, side, target, longest = phases[k]
+        if np.isnan(order):
+            order = straight
+        begin = t
+        while True:
+            gap, h, arrives = order - reading, step_s, False
+            if gap != 0.0 and abs(gap) <= limit * h:
+                h, arrives = abs(gap) / limit, True
+            if begin + longest - t < h:
+                h, arrives = begin + longest - t, False
+            speed = np.sign(gap) * limit
+            felt = _step(x, s, begun, reading, speed, h, t, sea, numbers, gear, n, room, xn, sn)
+            crossed = side != 0.0 and side * (xn[PSI, 0] - target) >= 0.0
+            if crossed:
+                low, high = 0.0, h
+                for _ in range(_HALVINGS):
+                    middle = 0.5 * (low + high)
+                    _step(x, s, begun, reading, speed, middle, t, sea, numbers, gear, n, room, xn, sn)
+                    if side * (xn[PSI, 0] - target) >= 0.0:
+                        high = middle
+                    else:
+                        low = middle
+                arrives, h = arrives and high == h, high
+                felt = _step(x, s, begun, reading, speed, h, t, sea, numbers, gear, n, room, xn, sn)
+            x[:], s[:], out[:] = xn, sn, gone
+            t, begun, reading = t + h, felt, order if arrives else reading + speed * h
+            if past.shape[1] > 1:
+                for i in range(m):
+                    past[2 * i, n], past[2 * i + 1, n] = t, (reading if i == 0 else out[i - 1])
+            _record(track[n], t, x, s, reading, sea)
+            n += 1
+            away = (
+                not np.isfinite(s[0] + x[V, 0] + x[R, 0])
+                or s[0] < _SLOWEST * V0
+                or abs(x[V, 0]) > _FASTEST_SIDEWAYS * s[0]
+                or abs(x[R, 0]) * scale > _FASTEST_TURN * s[0]
+            )
+            if away or n >= track.shape[0]:
+                return (RAN_AWAY if away else NEVER_CAME), n
+            if crossed:
+                break
+            if t - begin >= longest * (1.0 - 1e-12):
+                if side != 0.0:
+                    return NEVER_CAME, n
+                break
+        ends[k] = n - 1
+    return SAILED, n
+
+
+@njit(**FILLING)
+def _record(row, t, x, s, reading, sea):  # type: ignore[no-untyped-def]
+    """Write a row of the track; the speed is the one that effects make of the logged one, as of the last call."""
+    row[TIME], row[NORTH], row[EAST], row[HEADING] = t, s[1], s[2], x[PSI, 0]
+    row[FORWARD], row[LATERAL], row[RATE] = sea[4][SPEED, 0], x[V, 0], x[R, 0]
+    row[RUDDER], row[PATH] = reading, s[3]

@@ -1,0 +1,183 @@
+"""A predicted manoeuvre: figures with their intervals, from all ships that the data allow of all models alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.manoeuvre.covered import Beyond, beyond
+from kempf.pipeline.manoeuvre.criteria import Judged, judge
+from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
+from kempf.pipeline.manoeuvre.sailed import Manoeuvre, Reach, Sailed
+from kempf.schemas.errors import DataRejected
+
+#: an interval holds 95 %; it needs so many of the ships that were drawn
+_TAIL, ENOUGH = 2.5, 0.8
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number with its 95 % interval; all None where too few ships have it."""
+
+    value: float | None
+    low: float | None
+    high: float | None
+
+    def widened(self, factor: float) -> Figure:
+        """Return it with its interval wider by a factor about the value."""
+        if self.value is None or self.low is None or self.high is None:
+            return self
+        low, high = (self.value + factor * (end - self.value) for end in (self.low, self.high))
+        return Figure(self.value, min(low, self.low), max(high, self.high))
+
+
+@dataclass(frozen=True, eq=False)
+class OfModel:
+    """What one model predicts."""
+
+    model: Identified
+    #: Of the estimates.
+    sailed: Sailed | None
+    #: Of the draws that are ships.
+    drawn: tuple[Sailed, ...]
+    #: How many draws are none.
+    no_ships: int
+    #: How many of all draws are unstable on a straight course.
+    unstable: int
+
+    @property
+    def figures(self) -> dict[str, Figure]:
+        """By name, from this model alone."""
+        return figures_of(self.sailed, [self])
+
+
+@dataclass(frozen=True, eq=False)
+class Prediction:
+    """A predicted manoeuvre."""
+
+    manoeuvre: Manoeuvre
+    figures: Mapping[str, Figure]
+    #: The model that was asked for first.
+    models: tuple[OfModel, ...]
+    extrapolated: tuple[Beyond, ...]
+    imo: tuple[Judged, ...]
+    #: Of the profile.
+    length_m: float | None
+
+    @property
+    def sailed(self) -> Sailed:
+        """What the ship of the estimates does."""
+        found = self.models[0].sailed
+        assert found is not None
+        return found
+
+    @property
+    def drawn(self) -> list[Sailed]:
+        """What all ships do."""
+        return [one for model in self.models for one in model.drawn]
+
+    @property
+    def no_ships(self) -> int:
+        """How many draws are no ships."""
+        return sum(one.no_ships for one in self.models)
+
+    def widened(self, factor: float) -> Prediction:
+        """Return it with every interval wider by a factor about its value, and the probabilities that follow."""
+        if factor == 1.0:
+            return self
+        wide = {name: figure.widened(factor) for name, figure in self.figures.items()}
+        samples = {
+            name: self.sailed.figures[name] + factor * (values - self.sailed.figures[name])
+            for name, values in _samples(self.models).items()
+        }
+        waters, length = self.models[0].model.waters, self.length_m
+        return replace(self, figures=wide, imo=judge(self.manoeuvre, samples, length, waters.approach_m_s))
+
+    @property
+    def share_unstable(self) -> float:
+        """Share of all draws that are unstable on a straight course."""
+        return sum(one.unstable for one in self.models) / (len(self.drawn) + self.no_ships)
+
+
+def predict(
+    models: Sequence[Identified],
+    manoeuvre: Manoeuvre,
+    logs: Reach,
+    length_m: float | None,
+    count: int = DRAWS,
+) -> Prediction:
+    """Predict a manoeuvre.
+
+    Parameters
+    ----------
+    models : sequence of Identified
+        The one that is asked for, then those that the data do not tell from it.
+    logs : Reach
+        How far out the logs go.
+    length_m : float or None
+        Of the profile, for the criteria.
+    count : int, optional
+        Ships drawn from every model, a power of two.
+
+    Raises
+    ------
+    DataRejected
+        ``predicts_no_ship``: the ship of the estimates, or too many of those that the data allow, does not sail it.
+    """
+    made = tuple(_of_model(model, manoeuvre, count) for model in models)
+    drawn, lost = sum(len(one.drawn) for one in made), sum(one.no_ships for one in made)
+    first = made[0].sailed
+    if first is None or drawn < ENOUGH * (drawn + lost):
+        raise _no_ship(models[0], manoeuvre, first is None, lost, drawn + lost)
+    samples = _samples(made)
+    speed = models[0].waters.approach_m_s
+    return Prediction(
+        manoeuvre,
+        figures_of(first, made),
+        made,
+        beyond(first.reach, logs),
+        judge(manoeuvre, samples, length_m, speed),
+        length_m,
+    )
+
+
+def figures_of(sailed: Sailed | None, models: Sequence[OfModel]) -> dict[str, Figure]:
+    """Return the figures of a ship with the interval of all that were drawn from some models."""
+    samples = _samples(models)
+    found = {}
+    for name, values in samples.items():
+        there = values[np.isfinite(values)]
+        value = sailed.figures[name] if sailed is not None else np.nan
+        if there.size < ENOUGH * values.size or not np.isfinite(value):
+            found[name] = Figure(None, None, None)
+        else:
+            low, high = np.percentile(there, [_TAIL, 100.0 - _TAIL])
+            found[name] = Figure(float(value), float(low), float(high))
+    return found
+
+
+def _samples(models: Sequence[OfModel]) -> dict[str, Float]:
+    drawn = [one for model in models for one in model.drawn]
+    return {name: np.array([one.figures[name] for one in drawn]) for name in (drawn[0].figures if drawn else ())}
+
+
+def _of_model(model: Identified, manoeuvre: Manoeuvre, count: int) -> OfModel:
+    ships = list(model.ships(count))
+    drawn = tuple(one for one in map(manoeuvre.sailed, ships) if one is not None)
+    unstable = sum(ship.unstable for ship in ships)
+    return OfModel(model, manoeuvre.sailed(model.ship), drawn, count - len(drawn), unstable)
+
+
+def _no_ship(model: Identified, manoeuvre: Manoeuvre, itself: bool, lost: int, count: int) -> DataRejected:
+    whose = "the ship of the estimates and " if itself else ""
+    return DataRejected(
+        "predicts_no_ship",
+        f"{model.name} predicts no {manoeuvre.name}: {whose}{lost} of {count} ships that its errors allow run away or "
+        "never come to its end. An unstable hull without damping that grows with the motion turns without limit.",
+        "Sail a turning circle or a spiral beside the zigzags and let `kempf diagnose` look for the damping; or "
+        "predict with a set that has it (--set), or with less rudder.",
+        {"no_ships": lost, "draws": count, "estimates_sail": not itself},
+    )

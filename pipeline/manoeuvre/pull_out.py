@@ -1,0 +1,53 @@
+"""The pull-out: out of a steady turn the rudder is put amidships; the yaw rate that is left says if she is stable.
+
+ITTC 7.5-02-06-01; Burcher (1972), "Developments in ship manoeuvrability", Trans. RINA 114. Amidships is here the rudder
+with which she holds a straight course.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import degrees, nan, pi
+
+import numpy as np
+
+from kempf.pipeline.manoeuvre import motion
+from kempf.pipeline.manoeuvre.sailed import Sailed, reach_of, thinned
+from kempf.pipeline.manoeuvre.ship import Ship
+from kempf.pipeline.manoeuvre.turning_circle import LONGEST
+
+#: how long she is watched, in ship lengths on the approach; the end of it, over which what is left is averaged
+_WATCHED, _END = 60.0, 10.0
+
+
+@dataclass(frozen=True)
+class PullOut:
+    """Out of a turn to a side."""
+
+    #: Magnitude, of the turn.
+    rudder_rad: float
+    #: +1 to starboard, -1 to port.
+    side: int = 1
+    name: str = "pull-out"
+
+    def sailed(self, ship: Ship) -> Sailed | None:
+        """Sail it; the curve has columns time from the order amidships, s, and yaw rate, rad/s."""
+        own, side = ship.waters.own_time_s, self.side
+        turn = [side * self.rudder_rad, side, side * 3.0 * pi, LONGEST * own]
+        track = ship.sail(np.array([turn, [nan, 0.0, 0.0, _WATCHED * own]]))
+        if track.how != motion.SAILED:
+            return None
+        begin = int(track.ends[0])
+        time, rate = track.column(motion.TIME)[begin:], side * track.column(motion.RATE)[begin:]
+        time = time - time[0]
+        last = time >= time[-1] - _END * own
+        steady, left = float(rate[0]), float(np.mean(rate[last]))
+        below = np.flatnonzero(rate <= 0.5 * steady)
+        figures = {
+            "steady_yaw_rate_deg_s": side * degrees(steady),
+            "residual_yaw_rate_deg_s": side * degrees(left),
+            "residual_share_percent": 100.0 * left / steady,
+            "time_to_half_s": float(time[below[0]]) if below.size else nan,
+        }
+        curve = thinned(np.column_stack([time, side * rate]))
+        return Sailed(figures, curve, reach_of(track, ship.waters.length_m))

@@ -1,0 +1,40 @@
+"""docs/predict.md is true: its examples run to their output, its codes and numbers are those of the code."""
+
+from __future__ import annotations
+
+import re
+from math import degrees
+from pathlib import Path
+
+import pytest
+
+from kempf.pipeline.manoeuvre import draws, prediction, surge
+from kempf.pipeline.manoeuvre.rudder_rate import SOLAS_RAD_S
+from tests.docs.console import follow
+
+ROOT = Path(__file__).parents[2]
+TEXT = (ROOT / "docs" / "predict.md").read_text(encoding="utf-8")
+
+
+def test_the_examples_run_to_their_output(tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    assert follow(TEXT, tmp_path, f"export PYTHONPATH='{ROOT}'")
+
+
+def test_the_numbers_are_those_of_the_code() -> None:
+    assert f"{draws.DRAWS} ships are drawn" in TEXT
+    assert f"{degrees(SOLAS_RAD_S):.2f} deg/s" in TEXT
+    assert f"tau {surge.TAU_MEDIAN:g} lengths within a factor of 2" in TEXT
+    assert (
+        f"k_r {surge.LOSS_MEAN[0]:g} ± {surge.LOSS_STD[0]:g}, k_d {surge.LOSS_MEAN[1]:g} ± {surge.LOSS_STD[1]:g}"
+        in TEXT
+    )
+    assert pytest.approx(0.8) == prediction.ENOUGH
+
+
+def test_every_code_is_raised() -> None:
+    sources = [*(ROOT / "flows" / "jobs").glob("*.py"), *(ROOT / "pipeline" / "manoeuvre").glob("*.py")]
+    text = "".join(path.read_text(encoding="utf-8") for path in [*sources, ROOT / "workbench" / "cli" / "predict.py"])
+    rows = TEXT.partition("## Refusals")[2]
+    for code in re.findall(r"`([a-z]+(?:_[a-z]+)+)`", rows):
+        assert f'"{code}"' in text, code

@@ -1,0 +1,99 @@
+"""Intervals, criteria and refusals of predicted manoeuvres."""
+
+from math import radians
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.manoeuvre.draws import Identified
+from kempf.pipeline.manoeuvre.prediction import predict
+from kempf.pipeline.manoeuvre.sailed import Reach
+from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.schemas.errors import DataRejected
+from tests.manoeuvre.ships import identified, ship_of, unstable
+
+LOGS = Reach(0.1, 0.3, radians(20.0), 7.0, 8.0)
+CIRCLE = TurningCircle(radians(25.0))
+
+
+def made(model: Identified, manoeuvre=CIRCLE, length: float | None = 160.93):  # type: ignore[no-untyped-def]
+    return predict([model], manoeuvre, LOGS, length, 64)
+
+
+def test_the_same_set_gives_the_same_bits_and_another_name_others() -> None:
+    ship = ship_of(HULLS["mariner"])
+    first, again = made(identified(ship)), made(identified(ship))
+    assert first.figures == again.figures
+    other = made(identified(ship, name="ps-0000000000000002"))
+    assert other.figures["advance_m"].value == first.figures["advance_m"].value
+    assert other.figures["advance_m"].low != first.figures["advance_m"].low
+
+
+def test_an_interval_holds_95_percent_of_ships_drawn_otherwise() -> None:
+    model = identified(ship_of(HULLS["ferry"]), relative=0.03)
+    figure = predict([model], CIRCLE, LOGS, 140.0, 256).figures["tactical_diameter_m"]
+    random = np.random.default_rng(5)
+    estimates, inside = model.hull, []
+    for _ in range(300):
+        hull = estimates * (1.0 + 0.03 * random.standard_normal(6))
+        surge = model.surge.best * [1.0, 1.0 + 0.05 * random.standard_normal(), 1.0]
+        one = type(model.ship)(model.waters, hull, model.effects, surge, model.rudder_rate.rad_s)
+        sailed = CIRCLE.sailed(one)
+        assert sailed is not None
+        inside.append(figure.low <= sailed.figures["tactical_diameter_m"] <= figure.high)
+    assert 0.91 < np.mean(inside) < 0.985
+
+
+def test_models_that_fit_as_well_widen_the_interval_to_hold_them_all() -> None:
+    ship = ship_of(HULLS["mariner"])
+    narrow = identified(ship, relative=1e-4)
+    drag = ship_of(HULLS["mariner"], cross_flow_drag=(1.0,))
+    rival = identified(drag, relative=1e-4, name="ps-0000000000000003")
+    alone, both = made(narrow), predict([narrow, rival], CIRCLE, LOGS, 160.93, 64)
+    one, two = alone.figures["tactical_diameter_m"], both.figures["tactical_diameter_m"]
+    assert one.value == two.value
+    assert one.high is not None
+    assert two.high is not None
+    assert two.high > one.high * 1.02
+    rivals = both.models[1].figures["tactical_diameter_m"].value
+    assert rivals is not None
+    assert two.low is not None
+    assert two.low < rivals <= two.high * 1.0001
+
+
+def test_criteria_have_a_limit_and_a_probability_and_none_without_a_length() -> None:
+    model = identified(ship_of(HULLS["mariner"]))
+    circle = {one.name: one for one in predict([model], TurningCircle(radians(35.0)), LOGS, 160.93, 64).imo}
+    assert circle["advance"].limit == pytest.approx(4.5 * 160.93)
+    assert circle["tactical diameter"].probability == 1.0
+    zigzag = {one.name: one for one in made(model, Zigzag(radians(10.0), radians(10.0))).imo}
+    assert zigzag["initial turning"].limit == pytest.approx(2.5 * 160.93)
+    assert zigzag["10/10 first overshoot"].limit == pytest.approx(5.0 + 0.5 * 160.93 / 7.7175)
+    assert "35 deg" in made(model).imo[0].why
+    blind = made(model, Zigzag(radians(10.0), radians(10.0)), None).imo
+    assert all(one.probability is None and "length" in one.why for one in blind)
+    assert made(model, Zigzag(radians(5.0), radians(15.0))).imo == ()
+    some = predict([model], TurningCircle(radians(35.0)), LOGS, 389.0 / 4.5, 64).imo[0]
+    assert some.probability is not None
+    assert 0.0 < some.probability < 1.0
+    assert "100 m" in some.why
+
+
+def test_a_ship_that_runs_away_is_refused_with_what_to_sail() -> None:
+    with pytest.raises(DataRejected, match="predicts no turning-circle") as caught:
+        made(identified(unstable(drag=0.0)))
+    assert caught.value.code == "predicts_no_ship"
+    assert "Sail a turning circle or a spiral" in caught.value.next_step
+
+
+def test_draws_that_are_no_ships_are_counted() -> None:
+    # drag that may be nearly nothing leaves some ships without what keeps them
+    model = identified(unstable(drag=0.6), relative=0.0)
+    covariance = model.covariance.copy()
+    covariance[6, 6] = 0.3**2
+    loose = Identified(**{**vars(model), "covariance": covariance})
+    found = made(loose, length=None)
+    assert 0 < found.no_ships < 0.2 * 64
+    assert found.share_unstable == 1.0

@@ -1,0 +1,153 @@
+"""`kempf predict` on a simulated ship: what it prints, what it refuses."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.segment.turning_figures import TurningFigures, turning_figures
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.pipeline.simulate.manoeuvre import SteadyCourse, TurningCircle
+from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
+from kempf.warehouse import aliases, parameter_sets
+from kempf.warehouse.store import Warehouse
+from tests.conftest import Ship
+from tests.workbench.driving import Ran, kempf
+
+
+@pytest.fixture(scope="module")
+def warehouse(mariner: Ship, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("predict")
+    logs, place = mariner.write(folder / "logs"), folder / "warehouse"
+    assert kempf("ingest", logs / "mariner.csv.gz", "--profile", logs / "profile.yaml", "--warehouse", place).code == 0
+    assert kempf("identify", "--vessel", "mariner", "--warehouse", place).code == 0
+    return place
+
+
+def predicted(warehouse: Path, *arguments: object) -> Ran:
+    return kempf("predict", *arguments, "--vessel", "mariner", "--warehouse", warehouse)
+
+
+def test_a_turning_circle_has_an_interval_at_every_figure_and_says_what_lies_beyond(warehouse: Path) -> None:
+    shown = predicted(warehouse, "turning-circle", "--json").json
+    assert shown["manoeuvre"] == {"kind": "turning-circle", "rudder_deg": 35.0, "side": "starboard"}
+    assert {"advance_m", "transfer_m", "tactical_diameter_m", "steady_yaw_rate_deg_s", "steady_drift_deg",
+            "speed_loss_percent"} <= set(shown["figures"])  # fmt: skip
+    for figure in shown["figures"].values():
+        assert figure["low"] < figure["value"] < figure["high"]
+    assert [one["parameter_set_id"] for one in shown["models"]] == [shown["parameter_set_id"]]
+    assert shown["models"][0]["draws"] == 256
+    by_quantity = {one["quantity"]: one for one in shown["extrapolated"]}
+    assert by_quantity["rudder"]["covered"][1] == pytest.approx(20.0, abs=0.5)
+    assert {one["name"] for one in shown["imo"]} == {"advance", "tactical diameter"}
+    assert any("one model" in s or "taken alone" in s for s in shown["assumed"])
+    assert shown["own_zigzags"]["zigzags"] == 1
+    again = predicted(warehouse, "turning-circle", "--json").json
+    assert again == shown
+
+
+def test_a_circle_within_what_was_sailed_is_that_of_the_simulator(warehouse: Path) -> None:
+    shown = predicted(warehouse, "turning-circle", "--rudder", 20, "--speed", 7.7175, "--side", "port", "--json").json
+    truth = _sailed_in_calm_water(-20.0)
+    for name in ("advance_m", "transfer_m", "tactical_diameter_m"):
+        figure = shown["figures"][name]
+        assert figure["value"] == pytest.approx(getattr(truth, name), rel=0.02), name
+        assert figure["low"] <= getattr(truth, name) <= figure["high"], name
+    assert shown["figures"]["steady_yaw_rate_deg_s"]["value"] < 0.0
+
+
+def _sailed_in_calm_water(rudder_deg: float) -> TurningFigures:
+    hull = HULLS["mariner"]
+    trial = simulate_trial(TrialSettings(hull, (SteadyCourse(10.0), TurningCircle(rudder_deg, 540.0))))
+    record, path = trial.truth.manoeuvres[1], trial.truth.trajectory
+    rows = slice(round(record.start_s / path.step_s), round(record.end_s / path.step_s) + 1)
+    v, _, psi, north, east, forward = path.state[rows].T
+    speed, drift = np.hypot(forward, v), np.arctan2(-v, forward)
+    return turning_figures(path.time_s[rows] - record.start_s, north, east, psi, speed, drift, 0.0)
+
+
+def test_overshoots_are_a_list_and_lie_beside_the_measured_ones(warehouse: Path) -> None:
+    ran = predicted(warehouse, "zigzag", "--angles", "20/20", "--compare", "--json")
+    shown = ran.json
+    assert len(shown["figures"]["overshoots_deg"]) == 4
+    assert {"value", "low", "high"} == set(shown["figures"]["overshoots_deg"][0])
+    measured = shown["measured"]
+    assert len(measured) == 1
+    assert measured[0]["sample"] == "fitted"
+    first = measured[0]["figures"][0]
+    assert first["measured"] == pytest.approx(first["value"], abs=4.0)
+    table = predicted(warehouse, "zigzag", "--compare").out
+    assert "measured, and predicted with its own approach speed" in table
+    none = predicted(warehouse, "zigzag", "--angles", "5/5", "--compare").out
+    assert "no manoeuvre of this kind" in none
+
+
+@pytest.mark.parametrize("kind", ["turning-circle", "zigzag", "pull-out", "spiral"])
+def test_every_manoeuvre_is_printed_and_drawn(kind: str, warehouse: Path, tmp_path: Path) -> None:
+    pytest.importorskip("matplotlib")
+    ran = predicted(warehouse, kind, "--figure", tmp_path / "drawn.png")
+    assert ran.code == 0, ran.err
+    assert "95 % interval" in ran.out
+    assert "assumed: calm, deep water" in ran.out
+    assert (tmp_path / "drawn.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("arguments", "code", "word"),
+    [
+        (["turning-circle", "--speed", 0], "speed_out_of_range", "expected more than 0"),
+        (["turning-circle", "--speed", "nan"], "speed_out_of_range", "expected more than 0"),
+        (["turning-circle", "--rudder", 0], "rudder_out_of_range", "up to 60"),
+        (["pull-out", "--rudder", 90], "rudder_out_of_range", "up to 60"),
+        (["zigzag", "--angles", "20"], "angles_unreadable", "pair of angles"),
+        (["zigzag", "--angles", "0/20"], "angles_out_of_range", "0/20"),
+        (["zigzag", "--rudder", 20], "usage", "--angles"),
+        (["spiral", "--angles", "20/20"], "usage", "--rudder"),
+        (["turning-circle", "--figure", "x.gif"], "cannot_write", ".gif"),
+    ],
+)
+def test_requests_that_make_no_manoeuvre_are_refused(
+    arguments: list[object], code: str, word: str, warehouse: Path
+) -> None:
+    ran = predicted(warehouse, *arguments, "--json")
+    assert ran.code == 2
+    assert ran.json["error"]["code"] == code
+    assert word in f"{ran.json['error']['message']} {ran.json['error']['next_step']}"
+
+
+def test_a_spiral_of_a_stable_ship_says_that_there_is_no_loop(warehouse: Path) -> None:
+    shown = predicted(warehouse, "spiral", "--rudder", 10, "--json").json
+    width = shown["figures"]["loop_width_deg"]
+    assert width["value"] == width["low"] == 0.0
+    assert shown["unstable_on_a_straight_course"] == 0.0
+    assert shown["manoeuvre"]["orders_deg"] == [10.0, 5.0, 0.0, -5.0, -10.0]
+
+
+def test_a_vessel_without_a_set_and_a_set_without_errors_are_refused(
+    warehouse: Path, mariner: Ship, tmp_path: Path
+) -> None:
+    logs = mariner.write(tmp_path / "logs")
+    empty = tmp_path / "warehouse"
+    profile = ("--profile", logs / "profile.yaml", "--warehouse", empty)
+    assert kempf("ingest", logs / "mariner.csv.gz", *profile).code == 0
+    ran = kempf("predict", "zigzag", "--vessel", "mariner", "--warehouse", empty, "--json")
+    assert (ran.code, ran.json["error"]["code"]) == (4, "no_parameter_set")
+    there = Warehouse(str(warehouse))
+    one = parameter_sets.get(there, aliases.of_vessel(there, "mariner")["current"])
+    bare = replace(one, parameter_set_id="ps-00000000000000ff", covariance_names=(), covariance=())
+    parameter_sets.insert(there, [bare])
+    ran = predicted(warehouse, "zigzag", "--set", "ps-00000000000000ff", "--json")
+    assert (ran.code, ran.json["error"]["code"]) == (3, "set_without_covariance")
+
+
+def test_an_unstable_set_is_refused_with_what_to_sail(warehouse: Path) -> None:
+    there = Warehouse(str(warehouse))
+    one = parameter_sets.get(there, aliases.of_vessel(there, "mariner")["current"])
+    values = tuple(replace(p, value=0.3 * p.value) if p.name == "a22" else p for p in one.parameters)
+    parameter_sets.insert(there, [replace(one, parameter_set_id="ps-00000000000000fe", parameters=values)])
+    ran = predicted(warehouse, "turning-circle", "--set", "ps-00000000000000fe", "--json")
+    assert (ran.code, ran.json["error"]["code"]) == (3, "predicts_no_ship")
+    assert "spiral" in ran.json["error"]["next_step"]

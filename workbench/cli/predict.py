@@ -1,0 +1,220 @@
+"""``kempf predict``."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.given_once import GivenOnce
+from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
+from kempf.workbench.new_file import require_figures, writing
+from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
+    from kempf.flows.jobs.predict_vessel import Predicted
+    from kempf.pipeline.manoeuvre.prediction import Figure
+
+_KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
+
+
+@click.command("predict", cls=GivenOnce)
+@click.argument("manoeuvre", type=click.Choice(_KINDS))
+@vessel_option(required=True)
+@click.option("--set", "set_id", metavar="ID", help="Parameter set; default: the current one of the vessel.")
+@click.option(
+    "--rudder",
+    "rudder_deg",
+    type=float,
+    metavar="DEG",
+    help="Rudder of circle, pull-out or spiral; default: 35, 20 and 20.",
+)
+@click.option("--angles", metavar="HEADING/RUDDER", help="Of a zigzag, degrees; default: 20/20.")
+@click.option(
+    "--side", type=click.Choice(["starboard", "port"]), default="starboard", show_default=True, help="Of the turn."
+)
+@click.option(
+    "--speed", type=float, metavar="M/S", help="Of the approach; default: the mean of those that were sailed."
+)
+@click.option("--compare", is_flag=True, help="Lay it over the measured manoeuvres of the same kind and angles.")
+@figure_option("Draw the manoeuvre with its interval")
+@warehouse_option
+@json_option
+def command(
+    manoeuvre: Any,
+    vessel: str,
+    set_id: str | None,
+    rudder_deg: float | None,
+    angles: str | None,
+    side: Any,
+    speed: float | None,
+    compare: bool,
+    figure: Path | None,
+    uri: str,
+    as_json: bool,
+) -> None:
+    """Predict a standard manoeuvre from a parameter set, every figure with its 95 % interval.
+
+    The intervals are those of ships that the errors of the set allow, of it and of every model that the data do not
+    tell from it. What lies beyond the drift, yaw rate, rudder and speed of the logs is named.
+    """
+    from kempf.flows.jobs.checked_prediction import predict_checked
+    from kempf.flows.jobs.compare_predicted import measured_beside
+    from kempf.flows.jobs.predict_vessel import PredictRequest
+    from kempf.warehouse.store import Warehouse
+
+    require_figures(figure, code="cannot_write")
+    _require_fitting(manoeuvre, rudder_deg, angles)
+    heading, rudder = _angles(angles) if angles is not None else (20.0, 20.0)
+    request = PredictRequest(manoeuvre, set_id, rudder_deg, (heading, rudder), side, speed)
+    with progress_bar() as progress:
+        made = predict_checked(Warehouse(uri), vessel, request, progress)
+        measured = measured_beside(Warehouse(uri), made, progress) if compare else None
+    if figure is not None:
+        from kempf.workbench.figures.manoeuvre import draw_manoeuvre
+
+        with writing(figure):
+            draw_manoeuvre(made.prediction, figure, _title(made))
+    if as_json:
+        beside = {"measured": [one.show() for one in measured]} if measured is not None else {}
+        print_json({**made.show(), **beside, "figure": str(figure) if figure else None})
+    else:
+        _print_predicted(made, figure)
+        if measured is not None:
+            _print_measured(measured)
+
+
+def _require_fitting(manoeuvre: str, rudder_deg: float | None, angles: str | None) -> None:
+    if manoeuvre == "zigzag" and rudder_deg is not None:
+        raise UsageError("usage", "A zigzag has no --rudder.", "Give heading and rudder with --angles, such as 10/10.")
+    if manoeuvre != "zigzag" and angles is not None:
+        raise UsageError("usage", f"A {manoeuvre} has no --angles.", "Give its rudder with --rudder.")
+
+
+def _angles(text: str) -> tuple[float, float]:
+    found = re.fullmatch(r"\s*(\d+(?:\.\d+)?)\s*/\s*(\d+(?:\.\d+)?)\s*", text)
+    if found is None:
+        raise UsageError(
+            "angles_unreadable", f"--angles {text!r} is no pair of angles.", "Give heading and rudder, such as 20/20."
+        )
+    return float(found[1]), float(found[2])
+
+
+def _title(made: Predicted) -> str:
+    manoeuvre = made.show()["manoeuvre"]
+    kind = manoeuvre["kind"].replace("-", " ")
+    what = f"{kind} with {manoeuvre['rudder_deg']:g} deg of rudder"
+    if kind == "zigzag":
+        what = f"{manoeuvre['heading_deg']:g}/{manoeuvre['rudder_deg']:g} zigzag"
+    side = f" to {manoeuvre['side']}" if "side" in manoeuvre else ""
+    return f"{made.vessel}, {made.parameter_set.parameter_set_id}: {what}{side} at {number(made.speed_m_s, 3)} m/s"
+
+
+#: name and unit of a figure in the table
+_ROWS = {
+    "advance_m": ("advance", "m"),
+    "transfer_m": ("transfer", "m"),
+    "tactical_diameter_m": ("tactical diameter", "m"),
+    "steady_diameter_m": ("steady diameter", "m"),
+    "steady_yaw_rate_deg_s": ("steady yaw rate", "deg/s"),
+    "steady_drift_deg": ("steady drift angle", "deg"),
+    "speed_loss_percent": ("speed loss", "%"),
+    "time_to_90_s": ("time to 90 deg", "s"),
+    "time_to_180_s": ("time to 180 deg", "s"),
+    "overshoots_deg": ("overshoot", "deg"),
+    "initial_turning_m": ("distance to the second execute", "m"),
+    "time_to_second_execute_s": ("time to the second execute", "s"),
+    "period_s": ("period", "s"),
+    "residual_yaw_rate_deg_s": ("yaw rate that is left", "deg/s"),
+    "residual_share_percent": ("share of the rate that is left", "%"),
+    "time_to_half_s": ("time to half the rate", "s"),
+    "loop_width_deg": ("width of the loop", "deg"),
+    "loop_height_deg_s": ("height of the loop", "deg/s"),
+    "neutral_rudder_deg": ("rudder of a straight course", "deg"),
+    "from_starboard_deg_s": ("yaw rate from starboard at", "deg/s"),
+    "from_port_deg_s": ("yaw rate from port at", "deg/s"),
+}
+
+
+def _print_predicted(made: Predicted, figure: Path | None) -> None:
+    shown = made.show()
+    manoeuvre = shown["manoeuvre"]
+    rows = [_row(name, f, manoeuvre) for name, f in made.prediction.figures.items()]
+    print_table(["figure", "value", "95 % interval", "unit"], rows, _title(made))
+    if len(shown["models"]) > 1:
+        _print_models(made)
+    for one in made.prediction.imo:
+        limit = f"{number(one.limit)} {one.unit}: " if one.limit is not None else ""
+        verdict = (
+            f"fulfilled with a probability of {100 * one.probability:.0f} %"
+            if one.probability is not None
+            else "not judged"
+        )
+        print_paragraph(f"IMO {one.name}, at most {limit}{verdict}" + (f" ({one.why})" if one.why else ""))
+    for beyond in made.prediction.extrapolated:
+        print_paragraph(f"extrapolated: {beyond.sentence}")
+    if made.own_zigzags is not None:
+        print_paragraph(made.own_zigzags.sentence)
+    for sentence in made.limits:
+        print_paragraph(f"limit: {sentence}")
+    for sentence in made.assumed:
+        print_paragraph(f"assumed: {sentence}")
+    if figure is not None:
+        click.echo(f"  drawn: {figure}")
+
+
+def _row(name: str, figure: Figure, manoeuvre: dict[str, Any]) -> list[str]:
+    base, _, place = name.partition(".")
+    words, unit = _ROWS[base]
+    if base == "overshoots_deg":
+        words = f"{words} {int(place) + 1}"
+    elif place:
+        words = f"{words} {manoeuvre['orders_deg'][int(place)]:g} deg"
+    if figure.value is None:
+        return [words, "-", "too few ships have it", unit]
+    return [words, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit]
+
+
+def _print_models(made: Predicted) -> None:
+    first = next(iter(made.prediction.figures))
+    words, unit = _ROWS[first.partition(".")[0]]
+    rows = []
+    for one in made.prediction.models:
+        figure = one.figures[first]
+        effects = " + ".join(effect.name for effect in one.model.waters.model.effects) or "plain"
+        rows.append([effects, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit])
+    print_table([f"{words} of the model", "value", "95 % interval", "unit"], rows)
+
+
+def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
+    if not measured:
+        print_paragraph("measured: no manoeuvre of this kind and these angles is in the warehouse")
+        return
+    rows = []
+    for one in measured:
+        for beside in one.figures:
+            figure, inside = beside.predicted, beside.show()["inside"]
+            base, _, place = beside.name.partition(".")
+            words = f"{_ROWS[base][0]} {int(place) + 1}" if place else _ROWS[base][0]
+            if figure.value is not None:
+                interval = f"{number(figure.low)} to {number(figure.high)}"
+                about = (one.segment_id[:12], one.side, one.sample.replace("_", " "), words)
+                verdict = "yes" if inside else "no"
+                rows.append([*about, number(beside.measured), number(figure.value), interval, verdict])
+    head = ["segment", "side", "sample", "figure", "measured", "predicted", "95 % interval", "inside"]
+    print_table(
+        head, rows, "measured, and predicted with its own approach speed, rudder, switching headings and steady wind"
+    )
+    shown = [beside.show() for one in measured for beside in one.figures]
+    judged = [one for one in shown if one["inside"] is not None]
+    if judged:
+        inside = sum(one["inside"] for one in judged)
+        print_paragraph(f"{inside} of {len(judged)} measured figures lie inside the interval of their prediction")
+    for one in measured:
+        if one.why:
+            print_paragraph(f"{one.segment_id}: {one.why}")
