@@ -43,7 +43,7 @@ STAGES: dict[Stage, Entry] = {
     "segment": Entry(
         (
             *("channels.instruments", "channels.doctor.examine", "channels.doctor.corrections"),
-            *("channels.doctor.verdict", "segment.find", "segment.find_turning"),
+            *("channels.doctor.refused", "channels.doctor.verdict", "segment.find", "segment.find_turning"),
             *("segment.imo", "segment.imo_turning", "segment.lateral"),
             "estimate.no_log.companions",
         ),

@@ -126,6 +126,7 @@ class Predicted:
                     "draws": len(one.drawn) + one.no_ships,
                     "no_ships": one.no_ships,
                     "errors_widened": one.model.widened,
+                    "fitted_to_legs": one.model.fitted_to_legs,
                 }
                 for one in made.models
             ],
@@ -277,17 +278,33 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
         day=effects.day if effects is not None else 0.0,
     )
     values = effects.values if effects is not None else np.zeros(0)
-    factor = _widened(one, waters.model, basis, ship.hull.array(), values, ship.covariance)
+    hull, covariance, factor = ship.hull.array(), ship.covariance, 1.0
+    legs = _fitted_to_legs(one)
+    if legs is None:
+        factor = _widened(one, waters.model, basis, hull, values, covariance)
+    else:
+        hull, values, covariance = legs
     return Identified(
         name=one.parameter_set_id,
         waters=waters,
-        hull=ship.hull.array(),
+        hull=hull,
         effects=values,
-        covariance=factor**2 * ship.covariance,
+        covariance=factor**2 * covariance,
         surge=basis.surge,
         rudder_rate=basis.rudder_rate,
         widened=factor,
+        fitted_to_legs=legs is not None,
     )
+
+
+def _fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float] | None:
+    """Return hull, effects and covariance of the fit one leg ahead, None where that a step ahead predicts as well."""
+    ahead = ((one.fit or {}).get("rung") or {}).get("one_leg_ahead")
+    if ahead is None or ahead["better_than_one_step"] is None:
+        return None
+    values = np.array([each["value"] for each in ahead["parameters"].values()], dtype=np.float64)
+    covariance = np.array(ahead["covariance"], dtype=np.float64)
+    return (values[:6], values[6:], covariance) if np.all(np.isfinite(covariance)) else None
 
 
 def _widened(
@@ -321,6 +338,11 @@ def _assumed(request: PredictRequest, basis: Basis, models: Sequence[Identified]
     if not all("shaft_speed" in run.channels for run in basis.runs.runs):
         said.append("no shaft speed in the logs: taken as constant in them")
     for model in models:
+        if model.fitted_to_legs:
+            said.append(
+                f"parameters of {model.name} are those fitted to predict legs: the likelihood's, one step ahead, "
+                "predict them worse"
+            )
         if model.widened > _SAID:
             said.append(
                 f"errors of {model.name} widened {model.widened:.1f} times: over a leg its prediction errors remember, "

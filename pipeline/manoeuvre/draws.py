@@ -39,6 +39,8 @@ class Identified:
     rudder_rate: RudderRate
     #: Factor that is in the covariance for what the model lacks, see `kempf.pipeline.manoeuvre.widening`.
     widened: float = 1.0
+    #: Whether the parameters are those fitted to predict legs, see `kempf.pipeline.shooting`, not the likelihood's.
+    fitted_to_legs: bool = False
     #: Standard error of `Waters.wind_force_m_s2`, its wandering included.
     wind_force_std_m_s2: float = 0.0
 
