@@ -18,8 +18,8 @@ from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
-#: standard errors beyond which a prediction is worse
-WORSE = 2.0
+#: standard errors beyond which a prediction is worse, and part of the misfit: `kempf.pipeline.diagnose.matters`
+WORSE, LEAST_RISE = 2.0, 0.01
 
 
 def add_effect(
@@ -96,7 +96,7 @@ def worsening(made: ParameterSet) -> list[str]:
         }
         if one["in_std"] is None and (one["falls_by"] or 0.0) < 0.0:
             found.append(f"the prediction {words[sample]} diverges")
-        elif one["in_std"] is not None and one["in_std"] < -WORSE:
+        elif one["in_std"] is not None and one["in_std"] < -WORSE and one["falls_by"] < -LEAST_RISE:
             found.append(
                 f"the misfit {words[sample]} one leg ahead rises by {-100.0 * one['falls_by']:.0f} % "
                 f"({-one['in_std']:.1f} standard errors; {one['better']} of {one['of']} better)"

@@ -12,7 +12,7 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.record.average import step_of
 from kempf.pipeline.estimate.record.cut import make_record
-from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
+from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run, with_common_slip
 from kempf.pipeline.estimate.record.record import Record
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
@@ -91,8 +91,10 @@ def assemble(
     ship = ShipConstants(profile.length_m or LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
     step = step_of([record for _, _, record in records], profile.length_m)
     days = {log_id: k for k, log_id in enumerate(dict.fromkeys(one.log_id for _, one, _ in records))}
-    runs = tuple(
-        make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id])
-        for name, one, record in records
+    runs = with_common_slip(
+        [
+            make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id])
+            for name, one, record in records
+        ]
     )
     return VesselRuns(ready, runs, tuple(record for _, _, record in records), skipped)

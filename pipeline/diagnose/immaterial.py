@@ -14,8 +14,8 @@ from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.pipeline.shooting.ahead import Ahead
 from kempf.pipeline.shooting.paired import paired
 
-#: part of the misfit one leg ahead, and standard errors, by which an effect that is there must change it to matter
-LEAST_PART, _CHANGES = 0.02, 1.0
+#: part of the misfit one leg ahead by which it must fall with an effect that is certain, for that to matter
+LEAST_PART = 0.02
 #: or part by which a parameter of the hull must move, and standard errors
 LEAST_SHIFT, _MOVES = 0.03, 2.0
 
@@ -35,10 +35,9 @@ class Weight:
 
     @property
     def matters(self) -> bool:
-        """Whether predictions or parameters change by what anybody would notice, and by more than their errors."""
-        predicts = self.t > _CHANGES and self.fall > LEAST_PART
+        """Whether predictions or parameters change by what anybody would notice."""
         moves = self.shift > LEAST_SHIFT and self.shift_in_std > _MOVES
-        return bool(np.isnan(self.fall) or predicts or moves)
+        return bool(np.isnan(self.fall) or self.fall > LEAST_PART or moves)
 
 
 @dataclass(frozen=True, eq=False)

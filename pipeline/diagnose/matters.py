@@ -27,6 +27,8 @@ _MOST = 2.0 / 3.0
 STABLE = 0.9
 #: standard errors within which two models predict alike, and beyond which one is worse
 ALIKE, WORSE = 2.0, 2.0
+#: and part of the misfit by which it must rise to be worse
+LEAST_RISE = 0.01
 #: refits at a step
 _REFITS = 6
 
@@ -54,7 +56,7 @@ def falls(before: Ahead, after: Ahead) -> bool:
 
 def worsens(before: Ahead, after: Ahead) -> bool:
     """Return whether a model predicts fitted, left-out or held-out manoeuvres worse than another, beyond the error."""
-    return any(one.in_std < -WORSE for one in comparisons(before, after))
+    return any(one.in_std < -WORSE and one.falls_by < -LEAST_RISE for one in comparisons(before, after))
 
 
 def comparisons(before: Ahead, after: Ahead) -> list[Paired]:

@@ -46,7 +46,7 @@ def test_what_helps_the_fitted_and_harms_the_held_out_is_refused() -> None:
     ("fall", "t", "shift", "in_std", "matters"),
     [
         (0.3, 5.0, 0.0, 0.1, True),
-        (0.3, 0.5, 0.0, 0.1, False),
+        (0.015, 3.0, 0.0, 0.1, False),
         (0.001, 5.0, 0.0, 0.1, False),
         (-0.001, -1.0, 0.1, 2.5, True),
         # a gyro that reads 0.3 % low: sure of it, and nobody would notice

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,12 +13,15 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.average import cell_means, instants_of, step_of
 from kempf.pipeline.estimate.record.record import Instants, Record
+from kempf.pipeline.estimate.record.rudder_inflow import approach_speed
 from kempf.pipeline.estimate.record.speed_error import SpeedError
 from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS
 
 _APPROACH_S = 5.0
+#: quantile of speed over shaft speed that is that of a settled ship: her straight courses are few in zigzags
+_SETTLED = 0.95
 
 
 @dataclass(frozen=True)
@@ -60,7 +64,7 @@ class GridRun:
     current_row: Float
     #: Shape (n,).
     heading_rad: Float
-    #: approach_m_s, approach_per_s: Speed and shaft speed of the approach.
+    #: approach_m_s, approach_per_s: Speed of the approach, and the shaft speed that keeps it, see `with_common_slip`.
     approach_m_s: float
     approach_per_s: float
     #: Canonical channels that the run has beyond those it must have.
@@ -247,7 +251,7 @@ def make_run(
         noise_start=record.noise_start,
         current_row=_current_row(spec, coarse),
         heading_rad=coarse,
-        approach_m_s=float(np.median(inputs[first, 0])),
+        approach_m_s=approach_speed(fine, inputs[:, 0]),
         approach_per_s=float(np.median(inputs[first, shaft])) or 1.0,
         channels=frozenset(have),
         ship=ship,
@@ -283,6 +287,31 @@ def _channel(series: Series | None, start_ns: int, fine: Float) -> Float | None:
         return None
     filled: Float = np.interp(fine, fine[good], value[good])
     return filled
+
+
+def with_common_slip(runs: Sequence[GridRun]) -> tuple[GridRun, ...]:
+    """Return the runs of a vessel with the shaft speed that keeps the speed of each approach.
+
+    The race of a propeller goes with the shaft speed, not with the speed that the ship happens to have at the first
+    execute: after a turn, or gathering way, she is slower than her shaft would have her. So the speed that a shaft
+    speed keeps is the vessel's, one for all runs: what she comes to in those that have settled.
+
+    Parameters
+    ----------
+    runs : sequence of GridRun
+        With a logged shaft speed or without, which then stay as they are.
+    """
+    shaft = 2 + list(CHANNEL_SYMBOLS).index("n")
+    logged = [run for run in runs if "shaft_speed" in run.channels]
+    turning = [(run.speed_m_s, run.inputs[::ROWS, shaft]) for run in logged]
+    ratios = [speed[n > 0.0] / n[n > 0.0] for speed, n in turning if np.any(n > 0.0)]
+    if not ratios:
+        return tuple(runs)
+    kept = float(np.quantile(np.concatenate(ratios), _SETTLED))
+    if kept <= 0.0:
+        return tuple(runs)
+    names = {run.name for run in logged}
+    return tuple(replace(run, approach_per_s=run.approach_m_s / kept) if run.name in names else run for run in runs)
 
 
 def spread(measured: Float) -> Float:

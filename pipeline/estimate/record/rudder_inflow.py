@@ -12,11 +12,26 @@ from typing import TypeVar
 
 import numpy as np
 
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.record import Instants
 from kempf.schemas.model_spec import ModelSpec
 
 _APPROACH_S = 5.0
 _SLOWEST = 0.1
+#: share of the speed that a run comes to below which it begins at rest; quantile that is the speed it comes to
+_AT_REST, _REACHED = 0.5, 0.95
+
+
+def approach_speed(time_s: Float, speed_m_s: Float) -> float:
+    """Return the speed of the approach, m/s; of a run that begins almost at rest the one that it comes to.
+
+    Parameters
+    ----------
+    time_s, speed_m_s : ndarray, shape (n,)
+    """
+    approach = float(np.median(speed_m_s[time_s <= time_s[0] + _APPROACH_S]))
+    reached = float(np.quantile(speed_m_s, _REACHED))
+    return approach if approach > _AT_REST * reached else reached
 
 
 T = TypeVar("T", bound=Instants)
@@ -37,7 +52,7 @@ def with_rudder_inflow(record: T, spec: ModelSpec) -> T:
     """
     if spec.rudder_speed_exponent == 2.0:
         return record
-    approach = float(np.median(record.speed_m_s[record.time_s <= record.time_s[0] + _APPROACH_S]))
+    approach = approach_speed(record.time_s, record.speed_m_s)
     share = np.maximum(np.abs(record.speed_m_s / approach), _SLOWEST)
     factor = share ** (spec.rudder_speed_exponent - 2.0)
     return replace(
