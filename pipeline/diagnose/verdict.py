@@ -247,21 +247,24 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
     first, last = diagnosis.steps[0].ahead, diagnosis.steps[-1].ahead
     if first is None or last is None:
         return []
-    parts = [("manoeuvres left out", first.left_out, last.left_out), ("the fitted ones", first.own, last.own)]
+    parts = [("the fitted manoeuvres", first.own, last.own), ("the same left out", first.left_out, last.left_out)]
     if first.held.errors:
         parts.append(("those held out", first.held, last.held))
     falls = [
-        f"of {name} from {np.mean(first.percent(a)):.1f} to {np.mean(last.percent(b)):.1f} %" for name, a, b in parts
+        f"from {np.mean(first.percent(a)):.1f} to {np.mean(last.percent(b)):.1f} % in {name}" for name, a, b in parts
     ]
     before, after = first.percent(first.left_out), last.percent(last.left_out)
     best, worst = int(np.argmin(after - before)), int(np.argmax(after - before))
     said = [
-        f"One leg ahead ({last.horizon_s:.3g} s) the error goes {', '.join(falls)} of the motion; "
-        f"best from {before[best]:.1f} to {after[best]:.1f} %, worst from {before[worst]:.1f} to {after[worst]:.1f} %."
+        f"One leg ahead ({last.horizon_s:.3g} s) the error, of the motion, goes {listed(falls)}; left out, it goes "
+        f"from {before[best]:.1f} to {after[best]:.1f} % in the manoeuvre that gains most, from {before[worst]:.1f} to "
+        f"{after[worst]:.1f} % in the one that gains least."
     ]
     share = share_explained(diagnosis)
     if share is not None:
-        said.append(f"Of the misfit one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained.")
+        said.append(
+            f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained."
+        )
     if last.disagrees is not None:
         said.append(
             f"Fits one step and one leg ahead still disagree: with parameters fitted to legs the misfit is "
@@ -336,7 +339,11 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "suspected": [{"effect": name, "why": why} for name, why in diagnosis.suspected.items()],
         "share_explained": share_explained(diagnosis),
-        "refused": [_refit(c, k) | {"why": _refusal(k)} for step in _climbed(diagnosis) for c, k in step.refused],
+        "refused": [
+            _refit(c, k) | {"why": diagnosis.suspected.get(c.effect.name) or _refusal(k)}
+            for step in _climbed(diagnosis)
+            for c, k in step.refused
+        ],
         "ladder": [
             rung(number, step, diagnosis.steps[number - 1].ahead if number else None)
             for number, step in enumerate(diagnosis.steps)

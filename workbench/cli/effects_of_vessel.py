@@ -76,7 +76,8 @@ def _print_candidate(document: Mapping[str, Any]) -> None:
 
 
 def _why(document: Mapping[str, Any], candidate: Mapping[str, Any]) -> str:
-    return str(document["refused"][-1]["why"] if document["refused"] else candidate["why"])
+    refused = document["refused"] and candidate["verdict"] != "suspected"
+    return str(document["refused"][-1]["why"] if refused else candidate["why"])
 
 
 @click.command("add", cls=GivenOnce)
