@@ -111,7 +111,7 @@ def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
 def _changes(one: Immaterial) -> str:
     """Say how little an effect changes."""
     return (
-        f"with it the misfit one leg ahead falls by {100.0 * one.weight.fall:.1f} %, and no parameter of the hull "
+        f"with it the misfit one leg ahead changes by {-100.0 * one.weight.fall:+.1f} %, and no parameter of the hull "
         f"moves by more than {100.0 * one.weight.shift:.1f} % beyond its error"
     )
 
