@@ -1,4 +1,4 @@
-"""The race goes with the shaft speed: one ratio for all runs of a vessel, whatever speed a run happens to begin with."""
+"""The race goes with the shaft speed: one ratio for all runs of a vessel, whatever speed a run begins with."""
 
 from __future__ import annotations
 
