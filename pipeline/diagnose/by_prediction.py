@@ -19,12 +19,19 @@ from kempf.schemas.effect import Effect
 
 #: members of a set that are refitted by likelihood at most
 _MEMBERS = 4
+#: manoeuvres, fitted and held out, from which predictions choose
+_FEWEST = 3
 
 Member = tuple[Candidate, Confirmation, Ahead]
 
 
 def predicting_better(ladder: Ladder, steps: list[Step]) -> list[Step]:
-    """Return the ladder with every effect that makes the prediction one leg ahead better."""
+    """Return the ladder with every effect that makes the prediction one leg ahead better.
+
+    Of two manoeuvres each would have to be predicted by the other alone: too few to choose by.
+    """
+    if len(steps[0].fit.runs) + len(ladder.held) < _FEWEST:
+        return steps
     while ladder.shooting is not None and len(steps) <= ladder.settings.most_steps:
         last = steps[-1]
         assert last.ahead is not None

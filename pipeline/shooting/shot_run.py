@@ -141,7 +141,9 @@ class ShotRun:
         by = self.steps(at, scale)
         shared, own, starts = self._stepped(at, by)
         found = self.predicted(shared, own, starts)
-        return found[..., 0], (found[..., 1:] - found[..., :1]) / by
+        with np.errstate(invalid="ignore"):
+            slopes: Float = (found[..., 1:] - found[..., :1]) / by
+        return found[..., 0], slopes
 
     def _stepped(self, at: Unknowns, by: Float) -> tuple[Float, Float, Float]:
         many = by.size + 1

@@ -144,6 +144,16 @@ def compared(late: Late, tau: dict[str, Any]) -> None:
     assert errors[0] < 0.8 * errors[1]
 
 
+def predicted(late: Late, tau: dict[str, Any]) -> None:
+    lag, plain = (
+        late.json("predict", "zigzag", "--vessel", VESSEL, "--set", one, "--angles", "15/15")
+        for one in (late.lag, late.plain)
+    )
+    assert lag["models"][0]["effects"] == ["rudder_lag"] and plain["models"][0]["effects"] == []
+    # she turns on while the rudder is still on its way
+    assert lag["figures"]["overshoots_deg"][0]["value"] > plain["figures"]["overshoots_deg"][0]["value"]
+
+
 def built_again(late: Late, tau: dict[str, Any]) -> None:
     assert late.json("rerun", late.lag)["verdict"] == "bit-identical"
 
@@ -171,6 +181,7 @@ CHECKS: dict[tuple[str, ...], Callable[[Late, dict[str, Any]], None]] = {
     ("export", "mcap"): as_mcap,
     ("steer",): steered,
     ("compare",): compared,
+    ("predict",): predicted,
     ("rerun",): built_again,
 }
 #: these begin from a set's model and screen what it lacks: tests/flows/test_diagnose.py goes through them

@@ -125,7 +125,7 @@ def single(_filled: Path, tmp_path_factory: pytest.TempPathFactory) -> MadeRepor
 def as_verdict(verdict: str, stored: Mapping[str, Any], evidence: DiagnosisEvidence) -> tuple[Any, DiagnosisEvidence]:
     """What would be stored if the late rudder's diagnosis had come to another verdict."""
     content = {**stored, "verdict": verdict}
-    if verdict == "explained":
+    if verdict in ("explained", "partly_explained"):
         return content, evidence
     if verdict == "ambiguous":
         (one,) = stored["sets"]
@@ -168,6 +168,7 @@ def test_every_word_agrees_with_the_verdict(
         "adequate": "The plain model is adequate",
         "explained": "The plain model lacks first-order rudder lag.",
         "ambiguous": "The plain model lacks first-order rudder lag or bias of the rate gyro; these data cannot",
+        "partly_explained": "The plain model lacks first-order rudder lag, which explains",
         "unexplained": "Not explained: a systematic misfit of the plain model remains",
         "insufficient_data": "Not decided: too few manoeuvres",
     }
