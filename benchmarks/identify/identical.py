@@ -101,8 +101,13 @@ def machine() -> Content:
 
 
 def _processor() -> str:
-    found = [line for line in Path("/proc/cpuinfo").read_text().splitlines() if line.startswith("model name")]
-    return found[0].partition(":")[2].strip() if found else platform.machine()
+    """Return the name of the processor with family, model and stepping: one name may stand for several of them."""
+    known: dict[str, str] = {}
+    for line in Path("/proc/cpuinfo").read_text().splitlines():
+        name, _, value = line.partition(":")
+        known.setdefault(name.strip(), value.strip())
+    found = [known[name] for name in ("model name", "cpu family", "model", "stepping") if name in known]
+    return " ".join(found) or platform.machine()
 
 
 def differences(reference: Content, found: Content, *, bits: bool) -> list[str]:
