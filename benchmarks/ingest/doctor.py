@@ -203,7 +203,7 @@ def page(data: Path, many: int) -> list[str]:
         "",
         *result_page.table(["trap", "logs", "testable", "named alone", "then silent", "line"], traps_found),
         "",
-        f"## Lies told about honest logs: {many} simulated ones and {len(logs) - many} of seven ships",
+        f"## False findings on honest logs: {many} simulated ones and {len(logs) - many} of seven ships",
         "",
         "Found: the right fault of the right channel is named, alone or as one of these. Accused: another channel is "
         "named alone. By correlations: medians and correlations of pairs, and the right channel is in a pair that "
