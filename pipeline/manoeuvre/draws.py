@@ -52,7 +52,8 @@ class Identified:
     def ships(self, count: int = DRAWS) -> Iterator[Ship]:
         """Draw ships; parameters of effects stay within what is physical."""
         p = self.effects.size
-        seed = int.from_bytes(sha256(f"manoeuvre {self.name}".encode()).digest()[:8], "big")
+        # the same draws for every model: what differs between two is their parameters
+        seed = int.from_bytes(sha256(b"manoeuvre").digest()[:8], "big")
         sequence = qmc.Sobol(6 + p + 4, rng=np.random.Generator(np.random.PCG64(seed)))
         # of the closed unit interval the ends have no normal number
         normal = norm.ppf(np.clip(sequence.random(count), 1e-12, 1.0 - 1e-12))

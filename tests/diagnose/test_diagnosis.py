@@ -149,7 +149,11 @@ def test_what_the_reference_should_see_and_does_not_is_no_effect(
     assert 0.4 < foreseen / float(direction @ direction) < 0.55
     assert found.before.gain > 0.8 * foreseen
     assert not something_left(found.steps, found.before, found.after)
-    assert something_left(found.steps, replace(found.before, gain=0.3 * foreseen), found.after)
+    unseen = replace(found.before, gain=0.3 * foreseen)
+    by_likelihood = (found.steps[0], replace(found.steps[1], stability=None))
+    assert something_left(by_likelihood, unseen, found.after)
+    # what predictions of legs chose is there all the same
+    assert not something_left((found.steps[0], replace(found.steps[1], stability=1.0)), unseen, found.after)
     # a bias of the gyro does nothing that drift, turn, rudder or heading do
     _, quiet = calm
     bias = score(quiet.steps[0].fit, effects.get("gyro_bias"), WORKERS).direction
