@@ -8,20 +8,34 @@ from __future__ import annotations
 
 import hashlib
 import inspect
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from typing import Any
 
+import numba
 import numpy as np
-from numba import njit
 from numba.core import caching, config
 from numba.core.dispatcher import Dispatcher
 
 __all__ = ["FILLING", "STEP", "njit"]
 
 #: for a function that fills arrays and makes none: counting references to them would take longer than its arithmetic
-FILLING: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False}
+FILLING: dict[str, Any] = {
+    **{"cache": True, "nogil": True, "error_model": "numpy", "_nrt": False},
+    "fastmath": {"contract"},
+}
 #: for what runs at every instant: put into its caller, too
 STEP: dict[str, Any] = {**FILLING, "forceinline": True}
+
+
+def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return numba's decorator with every option of the arithmetic decided here.
+
+    Left open, a function takes them from whichever caller is compiled first: its last bits would go with what a
+    process happened to do before.
+    """
+    decided = {"fastmath": False, "error_model": "python"}
+    decorator: Callable[[Callable[..., Any]], Any] = numba.njit(**{**decided, **options})
+    return decorator
 
 
 def _went_in(function: Any) -> str:

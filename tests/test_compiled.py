@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from importlib import import_module
 from pathlib import Path
+from pkgutil import walk_packages
 
 import pytest
+from numba.core.dispatcher import Dispatcher
+
+import kempf.pipeline
 
 INNER = """
 from kempf.pipeline.compiled import njit
@@ -50,3 +55,15 @@ def test_a_change_in_another_file_is_compiled_in(tmp_path: Path, changed: str) -
         assert said(tmp_path, 20.0, 2.0) == (22.0, 0)
     else:
         assert said(tmp_path, 10.0, 3.0) == (13.0, 0)
+
+
+def test_no_kernel_takes_its_arithmetic_from_its_caller() -> None:
+    """numba hands open options from caller to callee, so that what compiles first would decide the last bits."""
+    kernels = {}
+    for module in walk_packages(kempf.pipeline.__path__, "kempf.pipeline."):
+        for name, value in vars(import_module(module.name)).items():
+            if isinstance(value, Dispatcher):
+                kernels[f"{value.__module__}.{name}"] = value.targetoptions
+    assert "kempf.pipeline.estimate.filters.ekf.extended" in kernels
+    left_open = [name for name, options in kernels.items() if "fastmath" not in options or "error_model" not in options]
+    assert left_open == []

@@ -16,11 +16,12 @@ from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, unseen
 from kempf.pipeline.diagnose.confusion_sets import WINDOW, shortlist, undecided
 from kempf.pipeline.diagnose.forward_selection import is_ship
 from kempf.pipeline.diagnose.immaterial import Immaterial, weighed
-from kempf.pipeline.diagnose.ladder import Ladder, Pairs
+from kempf.pipeline.diagnose.ladder import Ladder
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.legs import candidate_in_std
 from kempf.pipeline.diagnose.matters import worsens
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
+from kempf.pipeline.shooting.ahead import Ahead
 from kempf.schemas.effect import Effect
 
 #: how many times its score a refit gains at most, as far as has been seen; a hull bent by what is missing hides much
@@ -50,20 +51,20 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
         if not kept:
             found.steps[-1] = replace(last, refused=(*last.refused, *tried))
             break
-        names = {candidate.effect.name for candidate, _ in kept}
+        pairs = tuple(pair for pair, _ in kept)
+        names = {candidate.effect.name for candidate, _ in pairs}
         worse = tuple(pair for pair in tried if pair[0].effect.name not in names)
-        candidate, confirmation = kept[0]
-        ahead = ladder.ahead(last, candidate.effect)
+        (candidate, confirmation), ahead = kept[0]
         weight = weighed(last.ahead, ahead, ladder.probe, confirmation.fit)
         before, ladder.probe = ladder.probe, confirmation.fit
         if not weight.matters:
-            found.immaterial.append(Immaterial(kept, weight))
+            found.immaterial.append(Immaterial(pairs, weight))
             continue
         if before is not last.fit:
             # the ladder goes on without what is immaterial
             beside = score(last.fit, candidate.effect, ladder.workers)
-            kept = ((beside, ladder.confirmed(last.fit, ladder.unseen(last), beside)), *kept[1:])
-        found.steps.append(ladder.stepped(kept, worse, ahead, None))
+            pairs = ((beside, ladder.confirmed(last.fit, ladder.unseen(last), beside)), *pairs[1:])
+        found.steps.append(ladder.stepped(pairs, worse, ahead, None))
         idle = _idle(found.steps)
         if idle is not None:
             found.steps = ladder.without(idle, found.steps)
@@ -103,17 +104,19 @@ def _refitted(ladder: Ladder, found: Certain) -> list[tuple[Candidate, Confirmat
     return tried
 
 
-def _kept(ladder: Ladder, found: Certain, best: Sequence[tuple[Candidate, Confirmation]]) -> Pairs:
-    """Return those of the best that make no prediction one leg ahead worse."""
+def _kept(
+    ladder: Ladder, found: Certain, best: Sequence[tuple[Candidate, Confirmation]]
+) -> list[tuple[tuple[Candidate, Confirmation], Ahead | None]]:
+    """Return those of the best that make no prediction one leg ahead worse, with the model one leg ahead."""
     last, kept = found.steps[-1], []
-    for candidate, confirmation in best:
-        if last.ahead is not None:
-            ahead = ladder.ahead(last, candidate.effect)
-            if ahead is None or worsens(last.ahead, ahead):
-                found.suspected[candidate.effect.name] = "it makes the prediction one leg ahead worse"
-                continue
-        kept.append((candidate, confirmation))
-    return tuple(kept)
+    for pair in best:
+        effect = pair[0].effect
+        ahead = ladder.ahead(last, effect)
+        if last.ahead is not None and (ahead is None or worsens(last.ahead, ahead)):
+            found.suspected[effect.name] = "it makes the prediction one leg ahead worse"
+        else:
+            kept.append((pair, ahead))
+    return kept
 
 
 def _idle(steps: Sequence[Step]) -> Effect | None:

@@ -175,27 +175,23 @@ class RunFilter:
         withheld: Mask | None,
         still: bool,
     ) -> list[Passed]:
-        run, spec, ship = self.run, self.spec, self.run.ship
+        run, spec = self.run, self.spec
         (n, _), (size, k) = run.measured.shape, x0.shape
         assert size == N_BEFORE + self.model.extra + N_AFTER
         rates = (
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
             *(spec.current_correlation_rate_per_s, run.speed_error_rate_per_s),
         )
-        constants = np.array(
-            [
-                *(ship.arm_per_m, ship.length_m, ship.draught_m, run.approach_m_s, run.approach_per_s),
-                spec.rudder_speed_exponent,
-            ]
-        )
+        rudders = self.model.rudders(run.fine_time_s, run.inputs[:, 1], run.rudder_between, values)
         rows = n if states else 0
         kept = (
             *(np.full((n, 3, k), np.nan), np.full((n, 3, k), np.nan)),
             *(np.empty((rows, size, k)), np.empty((rows, size, k))),
         )
         found = extended(
-            *(hulls, levels, values, run.step_s, run.inputs, self._rudders(values), run.rudder_noise, run.measured),
-            *(run.offset_s, np.zeros(n, dtype=np.bool_) if withheld is None else withheld, run.current_row, constants),
+            *(hulls, levels, values, run.step_s, run.inputs, rudders, run.rudder_noise, run.measured),
+            *(run.offset_s, np.zeros(n, dtype=np.bool_) if withheld is None else withheld, run.current_row),
+            run.constants(spec.rudder_speed_exponent),
             *(np.zeros(4) if still else np.array(rates), x0, P0, self.model.table, kept, lanes),
         )
         predicted, variance, filtered, spread = (np.ascontiguousarray(np.moveaxis(part, -1, 0)) for part in kept)
@@ -203,13 +199,3 @@ class RunFilter:
             Passed(float(found[b]), run.measured - predicted[b], variance[b], predicted[b], filtered[b], spread[b])
             for b in range(k)
         ]
-
-    def _rudders(self, values: Float) -> Float:
-        """Return the rudder as the effects have it for every set of their parameters, shape (rows, k)."""
-        measured = self.run.inputs[:, 1]
-        between = self.run.rudder_between[:, None]
-        if all(effect.rudder_course is None for effect in self.model.effects):
-            return np.repeat(measured[:, None] + between, values.shape[1], axis=1)
-        own, of = np.unique(values, axis=1, return_inverse=True)
-        courses = [self.model.rudder(self.run.fine_time_s, measured, one) for one in own.T]
-        return np.ascontiguousarray((np.stack(courses, axis=-1) + between)[:, of])

@@ -43,7 +43,7 @@ def rates(theta, speed, arm, mu_F, mu_M, A, b):  # type: ignore[no-untyped-def]
     return abs(A[0, 0]) + abs(A[1, 1]) + np.sqrt(abs(A[0, 1] * A[1, 0])) + max(mu_F, mu_M)
 
 
-@njit(**STEP, fastmath={"contract"})
+@njit(**STEP)
 def discretise(  # type: ignore[no-untyped-def]
     A,
     b,

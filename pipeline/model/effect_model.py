@@ -145,3 +145,21 @@ class EffectModel:
             if effect.rudder_course is not None:
                 rudder_rad = RUDDER_COURSES[effect.rudder_course](time_s, rudder_rad, own)
         return rudder_rad
+
+    def rudders(self, time_s: Float, rudder_rad: Float, between: Float, values: Float) -> Float:
+        """Return the rudder as the effects have it for several sets of their parameters, shape (n, k).
+
+        Parameters
+        ----------
+        time_s, rudder_rad : ndarray, shape (n,)
+            Evenly spaced.
+        between : ndarray, shape (n,)
+            What is added to every course, see `kempf.pipeline.estimate.record.grid_run.GridRun.rudder_between`.
+        values : ndarray, shape (p, k)
+            Parameters.
+        """
+        if all(effect.rudder_course is None for effect in self.effects):
+            return np.repeat(rudder_rad[:, None] + between[:, None], values.shape[1], axis=1)
+        own, of = np.unique(values, axis=1, return_inverse=True)
+        courses = [self.rudder(time_s, rudder_rad, one) for one in own.T]
+        return np.ascontiguousarray((np.stack(courses, axis=-1) + between[:, None])[:, of])

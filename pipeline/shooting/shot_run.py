@@ -81,7 +81,7 @@ class ShotRun:
         ndarray, shape (m, 3, k)
             What would be measured, window after window.
         """
-        run, ship = self.windows.run, self.windows.run.ship
+        run = self.windows.run
         k, extra = shared.shape[1], self.model.extra
         many = -(-k // MOST) * MOST
         at = np.minimum(np.arange(many), k - 1)
@@ -90,13 +90,8 @@ class ShotRun:
         x0 = np.zeros((w, N_BEFORE + extra + N_AFTER, many))
         x0[:, :3], x0[:, 3], x0[:, 4] = starts, own[0], own[1]
         x0[:, -3:] = own[None, 2:]
-        constants = np.array(
-            [
-                *(ship.arm_per_m, ship.length_m, ship.draught_m, run.approach_m_s, run.approach_per_s),
-                self.spec.rudder_speed_exponent,
-            ]
-        )
-        rudder = self._rudders(shared[N_HULL:])
+        rudder = self.model.rudders(run.fine_time_s, run.inputs[:, 1], run.rudder_between, shared[N_HULL:])
+        constants = run.constants(self.spec.rudder_speed_exponent)
         found = np.empty((self.windows.rows.size, 3, many))
         for first in range(0, many, MOST):
             lanes = slice(first, first + MOST)
@@ -109,16 +104,6 @@ class ShotRun:
             )
             found[..., lanes] = part
         return found[..., :k]
-
-    def _rudders(self, values: Float) -> Float:
-        """Return the rudder as the effects have it for every set of their parameters, shape (rows, k)."""
-        run = self.windows.run
-        measured, between = run.inputs[:, 1], run.rudder_between[:, None]
-        if all(effect.rudder_course is None for effect in self.model.effects):
-            return np.repeat(measured[:, None] + between, values.shape[1], axis=1)
-        own, of = np.unique(values, axis=1, return_inverse=True)
-        courses = [self.model.rudder(run.fine_time_s, measured, one) for one in own.T]
-        return np.ascontiguousarray((np.stack(courses, axis=-1) + between)[:, of])
 
     def steps(self, at: Unknowns, scale: Float) -> Float:
         """Return the steps of the differences: shared, constants that there are, states; shape (6 + p + d + 3,)."""

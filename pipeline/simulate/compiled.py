@@ -12,4 +12,4 @@ Kernel = TypeVar("Kernel", bound=Callable[..., Any])
 
 def compiled(function: Kernel) -> Kernel:
     """Return ``function`` compiled on its first call and kept on disk; the types of its signature stay."""
-    return cast(Kernel, njit(cache=True, fastmath=False)(function))
+    return cast(Kernel, njit(cache=True, fastmath=False, error_model="python")(function))

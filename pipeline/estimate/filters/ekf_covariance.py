@@ -8,15 +8,11 @@ Most of what couples two states is nothing, and passed over. Every number stands
 
 from __future__ import annotations
 
-from typing import Any
-
-from kempf.pipeline.compiled import FILLING, njit
+from kempf.pipeline.compiled import FILLING, STEP, njit
 from kempf.pipeline.model.batch import each
 
-_ARITHMETIC: dict[str, Any] = {**FILLING, "fastmath": {"contract"}}
 
-
-@njit(**_ARITHMETIC)
+@njit(**FILLING)
 def _couplings(A, live, found, lanes):  # type: ignore[no-untyped-def]
     """Fill ``found`` with which elements of a matrix are anything in any lane."""
     for i in live:
@@ -28,14 +24,14 @@ def _couplings(A, live, found, lanes):  # type: ignore[no-untyped-def]
                     break
 
 
-@njit(**_ARITHMETIC, forceinline=True)
+@njit(**STEP)
 def _add_product(out, i, j, A, k, m, B, p, q, lanes):  # type: ignore[no-untyped-def]
     """Add A[k, m] B[p, q] to out[i, j] in every lane."""
     for b in range(each(lanes)):
         out[i, j, b] += A[k, m, b] * B[p, q, b]
 
 
-@njit(**_ARITHMETIC)
+@njit(**FILLING)
 def exponential(A, h, live, Phi, term, work, coupled, lanes):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
     """Fill Phi with exp(A h) to the fourth order, over the live states; the others stay what they are.
 
@@ -66,7 +62,7 @@ def exponential(A, h, live, Phi, term, work, coupled, lanes):  # type: ignore[no
     _couplings(Phi, live, coupled, lanes)
 
 
-@njit(**_ARITHMETIC)
+@njit(**FILLING)
 def carry_covariance(P, Phi, decay, live, after, W, coupled, lanes):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
     """Let P <- F P F' where F is Phi on the live states and ``decay`` on those after them.
 
@@ -104,7 +100,7 @@ def carry_covariance(P, Phi, decay, live, after, W, coupled, lanes):  # type: ig
                 P[i, j, b] *= decay[i] * decay[j]
 
 
-@njit(**_ARITHMETIC)
+@njit(**FILLING)
 def add_noise(P, A, w, q, h, live, coupled, term, work, node, lanes):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
     """Add to P what white noise of intensity q along w does over h seconds: Simpson's rule on exp(A s) w.
 
@@ -147,7 +143,7 @@ def add_noise(P, A, w, q, h, live, coupled, term, work, node, lanes):  # type: i
                 _add_product(P, i, j, term, i, 0, node, k, j, lanes)
 
 
-@njit(**_ARITHMETIC)
+@njit(**FILLING)
 def mirror(P, live, lanes):  # type: ignore[no-untyped-def]
     """Fill the upper triangle of the live states' covariance from the lower one."""
     for i in live:
@@ -158,7 +154,7 @@ def mirror(P, live, lanes):  # type: ignore[no-untyped-def]
                 P[j, i, b] = P[i, j, b]
 
 
-@njit(**_ARITHMETIC)
+@njit(**FILLING)
 def take_in(x, P, e, precision, gain, weight, states, lanes):  # type: ignore[no-untyped-def]
     """Take in one scalar measurement of innovations e and variances 1 / ``precision``; ``gain`` holds P h.
 

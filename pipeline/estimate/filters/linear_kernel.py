@@ -32,7 +32,7 @@ FASTEST_PER_S = 10.0
 _LOG_2PI = float(np.log(2.0 * np.pi))
 
 
-@njit(**STEP, fastmath={"contract"})
+@njit(**STEP)
 def _advance(  # type: ignore[no-untyped-def]
     x, P, dx, dP, F, g, Q, dF, dE, dg, dQ, derivatives, chain, error, W, dW, dWt, moved, dmoved
 ):
@@ -113,7 +113,7 @@ def _advance(  # type: ignore[no-untyped-def]
             P[c, i] = total
 
 
-@njit(**STEP, fastmath={"contract"})
+@njit(**STEP)
 def _update(  # type: ignore[no-untyped-def]
     y, h, row, noise, level, x, P, dx, dP, withheld, derivatives, score, information, gain, dPh, de, dS, gains, tile
 ):
@@ -188,7 +188,7 @@ def _update(  # type: ignore[no-untyped-def]
     return e, S
 
 
-@njit(**STEP)
+@njit(**{**STEP, "fastmath": False})
 def _gather(  # type: ignore[no-untyped-def]
     states, chain, error, q_delta, gain, Phi, g, held, Q, dPhi, dg, dheld, dQ, F, gs, Qs, dF, dE, dgs, dQs, derivatives
 ):

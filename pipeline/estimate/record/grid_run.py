@@ -108,6 +108,26 @@ class GridRun:
         rudder: Float = self.inputs[::ROWS, 1]
         return rudder
 
+    def constants(self, rudder_speed_exponent: float) -> Float:
+        """Return what the terms may ask of ship and approach, see `kempf.pipeline.estimate.filters.ekf.extended`.
+
+        Parameters
+        ----------
+        rudder_speed_exponent : float
+            See `kempf.schemas.model_spec.ModelSpec`.
+
+        Returns
+        -------
+        ndarray, shape (6,)
+        """
+        ship = self.ship
+        return np.array(
+            [
+                *(ship.arm_per_m, ship.length_m, ship.draught_m, self.approach_m_s, self.approach_per_s),
+                rudder_speed_exponent,
+            ]
+        )
+
     def instants(self) -> Instants:
         """Return the run as the linear filter takes it, every mean at the mean instant of its readings."""
         own, fine = self._own_instants(), self.fine_time_s
