@@ -99,6 +99,8 @@ class Effect(Frozen):
     needs: tuple[_Line, ...] = Field(default=(), validate_default=True)
     #: Canonical channels that show it already: where every run has one of them there is nothing left to look for.
     measured_by: tuple[_Line, ...] = ()
+    #: Whether it is a term of a series in drift and turn: it fits what was sailed, and says nothing beyond that.
+    polynomial: bool = False
     #: confounded_with, separated_by: What looks alike, and the manoeuvre or channel that distinguishes the two.
     confounded_with: _Words = ""
     separated_by: _Words = ""

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.confusion_sets import WINDOW
+from kempf.pipeline.diagnose.joint import better_together
 from kempf.pipeline.diagnose.ladder import Ladder
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.legs import ahead_in_std
 from kempf.pipeline.diagnose.matters import ALIKE, LEAST_FALL, STABLE, better_ahead
 from kempf.pipeline.diagnose.screen import Candidate
-from kempf.pipeline.shooting.ahead import Ahead
+from kempf.pipeline.shooting.ahead import Ahead, ShootingRange
 from kempf.pipeline.shooting.paired import paired
 from kempf.schemas.effect import Effect
 
@@ -26,53 +28,118 @@ Member = tuple[Candidate, Confirmation, Ahead]
 
 
 def predicting_better(ladder: Ladder, steps: list[Step]) -> list[Step]:
-    """Return the ladder with every effect that makes the prediction one leg ahead better.
+    """Return the ladder with every effect that makes the prediction one leg ahead better, alone or with others.
 
     Of two manoeuvres each would have to be predicted by the other alone: too few to choose by.
     """
     if len(steps[0].fit.runs) + len(ladder.held) < _FEWEST:
         return steps
     while ladder.shooting is not None and len(steps) <= ladder.settings.most_steps:
-        last = steps[-1]
-        assert last.ahead is not None
         ladder.announce(f"step {len(steps)}: predicting one leg ahead")
-        # also what disturbances carry one step ahead, so that the likelihood does not see it
-        screened = {c.effect.name: c for c in last.screened if not (c.missing or c.measured_by)}
-        choice = better_ahead(ladder.shooting, last.ahead, [c.effect for c in screened.values()])
-        if choice is None or choice.stability < STABLE:
+        more = _one_more(ladder, ladder.shooting, steps) or _several_more(ladder, ladder.shooting, steps)
+        if not more:
             break
-        alone = ladder.unseen(last)
-        tried: list[Member] = []
-        for ahead in choice.close[:_MEMBERS]:
-            candidate = screened[ahead.model.effects[-1].name]
-            found = ladder.confirmed(last.fit, alone, candidate)
-            if np.isfinite(found.fit.log_likelihood) and not (found.at_bound or found.absent):
-                tried.append((candidate, found, ahead))
-        close = _decided(tried, ladder.shooting.horizon_s)
-        if not close:
-            break
-        pairs = tuple((c, k) for c, k, _ in close)
-        names = {c.effect.name for c, _ in pairs}
-        others = tuple((c, k) for c, k, _ in tried if c.effect.name not in names)
-        steps = [*steps, ladder.stepped(pairs, others, close[0][2], choice.stability)]
-        idle = _idle(ladder, steps)
-        if idle is not None:
-            steps = ladder.without(idle, steps)
+        steps = more
         ladder.probe = steps[-1].fit
     return steps
 
 
-def _decided(tried: Sequence[Member], leg_s: float) -> list[Member]:
-    """Return those of the models that predict alike which the likelihood does not decide between, simplest first."""
+def _testable(step: Step) -> dict[str, Candidate]:
+    """Return what can be tested, also where disturbances carry it one step ahead and the likelihood is blind to it."""
+    return {c.effect.name: c for c in step.screened if not (c.missing or c.measured_by)}
+
+
+def _one_more(ladder: Ladder, shooting: ShootingRange, steps: list[Step]) -> list[Step]:
+    """Return the ladder with the effect that makes predictions better by itself; empty where none does."""
+    last = steps[-1]
+    assert last.ahead is not None
+    testable = _testable(last)
+    choice = better_ahead(shooting, last.ahead, [c.effect for c in testable.values()])
+    if choice is None or choice.stability < STABLE:
+        return []
+    alone = ladder.unseen(last)
+    tried: list[Member] = []
+    for ahead in choice.close[:_MEMBERS]:
+        candidate = testable[ahead.model.effects[-1].name]
+        found = ladder.confirmed(last.fit, alone, candidate)
+        if np.isfinite(found.fit.log_likelihood) and not (found.at_bound or found.absent):
+            tried.append((candidate, found, ahead))
+    steps = _put_on(ladder, shooting, steps, tried, choice.stability)
+    idle = _idle(ladder, steps) if steps else None
+    return steps if idle is None else ladder.without(idle, steps)
+
+
+def _several_more(ladder: Ladder, shooting: ShootingRange, steps: list[Step]) -> list[Step]:
+    """Return the ladder with effects that make predictions better together, a step each; empty where none do."""
+    first = steps[-1]
+    assert first.ahead is not None
+    found = better_together(shooting, first.ahead, [c.effect for c in _testable(first).values()])
+    if found is None or len(steps) + len(found.effects) > ladder.settings.most_steps + 1:
+        return []
+    for effect in found.effects[:-1]:
+        steps = _put_on(ladder, shooting, steps, _members(ladder, steps[-1], [effect]), found.stability)
+        if not steps:
+            return []
+    members = _members(ladder, steps[-1], found.alternatives[:_MEMBERS])
+    steps = _put_on(ladder, shooting, steps, members, found.stability)
+    if not steps:
+        return []
+    several = steps[-len(found.effects) :]
+    names = tuple(step.added.name for step in several if step.added is not None)
+    return [*steps[: -len(several)], *(replace(step, together=names) for step in several)]
+
+
+def _members(ladder: Ladder, last: Step, effects: Sequence[Effect]) -> list[Member]:
+    """Refit a rung by likelihood and by legs with each of several effects; what comes to nothing is left out."""
+    found = []
+    for effect in effects:
+        candidate = _testable(last)[effect.name]
+        confirmation, ahead = ladder.confirmed(last.fit, ladder.unseen(last), candidate), ladder.ahead(last, effect)
+        if ahead is not None and np.isfinite(confirmation.fit.log_likelihood) and not confirmation.at_bound:
+            found.append((candidate, confirmation, ahead))
+    return found
+
+
+def _put_on(
+    ladder: Ladder, shooting: ShootingRange, steps: list[Step], tried: Sequence[Member], stability: float
+) -> list[Step]:
+    """Return the ladder with the one of several that the likelihood prefers; empty where there is none."""
+    close = _decided(shooting, tried)
+    if not close:
+        return []
+    pairs = tuple((c, k) for c, k, _ in close)
+    names = {c.effect.name for c, _ in pairs}
+    others = tuple((c, k) for c, k, _ in tried if c.effect.name not in names)
+    return [*steps, ladder.stepped(pairs, others, close[0][2], stability)]
+
+
+def _decided(shooting: ShootingRange, tried: Sequence[Member]) -> list[Member]:
+    """Return those of the models that predict alike which the likelihood does not decide between, simplest first.
+
+    Where the likelihood's sizes predict legs clearly worse than those fitted to them, the model lacks something that
+    disturbances carry one step ahead, and the likelihood does not choose. Of what is equally simple, a term of a series
+    in drift and turn comes last: in a circle it goes wrong first.
+    """
     if not tried:
         return []
-    _, best, _ = min(tried, key=lambda one: one[1].bic_change)
+    best = min(tried, key=lambda one: one[1].bic_change)[1]
     close = [
         one
         for one in tried
-        if one[1].bic_change <= best.bic_change + WINDOW or ahead_in_std(best.fit, one[1].fit, leg_s) > -ALIKE
+        if one[1].bic_change <= best.bic_change + WINDOW
+        or ahead_in_std(best.fit, one[1].fit, shooting.horizon_s) > -ALIKE
     ]
-    return sorted(close, key=lambda one: (len(one[0].effect.parameters), one[2].left_out.mean, one[0].effect.name))
+    first = min(close, key=lambda one: one[2].left_out.mean)
+    apart = shooting.beside(first[2], first[1].fit).disagrees is not None
+    return sorted(
+        tried if apart else close,
+        key=lambda one: (
+            len(one[0].effect.parameters),
+            apart and one[0].effect.polynomial,
+            one[2].left_out.mean,
+            one[0].effect.name,
+        ),
+    )
 
 
 def _idle(ladder: Ladder, steps: Sequence[Step]) -> Effect | None:

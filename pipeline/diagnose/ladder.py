@@ -84,5 +84,6 @@ class Ladder:
             confirmation = self.confirmed(made[-1].fit, self.unseen(made[-1]), candidate)
             others = tuple(pair for pair in refused if pair[0].effect.name != step.added.name)
             ahead = self.ahead(made[-1], step.added)
-            made.append(self.stepped(((candidate, confirmation),), others, ahead, step.stability))
+            again = self.stepped(((candidate, confirmation),), others, ahead, step.stability)
+            made.append(replace(again, together=tuple(name for name in step.together if name != idle.name)))
         return made

@@ -43,6 +43,8 @@ class Step:
     #: Share of repetitions, each without one manoeuvre, that chose the same set by its prediction one leg ahead; None
     #: where the likelihood chose.
     stability: float | None = None
+    #: Names of the effects that were chosen together with this one, itself among them; empty where it stands alone.
+    together: tuple[str, ...] = ()
 
     @property
     def in_sample_error(self) -> float:
@@ -111,6 +113,7 @@ def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]
     return {
         "step": number,
         "added": None if step.added is None else step.added.name,
+        "together": list(step.together),
         "in_sample_error": step.in_sample_error,
         "held_out_error": step.held_out_error,
         "held_out": {run.name: _rms(run.rms) for run in step.held},

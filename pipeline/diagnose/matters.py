@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.shooting.ahead import Ahead, ShootingRange, at_bound
+from kempf.pipeline.shooting.ahead import Ahead, ShootingRange, at_bounds
 from kempf.pipeline.shooting.paired import Paired, paired
 from kempf.schemas.effect import Effect
 
@@ -22,7 +22,7 @@ FALLS = 3.5
 #: and part of it, below which a fall is of no use to anybody
 LEAST_FALL = 0.05
 #: share of the manoeuvres that must be predicted better
-_MOST = 2.0 / 3.0
+MOST = 2.0 / 3.0
 #: share of the repetitions, each without one manoeuvre, that must choose the same set
 STABLE = 0.9
 #: standard errors within which two models predict alike, and beyond which one is worse
@@ -49,7 +49,7 @@ def falls(before: Ahead, after: Ahead) -> bool:
     return bool(
         found.in_std > FALLS
         and found.falls_by > LEAST_FALL
-        and found.better >= _MOST * found.of
+        and found.better >= MOST * found.of
         and not worsens(before, after)
     )
 
@@ -76,7 +76,7 @@ def better_ahead(shooting: ShootingRange, base: Ahead, effects: Sequence[Effect]
     found = shooting.screened(base, effects)[:_REFITS]
     worth = [effect for foreseen, effect in found if foreseen < (1.0 - LEAST_FALL) * base.fit.cost]
     tried = [made for made in (shooting.with_effect(base, effect) for effect in worth) if made is not None]
-    good = [one for one in tried if not (at_bound(one) or worsens(base, one))]
+    good = [one for one in tried if not (at_bounds(one) or worsens(base, one))]
     if not good:
         return None
     best = min(good, key=lambda one: one.left_out.mean)
@@ -84,7 +84,7 @@ def better_ahead(shooting: ShootingRange, base: Ahead, effects: Sequence[Effect]
         return None
     close = [one for one in good if one is best or _alike(base, best, one)]
     close.sort(key=lambda one: one.left_out.mean)
-    return Choice(tuple(close), _stability(good, close))
+    return Choice(tuple(close), stability_of(good, close))
 
 
 def _alike(base: Ahead, best: Ahead, other: Ahead) -> bool:
@@ -95,7 +95,7 @@ def _alike(base: Ahead, best: Ahead, other: Ahead) -> bool:
     )
 
 
-def _stability(good: Sequence[Ahead], close: Sequence[Ahead]) -> float:
+def stability_of(good: Sequence[Ahead], close: Sequence[Ahead]) -> float:
     """Return the share of repetitions without one manoeuvre each in which the best is one of ``close``."""
     misfits = np.array([one.left_out.misfits for one in good])
     rest = misfits.sum(axis=1, keepdims=True) - misfits

@@ -96,7 +96,8 @@ def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
         if effect.name in members:
             others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
             alike = f"; these data would fit {listed(others)} as well" if others else ""
-            return EffectFinding("present", f"step {number}: {_sized(effect, members[effect.name])}{alike}")
+            size = _stated(diagnosis, step, effect, members[effect.name])
+            return EffectFinding("present", f"step {number}: {size}{alike}")
     for step in diagnosis.imitating:
         for member, confirmation in step.chosen_from:
             if member.effect.name == effect.name:
@@ -161,10 +162,29 @@ def _refusal(confirmation: Confirmation) -> str:
     return "another effect is clearly better"
 
 
+def _stated(diagnosis: Diagnosis, step: Step, effect: Effect, confirmation: Confirmation) -> str:
+    """Return the size of an effect that is claimed, from that fit which predicts better.
+
+    Where parameters fitted to legs predict better than the likelihood's, so do the sizes of effects; those of what
+    could be in the place of an effect are then not given.
+    """
+    ahead = diagnosis.steps[-1].ahead
+    if ahead is None or ahead.disagrees is None:
+        return _sized(effect, confirmation)
+    if step.added is None or effect.name != step.added.name:
+        return effect.title
+    own = [i for i, (of, _) in enumerate(ahead.model.parameters) if of.name == effect.name]
+    std = np.sqrt(np.maximum(np.diag(ahead.fit.covariance), 0.0))[-ahead.fit.values.size :]
+    return f"{_with_size(effect, ahead.fit.values[own], std[own])}, fitted to legs"
+
+
 def _sized(effect: Effect, confirmation: Confirmation) -> str:
     """Return an effect's size with its standard errors, in the units people use."""
     size = len(effect.parameters)
-    values, std = confirmation.fit.values[-size:], confirmation.fit.std[-size:]
+    return _with_size(effect, confirmation.fit.values[-size:], confirmation.fit.std[-size:])
+
+
+def _with_size(effect: Effect, values: Float, std: Float) -> str:
     shown = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, values, std, strict=True)]
     return f"{effect.title}, {', '.join(shown)}"
 
@@ -203,11 +223,12 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     what = verdict(diagnosis)
     for step in diagnosis.steps[1:]:
         (candidate, best), *others = step.chosen_from
-        line = f"{candidate.effect.plain.rstrip('.')}: {_sized(candidate.effect, best)}"
+        line = f"{candidate.effect.plain.rstrip('.')}: {_stated(diagnosis, step, candidate.effect, best)}"
         if others:
             line += f"; the same data would fit {listed([c.effect.title for c, _ in others])}"
             line += f". What distinguishes them: {candidate.effect.separated_by}"
         said.append(line.rstrip(".") + ".")
+    said += _together(diagnosis)
     if len(diagnosis.steps) > 1:
         said += _ahead(diagnosis)
         said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
@@ -240,6 +261,18 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
             terms = "; ".join(f"{term.target}: {term.expression}" for term in diagnosis.after.formula)
             said.append(f"Exploratory, not a finding; a formula to try: {terms}.")
     return said
+
+
+def _together(diagnosis: Diagnosis) -> list[str]:
+    """Say which effects were chosen together, once for every set of them."""
+    titles = {step.added.name: step.added.title for step in diagnosis.steps[1:] if step.added is not None}
+    sets = dict.fromkeys(step.together for step in diagnosis.steps if step.together)
+    words = [listed([titles[name] for name in names]) for names in sets]
+    return [
+        f"{said[:1].upper()}{said[1:]} belong together: each of them alone makes no prediction clearly better. They "
+        "were chosen by manoeuvres left out, and the held-out ones, which had no part in the choice, confirm them."
+        for said in words
+    ]
 
 
 def _ahead(diagnosis: Diagnosis) -> list[str]:

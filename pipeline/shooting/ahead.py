@@ -15,6 +15,7 @@ from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.shooting import shooting_fit
 from kempf.pipeline.shooting.left_out import LeftOut, left_out
+from kempf.pipeline.shooting.normal_equations import NormalEquations
 from kempf.pipeline.shooting.paired import Paired, paired
 from kempf.pipeline.shooting.reduced import Scales
 from kempf.pipeline.shooting.scales import scaled
@@ -136,6 +137,25 @@ class ShootingRange:
         _, shared = min(tried, key=lambda pair: pair[0])
         return self.refitted(model, shared, base)
 
+    def with_effects(self, base: Ahead, effects: Sequence[Effect], shared: Float) -> Ahead:
+        """Fit a model with several effects more.
+
+        Parameters
+        ----------
+        shared : ndarray, shape (6 + p,)
+            Hull and effects to start from.
+        """
+        return self.refitted(EffectModel((*base.model.effects, *effects)), shared, base)
+
+    def linearised(self, base: Ahead, effects: Sequence[Effect]) -> NormalEquations | None:
+        """Return the normal equations of a model with several effects more, none of them there yet."""
+        model = EffectModel((*base.model.effects, *effects))
+        absent = [p.absent for effect in effects for p in effect.parameters]
+        shared = np.concatenate([base.fit.shared, absent])
+        shots = [ShotRun(windows, model, self.spec) for windows in self.fitted]
+        at = [replace(part.at, shared=shared) for part in base.fit.parts]
+        return shooting_fit.linearised(shots, at, self.scales, self.workers)
+
     def without(self, base: Ahead, effect: Effect) -> Ahead:
         """Fit a model with one effect less."""
         at = dict(zip(base.model.names, base.fit.values, strict=True))
@@ -213,8 +233,8 @@ def _sizes(effect: Effect) -> list[Float]:
     return [np.array(size, dtype=np.float64) for size in product(*choices)]
 
 
-def at_bound(ahead: Ahead) -> bool:
-    """Return whether a parameter of the last effect ended at a bound."""
-    last = len(ahead.model.effects[-1].parameters)
+def at_bounds(ahead: Ahead, last: int = 1) -> bool:
+    """Return whether a parameter of the last effects, of one by default, ended at a bound."""
+    own = sum(len(effect.parameters) for effect in ahead.model.effects[-last:])
     low, high = ahead.model.at_bounds(ahead.fit.shared[N_HULL:])
-    return bool(np.any((low | high)[-last:]))
+    return bool(np.any((low | high)[-own:]))

@@ -16,12 +16,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.shooting.normal_equations import NormalEquations, normal_equations
 from kempf.pipeline.shooting.reduced import Reduced, Scales, reduce
 from kempf.pipeline.shooting.shot_run import N_HULL, ShotRun, Unknowns
 
-#: standard deviation of the weak prior of the hull's parameters, parts of those of an ordinary hull of her length
-_HULL_WIDE = 1.0
 _ITERATIONS, _SETTLED = 20, 1e-4
 #: windows over which what is misfitted hangs together
 _LAGS = 3
@@ -60,9 +58,7 @@ class ShootingFit:
     @property
     def information(self) -> Float:
         """Of the shared unknowns, with the prior, shape (6 + p, 6 + p)."""
-        precision, _ = _prior(self.shots[0], self.shared)
-        result: Float = np.sum([part.information for part in self.parts], axis=0) + np.diag(precision)
-        return result
+        return normal_equations(self.shots, self.parts).information
 
     @property
     def covariance(self) -> Float:
@@ -77,8 +73,9 @@ class ShootingFit:
             for lag in range(1, min(_LAGS, part.scores.shape[0] - 1) + 1):
                 both = part.scores[lag:].T @ part.scores[:-lag]
                 spread += (1.0 - lag / (_LAGS + 1.0)) * (both + both.T)
-        scale = np.sqrt(np.diag(self.information))
-        inverse = np.linalg.pinv(self.information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+        information = self.information
+        scale = np.sqrt(np.diag(information))
+        inverse = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
         result: Float = inverse @ spread @ inverse
         return result
 
@@ -118,39 +115,40 @@ def fit(
     """
     at = [replace(own, shared=shared) for own in begin] if begin else [shot.begin(shared) for shot in shots]
     parts = _reduced(shots, at, scales, workers)
-    cost, damping, converged = _cost(shots[0], parts), _DAMPING, False
-    model = shots[0].model
-    low = np.concatenate([np.full(N_HULL, -np.inf), model.low])
-    high = np.concatenate([np.full(N_HULL, np.inf), model.high])
+    here, damping, converged = normal_equations(shots, parts), _DAMPING, False
     for _ in range(iterations):
-        step = _step(shots[0], parts, damping, low, high)
+        step = here.step(damping)
         trial = _reduced(shots, [part.stepped(step) for part in parts], scales, workers)
-        there = _cost(shots[0], trial)
-        if np.isfinite(there) and there <= cost:
-            settled = cost - there < _SETTLED * cost
-            parts, cost, damping = trial, there, max(0.1 * damping, _LEAST_DAMPING)
+        there = normal_equations(shots, trial)
+        if np.isfinite(there.cost) and there.cost <= here.cost:
+            settled = here.cost - there.cost < _SETTLED * here.cost
+            parts, here, damping = trial, there, max(0.1 * damping, _LEAST_DAMPING)
             if settled:
                 converged = True
                 break
         else:
             damping *= 10.0
-            if damping > _MOST_DAMPING or not np.isfinite(cost):
+            if damping > _MOST_DAMPING or not np.isfinite(here.cost):
                 break
-    return ShootingFit(tuple(shots), scales, parts[0].at.shared, tuple(parts), cost, converged)
+    return ShootingFit(tuple(shots), scales, parts[0].at.shared, tuple(parts), here.cost, converged)
+
+
+def linearised(
+    shots: Sequence[ShotRun], at: Sequence[Unknowns], scales: Scales, workers: Executor
+) -> NormalEquations | None:
+    """Return the normal equations at a point; None where a window diverges there."""
+    found = normal_equations(shots, _reduced(shots, at, scales, workers))
+    return found if np.isfinite(found.cost) else None
 
 
 def foreseen(shots: Sequence[ShotRun], at: Sequence[Unknowns], scales: Scales, workers: Executor) -> float | None:
     """Return what the sum of squares would fall to by one step of Gauss-Newton; None where a window diverges."""
-    parts = _reduced(shots, at, scales, workers)
-    cost = _cost(shots[0], parts)
-    if not np.isfinite(cost):
+    here = linearised(shots, at, scales, workers)
+    if here is None:
         return None
-    precision, gradient = _prior(shots[0], at[0].shared)
-    information = np.sum([part.information for part in parts], axis=0) + np.diag(precision)
-    gradient = np.sum([part.gradient for part in parts], axis=0) + gradient
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    step = np.linalg.lstsq(information / np.outer(scale, scale), -gradient / scale, rcond=1e-9)[0] / scale
-    return cost + float(gradient @ step)
+    scale = here.scale
+    step = np.linalg.lstsq(here.information / np.outer(scale, scale), -here.gradient / scale, rcond=1e-9)[0] / scale
+    return here.cost + float(here.gradient @ step)
 
 
 def alone(shot: ShotRun, shared: Float, scales: Scales, begin: Unknowns | None = None) -> tuple[float, Unknowns, Float]:
@@ -179,42 +177,3 @@ def alone(shot: ShotRun, shared: Float, scales: Scales, begin: Unknowns | None =
 
 def _reduced(shots: Sequence[ShotRun], at: Sequence[Unknowns], scales: Scales, workers: Executor) -> list[Reduced]:
     return list(workers.map(lambda pair: reduce(pair[0], pair[1], scales), zip(shots, at, strict=True)))
-
-
-def _prior(shot: ShotRun, shared: Float) -> tuple[Float, Float]:
-    """Return precision and gradient of the prior of the shared parameters, shape (6 + p,) each."""
-    ordinary = mariner_like(shot.windows.run.ship.length_m).array()
-    precision = np.zeros(shared.size)
-    precision[:N_HULL] = 1.0 / (_HULL_WIDE * ordinary) ** 2
-    gradient = np.zeros(shared.size)
-    gradient[:N_HULL] = (shared[:N_HULL] - ordinary) * precision[:N_HULL]
-    return precision, gradient
-
-
-def _cost(shot: ShotRun, parts: Sequence[Reduced]) -> float:
-    precision, gradient = _prior(shot, parts[0].at.shared)
-    away = np.divide(gradient, precision, out=np.zeros_like(gradient), where=precision > 0.0)
-    found = sum(part.cost for part in parts) + float(away @ gradient)
-    return found if np.isfinite(found) else float("inf")
-
-
-def _step(shot: ShotRun, parts: Sequence[Reduced], damping: float, low: Float, high: Float) -> Float:
-    """Return the damped step of the shared parameters within their bounds; what would leave them is put on them."""
-    at = parts[0].at.shared
-    precision, gradient = _prior(shot, at)
-    information = np.sum([part.information for part in parts], axis=0) + np.diag(precision)
-    gradient = np.sum([part.gradient for part in parts], axis=0) + gradient
-    scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
-    A = information / np.outer(scale, scale) + damping * np.eye(at.size)
-    g = gradient / scale
-    step, free = np.zeros(at.size), np.ones(at.size, dtype=bool)
-    for _ in range(at.size):
-        held = step * scale
-        held[free] = 0.0
-        step[free] = np.linalg.lstsq(A[np.ix_(free, free)], -(g + A @ held)[free], rcond=1e-14)[0] / scale[free]
-        out = free & ((at + step < low) | (at + step > high))
-        if not out.any():
-            break
-        step[out] = np.clip(at + step, low, high)[out] - at[out]
-        free &= ~out
-    return step
