@@ -135,8 +135,9 @@ class Predicted:
             "unstable_on_a_straight_course": made.share_unstable,
             "surge": {
                 "time_constant_lengths": float(self.basis.surge.best[0]),
-                "loss_by_yaw_rate": float(self.basis.surge.best[1]),
-                "loss_by_rudder": float(self.basis.surge.best[2]),
+                "loss_by_drift_and_turn": float(self.basis.surge.best[1]),
+                "loss_by_yaw_rate": float(self.basis.surge.best[2]),
+                "loss_by_rudder": float(self.basis.surge.best[3]),
                 "std": [float(x) for x in self.basis.surge.std],
             },
             "rudder_rate_deg_s": {
