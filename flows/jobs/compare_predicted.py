@@ -10,18 +10,23 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.predict_vessel import Predicted
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.series import SECOND_NS
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.manoeuvre.began import Began, began
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.prediction import Figure, predict
 from kempf.pipeline.manoeuvre.pull_out import PullOut
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
+from kempf.pipeline.manoeuvre.ship import Start
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
-from kempf.pipeline.model.chain import F
+from kempf.pipeline.model.chain import F, R, V
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import segments
@@ -81,9 +86,9 @@ def measured_beside(
 ) -> tuple[MeasuredManoeuvre, ...]:
     """Lay the prediction over the measured manoeuvres of the same kind and angles, to both sides.
 
-    Each is predicted with its own side, approach speed and rudder as it was held; a zigzag also in the steady wind that
-    the filter finds, the rudder ordered over at the headings at which it was, so that wind and helmsman are in both
-    numbers.
+    Each is predicted with its own side, with the speed and the turn that it really began with, the shaft speed and the
+    true wind of its log, and the rudder as it was held; a zigzag also in the steady wind that the filter finds, the
+    rudder ordered over at the headings at which it was, so that wind and helmsman are in both numbers.
 
     Parameters
     ----------
@@ -91,7 +96,7 @@ def measured_beside(
         Says which kind and angles.
     """
     asked = predicted.prediction.manoeuvre
-    wanted = [s for s in segments.current(warehouse, predicted.vessel) if _same_order(s, asked)]
+    wanted = [s for s in segments.every(warehouse, predicted.vessel) if _same_order(s, asked)]
     return _all_beside(warehouse, predicted, [(segment, asked) for segment in wanted], progress)
 
 
@@ -109,12 +114,24 @@ def _all_beside(
 ) -> tuple[MeasuredManoeuvre, ...]:
     zigzags = [segment for segment, asked in pairs if isinstance(asked, Zigzag)]
     runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
-    found = []
+    found, logs = [], _Logs(warehouse)
     for done, (segment, asked) in enumerate(pairs):
         progress(done, len(pairs), f"predicting {segment.segment_id}")
-        found.append(_beside(predicted, asked, segment, runs.get(segment.segment_id)))
+        found.append(_beside(predicted, asked, segment, logs.of(segment), runs.get(segment.segment_id)))
     progress(len(pairs), len(pairs), "predicted")
     return tuple(found)
+
+
+class _Logs:
+    """The channels of the log that was read last: manoeuvres come log by log."""
+
+    def __init__(self, warehouse: Warehouse) -> None:
+        self._warehouse, self._ingest = warehouse, ""
+
+    def of(self, segment: Segment) -> Instruments:
+        if segment.ingest_id != self._ingest:
+            self._instruments, self._ingest = channels_of(self._warehouse, segment.ingest_id), segment.ingest_id
+        return self._instruments
 
 
 def _same_order(segment: Segment, asked: Manoeuvre) -> bool:
@@ -142,15 +159,25 @@ def _runs(
     return {run.name: RunFilter(run, model, made.spec) for run in made.runs}
 
 
-def _beside(predicted: Predicted, asked: Manoeuvre, segment: Segment, run: RunFilter | None) -> MeasuredManoeuvre:
+def _beside(
+    predicted: Predicted, asked: Manoeuvre, segment: Segment, log: Instruments, run: RunFilter | None
+) -> MeasuredManoeuvre:
     speed_m_s = float(run.run.approach_m_s if run else segment.detail.get("approach_speed_m_s") or predicted.speed_m_s)
-    force, force_std = _steady_wind(run, predicted) if run else (0.0, 0.0)
+    passed = _passed(run, predicted) if run else None
+    force, force_std = _steady_wind(run, passed) if run and passed else (0.0, 0.0)
+    executes = segment.executes_utc_ns or (segment.start_utc_ns,)
+    seen = began(log, executes[0], segment.end_utc_ns, predicted.basis.scale_m / speed_m_s)
+    if run is not None:
+        seen = replace(seen, start=_start(run, passed, segment))
     held = set(predicted.parameter_set.convergence.get("held_out") or ())
     fitted = segment.segment_id in predicted.parameter_set.segment_ids and segment.segment_id not in held
     sample = "fitted" if fitted else "held_out"
     manoeuvre = _as_sailed(asked, segment)
     arm = run.run.ship.arm_per_m if run else 0.0
-    models = [_on_the_day(one.model, speed_m_s, (force, force_std), arm) for one in predicted.prediction.models]
+    models = [
+        _on_the_day(one.model, predicted, speed_m_s, (force, force_std), arm, _turned(seen, segment))
+        for one in predicted.prediction.models
+    ]
     try:
         basis = predicted.basis
         made = predict(models, manoeuvre, basis.logs, basis.profile.length_m, _DRAWS)
@@ -178,23 +205,59 @@ def _as_sailed(asked: Manoeuvre, segment: Segment) -> Manoeuvre:
     return replace(asked, side=side, rudder_rad=rudder)  # type: ignore[type-var]
 
 
-def _on_the_day(model: Identified, speed_m_s: float, force: tuple[float, float], arm: float) -> Identified:
-    waters = replace(model.waters, approach_m_s=speed_m_s, wind_force_m_s2=force[0], wind_arm_per_m=arm)
-    return replace(model, waters=waters, wind_force_std_m_s2=force[1])
+def _turned(seen: Began, segment: Segment) -> Began:
+    """Return a beginning with the wind counted from the course of the approach."""
+    return replace(seen, wind_from_rad=seen.wind_from_rad - radians(segment.base_heading_deg))
 
 
-def _steady_wind(run: RunFilter, predicted: Predicted) -> tuple[float, float]:
+def _on_the_day(
+    model: Identified, predicted: Predicted, speed_m_s: float, force: tuple[float, float], arm: float, seen: Began
+) -> Identified:
+    kept, (ratio, std) = predicted.basis.kept_m, predicted.basis.surge.settled
+    shaft = seen.shaft_per_s if kept is not None else None
+    waters = replace(
+        model.waters,
+        approach_m_s=speed_m_s,
+        wind_force_m_s2=force[0],
+        wind_arm_per_m=arm,
+        true_wind_m_s=seen.wind_m_s,
+        true_wind_from_rad=seen.wind_from_rad,
+        settled_m_s=None if shaft is None or kept is None else ratio * kept * shaft,
+        start=seen.start,
+    )
+    return replace(model, waters=waters, wind_force_std_m_s2=force[1], settled_std=std / ratio)
+
+
+def _passed(run: RunFilter, predicted: Predicted) -> Passed | None:
+    """Return a manoeuvre passed through the filter of the set, None for a set without noise levels."""
+    levels: Mapping[str, Any] = predicted.parameter_set.convergence.get("levels") or {}
+    if not levels:
+        return None
+    every = np.array(list(levels.values()), dtype=np.float64)
+    own = np.array(levels[run.run.name], dtype=np.float64) if run.run.name in levels else np.mean(every, axis=0)
+    model = predicted.prediction.models[0].model
+    return run.run_filter(model.hull, np.exp(own), model.effects, states=True)
+
+
+def _start(run: RunFilter, passed: Passed | None, segment: Segment) -> Start:
+    """Return with which speed, drift, turn and rudder a zigzag began."""
+    executes = list(segment.detail.get("executes", ()))
+    at = (executes[0]["time_utc_ns"] - run.run.start_utc_ns) / SECOND_NS if executes else 0.0
+    speed = float(np.interp(at, run.run.time_s, run.run.speed_m_s))
+    if passed is None or not np.all(np.isfinite(passed.states)):
+        return Start(forward_m_s=speed)
+    lateral, rate = (float(np.interp(at, run.run.time_s, passed.states[:, i])) for i in (V, R))
+    rudder = radians(float(executes[0]["rudder_before_deg"])) if executes else None
+    return Start(speed, lateral, rate, rudder)
+
+
+def _steady_wind(run: RunFilter, passed: Passed) -> tuple[float, float]:
     """Return the wind force that the filter comes to in a manoeuvre, m/s^2, with its standard error and wandering.
 
     Both are 0 where the model's force is no steady wind.
     """
-    levels: Mapping[str, Any] = predicted.parameter_set.convergence.get("levels") or {}
-    if run.spec.wind == "none" or run.spec.wind_correlation_rate_per_s > _STEADY_PER_S or not levels:
+    if run.spec.wind == "none" or run.spec.wind_correlation_rate_per_s > _STEADY_PER_S:
         return 0.0, 0.0
-    every = np.array(list(levels.values()), dtype=np.float64)
-    own = np.array(levels[run.run.name], dtype=np.float64) if run.run.name in levels else np.mean(every, axis=0)
-    model = predicted.prediction.models[0].model
-    passed = run.run_filter(model.hull, np.exp(own), model.effects, states=True)
     # the first half is what it takes to find it
     late = slice(len(passed.states) // 2, None)
     force, wander = float(np.mean(passed.states[late, F])), float(np.var(passed.states[late, F]))

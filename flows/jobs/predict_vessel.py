@@ -89,6 +89,12 @@ class Basis:
     scale_m: float
 
     @property
+    def kept_m(self) -> float | None:
+        """Way that a turn of the shaft keeps on a straight course, m, as models take it; None without a shaft speed."""
+        logged = [run for run in self.runs.runs if "shaft_speed" in run.channels and run.approach_per_s > 0.0]
+        return float(np.median([run.approach_m_s / run.approach_per_s for run in logged])) if logged else None
+
+    @property
     def approach_m_s(self) -> float:
         """Mean speed of the approaches."""
         return float(np.mean([run.approach_m_s for run in self.runs.runs]))
@@ -277,6 +283,7 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
         scale_m=basis.scale_m,
         rudder_speed_exponent=ship.spec.rudder_speed_exponent,
         day=effects.day if effects is not None else 0.0,
+        shaft_share=1.0 / basis.surge.settled[0] if basis.kept_m is not None else 1.0,
     )
     values = effects.values if effects is not None else np.zeros(0)
     hull, covariance, factor = ship.hull.array(), ship.covariance, 1.0

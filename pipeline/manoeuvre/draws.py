@@ -43,6 +43,8 @@ class Identified:
     fitted_to_legs: bool = False
     #: Standard error of `Waters.wind_force_m_s2`, its wandering included.
     wind_force_std_m_s2: float = 0.0
+    #: Relative standard error of `Waters.settled_m_s`, where it is not the approach's.
+    settled_std: float = 0.0
 
     @property
     def ship(self) -> Ship:
@@ -63,12 +65,15 @@ class Identified:
         # a rate is positive whatever its error
         share = self.rudder_rate.std_rad_s / self.rudder_rate.rad_s
         rate = self.rudder_rate.rad_s * np.exp(share * normal[:, -1])
-        wind = self.wind_force_std_m_s2 * np.random.Generator(np.random.PCG64([seed, 1])).standard_normal(count)
+        of_the_day = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((2, count))
+        wind, settled = self.wind_force_std_m_s2 * of_the_day[0], 1.0 + self.settled_std * of_the_day[1]
         for k in range(count):
             values = np.clip(theta[k, 6:], low, high)
             waters = self.waters
             if wind[k] != 0.0:
                 waters = replace(waters, wind_force_m_s2=waters.wind_force_m_s2 + float(wind[k]))
+            if waters.settled_m_s is not None:
+                waters = replace(waters, settled_m_s=waters.settled_m_s * float(settled[k]))
             yield Ship(waters, theta[k, :6], values, surge[k], float(rate[k]))
 
 

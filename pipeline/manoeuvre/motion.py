@@ -23,7 +23,7 @@ N_TRACK = 9
 SAILED, RAN_AWAY, NEVER_CAME = 0, 1, 2
 #: parts of the ship's vector, `kempf.pipeline.manoeuvre.ship.Ship.vector`
 LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_DRIFT, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE = range(8)
-EXPONENT, SCALE, FORCE, ARM, SETTLED, WIND, WIND_FROM = range(8, 15)
+EXPONENT, SCALE, FORCE, ARM, SETTLED, WIND, WIND_FROM, SHAFT = range(8, 16)
 _TRUE_HEADING = 2 + SYMBOLS.index("K") - CHANNEL
 _RUN_TIME = 2 + SYMBOLS.index("t") - CHANNEL
 _WIND_SPEED, _WIND_ANGLE, _SHAFT, _DEPTH = (2 + SYMBOLS.index(name) - CHANNEL for name in ("U", "gamma", "n", "h"))
@@ -102,7 +102,7 @@ def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignor
     for i in range(p):
         values[PARAMETER + i, 0] = values_of_effects[i]
     # no wind but the steady one, the shaft turning on, deep water, upright; n0 is 1 and V0 the speed of the approach
-    row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = numbers[SETTLED] / numbers[APPROACH], 1e12, day
+    row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = numbers[SHAFT] / numbers[APPROACH], 1e12, day
     ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
     stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))
     return row, ship, width, table, values, slopes, stack, by, total, np.zeros((width, width, 1))
@@ -211,7 +211,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, phases,
 
     Parameters
     ----------
-    numbers : ndarray, shape (15,)
+    numbers : ndarray, shape (16,)
         See the constants of this file.
     hull : ndarray, shape (6, 1)
     effects : ndarray, shape (p,)

@@ -57,6 +57,8 @@ class Waters:
     true_wind_from_rad: float = 0.0
     #: The speed that the shaft keeps on a straight course; that of the approach where she has settled on it.
     settled_m_s: float | None = None
+    #: What effects take for the speed that the shaft keeps, as a share of it: as in the logs they were identified from.
+    shaft_share: float = 1.0
     start: Start = Start()
 
     @property
@@ -81,14 +83,14 @@ class Ship:
 
     @property
     def numbers(self) -> Float:
-        """What the compiled motion reads, shape (15,)."""
+        """What the compiled motion reads, shape (16,)."""
         w, (tau, by_drift, by_rate, by_rudder) = self.waters, self.surge
         share = w.scale_m / w.length_m
         surge = (tau * share, by_drift * share, by_rate * share**2, by_rudder)
         settled = w.approach_m_s if w.settled_m_s is None else w.settled_m_s
         rest = (
             *(self.rudder_rate_rad_s, w.rudder_speed_exponent, w.scale_m, w.wind_force_m_s2, w.wind_arm_per_m),
-            *(settled, w.true_wind_m_s, w.true_wind_from_rad),
+            *(settled, w.true_wind_m_s, w.true_wind_from_rad, settled * w.shaft_share),
         )
         return np.array([w.length_m, w.draught_m, w.approach_m_s, *surge, *rest])
 
