@@ -181,7 +181,6 @@ def _beside(
     try:
         basis = predicted.basis
         made = predict(models, manoeuvre, basis.logs, basis.profile.length_m, _DRAWS)
-        made = made.widened(predicted.own_zigzags.factor if predicted.own_zigzags else 1.0)
     except KempfError as error:
         about = (segment.segment_id, segment.first_side, speed_m_s, force, sample)
         return MeasuredManoeuvre(*about, (), error.message)

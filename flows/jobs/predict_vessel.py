@@ -192,7 +192,7 @@ def predict_vessel(
     made = predict(models, manoeuvre, basis.logs, basis.profile.length_m, count)
     progress(1, 1, "sailed")
     assumed = (*_assumed(request, basis, models, speed), *rivals.remarks)
-    return Predicted(vessel, one, basis, speed, made, assumed, _limits(made, one))
+    return Predicted(vessel, one, basis, speed, made, assumed, limits_of(made, one))
 
 
 def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
@@ -365,7 +365,8 @@ def _assumed(request: PredictRequest, basis: Basis, models: Sequence[Identified]
     return tuple(said)
 
 
-def _limits(made: Prediction, one: ParameterSet) -> tuple[str, ...]:
+def limits_of(made: Prediction, one: ParameterSet) -> tuple[str, ...]:
+    """Return what limits a prediction, sentences."""
     said = []
     if made.no_ships:
         count = made.no_ships + len(made.drawn)

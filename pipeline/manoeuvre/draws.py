@@ -15,12 +15,16 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.manoeuvre.own_zigzags import REFERENCE
 from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
 from kempf.pipeline.manoeuvre.ship import Ship, Waters
 from kempf.pipeline.manoeuvre.surge import SurgeFit
+from kempf.pipeline.model.ship import mariner_like
 
 #: a power of two, as the sequence wants it
 DRAWS = 256
+#: a parameter of the hull that happens to be nothing scatters as if it were this part of an ordinary hull's
+_ORDINARY = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,6 +54,27 @@ class Identified:
     def ship(self) -> Ship:
         """The ship of the estimates."""
         return Ship(self.waters, self.hull, self.effects, self.surge.best, self.rudder_rate.rad_s)
+
+    def scattered(self, share: float) -> Identified:
+        """Return the model with parameters that scatter beside their errors, each by a share of its size."""
+        return replace(self, covariance=self.covariance + np.diag((share * self._sizes) ** 2))
+
+    def scattered_alone(self) -> Identified:
+        """Return the model with parameters that scatter by `REFERENCE` and nothing else that is unsure."""
+        return replace(
+            self,
+            covariance=np.diag((REFERENCE * self._sizes) ** 2),
+            surge=self.surge.sure,
+            rudder_rate=replace(self.rudder_rate, std_rad_s=0.0),
+            wind_force_std_m_s2=0.0,
+            settled_std=0.0,
+        )
+
+    @property
+    def _sizes(self) -> Float:
+        """Sizes of the parameters, shape (6 + p,); of the hull's no less than a part of an ordinary hull's."""
+        ordinary = np.abs(mariner_like(self.waters.scale_m).array())
+        return np.concatenate([np.maximum(np.abs(self.hull), _ORDINARY * ordinary), np.abs(self.effects)])
 
     def ships(self, count: int = DRAWS) -> Iterator[Ship]:
         """Draw ships; parameters of effects stay within what is physical."""

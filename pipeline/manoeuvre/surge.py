@@ -77,6 +77,14 @@ class SurgeFit:
         within = np.einsum("g,gii->i", p, self.covariance) + p @ (self.loss - np.array(means[1:])) ** 2
         return np.sqrt([spread, *within])
 
+    @property
+    def sure(self) -> SurgeFit:
+        """The most probable part alone, without errors."""
+        k = int(np.argmax(self.probability))
+        part = slice(k, k + 1)
+        none = np.zeros_like(self.covariance[part])
+        return replace(self, tau=self.tau[part], probability=np.ones(1), loss=self.loss[part], covariance=none)
+
     def drawn(self, normal: Float) -> Float:
         """Return tau, k_vr, k_r and k_d of draws, shape (n, 4), from standard normal numbers, shape (n, 3)."""
         from scipy.stats import norm
@@ -85,7 +93,7 @@ class SurgeFit:
         found = np.empty((len(normal), 4))
         for i, (k, z) in enumerate(zip(np.minimum(part, self.tau.size - 1), normal[:, 1:], strict=True)):
             # a part has one kind of loss by turning, and at most the rudder's beside it
-            turning = BY_DRIFT if self.covariance[k, BY_DRIFT, BY_DRIFT] > 0.0 else BY_RATE
+            turning = BY_DRIFT if self.loss[k, BY_DRIFT] != 0.0 else BY_RATE
             C = self.covariance[k]
             first = np.sqrt(C[turning, turning])
             along = C[turning, BY_RUDDER] / first if first > 0.0 else 0.0
