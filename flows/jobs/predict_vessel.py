@@ -6,7 +6,7 @@ Nothing is fitted but the speed's equation; what is stored are models that the d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import degrees, isfinite, radians
 from typing import Any, Literal
 
@@ -133,6 +133,7 @@ class Predicted:
                     "no_ships": one.no_ships,
                     "errors_widened": one.model.widened,
                     "fitted_to_legs": one.model.fitted_to_legs,
+                    "brought_to_own_zigzags": one.model.conditioned,
                 }
                 for one in made.models
             ],
@@ -151,7 +152,7 @@ class Predicted:
                 "std": degrees(self.basis.rudder_rate.std_rad_s),
                 "executes": self.basis.rudder_rate.executes,
             },
-            "own_zigzags": None if self.own_zigzags is None else vars(self.own_zigzags),
+            "own_zigzags": None if self.own_zigzags is None else asdict(self.own_zigzags),
             "assumed": list(self.assumed),
             "limits": list(self.limits),
         }

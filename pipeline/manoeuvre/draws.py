@@ -45,6 +45,8 @@ class Identified:
     widened: float = 1.0
     #: Whether the parameters are those fitted to predict legs, see `kempf.pipeline.shooting`, not the likelihood's.
     fitted_to_legs: bool = False
+    #: Whether they were brought to her own overshoots, see `kempf.pipeline.manoeuvre.conditioned`.
+    conditioned: bool = False
     #: Standard error of `Waters.wind_force_m_s2`, its wandering included.
     wind_force_std_m_s2: float = 0.0
     #: Relative standard error of `Waters.settled_m_s`, where it is not the approach's.

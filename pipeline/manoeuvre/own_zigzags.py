@@ -23,6 +23,8 @@ FEWEST = 4
 REFERENCE, MOST = 0.03, 0.25
 #: half the width of a 95 % interval in standard errors; median of the square of a standard normal number
 _HALF, _MEDIAN = 1.96, 0.4549
+#: square of what is missed in units of the errors, median over few overshoots, that is no chance
+_CLEARLY = 1.5
 _HALVINGS = 40
 
 
@@ -38,6 +40,8 @@ class OwnZigzags:
     rms_deg: float
     #: Share of their size by which the parameters scatter beside their errors.
     scatter: float = 0.0
+    #: The same before the parameters were brought to the overshoots of the fitted ones; None where they were not.
+    before: OwnZigzags | None = None
 
     @property
     def sentence(self) -> str:
@@ -48,13 +52,15 @@ class OwnZigzags:
             f"her own {self.zigzags} zigzags: {self.inside} of {self.overshoots} first and second overshoots in the "
             f"interval of the errors, {self.rms_deg:.2g} deg rms off"
         )
+        if self.before is not None:
+            said = f"{said}, after the parameters were brought to the fitted ones ({self.before.rms_deg:.2g} deg before)"
         if self.scatter <= 0.0:
             return said
         most = ", the most that is tried" if self.scatter >= MOST else ""
         return f"{said}; every parameter scatters by {100.0 * self.scatter:.2g} % beside its error for it{most}"
 
 
-def own_zigzags(overshoots: Float, zigzags: int) -> OwnZigzags:
+def held_against(overshoots: Float, zigzags: int) -> OwnZigzags:
     """Return what the intervals of the errors miss.
 
     Parameters
@@ -66,7 +72,7 @@ def own_zigzags(overshoots: Float, zigzags: int) -> OwnZigzags:
 
     Examples
     --------
-    >>> made = own_zigzags(np.array([[10.0, 11.0, 10.8, 11.2]] * 4), 2)
+    >>> made = held_against(np.array([[10.0, 11.0, 10.8, 11.2]] * 4), 2)
     >>> made.inside, made.rms_deg
     (0, 1.0)
     """
@@ -77,8 +83,8 @@ def own_zigzags(overshoots: Float, zigzags: int) -> OwnZigzags:
 
 
 def missed(overshoots: Float) -> bool:
-    """Return whether the intervals hold fewer overshoots than they should."""
-    return len(overshoots) >= FEWEST and _misfit(overshoots, np.zeros(len(overshoots))) > 1.0
+    """Return whether the intervals hold clearly fewer overshoots than they should."""
+    return len(overshoots) >= FEWEST and _misfit(overshoots, np.zeros(len(overshoots))) > _CLEARLY
 
 
 def scatter(overshoots: Float, scattered: Float) -> float:
@@ -87,11 +93,11 @@ def scatter(overshoots: Float, scattered: Float) -> float:
     Parameters
     ----------
     overshoots : ndarray, shape (n, 4)
-        As `own_zigzags` takes them.
+        As `held_against` takes them.
     scattered : ndarray, shape (n, 4)
         The same of ships that scatter by `REFERENCE` and have no other error.
     """
-    if not missed(overshoots):
+    if len(overshoots) < FEWEST or _misfit(overshoots, np.zeros(len(overshoots))) <= 1.0:
         return 0.0
     variance = ((scattered[:, 3] - scattered[:, 2]) / (2.0 * _HALF * REFERENCE)) ** 2
     low, high = 0.0, MOST
