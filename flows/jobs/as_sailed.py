@@ -1,4 +1,4 @@
-"""The measured manoeuvres of a vessel as they were really sailed: how each began, shaft and wind, rudder and headings."""
+"""The measured manoeuvres of a vessel as they were really sailed: beginning, shaft and wind, rudder and headings."""
 
 from __future__ import annotations
 
@@ -86,9 +86,7 @@ def as_sailed(
     return found
 
 
-def _one(
-    predicted: Predicted, asked: Manoeuvre, segment: Segment, log: Instruments, run: RunFilter | None
-) -> AsSailed:
+def _one(predicted: Predicted, asked: Manoeuvre, segment: Segment, log: Instruments, run: RunFilter | None) -> AsSailed:
     speed_m_s = float(run.run.approach_m_s if run else segment.detail.get("approach_speed_m_s") or predicted.speed_m_s)
     passed = _passed(run, predicted) if run else None
     executes = segment.executes_utc_ns or (segment.start_utc_ns,)

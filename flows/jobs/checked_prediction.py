@@ -42,9 +42,7 @@ def predict_checked(
     asked, length_m = made.prediction.manoeuvre, made.basis.profile.length_m
     prediction = predict(models, asked, made.basis.logs, length_m, count)
     after = replace(held_against(_rows(own), len(zigzags)), scatter=share, before=before)
-    return replace(
-        made, prediction=prediction, limits=limits_of(prediction, made.parameter_set), own_zigzags=after
-    )
+    return replace(made, prediction=prediction, limits=limits_of(prediction, made.parameter_set), own_zigzags=after)
 
 
 def _brought(model: Identified, made: Predicted, zigzags: Sequence[AsSailed]) -> Identified:

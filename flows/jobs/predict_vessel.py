@@ -292,7 +292,7 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
     if legs is None:
         factor = _widened(one, waters.model, basis, hull, values, covariance)
     else:
-        hull, values, covariance = legs
+        hull, values, covariance, factor = legs
     return Identified(
         name=one.parameter_set_id,
         waters=waters,
@@ -306,14 +306,21 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
     )
 
 
-def _fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float] | None:
-    """Return hull, effects and covariance of the fit one leg ahead, None where that a step ahead predicts as well."""
+def _fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float, float] | None:
+    """Return hull, effects, covariance and its factor of the fit one leg ahead.
+
+    None where that a step ahead predicts as well. The factor is by how much worse a manoeuvre is predicted that was
+    left out: of few manoeuvres the spread that a covariance is made of is itself fitted away (MacKinnon & White 1985,
+    "Some heteroskedasticity-consistent covariance matrix estimators", Journal of Econometrics 29).
+    """
     ahead = ((one.fit or {}).get("rung") or {}).get("one_leg_ahead")
     if ahead is None or ahead["better_than_one_step"] is None:
         return None
     values = np.array([each["value"] for each in ahead["parameters"].values()], dtype=np.float64)
     covariance = np.array(ahead["covariance"], dtype=np.float64)
-    return (values[:6], values[6:], covariance) if np.all(np.isfinite(covariance)) else None
+    fitted, left = ahead.get("fitted_misfit"), ahead.get("left_out_misfit")
+    factor = float(np.sqrt(max(left / fitted, 1.0))) if fitted and left and np.isfinite(left) else 1.0
+    return (values[:6], values[6:], covariance, factor) if np.all(np.isfinite(covariance)) else None
 
 
 def _widened(
@@ -352,7 +359,12 @@ def _assumed(request: PredictRequest, basis: Basis, models: Sequence[Identified]
                 f"parameters of {model.name} are those fitted to predict legs: the likelihood's, one step ahead, "
                 "predict them worse"
             )
-        if model.widened > _SAID:
+        if model.widened > _SAID and model.fitted_to_legs:
+            said.append(
+                f"errors of {model.name} widened {model.widened:.1f} times: so much worse it predicts a manoeuvre that "
+                "is left out"
+            )
+        elif model.widened > _SAID:
             said.append(
                 f"errors of {model.name} widened {model.widened:.1f} times: over a leg its prediction errors remember, "
                 "as those of a model that lacks something do"

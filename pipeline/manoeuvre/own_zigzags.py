@@ -53,7 +53,9 @@ class OwnZigzags:
             f"interval of the errors, {self.rms_deg:.2g} deg rms off"
         )
         if self.before is not None:
-            said = f"{said}, after the parameters were brought to the fitted ones ({self.before.rms_deg:.2g} deg before)"
+            said = (
+                f"{said}, after the parameters were brought to the fitted ones ({self.before.rms_deg:.2g} deg before)"
+            )
         if self.scatter <= 0.0:
             return said
         most = ", the most that is tried" if self.scatter >= MOST else ""

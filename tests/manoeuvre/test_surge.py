@@ -67,6 +67,7 @@ def test_a_loss_by_drift_and_turn_is_seen_to_be_one_whatever_the_shaft_keeps() -
     assert fit.best[0] == pytest.approx(tau, rel=0.1)
     assert fit.settled[0] == pytest.approx(1.0, abs=0.02)
 
+
 def test_without_turns_the_loss_is_a_guess_and_said_to_be() -> None:
     run = run_of(record_of(speed_loss=0.3))
     measured = run.measured.copy()
