@@ -20,12 +20,14 @@ from kempf.flows.jobs.as_sailed import as_sailed
 from kempf.flows.jobs.checked_prediction import predict_checked
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre, beside, measured_beside
+from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_model
 from kempf.flows.jobs.predict_vessel import Predicted, PredictRequest
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, point
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import parameter_sets, segments
 from kempf.warehouse.store import Warehouse
@@ -46,13 +48,15 @@ class Source:
 def sources(warehouse: Warehouse, vessel: str, spec: ModelSpec | None, named: ModelSpec | None) -> list[Source]:
     """Return the set that a diagnosis ends with, and that of a model whose effects are named by hand."""
     found = []
-    made = diagnose_vessel(warehouse, vessel, spec)[0]
-    last = made.show()["ladder"][-1]["parameter_set_id"]
-    effects = " + ".join(parameter_sets.get(warehouse, last).model_spec["effects"]) or "none"
-    found.append(Source(f"the diagnosis, effects: {effects}", last))
+    plain = spec or default_model_of(warehouse, vessel)
+    ladder = diagnose_vessel(warehouse, vessel, plain)[0].show()["ladder"]
+    effects = (*plain.effects, *(step["added"] for step in ladder if step["added"]))
+    ends = [("the diagnosis", plain.model_copy(update={"effects": effects}))]
     if named is not None:
-        one, _ = store_model(warehouse, choose(warehouse, vessel), named, NONE_OF_ONES_OWN)
-        found.append(Source(f"a model file, effects: {' + '.join(named.effects)}", one.parameter_set_id))
+        ends.append(("a model file", named))
+    for words, model in ends:
+        one, _ = store_model(warehouse, choose(warehouse, vessel), model, NONE_OF_ONES_OWN)
+        found.append(Source(f"{words}, effects: {' + '.join(model.effects) or 'none'}", one.parameter_set_id))
     return found
 
 
@@ -157,9 +161,12 @@ def _of(ship: Ship, spec: ModelSpec | None, named: ModelSpec | None) -> list[str
         measured_ships.take_in(warehouse, ship)
         for source in sources(warehouse, ship.name, spec, named):
             point(warehouse, parameter_sets.get(warehouse, source.set_id))
-            if any(s.kind == "turning_circle" for s in segments.every(warehouse, ship.name)):
-                lines += circles(warehouse, ship.name, source)
-            lines += zigzags(warehouse, ship.name, source)
+            turned = any(s.kind == "turning_circle" for s in segments.every(warehouse, ship.name))
+            for part in ((circles, zigzags) if turned else (zigzags,)):
+                try:
+                    lines += part(warehouse, ship.name, source)
+                except KempfError as error:
+                    lines += [f"### Refused: {part.__name__} by {source.words}", "", error.message, ""]
     return lines
 
 

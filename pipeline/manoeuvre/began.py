@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
 from kempf.pipeline.manoeuvre.ship import Start
 
+Complex = NDArray[np.complex128]
 #: the beginning is read over this part of the time in which she sails her own length, and over no less than that, s
 _PART, _LEAST_S = 0.25, 1.0
 #: instants at which what acts from then on is read
@@ -75,14 +77,15 @@ def _forward(instruments: Instruments, at: Nanoseconds) -> Float:
     return found
 
 
-def _wind(instruments: Instruments, at: Nanoseconds) -> np.ndarray:
+def _wind(instruments: Instruments, at: Nanoseconds) -> Complex:
     """Return the true wind, speed and where it comes from as a complex number (north, east), from either anemometer."""
     speed, direction = (_read(instruments, f"true_wind_{name}", at) for name in ("speed", "direction"))
     if np.isfinite(speed * direction).any():
-        return speed * np.exp(1j * direction)
+        true: Complex = speed * np.exp(1j * direction)
+        return true
     speed, angle = _read(instruments, "wind_speed", at), _read(instruments, "wind_angle", at)
     over_ground = _read(instruments, "speed_over_ground", at)
     way = over_ground * np.exp(1j * _read(instruments, "course_over_ground", at))
     # over the deck comes the true wind and that of her own way, which comes from ahead
-    found: np.ndarray = speed * np.exp(1j * (angle + _read(instruments, "heading", at))) - way
+    found: Complex = speed * np.exp(1j * (angle + _read(instruments, "heading", at))) - way
     return found

@@ -50,7 +50,7 @@ def conditioned(model: Identified, zigzags: Sequence[OwnZigzag]) -> Identified:
     zigzags : sequence of OwnZigzag
         That the model was fitted to, never one that is to judge it.
     """
-    before = np.concatenate([model.hull, model.effects])
+    before: Float = np.concatenate([model.hull, model.effects])
     measured = np.array([value for one in zigzags for value in one.measured.values()])
     if measured.size < _FEWEST:
         return model
@@ -59,8 +59,9 @@ def conditioned(model: Identified, zigzags: Sequence[OwnZigzag]) -> Identified:
     if np.count_nonzero(good) < _FEWEST:
         return model
     times, left = _levels((measured - start)[good], H[good], model.covariance)
-    prior = times**2 * model.covariance
-    theta, spread = before, H[good] @ prior @ H[good].T
+    prior: Float = times**2 * model.covariance
+    theta: Float = before
+    spread: Float = prior
     for _ in range(_ITERATIONS):
         off = measured - _sailed(zigzags, theta)
         H = _slopes(zigzags, theta, model.covariance)
@@ -82,7 +83,7 @@ def _within(model: Identified, theta: Float) -> Float:
 def _gain(H: Float, prior: Float, left: float) -> tuple[Float, Float]:
     """Return how errors of overshoots move the parameters, and their covariance then."""
     whole = H @ prior @ H.T + left**2 * np.eye(len(H))
-    gain: Float = np.linalg.solve(whole, H @ prior).T
+    gain: Float = np.asarray(np.linalg.solve(whole, H @ prior).T, dtype=np.float64)
     spread: Float = prior - gain @ H @ prior
     return gain, 0.5 * (spread + spread.T)
 
