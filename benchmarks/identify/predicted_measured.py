@@ -23,7 +23,7 @@ from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre, beside
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.predict_vessel import Predicted, PredictRequest
+from kempf.flows.jobs.predict_vessel import PredictRequest
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, point
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
@@ -86,7 +86,7 @@ def circles(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
 
 def zigzags(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
     """Return the part of the page with the zigzags of a ship."""
-    made = predict_checked(warehouse, vessel, PredictRequest("turning-circle", source.set_id))
+    made = predict_checked(warehouse, vessel, PredictRequest("zigzag", source.set_id))
     checked = made.own_zigzags
     assert checked is not None
     every = [s for s in segments.current(warehouse, vessel) if s.kind == "zigzag"]
@@ -110,7 +110,7 @@ def zigzags(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
         "",
         *result_page.table(["zigzag", "sample", "first overshoot, deg", "second overshoot, deg"], rows),
         "",
-        *_figures(made),
+        *_calm_circle(warehouse, vessel, source),
     ]
 
 
@@ -130,8 +130,12 @@ def _shares(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
     return lines
 
 
-def _figures(made: Predicted) -> list[str]:
+def _calm_circle(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
     """Return a 35 deg circle in calm water with its intervals: how much the model is worth beyond zigzags."""
+    try:
+        made = predict_checked(warehouse, vessel, PredictRequest("turning-circle", source.set_id))
+    except KempfError as error:
+        return [f"Her circle with 35 deg of rudder is refused: {error.message}", ""]
     rows = []
     for name in _CIRCLE:
         one = made.prediction.figures[name]

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.stats import binom
 
 from kempf.pipeline.channels.series import Float
 
@@ -23,8 +24,8 @@ FEWEST = 4
 REFERENCE, MOST = 0.03, 0.25
 #: half the width of a 95 % interval in standard errors; median of the square of a standard normal number
 _HALF, _MEDIAN = 1.96, 0.4549
-#: square of what is missed in units of the errors, median over few overshoots, that is no chance
-_CLEARLY = 1.5
+#: so improbable is no chance
+_CHANCE = 0.01
 _HALVINGS = 40
 
 
@@ -85,8 +86,12 @@ def held_against(overshoots: Float, zigzags: int) -> OwnZigzags:
 
 
 def missed(overshoots: Float) -> bool:
-    """Return whether the intervals hold clearly fewer overshoots than they should."""
-    return len(overshoots) >= FEWEST and _misfit(overshoots, np.zeros(len(overshoots))) > _CLEARLY
+    """Return whether the intervals hold fewer overshoots than chance lets those that are right hold."""
+    if len(overshoots) < FEWEST:
+        return False
+    off, half = overshoots[:, 0] - overshoots[:, 1], 0.5 * (overshoots[:, 3] - overshoots[:, 2])
+    inside = int(np.sum(np.abs(off) <= np.hypot(half, _HALF * READ_DEG)))
+    return bool(binom.cdf(inside, len(off), 0.95) < _CHANCE)
 
 
 def scatter(overshoots: Float, scattered: Float) -> float:
