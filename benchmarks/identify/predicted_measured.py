@@ -166,7 +166,7 @@ def _of(ship: Ship, spec: ModelSpec | None, named: ModelSpec | None) -> list[str
         for source in sources(warehouse, ship.name, spec, named):
             point(warehouse, parameter_sets.get(warehouse, source.set_id))
             turned = any(s.kind == "turning_circle" for s in segments.every(warehouse, ship.name))
-            for part in ((circles, zigzags) if turned else (zigzags,)):
+            for part in (circles, zigzags) if turned else (zigzags,):
                 try:
                     lines += part(warehouse, ship.name, source)
                 except KempfError as error:

@@ -18,6 +18,8 @@ from kempf.pipeline.manoeuvre.own_zigzags import held_against, missed, scatter
 from kempf.pipeline.manoeuvre.prediction import predict
 from kempf.warehouse.store import Warehouse
 
+_FIRST_TWO = ("overshoots_deg.0", "overshoots_deg.1")
+
 
 def predict_checked(
     warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent, count: int = DRAWS
@@ -41,8 +43,10 @@ def predict_checked(
     models = [one.model.scattered(share) for one in nearer.prediction.models]
     asked, length_m = made.prediction.manoeuvre, made.basis.profile.length_m
     prediction = predict(models, asked, made.basis.logs, length_m, count)
-    after = replace(held_against(_rows(own), len(zigzags)), scatter=share, before=before)
-    return replace(made, prediction=prediction, limits=limits_of(prediction, made.parameter_set), own_zigzags=after)
+    brought = any(one.model.conditioned for one in nearer.prediction.models)
+    after = replace(held_against(_rows(own), len(zigzags)), scatter=share, before=before if brought else None)
+    limits = limits_of(prediction, made.parameter_set)
+    return replace(made, prediction=prediction, limits=limits, own_zigzags=after)
 
 
 def _brought(model: Identified, made: Predicted, zigzags: Sequence[AsSailed]) -> Identified:
@@ -51,9 +55,6 @@ def _brought(model: Identified, made: Predicted, zigzags: Sequence[AsSailed]) ->
         wanted = {name: value for name, value in figures_of(one.segment).items() if name in _FIRST_TWO}
         measured.append(OwnZigzag(one.on_the_day(model, made.basis), one.manoeuvre, wanted))
     return conditioned(model, measured)
-
-
-_FIRST_TWO = ("overshoots_deg.0", "overshoots_deg.1")
 
 
 def _with_models(made: Predicted, changed: Callable[[Identified], Identified]) -> Predicted:
