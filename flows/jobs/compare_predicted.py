@@ -2,35 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass
 from math import radians
 from typing import Any
 
-import numpy as np
-
-from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.as_sailed import AsSailed, as_sailed
 from kempf.flows.jobs.predict_vessel import Predicted
-from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.estimate.filtered import RunFilter
-from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.prediction import Figure, predict
 from kempf.pipeline.manoeuvre.pull_out import PullOut
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
-from kempf.pipeline.model.chain import F
 from kempf.schemas.errors import KempfError
-from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import segments
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
 _KINDS = {TurningCircle: "turning_circle", Zigzag: "zigzag", PullOut: "pull_out", Spiral: "spiral"}
-#: a force that changes faster is no wind that is steady over a manoeuvre
-_STEADY_PER_S = 0.01
 #: ships drawn for each measured manoeuvre
 _DRAWS = 128
 #: rudder angles that differ by less are the same order, deg
@@ -81,9 +72,9 @@ def measured_beside(
 ) -> tuple[MeasuredManoeuvre, ...]:
     """Lay the prediction over the measured manoeuvres of the same kind and angles, to both sides.
 
-    Each is predicted with its own side, approach speed and rudder as it was held; a zigzag also in the steady wind that
-    the filter finds, the rudder ordered over at the headings at which it was, so that wind and helmsman are in both
-    numbers.
+    Each is predicted with its own side, with the speed and the turn that it really began with, the shaft speed and the
+    true wind of its log, and the rudder as it was held; a zigzag also in the steady wind that the filter finds, the
+    rudder ordered over at the headings at which it was, so that wind and helmsman are in both numbers.
 
     Parameters
     ----------
@@ -91,30 +82,16 @@ def measured_beside(
         Says which kind and angles.
     """
     asked = predicted.prediction.manoeuvre
-    wanted = [s for s in segments.current(warehouse, predicted.vessel) if _same_order(s, asked)]
-    return _all_beside(warehouse, predicted, [(segment, asked) for segment in wanted], progress)
+    wanted = [s for s in segments.every(warehouse, predicted.vessel) if _same_order(s, asked)]
+    every = as_sailed(warehouse, predicted, [(segment, asked) for segment in wanted], progress)
+    return tuple(beside(predicted, one) for one in every)
 
 
-def own_zigzags_beside(
-    warehouse: Warehouse, predicted: Predicted, progress: Progress = silent
-) -> tuple[MeasuredManoeuvre, ...]:
-    """Lay predictions over all zigzags of the vessel, whatever their angles, each as `measured_beside` does it."""
+def own_zigzags(warehouse: Warehouse, predicted: Predicted, progress: Progress = silent) -> list[AsSailed]:
+    """Return all zigzags of the vessel, whatever their angles, with their first two overshoots."""
     every = [s for s in segments.current(warehouse, predicted.vessel) if s.kind == "zigzag"]
     pairs = [(s, Zigzag(radians(s.psi0_deg), radians(s.delta0_deg), overshoots=2)) for s in every]
-    return _all_beside(warehouse, predicted, pairs, progress)
-
-
-def _all_beside(
-    warehouse: Warehouse, predicted: Predicted, pairs: Sequence[tuple[Segment, Manoeuvre]], progress: Progress
-) -> tuple[MeasuredManoeuvre, ...]:
-    zigzags = [segment for segment, asked in pairs if isinstance(asked, Zigzag)]
-    runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
-    found = []
-    for done, (segment, asked) in enumerate(pairs):
-        progress(done, len(pairs), f"predicting {segment.segment_id}")
-        found.append(_beside(predicted, asked, segment, runs.get(segment.segment_id)))
-    progress(len(pairs), len(pairs), "predicted")
-    return tuple(found)
+    return as_sailed(warehouse, predicted, pairs, progress)
 
 
 def _same_order(segment: Segment, asked: Manoeuvre) -> bool:
@@ -127,82 +104,25 @@ def _same_order(segment: Segment, asked: Manoeuvre) -> bool:
     return same or isinstance(asked, Spiral)
 
 
-def _runs(
-    warehouse: Warehouse, predicted: Predicted, wanted: list[Segment], progress: Progress
-) -> dict[str, RunFilter]:
-    """Return every zigzag whose log can be used, by its id, under the model of the set."""
-    chosen, names = choose(warehouse, predicted.vessel), {segment.segment_id for segment in wanted}
-    kept = tuple(segment for segment in chosen.segments if segment.segment_id in names)
-    if not kept:
-        return {}
-    logs = {segment.log_id for segment in kept}
-    fewer = replace(chosen, segments=kept, ingests={k: v for k, v in chosen.ingests.items() if k in logs})
-    spec = ModelSpec.model_validate(dict(predicted.parameter_set.model_spec))
-    made, model = assembled(warehouse, fewer, spec, progress), predicted.prediction.models[0].model.waters.model
-    return {run.name: RunFilter(run, model, made.spec) for run in made.runs}
-
-
-def _beside(predicted: Predicted, asked: Manoeuvre, segment: Segment, run: RunFilter | None) -> MeasuredManoeuvre:
-    speed_m_s = float(run.run.approach_m_s if run else segment.detail.get("approach_speed_m_s") or predicted.speed_m_s)
-    force, force_std = _steady_wind(run, predicted) if run else (0.0, 0.0)
-    held = set(predicted.parameter_set.convergence.get("held_out") or ())
-    fitted = segment.segment_id in predicted.parameter_set.segment_ids and segment.segment_id not in held
-    sample = "fitted" if fitted else "held_out"
-    manoeuvre = _as_sailed(asked, segment)
-    arm = run.run.ship.arm_per_m if run else 0.0
-    models = [_on_the_day(one.model, speed_m_s, (force, force_std), arm) for one in predicted.prediction.models]
+def beside(predicted: Predicted, one: AsSailed) -> MeasuredManoeuvre:
+    """Lay a prediction over one manoeuvre."""
+    segment, basis = one.segment, predicted.basis
+    models = [one.on_the_day(each.model, basis) for each in predicted.prediction.models]
+    about = (segment.segment_id, segment.first_side, one.speed_m_s, one.wind_force_m_s2[0], one.sample)
     try:
-        basis = predicted.basis
-        made = predict(models, manoeuvre, basis.logs, basis.profile.length_m, _DRAWS)
-        made = made.widened(predicted.own_zigzags.factor if predicted.own_zigzags else 1.0)
+        made = predict(models, one.manoeuvre, basis.logs, basis.profile.length_m, _DRAWS)
     except KempfError as error:
-        about = (segment.segment_id, segment.first_side, speed_m_s, force, sample)
         return MeasuredManoeuvre(*about, (), error.message)
-    beside = tuple(
+    figures = tuple(
         Beside(name, *_measured(figure), made.figures[name])
-        for name, figure in _figures_of(segment).items()
+        for name, figure in figures_of(segment).items()
         if name in made.figures and _measured(figure)[0] is not None
     )
-    return MeasuredManoeuvre(segment.segment_id, segment.first_side, speed_m_s, force, sample, beside)
+    return MeasuredManoeuvre(*about, figures)
 
 
-def _as_sailed(asked: Manoeuvre, segment: Segment) -> Manoeuvre:
-    side = 1 if segment.first_side == "starboard" else -1
-    rudder = radians(float(segment.detail.get("delta0_measured_deg") or segment.delta0_deg))
-    if isinstance(asked, Zigzag):
-        executes = list(segment.detail.get("executes", ()))[1:]
-        switched = [radians(abs(float(e["heading_deg"]))) for e in executes]
-        return replace(asked, side=side, rudder_rad=rudder, switched_rad=tuple(switched[: asked.overshoots + 1]))
-    if isinstance(asked, Spiral):
-        return replace(asked, rudder_rad=rudder)
-    return replace(asked, side=side, rudder_rad=rudder)  # type: ignore[type-var]
-
-
-def _on_the_day(model: Identified, speed_m_s: float, force: tuple[float, float], arm: float) -> Identified:
-    waters = replace(model.waters, approach_m_s=speed_m_s, wind_force_m_s2=force[0], wind_arm_per_m=arm)
-    return replace(model, waters=waters, wind_force_std_m_s2=force[1])
-
-
-def _steady_wind(run: RunFilter, predicted: Predicted) -> tuple[float, float]:
-    """Return the wind force that the filter comes to in a manoeuvre, m/s^2, with its standard error and wandering.
-
-    Both are 0 where the model's force is no steady wind.
-    """
-    levels: Mapping[str, Any] = predicted.parameter_set.convergence.get("levels") or {}
-    if run.spec.wind == "none" or run.spec.wind_correlation_rate_per_s > _STEADY_PER_S or not levels:
-        return 0.0, 0.0
-    every = np.array(list(levels.values()), dtype=np.float64)
-    own = np.array(levels[run.run.name], dtype=np.float64) if run.run.name in levels else np.mean(every, axis=0)
-    model = predicted.prediction.models[0].model
-    passed = run.run_filter(model.hull, np.exp(own), model.effects, states=True)
-    # the first half is what it takes to find it
-    late = slice(len(passed.states) // 2, None)
-    force, wander = float(np.mean(passed.states[late, F])), float(np.var(passed.states[late, F]))
-    std = float(np.sqrt(wander + np.mean(passed.spread[late, F])))
-    return (force, std) if np.isfinite(force + std) else (0.0, 0.0)
-
-
-def _figures_of(segment: Segment) -> Mapping[str, Any]:
+def figures_of(segment: Segment) -> Mapping[str, Any]:
+    """Return what was measured of a manoeuvre, by the name of its figure."""
     if segment.kind == "zigzag":
         overshoots = segment.detail.get("overshoots", ())
         return {f"overshoots_deg.{o['number'] - 1}": o["beyond_nominal_deg"] for o in overshoots}

@@ -6,7 +6,7 @@ Nothing is fitted but the speed's equation; what is stored are models that the d
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from math import degrees, isfinite, radians
 from typing import Any, Literal
 
@@ -89,6 +89,12 @@ class Basis:
     scale_m: float
 
     @property
+    def kept_m(self) -> float | None:
+        """Way that a turn of the shaft keeps on a straight course, m, as models take it; None without a shaft speed."""
+        logged = [run for run in self.runs.runs if "shaft_speed" in run.channels and run.approach_per_s > 0.0]
+        return float(np.median([run.approach_m_s / run.approach_per_s for run in logged])) if logged else None
+
+    @property
     def approach_m_s(self) -> float:
         """Mean speed of the approaches."""
         return float(np.mean([run.approach_m_s for run in self.runs.runs]))
@@ -127,6 +133,7 @@ class Predicted:
                     "no_ships": one.no_ships,
                     "errors_widened": one.model.widened,
                     "fitted_to_legs": one.model.fitted_to_legs,
+                    "brought_to_own_zigzags": one.model.conditioned,
                 }
                 for one in made.models
             ],
@@ -135,8 +142,9 @@ class Predicted:
             "unstable_on_a_straight_course": made.share_unstable,
             "surge": {
                 "time_constant_lengths": float(self.basis.surge.best[0]),
-                "loss_by_yaw_rate": float(self.basis.surge.best[1]),
-                "loss_by_rudder": float(self.basis.surge.best[2]),
+                "loss_by_drift_and_turn": float(self.basis.surge.best[1]),
+                "loss_by_yaw_rate": float(self.basis.surge.best[2]),
+                "loss_by_rudder": float(self.basis.surge.best[3]),
                 "std": [float(x) for x in self.basis.surge.std],
             },
             "rudder_rate_deg_s": {
@@ -144,7 +152,7 @@ class Predicted:
                 "std": degrees(self.basis.rudder_rate.std_rad_s),
                 "executes": self.basis.rudder_rate.executes,
             },
-            "own_zigzags": None if self.own_zigzags is None else vars(self.own_zigzags),
+            "own_zigzags": None if self.own_zigzags is None else asdict(self.own_zigzags),
             "assumed": list(self.assumed),
             "limits": list(self.limits),
         }
@@ -185,7 +193,7 @@ def predict_vessel(
     made = predict(models, manoeuvre, basis.logs, basis.profile.length_m, count)
     progress(1, 1, "sailed")
     assumed = (*_assumed(request, basis, models, speed), *rivals.remarks)
-    return Predicted(vessel, one, basis, speed, made, assumed, _limits(made, one))
+    return Predicted(vessel, one, basis, speed, made, assumed, limits_of(made, one))
 
 
 def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
@@ -276,6 +284,7 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
         scale_m=basis.scale_m,
         rudder_speed_exponent=ship.spec.rudder_speed_exponent,
         day=effects.day if effects is not None else 0.0,
+        shaft_share=1.0 / basis.surge.settled[0] if basis.kept_m is not None else 1.0,
     )
     values = effects.values if effects is not None else np.zeros(0)
     hull, covariance, factor = ship.hull.array(), ship.covariance, 1.0
@@ -283,7 +292,7 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
     if legs is None:
         factor = _widened(one, waters.model, basis, hull, values, covariance)
     else:
-        hull, values, covariance = legs
+        hull, values, covariance, factor = legs
     return Identified(
         name=one.parameter_set_id,
         waters=waters,
@@ -297,14 +306,21 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
     )
 
 
-def _fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float] | None:
-    """Return hull, effects and covariance of the fit one leg ahead, None where that a step ahead predicts as well."""
+def _fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float, float] | None:
+    """Return hull, effects, covariance and its factor of the fit one leg ahead.
+
+    None where that a step ahead predicts as well. The factor is by how much worse a manoeuvre is predicted that was
+    left out: of few manoeuvres the spread that a covariance is made of is itself fitted away (MacKinnon & White 1985,
+    "Some heteroskedasticity-consistent covariance matrix estimators", Journal of Econometrics 29).
+    """
     ahead = ((one.fit or {}).get("rung") or {}).get("one_leg_ahead")
     if ahead is None or ahead["better_than_one_step"] is None:
         return None
     values = np.array([each["value"] for each in ahead["parameters"].values()], dtype=np.float64)
     covariance = np.array(ahead["covariance"], dtype=np.float64)
-    return (values[:6], values[6:], covariance) if np.all(np.isfinite(covariance)) else None
+    fitted, left = ahead.get("fitted_misfit"), ahead.get("left_out_misfit")
+    factor = float(np.sqrt(max(left / fitted, 1.0))) if fitted and left and np.isfinite(left) else 1.0
+    return (values[:6], values[6:], covariance, factor) if np.all(np.isfinite(covariance)) else None
 
 
 def _widened(
@@ -343,7 +359,12 @@ def _assumed(request: PredictRequest, basis: Basis, models: Sequence[Identified]
                 f"parameters of {model.name} are those fitted to predict legs: the likelihood's, one step ahead, "
                 "predict them worse"
             )
-        if model.widened > _SAID:
+        if model.widened > _SAID and model.fitted_to_legs:
+            said.append(
+                f"errors of {model.name} widened {model.widened:.1f} times: so much worse it predicts a manoeuvre that "
+                "is left out"
+            )
+        elif model.widened > _SAID:
             said.append(
                 f"errors of {model.name} widened {model.widened:.1f} times: over a leg its prediction errors remember, "
                 "as those of a model that lacks something do"
@@ -357,7 +378,8 @@ def _assumed(request: PredictRequest, basis: Basis, models: Sequence[Identified]
     return tuple(said)
 
 
-def _limits(made: Prediction, one: ParameterSet) -> tuple[str, ...]:
+def limits_of(made: Prediction, one: ParameterSet) -> tuple[str, ...]:
+    """Return what limits a prediction, sentences."""
     said = []
     if made.no_ships:
         count = made.no_ships + len(made.drawn)

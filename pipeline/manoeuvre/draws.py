@@ -15,12 +15,16 @@ import numpy as np
 from scipy.stats import norm, qmc
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.manoeuvre.own_zigzags import REFERENCE
 from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
 from kempf.pipeline.manoeuvre.ship import Ship, Waters
 from kempf.pipeline.manoeuvre.surge import SurgeFit
+from kempf.pipeline.model.ship import mariner_like
 
 #: a power of two, as the sequence wants it
 DRAWS = 256
+#: a parameter of the hull that happens to be nothing scatters as if it were this part of an ordinary hull's
+_ORDINARY = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,13 +45,38 @@ class Identified:
     widened: float = 1.0
     #: Whether the parameters are those fitted to predict legs, see `kempf.pipeline.shooting`, not the likelihood's.
     fitted_to_legs: bool = False
+    #: Whether they were brought to her own overshoots, see `kempf.pipeline.manoeuvre.conditioned`.
+    conditioned: bool = False
     #: Standard error of `Waters.wind_force_m_s2`, its wandering included.
     wind_force_std_m_s2: float = 0.0
+    #: Relative standard error of `Waters.settled_m_s`, where it is not the approach's.
+    settled_std: float = 0.0
 
     @property
     def ship(self) -> Ship:
         """The ship of the estimates."""
         return Ship(self.waters, self.hull, self.effects, self.surge.best, self.rudder_rate.rad_s)
+
+    def scattered(self, share: float) -> Identified:
+        """Return the model with parameters that scatter beside their errors, each by a share of its size."""
+        return replace(self, covariance=self.covariance + np.diag((share * self._sizes) ** 2))
+
+    def scattered_alone(self) -> Identified:
+        """Return the model with parameters that scatter by `REFERENCE` and nothing else that is unsure."""
+        return replace(
+            self,
+            covariance=np.diag((REFERENCE * self._sizes) ** 2),
+            surge=self.surge.sure,
+            rudder_rate=replace(self.rudder_rate, std_rad_s=0.0),
+            wind_force_std_m_s2=0.0,
+            settled_std=0.0,
+        )
+
+    @property
+    def _sizes(self) -> Float:
+        """Sizes of the parameters, shape (6 + p,); of the hull's no less than a part of an ordinary hull's."""
+        ordinary = np.abs(mariner_like(self.waters.scale_m).array())
+        return np.concatenate([np.maximum(np.abs(self.hull), _ORDINARY * ordinary), np.abs(self.effects)])
 
     def ships(self, count: int = DRAWS) -> Iterator[Ship]:
         """Draw ships; parameters of effects stay within what is physical."""
@@ -63,12 +92,15 @@ class Identified:
         # a rate is positive whatever its error
         share = self.rudder_rate.std_rad_s / self.rudder_rate.rad_s
         rate = self.rudder_rate.rad_s * np.exp(share * normal[:, -1])
-        wind = self.wind_force_std_m_s2 * np.random.Generator(np.random.PCG64([seed, 1])).standard_normal(count)
+        of_the_day = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((2, count))
+        wind, settled = self.wind_force_std_m_s2 * of_the_day[0], 1.0 + self.settled_std * of_the_day[1]
         for k in range(count):
             values = np.clip(theta[k, 6:], low, high)
             waters = self.waters
             if wind[k] != 0.0:
                 waters = replace(waters, wind_force_m_s2=waters.wind_force_m_s2 + float(wind[k]))
+            if waters.settled_m_s is not None:
+                waters = replace(waters, settled_m_s=waters.settled_m_s * float(settled[k]))
             yield Ship(waters, theta[k, :6], values, surge[k], float(rate[k]))
 
 

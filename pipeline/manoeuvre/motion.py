@@ -1,7 +1,7 @@
 """The mean motion of a ship of eq. (16) with effects, with her speed and her track, compiled.
 
 The lateral motion is that of `pipeline.model.dynamics`, by which the filter moves: no effect is written out again. The
-speed is `pipeline.manoeuvre.surge`'s. There is no wave or current, nothing random, and no wind but a steady force.
+speed is `pipeline.manoeuvre.surge`'s. There is no wave or current, nothing random, and no wind but a steady one.
 """
 
 from __future__ import annotations
@@ -22,11 +22,11 @@ N_TRACK = 9
 #: how a manoeuvre ended
 SAILED, RAN_AWAY, NEVER_CAME = 0, 1, 2
 #: parts of the ship's vector, `kempf.pipeline.manoeuvre.ship.Ship.vector`
-LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE, EXPONENT, SCALE, FORCE, ARM = range(
-    11
-)
+LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_DRIFT, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE = range(8)
+EXPONENT, SCALE, FORCE, ARM, SETTLED, WIND, WIND_FROM, SHAFT = range(8, 16)
 _TRUE_HEADING = 2 + SYMBOLS.index("K") - CHANNEL
 _RUN_TIME = 2 + SYMBOLS.index("t") - CHANNEL
+_WIND_SPEED, _WIND_ANGLE, _SHAFT, _DEPTH = (2 + SYMBOLS.index(name) - CHANNEL for name in ("U", "gamma", "n", "h"))
 #: a crossing is found to this part of a step
 _HALVINGS = 48
 #: she is no ship any more: this share of the approach speed is left; v / V; r L / V. Hulls reach 0.8 and 1.3
@@ -35,15 +35,26 @@ _ROUNDS = 40
 
 
 @njit(**FILLING)
+def _kept(numbers, v, r, rudder):  # type: ignore[no-untyped-def]
+    """Return the forward speed that thrust and resistance keep with this drift, turn and rudder, m/s."""
+    unit, settled = numbers[LENGTH] / numbers[SETTLED], numbers[SETTLED]
+    lost = numbers[LOSS_BY_RATE] * (unit * r) ** 2 + numbers[LOSS_BY_RUDDER] * rudder * rudder
+    return settled * (1.0 + numbers[LOSS_BY_DRIFT] * unit * r * v / settled - lost)
+
+
+@njit(**FILLING)
 def rates(x, s, rudder, sea, numbers, fx, fs):  # type: ignore[no-untyped-def]
     """Fill dx/dt of the lateral states, and d(V, north, east, path)/dt."""
     row, ship, width, table, values, slopes, stack, by, total, J = sea
     row[0], row[_TRUE_HEADING] = s[0], x[PSI, 0]
+    if numbers[WIND] > 0.0:
+        # where the air over the deck comes from, clockwise from the bow
+        away = numbers[WIND_FROM] - x[PSI, 0]
+        ahead, abeam = numbers[WIND] * np.cos(away) + s[0], numbers[WIND] * np.sin(away) + x[V, 0]
+        row[_WIND_SPEED], row[_WIND_ANGLE] = np.hypot(ahead, abeam), np.arctan2(abeam, ahead)
     dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, fx, J, ONE)
-    length, approach = numbers[LENGTH], numbers[APPROACH]
-    turn = length * x[R, 0] / approach
-    settled = 1.0 - numbers[LOSS_BY_RATE] * turn * turn - numbers[LOSS_BY_RUDDER] * rudder[0] * rudder[0]
-    fs[0] = (approach * settled - s[0]) * approach / (numbers[TIME_LENGTHS] * length)
+    length, settled = numbers[LENGTH], numbers[SETTLED]
+    fs[0] = (_kept(numbers, x[V, 0], x[R, 0], rudder[0]) - s[0]) * settled / (numbers[TIME_LENGTHS] * length)
     # the speed that effects make of the logged one is the one that she has
     u, v, cosine, sine = values[SPEED, 0], x[V, 0], np.cos(x[PSI, 0]), np.sin(x[PSI, 0])
     fs[1], fs[2], fs[3] = u * cosine - v * sine, u * sine + v * cosine, np.hypot(u, v)
@@ -90,8 +101,8 @@ def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignor
     values[SHIP + 8, 0], values[SHIP + 9, 0] = numbers[APPROACH], 1.0
     for i in range(p):
         values[PARAMETER + i, 0] = values_of_effects[i]
-    # wind speed and angle 0, shaft as on the approach, deep water, upright
-    row[4], row[5], row[_RUN_TIME + 1] = 1.0, 1e12, day
+    # no wind but the steady one, the shaft turning on, deep water, upright; n0 is 1 and V0 the speed of the approach
+    row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = numbers[SHAFT] / numbers[APPROACH], 1e12, day
     ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
     stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))
     return row, ship, width, table, values, slopes, stack, by, total, np.zeros((width, width, 1))
@@ -131,8 +142,7 @@ def balanced(numbers, hull, effects, day, table, extra, given, rate_given, start
             if column > 0:
                 moved[column - 1] += 1e-6 * scale[column - 1]
             r, delta = (given, moved[1]) if rate_given else (moved[1], given)
-            turn = L * r / V0
-            s[0] = V0 * (1.0 - numbers[LOSS_BY_RATE] * turn**2 - numbers[LOSS_BY_RUDDER] * delta**2)
+            s[0] = _kept(numbers, moved[0], r, delta)
             x[V, 0], x[R, 0], x[F, 0], rudder[0] = moved[0], r, numbers[FORCE], delta
             x[N_BEFORE:, 0] = moved[2:]
             rates(x, s, rudder, sea, numbers, fx, fs)
@@ -156,8 +166,7 @@ def balanced(numbers, hull, effects, day, table, extra, given, rate_given, start
             break
     start[:] = z
     r, delta = (given, z[1]) if rate_given else (z[1], given)
-    turn = L * r / V0
-    u = V0 * (1.0 - numbers[LOSS_BY_RATE] * turn**2 - numbers[LOSS_BY_RUDDER] * delta**2)
+    u = _kept(numbers, z[0], r, delta)
     return u, largest < 1e-7 and u > _SLOWEST * V0
 
 
@@ -197,12 +206,12 @@ def _step(x, s, begun, before, speed, h, t, sea, numbers, gear, held, room, xn, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s, track, ends):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one loop
-    """Sail a manoeuvre from a steady straight course on.
+def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, phases, step_s, track, ends):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one loop
+    """Sail a manoeuvre, from a steady straight course on or as it really began.
 
     Parameters
     ----------
-    numbers : ndarray, shape (11,)
+    numbers : ndarray, shape (16,)
         See the constants of this file.
     hull : ndarray, shape (6, 1)
     effects : ndarray, shape (p,)
@@ -211,6 +220,8 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s
         Of the effects: see `kempf.pipeline.manoeuvre.ship.Waters`.
     kinds, sizes : ndarray, shape (m,)
         See `kempf.pipeline.manoeuvre.helm.pass_through`.
+    start : ndarray, shape (4,)
+        Forward and lateral speed, m/s, yaw rate, rad/s, and rudder, rad, to begin with; NaN: as on a straight course.
     phases : ndarray, shape (q, 4)
         Rudder order, rad (NaN: the one that holds a straight course); side (+1, -1) to which the heading has to pass
         the target that ends the phase, 0 for none; target, rad; longest duration, s.
@@ -240,12 +251,19 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, phases, step_s
     straight = rest[1]
     x[V, 0], x[F, 0], s[0] = rest[0], numbers[FORCE], numbers[APPROACH]
     x[N_BEFORE:, 0] = rest[2:]
-    out, gone = np.full(m, straight), np.zeros(m)
+    if not np.isnan(start[0]):
+        s[0] = start[0]
+    if not np.isnan(start[1]):
+        x[V, 0] = start[1]
+    if not np.isnan(start[2]):
+        x[R, 0] = start[2]
+    reading = straight if np.isnan(start[3]) else start[3]
+    out, gone = np.full(m, reading), np.zeros(m)
     past = np.zeros((2 * m, track.shape[0] if np.any(kinds == DEAD_TIME) else 1))
-    past[1::2, 0] = straight
+    past[1::2, 0] = reading
     gear = (kinds, sizes, out, np.zeros(m), gone, past, np.zeros(3))
-    reading, begun, t, n = straight, straight, 0.0, 1
-    room[8][0] = straight
+    begun, t, n = reading, 0.0, 1
+    room[8][0] = reading
     rates(x, s, room[8], sea, numbers, room[0], room[4])
     _record(track[0], t, x, s, reading, sea)
     limit, V0, scale = numbers[RUDDER_RATE], numbers[APPROACH], numbers[SCALE]

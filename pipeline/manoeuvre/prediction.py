@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -25,13 +25,6 @@ class Figure:
     value: float | None
     low: float | None
     high: float | None
-
-    def widened(self, factor: float) -> Figure:
-        """Return it with its interval wider by a factor about the value."""
-        if self.value is None or self.low is None or self.high is None:
-            return self
-        low, high = (self.value + factor * (end - self.value) for end in (self.low, self.high))
-        return Figure(self.value, min(low, self.low), max(high, self.high))
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,8 +57,6 @@ class Prediction:
     models: tuple[OfModel, ...]
     extrapolated: tuple[Beyond, ...]
     imo: tuple[Judged, ...]
-    #: Of the profile.
-    length_m: float | None
 
     @property
     def sailed(self) -> Sailed:
@@ -83,18 +74,6 @@ class Prediction:
     def no_ships(self) -> int:
         """How many draws are no ships."""
         return sum(one.no_ships for one in self.models)
-
-    def widened(self, factor: float) -> Prediction:
-        """Return it with every interval wider by a factor about its value, and the probabilities that follow."""
-        if factor == 1.0:
-            return self
-        wide = {name: figure.widened(factor) for name, figure in self.figures.items()}
-        samples = {
-            name: self.sailed.figures[name] + factor * (values - self.sailed.figures[name])
-            for name, values in _samples(self.models).items()
-        }
-        waters, length = self.models[0].model.waters, self.length_m
-        return replace(self, figures=wide, imo=judge(self.manoeuvre, samples, length, waters.approach_m_s))
 
     @property
     def share_unstable(self) -> float:
@@ -140,7 +119,6 @@ def predict(
         made,
         beyond(first.reach, logs),
         judge(manoeuvre, samples, length_m, speed),
-        length_m,
     )
 
 

@@ -19,6 +19,21 @@ _MOST_ROWS = 40_000
 
 
 @dataclass(frozen=True)
+class Start:
+    """How a manoeuvre begins where it does not from a steady straight course; None is as on one."""
+
+    forward_m_s: float | None = None
+    lateral_m_s: float | None = None
+    yaw_rate_rad_s: float | None = None
+    rudder_rad: float | None = None
+
+    def vector(self) -> Float:
+        """Return it as the compiled motion reads it, shape (4,)."""
+        parts = (self.forward_m_s, self.lateral_m_s, self.yaw_rate_rad_s, self.rudder_rad)
+        return np.array([np.nan if part is None else part for part in parts], dtype=np.float64)
+
+
+@dataclass(frozen=True)
 class Waters:
     """What is the same for all ships of a model."""
 
@@ -36,6 +51,15 @@ class Waters:
     #: wind_force_m_s2, wind_arm_per_m: A steady wind, F and l of eq. (16); none unless one is to be compared with.
     wind_force_m_s2: float = 0.0
     wind_arm_per_m: float = 0.0
+    #: true_wind_m_s, true_wind_from_rad: A steady wind for effects that ask for it; from where, clockwise from the
+    #: course of the approach.
+    true_wind_m_s: float = 0.0
+    true_wind_from_rad: float = 0.0
+    #: The speed that the shaft keeps on a straight course; that of the approach where she has settled on it.
+    settled_m_s: float | None = None
+    #: What effects take for the speed that the shaft keeps, as a share of it: as in the logs they were identified from.
+    shaft_share: float = 1.0
+    start: Start = Start()
 
     @property
     def own_time_s(self) -> float:
@@ -52,17 +76,22 @@ class Ship:
     hull: Float
     #: Shape (p,). Parameters of the effects.
     effects: Float
-    #: Shape (3,). Time constant of the speed in lengths `Waters.scale_m`, loss by (scale r / V0)^2, loss by delta^2.
+    #: Shape (4,). Time constant of the speed in lengths `Waters.scale_m`, loss by -scale v r / V_s^2, by
+    #: (scale r / V_s)^2 and by delta^2.
     surge: Float
     rudder_rate_rad_s: float
 
     @property
     def numbers(self) -> Float:
-        """What the compiled motion reads, shape (11,)."""
-        w, (tau, by_rate, by_rudder) = self.waters, self.surge
+        """What the compiled motion reads, shape (16,)."""
+        w, (tau, by_drift, by_rate, by_rudder) = self.waters, self.surge
         share = w.scale_m / w.length_m
-        surge = (tau * share, by_rate * share**2, by_rudder)
-        rest = (self.rudder_rate_rad_s, w.rudder_speed_exponent, w.scale_m, w.wind_force_m_s2, w.wind_arm_per_m)
+        surge = (tau * share, by_drift * share, by_rate * share**2, by_rudder)
+        settled = w.approach_m_s if w.settled_m_s is None else w.settled_m_s
+        rest = (
+            *(self.rudder_rate_rad_s, w.rudder_speed_exponent, w.scale_m, w.wind_force_m_s2, w.wind_arm_per_m),
+            *(settled, w.true_wind_m_s, w.true_wind_from_rad, settled * w.shaft_share),
+        )
         return np.array([w.length_m, w.draught_m, w.approach_m_s, *surge, *rest])
 
     @property
@@ -91,7 +120,8 @@ class Ship:
         track, ends = np.empty((_MOST_ROWS, motion.N_TRACK)), np.full(len(phases), -1, dtype=np.int64)
         step = self.waters.own_time_s / steps_a_length
         how, rows = motion.sail(
-            *self._shared(), kinds, sizes, np.ascontiguousarray(phases, dtype=np.float64), step, track, ends
+            *(*self._shared(), kinds, sizes, self.waters.start.vector()),
+            *(np.ascontiguousarray(phases, dtype=np.float64), step, track, ends),
         )
         return Track(track[:rows].copy(), ends, int(how))
 

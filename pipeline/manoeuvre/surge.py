@@ -1,20 +1,24 @@
 """The speed of a ship in a turn, identified from what her log showed in the manoeuvres.
 
-    dV/dt = (V_0 (1 - k_r (L r / V_a)^2 - k_d delta^2) - V) V_a / (tau L)
+    dV/dt = (V_0 (1 + k_vr L v r / V_s^2 - k_r (L r / V_s)^2 - k_d delta^2) - V) V_s / (tau L)
 
-V_0 is the speed at which thrust and resistance balance on a straight course, V_a that of the approach, tau the time in
-ship lengths in which she finds it, k_r and k_d what turn and rudder cost of it in the long run, without a dimension.
-Both kinds of loss are in Norrbin (1971), "Theory and observations on the use of a mathematical model for ship
-manoeuvring in deep and confined waters", SSPA publication 68; the loss by v r is in k_r, as drift goes with turn.
+V_s is the speed that the shaft keeps on a straight course, V_0 that of one manoeuvre, tau the time in ship lengths in
+which she finds it; the rest is what turn and rudder cost of it in the long run, without a dimension. Thrust falls and
+resistance rises with the speed, so that their difference is close to a straight line down to half of it. A ship that
+drifts while she turns loses by the momentum of her sideways motion, (m + m_y) v r / (m + m_x), and regains some of it
+by X_vr: k_vr / tau is 1 to 1.6 (Yasukawa & Yoshimura 2015, "Introduction of MMG standard method for ship maneuvering
+predictions", J. Mar. Sci. Technol. 20; Norrbin 1971, "Theory and observations on the use of a mathematical model for
+ship manoeuvring in deep and confined waters", SSPA publication 68). Where no lateral speed was measured, or where the
+log shows it better, the loss goes by the yaw rate alone, as drift goes with turn.
 
-For a given tau all else enters linearly. So tau is gone through on a grid, and at each value the rest is a linear
-regression with priors: the posterior is exact but for the grid, and needs no start.
+For a given tau and one of both forms all else enters linearly. So tau is gone through on a grid, and at each value the
+rest is a linear regression with priors: the posterior is exact but for the grid, and needs no start.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.linalg import inv, lstsq, slogdet
@@ -26,12 +30,15 @@ from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 #: of tau: ships come back to their speed in some lengths to some dozens of them; median, and its logarithm's spread
 TAU_MEDIAN, TAU_SPREAD = 8.0, 0.7
-#: of k_r: with (L r / V_a)^2 of 0.1 to 0.2 in a hard turn a loss of 20 to 60 %; of k_d: 0.4 rad cost some percent
-LOSS_MEAN, LOSS_STD = np.array([2.0, 0.3]), np.array([2.0, 0.3])
-#: of V_0 about the speed of the approach, as a share of it
-_SETTLED_STD = 0.03
+#: of k_vr / tau, of k_r and of k_d: with (L r / V)^2 of 0.1 to 0.2 in a hard turn a loss of 20 to 60 %; 0.4 rad of
+#: rudder cost some percent
+LOSS_MEAN, LOSS_STD = np.array([1.3, 2.0, 0.3]), np.array([0.6, 2.0, 0.3])
+#: the kinds of loss: by drift and turn, by turn alone, by the rudder
+BY_DRIFT, BY_RATE, BY_RUDDER = range(3)
+#: of V_0 about V_s: of a run that begins settled, and of one that gathers way; from where on it is the latter
+_SETTLED_STD, _UNSETTLED_STD, _UNSETTLED = 0.03, 0.15, 0.1
 _GRID = np.exp(np.linspace(np.log(1.0), np.log(64.0), 121))
-#: no log is better than this share of the approach speed
+#: no log is better than this share of the speed
 _LEAST_ERROR = 0.0005
 #: a posterior wider than this share of the prior comes from the prior
 _FROM_PRIOR = 0.7
@@ -40,16 +47,16 @@ _LAGS = 400
 
 @dataclass(frozen=True, eq=False)
 class SurgeFit:
-    """What the logs say of the speed in turns, as a mixture over tau."""
+    """What the logs say of the speed in turns, as a mixture over tau and the forms of the loss."""
 
     #: Shape (g,). tau, in ship lengths, and its probabilities.
     tau: Float
     probability: Float
-    #: loss, covariance: Shape (g, 2) and (g, 2, 2). k_r and k_d at every tau; rows of k_d are 0 where it is left out.
+    #: loss, covariance: Shape (g, 3) and (g, 3, 3). k_vr, k_r and k_d of every part; 0 where one is left out.
     loss: Float
     covariance: Float
-    #: Whether k_d is in the model.
-    by_rudder: bool
+    #: V_0 / V_s, mean and standard deviation over the manoeuvres.
+    settled: tuple[float, float]
     #: Root mean square of what is left of the logged speed, m/s.
     error_m_s: float
     #: What a user should know of it, sentences.
@@ -57,34 +64,43 @@ class SurgeFit:
 
     @property
     def best(self) -> Float:
-        """The most probable tau with its k_r and k_d, shape (3,)."""
+        """The most probable tau with its k_vr, k_r and k_d, shape (4,)."""
         k = int(np.argmax(self.probability))
         return np.array([self.tau[k], *np.maximum(self.loss[k], 0.0)])
 
     @property
     def std(self) -> Float:
-        """Standard deviations of tau, k_r and k_d, shape (3,)."""
+        """Standard deviations of tau, k_vr, k_r and k_d, shape (4,)."""
         p = self.probability
         means = [p @ self.tau, *(p @ self.loss)]
         spread = p @ (self.tau - means[0]) ** 2
         within = np.einsum("g,gii->i", p, self.covariance) + p @ (self.loss - np.array(means[1:])) ** 2
         return np.sqrt([spread, *within])
 
+    @property
+    def sure(self) -> SurgeFit:
+        """The most probable part alone, without errors."""
+        k = int(np.argmax(self.probability))
+        part = slice(k, k + 1)
+        none = np.zeros_like(self.covariance[part])
+        return replace(self, tau=self.tau[part], probability=np.ones(1), loss=self.loss[part], covariance=none)
+
     def drawn(self, normal: Float) -> Float:
-        """Return tau, k_r and k_d of draws, shape (n, 3), from standard normal numbers, shape (n, 3)."""
+        """Return tau, k_vr, k_r and k_d of draws, shape (n, 4), from standard normal numbers, shape (n, 3)."""
         from scipy.stats import norm
 
-        below = np.concatenate([[0.0], np.cumsum(self.probability)])
-        middle = 0.5 * (below[:-1] + below[1:])
-        at = np.interp(norm.cdf(normal[:, 0]), middle, np.log(self.tau))
-        found = np.empty((len(normal), 3))
-        for i, (place, z) in enumerate(zip(at, normal[:, 1:], strict=True)):
-            k = int(np.argmin(np.abs(np.log(self.tau) - place)))
+        part = np.searchsorted(np.cumsum(self.probability), norm.cdf(normal[:, 0]) * (1.0 - 1e-12))
+        found = np.empty((len(normal), 4))
+        for i, (k, z) in enumerate(zip(np.minimum(part, self.tau.size - 1), normal[:, 1:], strict=True)):
+            # a part has one kind of loss by turning, and at most the rudder's beside it
+            turning = BY_DRIFT if self.loss[k, BY_DRIFT] != 0.0 else BY_RATE
             C = self.covariance[k]
-            first = np.sqrt(C[0, 0])
-            along = C[0, 1] / first if first > 0.0 else 0.0
-            loss = self.loss[k] + [first * z[0], along * z[0] + np.sqrt(max(C[1, 1] - along**2, 0.0)) * z[1]]
-            found[i] = [np.exp(place), *np.maximum(loss, 0.0)]
+            first = np.sqrt(C[turning, turning])
+            along = C[turning, BY_RUDDER] / first if first > 0.0 else 0.0
+            loss = self.loss[k].copy()
+            loss[turning] += first * z[0]
+            loss[BY_RUDDER] += along * z[0] + np.sqrt(max(C[BY_RUDDER, BY_RUDDER] - along**2, 0.0)) * z[1]
+            found[i] = [self.tau[k], *np.maximum(loss, 0.0)]
         return found
 
 
@@ -101,42 +117,66 @@ def surge_of(runs: Sequence[GridRun], length_m: float) -> SurgeFit:
     logs = [log for log in (_Log.of(run, length_m) for run in runs) if log is not None]
     if not logs:
         return _prior(("the speed in turns is a guess: no log shows it",))
-    plain, both = _posterior(logs, 1), _posterior(logs, 2)
-    chosen = both if both.score < plain.score - 2.0 and both.loss_at_best[1] > 0.0 else plain
-    remarks = []
-    if chosen.fit.std[1] > _FROM_PRIOR * LOSS_STD[0]:
-        remarks.append(
+    drifts = all(np.isfinite(log.costs[:, BY_DRIFT]).all() for log in logs)
+    turning = (BY_DRIFT, BY_RATE) if drifts else (BY_RATE,)
+    made = _posterior(logs, [kinds for one in turning for kinds in ((one,), (one, BY_RUDDER))])
+    best = int(np.argmax(made.probability))
+    own = BY_DRIFT if made.loss[best, BY_DRIFT] != 0.0 else BY_RATE
+    unit = made.tau[best] if own == BY_DRIFT else 1.0
+    if np.sqrt(made.covariance[best, own, own]) > _FROM_PRIOR * LOSS_STD[own] * unit:
+        words = "k_vr / tau of" if own == BY_DRIFT else "k_r of"
+        remark = (
             "the logs hardly show what a turn costs of her speed: the loss is that of usual ships, "
-            f"{LOSS_MEAN[0]:g} ± {LOSS_STD[0]:g} (L r / V)^2"
+            f"{words} {LOSS_MEAN[own]:g} ± {LOSS_STD[own]:g}"
         )
-    return SurgeFit(**{**vars(chosen.fit), "remarks": tuple(remarks)})
+        return replace(made, remarks=(remark,))
+    return made
+
+
+def settled_speed(run: GridRun) -> float:
+    """Return the speed that the shaft of a run keeps on a straight course, m/s; that of the approach where unknown."""
+    if "shaft_speed" not in run.channels or not run.approach_per_s > 0.0:
+        return run.approach_m_s
+    return run.approach_m_s * float(np.mean(_shaft(run))) / run.approach_per_s
+
+
+def _shaft(run: GridRun) -> Float:
+    column = 2 + list(CHANNEL_SYMBOLS.values()).index("shaft_speed")
+    found: Float = run.inputs[:: (run.inputs.shape[0] - 1) // (run.speed_m_s.size - 1), column]
+    return found
 
 
 @dataclass(frozen=True, eq=False)
 class _Log:
-    """One run: time step, speed, what the shaft does, and what costs speed, all over the speed of the approach."""
+    """One run: time step, speed, what the shaft does, and what costs speed, all over the speed that the shaft keeps."""
 
     step: float
     speed: Float
     shaft: Float
+    #: Shape (n, 3). By kind of loss; NaN where it is not known.
     costs: Float
-    approach_m_s: float
+    settled_m_s: float
+    #: Prior standard deviation of V_0 / V_s.
+    settled_std: float
 
     @classmethod
     def of(cls, run: GridRun, length_m: float) -> _Log | None:
-        speed, approach = run.speed_m_s, run.approach_m_s
+        speed, settled = run.speed_m_s, settled_speed(run)
         rate = _yaw_rate(run, length_m)
-        if rate is None or not approach > 0.0 or not np.all(np.isfinite(speed)) or speed.size < 20:
+        if rate is None or not settled > 0.0 or not np.all(np.isfinite(speed)) or speed.size < 20:
             return None
         shaft = np.ones(speed.size)
         if "shaft_speed" in run.channels and run.approach_per_s > 0.0:
-            column = 2 + list(CHANNEL_SYMBOLS.values()).index("shaft_speed")
-            shaft = run.inputs[:: (run.inputs.shape[0] - 1) // (speed.size - 1), column] / run.approach_per_s
-        square = np.maximum(rate**2, 0.0) * (length_m / approach) ** 2
-        costs = np.column_stack([square, run.rudder_rad**2])
-        return cls(run.step_s * approach / length_m, speed / approach, shaft, costs, approach)
+            shaft = _shaft(run)
+            shaft = shaft / np.mean(shaft)
+        lateral, unit = _lateral(run, length_m), length_m / settled
+        drift = np.full(speed.size, np.nan) if lateral is None else -lateral * rate * unit / settled
+        costs = np.column_stack([drift, (unit * rate) ** 2, run.rudder_rad**2])
+        gathers_way = abs(speed[0] / settled - 1.0) > _UNSETTLED
+        std = _UNSETTLED_STD if gathers_way else _SETTLED_STD
+        return cls(run.step_s * settled / length_m, speed / settled, shaft, costs, settled, std)
 
-    def columns(self, tau: float, losses: int) -> tuple[Float, Float]:
+    def columns(self, tau: float, kinds: Sequence[int]) -> tuple[Float, Float]:
         """Return the columns of V_0, of the first speed and of the losses, each through the lag of tau."""
         kept = np.exp(-self.step / tau)
 
@@ -146,7 +186,7 @@ class _Log:
             return found
 
         own = np.column_stack([lagged(self.shaft), kept ** np.arange(self.speed.size)])
-        lost = np.column_stack([-lagged(self.costs[:, j]) for j in range(losses)])
+        lost = np.column_stack([-lagged(self.costs[:, j]) for j in kinds])
         return own, lost
 
 
@@ -162,77 +202,103 @@ def _yaw_rate(run: GridRun, length_m: float) -> Float | None:
         rate = np.gradient(np.interp(time, time[there], heading[there]), run.step_s)
         known = np.isfinite(rate)
     laid = np.interp(time, time[known], rate[known])
-    # a ship's rate does not change within a quarter of her length
+    return _smooth(run, laid, length_m)
+
+
+def _lateral(run: GridRun, length_m: float) -> Float | None:
+    """Return the lateral speed at the instants, m/s, counted from that of the approach; None where not measured."""
+    known = np.isfinite(run.measured[:, 0])
+    if known.mean() < 0.3:
+        return None
+    smooth = _smooth(run, np.interp(run.time_s, run.time_s[known], run.measured[known, 0]), length_m)
+    # what a stream or a wind gives her before she turns costs nothing
+    first = max(1, round(0.5 * length_m / max(run.approach_m_s, 0.05) / run.step_s))
+    return smooth - float(np.median(smooth[:first]))
+
+
+def _smooth(run: GridRun, laid: Float, length_m: float) -> Float:
+    """Return a course without its noise: a ship's motion does not change within a quarter of her length."""
     width = max(1, round(0.25 * length_m / max(run.approach_m_s, 0.05) / run.step_s))
-    window = np.ones(width) / width
     padded = np.pad(laid, (width // 2, width - 1 - width // 2), mode="edge")
-    smooth: Float = np.convolve(padded, window, mode="valid")
+    smooth: Float = np.convolve(padded, np.ones(width) / width, mode="valid")
     return smooth
 
 
-@dataclass(frozen=True, eq=False)
-class _Posterior:
-    fit: SurgeFit
-    #: Bayesian information criterion.
-    score: float
-    loss_at_best: Float
-
-
-def _posterior(logs: Sequence[_Log], losses: int) -> _Posterior:
-    """Return the posterior with so many kinds of loss; errors that remember count as fewer."""
+def _posterior(logs: Sequence[_Log], forms: Sequence[tuple[int, ...]]) -> SurgeFit:
+    """Return the posterior over all forms of the loss and all tau; errors that remember count as fewer."""
     # where the logs alone are best, their errors are smallest: so large they are
-    every = [_left(logs, tau, losses) for tau in _GRID]
+    every = [_left(logs, tau, kinds) for kinds in forms for tau in _GRID]
     left = min(every, key=lambda parts: sum(float(e @ e) for e in parts))
     count = sum(e.size for e in left)
     error = max(float(np.sqrt(sum(float(e @ e) for e in left) / count)), _LEAST_ERROR)
     variance = error**2 * _memory(left)
-    independent = count * error**2 / variance
-    found = [_solved(logs, tau, losses, variance) for tau in _GRID]
-    log_tau = np.log(_GRID / TAU_MEDIAN) / TAU_SPREAD
+    parts = [(tau, kinds, _solved(logs, tau, kinds, variance)) for kinds in forms for tau in _GRID]
+    tau = np.array([part[0] for part in parts])
     # the area of the other parameters counts, as in any marginal likelihood
-    score = np.array([cost + logdet for cost, logdet, *_ in found]) + log_tau**2
+    score = np.array([solved.score for _, _, solved in parts]) + (np.log(tau / TAU_MEDIAN) / TAU_SPREAD) ** 2
     p = np.exp(-0.5 * (score - score.min()))
     p /= p.sum()
-    loss, covariance = np.zeros((_GRID.size, 2)), np.zeros((_GRID.size, 2, 2))
-    for k, (_, _, mean, spread) in enumerate(found):
-        loss[k, :losses], covariance[k, :losses, :losses] = mean, spread
-    cost = min(entry[0] for entry in found)
-    approach = float(np.mean([log.approach_m_s for log in logs]))
-    fit = SurgeFit(_GRID, p, loss, covariance, losses == 2, error * approach, ())
-    return _Posterior(fit, cost + losses * np.log(max(independent, 2.0)), loss[int(np.argmax(p))])
+    loss, covariance = np.zeros((tau.size, 3)), np.zeros((tau.size, 3, 3))
+    for k, (_, kinds, solved) in enumerate(parts):
+        loss[k, kinds] = solved.mean
+        covariance[k][np.ix_(kinds, kinds)] = solved.covariance
+    kept = np.array(parts[int(np.argmax(p))][2].settled)
+    settled = float(np.mean(kept)), float(np.std(kept))
+    speed = float(np.mean([log.settled_m_s for log in logs]))
+    return SurgeFit(tau, p, loss, covariance, settled, error * speed, ())
 
 
-def _solved(logs: Sequence[_Log], tau: float, losses: int, variance: float) -> tuple[float, float, Float, Float]:
-    """Return misfit, log determinant of the information, and mean and covariance of the losses at a tau."""
+@dataclass(frozen=True, eq=False)
+class _Solved:
+    """What the logs say at one tau with some kinds of loss."""
+
+    #: Minus twice the logarithm of the evidence, but for constants.
+    score: float
+    mean: Float
+    covariance: Float
+    #: V_0 / V_s of every log.
+    settled: tuple[float, ...]
+
+
+def _solved(logs: Sequence[_Log], tau: float, kinds: Sequence[int], variance: float) -> _Solved:
+    """Return the posterior of the losses at a tau."""
+    losses, kinds = len(kinds), list(kinds)
     information, right, constant, logdet = np.zeros((losses, losses)), np.zeros(losses), 0.0, 0.0
+    own_parts = []
     for log in logs:
-        own, lost = log.columns(tau, losses)
-        # V_0 has a prior at the approach's speed, the first speed a wide one
-        A = own.T @ own / variance + np.diag([1.0 / _SETTLED_STD**2, 1.0])
-        b = own.T @ log.speed / variance + np.array([1.0 / _SETTLED_STD**2, 1.0])
+        own, lost = log.columns(tau, kinds)
+        # V_0 has a prior at V_s, the first speed a wide one
+        precision = np.array([1.0 / log.settled_std**2, 1.0])
+        A = own.T @ own / variance + np.diag(precision)
+        b = own.T @ log.speed / variance + precision
         C = own.T @ lost / variance
         solved = np.linalg.solve(A, np.column_stack([b, C]))
-        constant += log.speed @ log.speed / variance + 1.0 / _SETTLED_STD**2 + 1.0 - b @ solved[:, 0]
+        own_parts.append(solved[0])
+        constant += log.speed @ log.speed / variance + precision.sum() - b @ solved[:, 0]
         right += lost.T @ log.speed / variance - C.T @ solved[:, 0]
         information += lost.T @ lost / variance - C.T @ solved[:, 1:]
         logdet += slogdet(A)[1]
-    prior = np.diag(1.0 / LOSS_STD[:losses] ** 2)
+    unit = np.where(np.array(kinds) == BY_DRIFT, tau, 1.0)
+    mean_before, std_before = LOSS_MEAN[kinds] * unit, LOSS_STD[kinds] * unit
+    prior = np.diag(1.0 / std_before**2)
     whole = information + prior
-    target = right + prior @ LOSS_MEAN[:losses]
+    target = right + prior @ mean_before
     mean = np.linalg.solve(whole, target)
-    cost = constant + LOSS_MEAN[:losses] @ prior @ LOSS_MEAN[:losses] - target @ mean
+    cost = constant + mean_before @ prior @ mean_before - target @ mean
+    area = logdet + slogdet(whole)[1] - slogdet(prior)[1]
     covariance = np.asarray(inv(whole), dtype=np.float64)
-    return float(cost), float(logdet + slogdet(whole)[1]), mean, covariance
+    settled = tuple(float(part[0] - part[1:] @ mean) for part in own_parts)
+    return _Solved(float(cost + area), mean, covariance, settled)
 
 
-def _left(logs: Sequence[_Log], tau: float, losses: int) -> list[Float]:
+def _left(logs: Sequence[_Log], tau: float, kinds: Sequence[int]) -> list[Float]:
     """Return what the model leaves of every log's speed, without priors.
 
     V_0 and the first speed of each log are taken out first (Frisch & Waugh 1933), so that the losses alone are solved.
     """
     speeds, costs = [], []
     for log in logs:
-        own, lost = log.columns(tau, losses)
+        own, lost = log.columns(tau, kinds)
         base = np.linalg.qr(own)[0]
         speeds.append(log.speed - base @ (base.T @ log.speed))
         costs.append(lost - base @ (base.T @ lost))
@@ -257,7 +323,6 @@ def _memory(left: Sequence[Float]) -> float:
 def _prior(remarks: tuple[str, ...]) -> SurgeFit:
     p = np.exp(-0.5 * (np.log(_GRID / TAU_MEDIAN) / TAU_SPREAD) ** 2)
     n = _GRID.size
-    covariance = np.zeros((n, 2, 2))
-    covariance[:, 0, 0] = LOSS_STD[0] ** 2
-    loss = np.tile([LOSS_MEAN[0], 0.0], (n, 1))
-    return SurgeFit(_GRID, p / p.sum(), loss, covariance, by_rudder=False, error_m_s=float("nan"), remarks=remarks)
+    loss, covariance = np.zeros((n, 3)), np.zeros((n, 3, 3))
+    loss[:, BY_RATE], covariance[:, BY_RATE, BY_RATE] = LOSS_MEAN[BY_RATE], LOSS_STD[BY_RATE] ** 2
+    return SurgeFit(_GRID, p / p.sum(), loss, covariance, (1.0, _SETTLED_STD), float("nan"), remarks)

@@ -1,0 +1,182 @@
+"""The measured manoeuvres of a vessel as they were really sailed: beginning, shaft and wind, rudder and headings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import radians
+from typing import Any
+
+import numpy as np
+
+from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.predict_vessel import Basis, Predicted
+from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.series import SECOND_NS
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.manoeuvre.began import Began, began
+from kempf.pipeline.manoeuvre.draws import Identified
+from kempf.pipeline.manoeuvre.sailed import Manoeuvre
+from kempf.pipeline.manoeuvre.ship import Start
+from kempf.pipeline.manoeuvre.spiral import Spiral
+from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.model.chain import F, R, V
+from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
+
+#: a force that changes faster is no wind that is steady over a manoeuvre
+_STEADY_PER_S = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class AsSailed:
+    """One measured manoeuvre, ready to be sailed by a model."""
+
+    segment: Segment
+    #: With the rudder as it was held, and for a zigzag the headings at which it was ordered over.
+    manoeuvre: Manoeuvre
+    speed_m_s: float
+    #: The wind counted from the course of the approach.
+    began: Began
+    #: Steady wind force of the manoeuvre and its standard error, as the filter finds it.
+    wind_force_m_s2: tuple[float, float]
+    arm_per_m: float
+    #: ``fitted`` where the set was identified from it, ``held_out`` else.
+    sample: str
+
+    def on_the_day(self, model: Identified, basis: Basis) -> Identified:
+        """Return a model as it was on the day of this manoeuvre."""
+        kept, (ratio, std), shaft = basis.kept_m, basis.surge.settled, self.began.shaft_per_s
+        waters = replace(
+            model.waters,
+            approach_m_s=self.speed_m_s,
+            wind_force_m_s2=self.wind_force_m_s2[0],
+            wind_arm_per_m=self.arm_per_m,
+            true_wind_m_s=self.began.wind_m_s,
+            true_wind_from_rad=self.began.wind_from_rad,
+            settled_m_s=None if shaft is None or kept is None else ratio * kept * shaft,
+            start=self.began.start,
+        )
+        return replace(model, waters=waters, wind_force_std_m_s2=self.wind_force_m_s2[1], settled_std=std / ratio)
+
+
+def as_sailed(
+    warehouse: Warehouse, predicted: Predicted, pairs: Sequence[tuple[Segment, Manoeuvre]], progress: Progress = silent
+) -> list[AsSailed]:
+    """Return measured manoeuvres as they were sailed.
+
+    Parameters
+    ----------
+    predicted : Predicted
+        Whose set finds the wind of each zigzag, and the motion with which it began.
+    pairs : sequence of (Segment, Manoeuvre)
+        What was measured, and what of it is to be sailed.
+    """
+    zigzags = [segment for segment, asked in pairs if isinstance(asked, Zigzag)]
+    runs = _runs(warehouse, predicted, zigzags, progress) if zigzags else {}
+    found, logs = [], _Logs(warehouse)
+    for done, (segment, asked) in enumerate(pairs):
+        progress(done, len(pairs), f"reading {segment.segment_id}")
+        found.append(_one(predicted, asked, segment, logs.of(segment), runs.get(segment.segment_id)))
+    progress(len(pairs), len(pairs), "read")
+    return found
+
+
+def _one(predicted: Predicted, asked: Manoeuvre, segment: Segment, log: Instruments, run: RunFilter | None) -> AsSailed:
+    speed_m_s = float(run.run.approach_m_s if run else segment.detail.get("approach_speed_m_s") or predicted.speed_m_s)
+    passed = _passed(run, predicted) if run else None
+    executes = segment.executes_utc_ns or (segment.start_utc_ns,)
+    seen = began(log, executes[0], segment.end_utc_ns, predicted.basis.scale_m / speed_m_s)
+    if run is not None:
+        seen = replace(seen, start=_start(run, passed, segment))
+    held = set(predicted.parameter_set.convergence.get("held_out") or ())
+    fitted = segment.segment_id in predicted.parameter_set.segment_ids and segment.segment_id not in held
+    return AsSailed(
+        segment=segment,
+        manoeuvre=_as_ordered(asked, segment),
+        speed_m_s=speed_m_s,
+        began=replace(seen, wind_from_rad=seen.wind_from_rad - radians(segment.base_heading_deg)),
+        wind_force_m_s2=_steady_wind(run, passed) if run and passed else (0.0, 0.0),
+        arm_per_m=run.run.ship.arm_per_m if run else 0.0,
+        sample="fitted" if fitted else "held_out",
+    )
+
+
+class _Logs:
+    """The channels of the log that was read last: manoeuvres come log by log."""
+
+    def __init__(self, warehouse: Warehouse) -> None:
+        self._warehouse, self._ingest = warehouse, ""
+
+    def of(self, segment: Segment) -> Instruments:
+        if segment.ingest_id != self._ingest:
+            self._instruments, self._ingest = channels_of(self._warehouse, segment.ingest_id), segment.ingest_id
+        return self._instruments
+
+
+def _runs(
+    warehouse: Warehouse, predicted: Predicted, wanted: list[Segment], progress: Progress
+) -> dict[str, RunFilter]:
+    """Return every zigzag whose log can be used, by its id, under the model of the set."""
+    chosen, names = choose(warehouse, predicted.vessel), {segment.segment_id for segment in wanted}
+    kept = tuple(segment for segment in chosen.segments if segment.segment_id in names)
+    if not kept:
+        return {}
+    logs = {segment.log_id for segment in kept}
+    fewer = replace(chosen, segments=kept, ingests={k: v for k, v in chosen.ingests.items() if k in logs})
+    spec = ModelSpec.model_validate(dict(predicted.parameter_set.model_spec))
+    made, model = assembled(warehouse, fewer, spec, progress), predicted.prediction.models[0].model.waters.model
+    return {run.name: RunFilter(run, model, made.spec) for run in made.runs}
+
+
+def _as_ordered(asked: Manoeuvre, segment: Segment) -> Manoeuvre:
+    side = 1 if segment.first_side == "starboard" else -1
+    rudder = radians(float(segment.detail.get("delta0_measured_deg") or segment.delta0_deg))
+    if isinstance(asked, Zigzag):
+        executes = list(segment.detail.get("executes", ()))[1:]
+        switched = [radians(abs(float(e["heading_deg"]))) for e in executes]
+        return replace(asked, side=side, rudder_rad=rudder, switched_rad=tuple(switched[: asked.overshoots + 1]))
+    if isinstance(asked, Spiral):
+        return replace(asked, rudder_rad=rudder)
+    return replace(asked, side=side, rudder_rad=rudder)  # type: ignore[type-var]
+
+
+def _passed(run: RunFilter, predicted: Predicted) -> Passed | None:
+    """Return a manoeuvre passed through the filter of the set, None for a set without noise levels."""
+    levels: Mapping[str, Any] = predicted.parameter_set.convergence.get("levels") or {}
+    if not levels:
+        return None
+    every = np.array(list(levels.values()), dtype=np.float64)
+    own = np.array(levels[run.run.name], dtype=np.float64) if run.run.name in levels else np.mean(every, axis=0)
+    model = predicted.prediction.models[0].model
+    return run.run_filter(model.hull, np.exp(own), model.effects, states=True)
+
+
+def _start(run: RunFilter, passed: Passed | None, segment: Segment) -> Start:
+    """Return with which speed, drift, turn and rudder a zigzag began."""
+    executes = list(segment.detail.get("executes", ()))
+    at = (executes[0]["time_utc_ns"] - run.run.start_utc_ns) / SECOND_NS if executes else 0.0
+    speed = float(np.interp(at, run.run.time_s, run.run.speed_m_s))
+    if passed is None or not np.all(np.isfinite(passed.states)):
+        return Start(forward_m_s=speed)
+    lateral, rate = (float(np.interp(at, run.run.time_s, passed.states[:, i])) for i in (V, R))
+    rudder = radians(float(executes[0]["rudder_before_deg"])) if executes else None
+    return Start(speed, lateral, rate, rudder)
+
+
+def _steady_wind(run: RunFilter, passed: Passed) -> tuple[float, float]:
+    """Return the wind force that the filter comes to in a manoeuvre, m/s^2, with its standard error and wandering.
+
+    Both are 0 where the model's force is no steady wind.
+    """
+    if run.spec.wind == "none" or run.spec.wind_correlation_rate_per_s > _STEADY_PER_S:
+        return 0.0, 0.0
+    # the first half is what it takes to find it
+    late = slice(len(passed.states) // 2, None)
+    force, wander = float(np.mean(passed.states[late, F])), float(np.var(passed.states[late, F]))
+    std = float(np.sqrt(wander + np.mean(passed.spread[late, F])))
+    return (force, std) if np.isfinite(force + std) else (0.0, 0.0)

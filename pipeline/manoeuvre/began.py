@@ -1,0 +1,91 @@
+"""How a measured manoeuvre began, and what acted from there on, read off its log: speed, turn, shaft and true wind."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.pipeline.manoeuvre.ship import Start
+
+Complex = NDArray[np.complex128]
+#: the beginning is read over this part of the time in which she sails her own length, and over no less than that, s
+_PART, _LEAST_S = 0.25, 1.0
+#: instants at which what acts from then on is read
+_INSTANTS = 400
+
+
+@dataclass(frozen=True)
+class Began:
+    """A beginning; None and 0 where the log does not show it."""
+
+    start: Start
+    #: Mean shaft speed from the first execute on.
+    shaft_per_s: float | None
+    #: wind_m_s, wind_from_rad: Mean true wind from the first execute on; from where, clockwise from north.
+    wind_m_s: float
+    wind_from_rad: float
+
+
+def began(instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_time_s: float) -> Began:
+    """Read how a manoeuvre began.
+
+    Parameters
+    ----------
+    instruments : Instruments
+        Of its log.
+    execute_utc_ns, end_utc_ns : int
+        First execute and end.
+    own_time_s : float
+        In which she sails her own length.
+    """
+    before = round(max(_PART * own_time_s, _LEAST_S) * SECOND_NS)
+    at = np.linspace(execute_utc_ns - before, execute_utc_ns, 21).round().astype(np.int64)
+    later = np.linspace(execute_utc_ns, end_utc_ns, _INSTANTS).round().astype(np.int64)
+    forward, rate = _mean(_forward(instruments, at)), _mean(_read(instruments, "yaw_rate", at))
+    wind = _wind(instruments, later)
+    known = np.isfinite(wind)
+    mean = complex(np.mean(wind[known])) if known.mean() > 0.5 else 0.0 + 0.0j
+    shaft = _mean(_read(instruments, "shaft_speed", later))
+    return Began(Start(forward_m_s=forward, yaw_rate_rad_s=rate), shaft, abs(mean), float(np.angle(mean)))
+
+
+def _mean(course: Float) -> float | None:
+    known = np.isfinite(course)
+    return float(np.mean(course[known])) if known.mean() > 0.5 else None
+
+
+def _read(instruments: Instruments, channel: str, at: Nanoseconds) -> Float:
+    series = instruments.get(channel)
+    if series is None or len(series) < 2:
+        return np.full(at.size, np.nan)
+    found: Float = series.at(at, gap_limit_s(series))
+    return found
+
+
+def _forward(instruments: Instruments, at: Nanoseconds) -> Float:
+    """Return the speed along the bow, through the water where a log shows that, else over ground."""
+    water = _read(instruments, "speed_through_water", at)
+    if np.isfinite(water).any():
+        return water
+    away = _read(instruments, "course_over_ground", at) - _read(instruments, "heading", at)
+    found: Float = _read(instruments, "speed_over_ground", at) * np.cos(away)
+    return found
+
+
+def _wind(instruments: Instruments, at: Nanoseconds) -> Complex:
+    """Return the true wind, speed and where it comes from as a complex number (north, east), from either anemometer."""
+    speed, direction = (_read(instruments, f"true_wind_{name}", at) for name in ("speed", "direction"))
+    if np.isfinite(speed * direction).any():
+        true: Complex = speed * np.exp(1j * direction)
+        return true
+    speed, angle = _read(instruments, "wind_speed", at), _read(instruments, "wind_angle", at)
+    over_ground = _read(instruments, "speed_over_ground", at)
+    way = over_ground * np.exp(1j * _read(instruments, "course_over_ground", at))
+    # over the deck comes the true wind and that of her own way, which comes from ahead
+    found: Complex = speed * np.exp(1j * (angle + _read(instruments, "heading", at))) - way
+    return found

@@ -1,0 +1,37 @@
+"""`kempf predict --compare` with the measured circles of a model on a pond, from a model of her zigzags."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.compare_predicted import measured_beside
+from kempf.flows.jobs.files import read_model
+from kempf.flows.jobs.predict_vessel import PredictRequest, predict_vessel
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
+from kempf.flows.jobs.vessel_model import store_model
+from tests.real_data.voyage import Voyage
+
+MODEL = Path(__file__).parents[2] / "docs" / "models" / "pond.yaml"
+
+
+def test_circles_are_laid_beside_predictions_in_their_own_wind_and_way(pond: Voyage) -> None:
+    vessel = pond.ship.name
+    made, _ = store_model(pond.warehouse, choose(pond.warehouse, vessel), read_model(MODEL), NONE_OF_ONES_OWN)
+    request = PredictRequest("turning-circle", made.parameter_set_id, 35.0)
+    predicted = predict_vessel(pond.warehouse, vessel, request, count=32)
+    beside = measured_beside(pond.warehouse, predicted)
+    assert sorted(one.side for one in beside) == ["port", "starboard", "starboard", "starboard"]
+    assert {one.sample for one in beside} == {"held_out"}
+    figures = [{figure.name: figure for figure in one.figures} for one in beside]
+    # a hull of this block loses more than half of her speed, hard over
+    lost = [(one["speed_loss_percent"].measured, one["speed_loss_percent"].predicted.value) for one in figures]
+    np.testing.assert_allclose([p for _, p in lost], [m for m, _ in lost], atol=10.0)
+    rates = [one["steady_yaw_rate_deg_s"] for one in figures]
+    assert all(0.8 < float(rate.predicted.value or 0.0) / rate.measured < 1.35 for rate in rates)
+    # she did not begin from the speed that her shaft keeps in her zigzags, and the wind is that of each log
+    (kept, std) = predicted.basis.surge.settled
+    assert 1.05 < kept < 1.3
+    assert std < 0.15
