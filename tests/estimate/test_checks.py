@@ -131,10 +131,6 @@ def test_a_mis_scaled_rate_is_flagged() -> None:
     assert len(said) == 1 and "integrated yaw rate is 1.5" in said[0]
 
 
-@pytest.mark.xfail(
-    reason="a rate that has nothing to do with the heading is 'not correlated' since drifting ships are not accused",
-    strict=True,
-)
 def test_a_rate_of_another_ship_is_flagged() -> None:
     other = instruments_of(sailed("mariner", seed=5, duration_s=400.0)).series["yaw_rate"]
     (said,) = make_record(changed(LOG, "yaw_rate", other), START, END).warnings

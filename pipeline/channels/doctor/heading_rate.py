@@ -4,14 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.channels.doctor.align import LONGEST_S, Alignment, align
+from kempf.pipeline.channels.doctor.align import LONGEST_S, Alignment, align, edges_of
 from kempf.pipeline.channels.doctor.clocks import clock_figures, clock_outcome
 from kempf.pipeline.channels.doctor.faults import UNITS, Fault, unit_faults
 from kempf.pipeline.channels.doctor.log import Log, integral
 from kempf.pipeline.channels.doctor.motion import does_not_move
 from kempf.pipeline.channels.doctor.outcome import STILL, SURE, Figure, Outcome, untestable
 from kempf.pipeline.channels.doctor.robust_regression import reach
-from kempf.pipeline.channels.series import SECOND_NS
+from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.series import SECOND_NS, Series
 
 #: Slopes that are no fault: rate-of-turn indicators are allowed 5 % (IMO A.526(13)), and the filters of many do worse.
 SLOPES = (0.8, 1.25)
@@ -21,6 +22,8 @@ _LEAST_TURN = float(np.deg2rad(6.0))
 _TOGETHER = 0.6
 #: A steady turn shows a slope from so far on, rad, and the bias of a rate gyro that may lie in it, rad/s.
 _STEADY_TURN, _BIAS_RAD_S = 1.5, float(np.deg2rad(0.05))
+#: A ship that swings to and fro turns so many times faster than that bias, and as fast as in the window before.
+_SWINGING, _SMOOTHLY = 4.0, 0.5
 _CHANNELS = ("heading", "yaw_rate")
 
 
@@ -50,12 +53,29 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         # of a compass that repeats itself the check of standstills decides
         return [untestable(name, _CHANNELS, "the heading is constant, or the two hardly overlap") for name in names]
     span = float(heading.time_utc_ns[-1] - heading.time_utc_ns[0]) / SECOND_NS
-    return [_turning(found, span), *([_clocks(log, found, (-late, late))] if thorough else [])]
+    return [
+        _turning(found, span, swings=_swings(heading, turned)),
+        *([_clocks(log, found, (-late, late))] if thorough else []),
+    ]
 
 
-def _turning(found: Alignment, span_s: float) -> Outcome:
+def _swings(heading: Series, turned: Series) -> bool:
+    """Return whether a ship turns to and fro by more than noise and a gyro's bias: then any rate of hers shows it."""
+    edges = edges_of(heading, turned)
+    rate = np.diff(heading.at(edges, gap_limit_s(heading))) / (np.diff(edges) / SECOND_NS)
+    both = np.isfinite(rate[1:]) & np.isfinite(rate[:-1])
+    if not both.any():
+        return False
+    away = rate - np.nanmean(rate)
+    size = float(np.nanmean(away**2))
+    # the noise of a heading turns round from window to window, the ship does not
+    smooth = float(np.mean(away[1:][both] * away[:-1][both]))
+    return bool(np.sqrt(size) > _SWINGING * _BIAS_RAD_S and smooth > _SMOOTHLY * size)
+
+
+def _turning(found: Alignment, span_s: float, *, swings: bool) -> Outcome:
     slope, std = found.slope, found.slope_std
-    if found.varying > _TOGETHER:
+    if found.varying > _TOGETHER and not swings:
         # of a steady turn the changes about the mean are noise: the turn itself is compared, and a bias allowed for
         if found.turned < _STEADY_TURN:
             return untestable("heading_rate", _CHANNELS, "the two motions are not correlated")
