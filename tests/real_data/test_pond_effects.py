@@ -1,0 +1,54 @@
+"""A tanker model on a windy pond lacks three effects that hide each other: what predictions of legs say of her."""
+
+from __future__ import annotations
+
+from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.default_model import default_model_of
+from kempf.flows.jobs.diagnose_vessel import examine
+from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, known_effects
+from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.process.progress import silent
+from kempf.pipeline.diagnose.joint import better_together
+from kempf.pipeline.diagnose.matters import better_ahead
+from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.diagnose.verdict import sentences, verdict
+from kempf.pipeline.shooting.ahead import shooting_range
+from tests.diagnose.sailing import WORKERS
+from tests.real_data.voyage import Voyage
+
+
+def test_wind_race_and_drag_are_found_together_where_none_is_alone(pond: Voyage) -> None:
+    vessel = pond.ship.name
+    spec = default_model_of(pond.warehouse, vessel)
+    runs = assembled(pond.warehouse, choose(pond.warehouse, vessel), spec, silent).runs
+    fitted, held = split(runs)
+    shooting = shooting_range([runs[i] for i in fitted], [runs[i] for i in held], spec, WORKERS)
+    channels = set.intersection(*(set(run.channels) for run in runs))
+    effects = [e for e in known_effects(NONE_OF_ONES_OWN).values() if set(e.needs) <= channels]
+    assert better_ahead(shooting, shooting.plain, effects) is None
+    found = better_together(shooting, shooting.plain, effects)
+    assert found is not None
+    assert {effect.name for effect in found.effects[:-1]} == {"wind_force", "propeller_wash"}
+    assert found.alternatives[0].name == "cross_flow_drag"
+    assert all(effect.group == "hull" for effect in found.alternatives)
+
+
+def test_her_diagnosis_names_the_three_with_sizes_that_predict(pond: Voyage) -> None:
+    vessel = pond.ship.name
+    spec = default_model_of(pond.warehouse, vessel)
+    chosen = choose(pond.warehouse, vessel)
+    some = ("wind_force", "propeller_wash", "cross_flow_drag", "yaw_vr2")
+    diagnosis = examine(pond.warehouse, chosen, spec, NONE_OF_ONES_OWN, only=some).diagnosis
+    names = ("wind_force", "propeller_wash", "cross_flow_drag")
+    assert [step.added.name for step in diagnosis.steps[1:] if step.added is not None] == list(names)
+    assert all(step.together == names for step in diagnosis.steps[1:])
+    assert verdict(diagnosis) in ("partly_explained", "ambiguous")
+    said = sentences(diagnosis)
+    (together,) = (line for line in said if "belong together" in line)
+    assert together.startswith("Force and moment of the wind, propeller race over the rudder and cross-flow drag")
+    # one step ahead disturbances carry all three: the sizes are those that predict legs
+    assert sum(", fitted to legs" in line for line in said) == 3
+    first, last = diagnosis.steps[0].ahead, diagnosis.steps[-1].ahead
+    assert first is not None and last is not None
+    assert last.own.mean < 0.5 * first.own.mean and last.left_out.mean < 0.6 * first.left_out.mean
+    assert last.held.mean < 0.3 * first.held.mean
