@@ -12,13 +12,24 @@ from benchmarks.diagnose.hidden_effects.score import page
 from benchmarks.diagnose.hidden_effects.tally import Judged, Share, targets
 
 
-def judged(kind: str, effect: str, verdict: str, sets: list[list[str]], ratio: float = 100.0, value: float = 1.0):
+def judged(
+    kind: str,
+    effect: str,
+    verdict: str,
+    sets: list[list[str]],
+    ratio: float = 100.0,
+    value: float = 1.0,
+    last: float = 2.0,
+):
     parameters = {"c": {"value": value, "std": 0.1, "unit": "1"}}
     named = [{"effects": s, "refits": [{"effect": n, "parameters": parameters} for n in s]} for s in sets]
-    ladder = [{"held_out_error": 0.4}, {"held_out_error": 0.22}]
+    first, then = (
+        {"fitted_misfit": 0.1 + one, "left_out_misfit": 0.2 + one, "held_out_misfit": one} for one in (3.0, last)
+    )
+    ladder = [{"held_out_error": 0.4, "one_leg_ahead": first}, {"held_out_error": 0.22, "one_leg_ahead": then}]
     told = {"verdict": verdict, "sets": named, "ladder": ladder, "candidates": []}
     truth = {"kind": kind, "effect": effect, "hull": "ferry", "noise": 1.0, "disturbance": "calm", "strength": 1}
-    truth["parameters"] = {"c": 1.0}
+    truth |= {"parameters": {"c": 1.0}, "sold": verdict == "ambiguous"}
     oracle = {"likelihood_ratio": ratio, "held_out": 0.21} if kind == "catalogue" else {}
     return Judged(truth, {"diagnosis": told, "seconds": {"diagnose": 3.0}}, oracle)
 
@@ -30,7 +41,7 @@ CASES = [
     judged("outsider", "bank_shear", "explained", [["waves"]]),
     judged("catalogue", "rudder_lag", "explained", [["rudder_lag"]]),
     judged("catalogue", "rudder_lag", "ambiguous", [["dead_time", "rudder_lag"]], value=1.3),
-    judged("catalogue", "rudder_lag", "explained", [["rate_limit"]]),
+    judged("catalogue", "rudder_lag", "explained", [["rate_limit"]], last=3.3),
     judged("catalogue", "rudder_lag", "adequate", [], ratio=20.0),
 ]
 
@@ -39,10 +50,13 @@ def test_every_target_counts_what_it_says() -> None:
     found = {asked: told for asked, _, told in targets(CASES)}
     begins = {
         "true effect in a named set": "67 % (2 of 3",
+        "of these with the 3 m boat": "no case",
+        "of these with instruments": "100 % (1 of 1",
+        "every ladder falls": "88 % (7 of 8",
         "exact name": "50 % (1 of 2",
         "mean size": "1.33",
         "any claim": "50 % (1 of 2",
-        "outside the catalogue: unexplained": "50 % (1 of 2",
+        "outside the catalogue: refused": "50 % (1 of 2",
         "outside the catalogue: a confident": "50 % (1 of 2",
         "present though": "0 % (0 of 8",
         "held-out error": "100 % (3 of 3",

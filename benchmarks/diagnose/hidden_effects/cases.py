@@ -18,6 +18,8 @@ T = TypeVar("T")
 
 #: Factors on the realistic noise.
 NOISES = (0.5, 1.0, 2.0)
+#: Whether the instruments are as they are sold: a third.
+SOLD = (False, False, True)
 FORMATS = ("csv", "mcap", "nmea")
 
 #: Parts of the sample without effect and with one outside the catalogue.
@@ -40,6 +42,8 @@ class Case:
     disturbance: str
     #: 0 small, 1 medium, 2 large.
     strength: int
+    #: Whether the instruments are as they are sold.
+    sold: bool
     #: Of the logs, one a day.
     formats: tuple[str, str]
     #: Of everything random in the case.
@@ -67,7 +71,7 @@ def design(n: int, seed: int) -> tuple[Case, ...]:
     rows = []
     for label in dict.fromkeys(labels):
         count = labels.count(label)
-        factors = (tuple(HULLS), NOISES, DISTURBANCES, tuple(range(len(SHARES))))
+        factors = (tuple(HULLS), NOISES, DISTURBANCES, tuple(range(len(SHARES))), SOLD)
         columns = [_turns(f, count, seed, f"{label[1]} {k}") for k, f in enumerate(factors)]
         rows += [(label, *row) for row in zip(*columns, strict=True)]
     order = stream(seed, "order of the cases").permutation(n)
@@ -83,9 +87,9 @@ def _turns(levels: tuple[T, ...], n: int, seed: int, purpose: str) -> list[T]:
 
 
 def _case(
-    place: int, seed: int, label: tuple[Kind, str], hull: str, noise: float, disturbance: str, strength: int
+    place: int, seed: int, label: tuple[Kind, str], hull: str, noise: float, disturbance: str, strength: int, sold: bool
 ) -> Case:
     digest = hashlib.sha256(f"{seed} {place}".encode()).digest()
     own = int(np.frombuffer(digest[:4], dtype=np.uint32)[0])
     formats = (FORMATS[place % 3], FORMATS[(place + 1) % 3])
-    return Case(digest[4:9].hex(), *label, hull, noise, disturbance, strength, formats, own)
+    return Case(digest[4:9].hex(), *label, hull, noise, disturbance, strength, sold, formats, own)

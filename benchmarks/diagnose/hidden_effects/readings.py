@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks.diagnose.hidden_effects import plant
+from benchmarks.diagnose.hidden_effects.as_sold import as_sold
 from benchmarks.diagnose.hidden_effects.programme import QUICK_SHIP_S
 from benchmarks.diagnose.hidden_effects.sail import Voyage
 from kempf.pipeline.simulate.hulls import SimulatedHull
@@ -55,7 +56,7 @@ class _Late(Trajectory):
 def instruments(hull: SimulatedHull) -> tuple[Instrument, ...]:
     """Return what she carries."""
     time_s = hull.length_m / hull.trial_speed_m_s
-    quick = time_s < QUICK_SHIP_S
+    quick = _is_quick(hull)
     rates = _RATES | (_QUICK if quick else _SLOW if time_s > _SLOW_SHIP_S else {})
     found = []
     for one in DEFAULT_INSTRUMENTS:
@@ -69,8 +70,18 @@ def instruments(hull: SimulatedHull) -> tuple[Instrument, ...]:
     return tuple(found)
 
 
+def _is_quick(hull: SimulatedHull) -> bool:
+    return hull.length_m / hull.trial_speed_m_s < QUICK_SHIP_S
+
+
 def read(
-    hull: SimulatedHull, voyage: Voyage, wind_from_rad: float, settings: TrialSettings, sensor: tuple[str, float] | None
+    hull: SimulatedHull,
+    voyage: Voyage,
+    wind_from_rad: float,
+    settings: TrialSettings,
+    sensor: tuple[str, float] | None,
+    *,
+    sold: bool = False,
 ) -> Trial:
     """Let the instruments measure a voyage.
 
@@ -82,6 +93,8 @@ def read(
         Seed, noise, start, instruments and where she begins.
     sensor : (str, float) or None
         Name and parameter of the effect, where it sits in an instrument.
+    sold : bool, optional
+        Whether the instruments are as they are sold, see `benchmarks.diagnose.hidden_effects.as_sold`.
 
     Returns
     -------
@@ -100,8 +113,14 @@ def read(
     for one in settings.instruments:
         told = {"start_utc_ns": settings.start_utc_ns, "seed": settings.seed}
         seen = late if name == _LATE.get(one.name) else path
-        record = measure(one, seen, hull, setting, **told, noise_scale=settings.noise_scale)
-        records.append(_own(record, voyage, hull, settings.start_utc_ns, name, c))
+        record, clean = (
+            _own(
+                measure(one, seen, hull, setting, **told, noise_scale=scale),
+                *(voyage, hull, settings.start_utc_ns, name, c),
+            )
+            for scale in (settings.noise_scale, 0.0)
+        )
+        records.append(as_sold(record, clean, quick=_is_quick(hull)) if sold else record)
     truth = Truth(hull.parameters, hull.wind_arm_per_m, path, ())
     return Trial(settings, truth, tuple(records))
 

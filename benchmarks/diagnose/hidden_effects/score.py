@@ -63,7 +63,7 @@ def page(cases: Sequence[Judged], asked: int) -> list[str]:
         "",
     ]
     rows = []
-    for what in ("hull", "noise", "disturbance", "strength"):
+    for what in ("hull", "noise", "disturbance", "strength", "sold"):
         for level in sorted({c.truth[what] for c in cases}):
             own = [c for c in cases if c.truth[what] == level]
             seen = [c for c in kind(own, "catalogue") if c.detectable]

@@ -64,7 +64,7 @@ def logs_of(case: Case) -> tuple[dict[str, bytes], dict[str, Any]]:
     for day, (weather, voyage) in enumerate(zip(weathers, voyages, strict=True)):
         settings = _settings(case, hull, day)
         sensor = (effect.name, c) if effect and effect.sensor else None
-        trial = readings.read(hull, voyage, weather.wind_from_rad, settings, sensor)
+        trial = readings.read(hull, voyage, weather.wind_from_rad, settings, sensor, sold=case.sold)
         ending, write = _TO[case.formats[day]]
         begin = datetime.fromtimestamp(settings.start_utc_ns // 1_000_000_000, UTC)
         files[f"{begin:%Y%m%dT%H%M}.{ending}"] = write(trial)
