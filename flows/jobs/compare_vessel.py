@@ -10,6 +10,7 @@ import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.standing_model import Own, known_effects, named
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
@@ -124,6 +125,7 @@ def compare_vessel(
     filtered = [RunFilter(left_out(run, gross.get(run.name, {})), model, data.spec) for run in data.runs]
     progress(0, len(filtered), "predicting")
     levels = _levels(filtered, held, hull, values, chosen)
+    legs = fitted_to_legs(chosen)
     runs, found, skipped = [], [], dict(data.skipped)
     for k, (one, segment) in enumerate(zip(filtered, ordered, strict=True)):
         progress(k, len(filtered), f"predicting {segment.segment_id}")
@@ -131,6 +133,7 @@ def compare_vessel(
             compared = compare_run(
                 *(one, Point(hull, values, levels[k].foreseen), asked),
                 held_out=held[k],
+                legs=None if legs is None else legs[:2],
                 levels_from=levels[k].source,
                 own_levels=levels[k].own,
                 phases=phases_s(segment.detail.get("phases", ()), one.run.start_utc_ns),

@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 
 from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.rival_models import rivals_of
 from kempf.flows.jobs.ship_model import ShipOfSet, ship_of_set
@@ -288,7 +289,7 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
     )
     values = effects.values if effects is not None else np.zeros(0)
     hull, covariance, factor = ship.hull.array(), ship.covariance, 1.0
-    legs = _fitted_to_legs(one)
+    legs = fitted_to_legs(one)
     if legs is None:
         factor = _widened(one, waters.model, basis, hull, values, covariance)
     else:
@@ -304,23 +305,6 @@ def identified(ship: ShipOfSet, basis: Basis) -> Identified:
         widened=factor,
         fitted_to_legs=legs is not None,
     )
-
-
-def _fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float, float] | None:
-    """Return hull, effects, covariance and its factor of the fit one leg ahead.
-
-    None where that a step ahead predicts as well. The factor is by how much worse a manoeuvre is predicted that was
-    left out: of few manoeuvres the spread that a covariance is made of is itself fitted away (MacKinnon & White 1985,
-    "Some heteroskedasticity-consistent covariance matrix estimators", Journal of Econometrics 29).
-    """
-    ahead = ((one.fit or {}).get("rung") or {}).get("one_leg_ahead")
-    if ahead is None or ahead["better_than_one_step"] is None:
-        return None
-    values = np.array([each["value"] for each in ahead["parameters"].values()], dtype=np.float64)
-    covariance = np.array(ahead["covariance"], dtype=np.float64)
-    fitted, left = ahead.get("fitted_misfit"), ahead.get("left_out_misfit")
-    factor = float(np.sqrt(max(left / fitted, 1.0))) if fitted and left and np.isfinite(left) else 1.0
-    return (values[:6], values[6:], covariance, factor) if np.all(np.isfinite(covariance)) else None
 
 
 def _widened(

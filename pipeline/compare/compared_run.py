@@ -24,6 +24,7 @@ def compare_run(
     horizon: Horizon,
     *,
     held_out: bool,
+    legs: tuple[Float, Float] | None = None,
     levels_from: str = "fitted with the parameters",
     own_levels: Float | None = None,
     phases: Sequence[PhaseInterval] = (),
@@ -35,6 +36,8 @@ def compare_run(
     ----------
     held_out : bool
         Whether the parameters have not seen this run.
+    legs : (ndarray, ndarray), optional
+        Hull and parameters of effects, shape (6,) and (p,), fitted to legs where these predict better than ``point``.
     levels_from : str, optional
         Where the noise levels come from, in words.
     own_levels : ndarray, shape (6,), optional
@@ -63,4 +66,5 @@ def compare_run(
         ),
         looked=Looked(filtered, sensitivity.passed(filtered, own), found, tuple(phases)),
         levels_from=levels_from,
+        free_run_error_by_legs=None if legs is None else free_run_of(filtered, *legs).relative_error,
     )

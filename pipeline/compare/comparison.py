@@ -39,6 +39,8 @@ class ComparedRun:
     looked: Looked
     #: Where the noise levels come from, in words.
     levels_from: str
+    #: The free-run error with the parameters fitted to legs, where these predict better than the set's; None elsewhere.
+    free_run_error_by_legs: float | None = None
 
     @property
     def sample(self) -> str:
@@ -130,7 +132,8 @@ def summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
     dict
         ``fitted`` and ``held_out``, None where there is no such run: ``runs``, ``fit_percent`` and ``rms_display`` by
         channel, ``inside_95_percent`` by channel over all runs, ``overshoot_error_deg`` with ``mean``, ``std_error``,
-        ``mean_size``, ``n`` and ``not_predicted``, and ``free_run_error_percent``.
+        ``mean_size``, ``n`` and ``not_predicted``, ``free_run_error_percent``, and the same fitted to legs, None where
+        those predict no better.
     """
     found: dict[str, Any] = {}
     for sample in (FITTED, HELD_OUT):
@@ -156,6 +159,7 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
     }
     errors = [turn.error_deg for run in runs for turn in run.overshoots]
     known = [e for e in errors if e is not None]
+    legs = [run.free_run_error_by_legs for run in runs if run.free_run_error_by_legs is not None]
     return {
         "runs": len(runs),
         "fit_percent": {name: _mean([fit[name] for fit in fits if name in fit]) for name in there},
@@ -169,6 +173,7 @@ def _summary(runs: Sequence[ComparedRun]) -> dict[str, Any]:
             "not_predicted": len(errors) - len(known),
         },
         "free_run_error_percent": _in_percent(_mean([run.free_run_error for run in runs])),
+        "free_run_error_percent_fitted_to_legs": _in_percent(_mean(legs)) if legs else None,
     }
 
 

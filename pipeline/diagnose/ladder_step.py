@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +40,8 @@ class Step:
     held: tuple[FreeRun, ...]
     #: The model one leg ahead, fitted by shooting; None where one manoeuvre alone is fitted.
     ahead: Ahead | None = None
+    #: Free runs with the parameters of that fit, of the fitted and then of the held-out manoeuvres; empty without it.
+    by_legs: tuple[FreeRun, ...] = ()
     #: Share of repetitions, each without one manoeuvre, that chose the same set by its prediction one leg ahead; None
     #: where the likelihood chose.
     stability: float | None = None
@@ -98,7 +100,11 @@ def make_step(
     each = map if workers is None else workers.map
     free = tuple(each(lambda run: free_run(fit, run), runs))
     many = len(fit.runs)
-    return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:], ahead)
+    legs: tuple[FreeRun, ...] = ()
+    if ahead is not None:
+        better = replace(fit, hull=ahead.fit.hull, values=ahead.fit.values)
+        legs = tuple(each(lambda run: free_run(better, run), runs))
+    return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:], ahead, legs)
 
 
 def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]:
@@ -124,6 +130,7 @@ def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]
             "current_m_s_per_sqrt_s": float(current),
         },
         "one_leg_ahead": None if step.ahead is None else _ahead(step.ahead, before),
+        "free_run_fitted_to_legs": {run.name: run.relative_error for run in step.by_legs},
         "log_likelihood": step.fit.log_likelihood,
         "converged": step.fit.converged,
         "hull": dict(zip(_HULL, (float(x) for x in step.fit.hull), strict=True)),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal
 
@@ -14,6 +15,7 @@ from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step, rung
 from kempf.pipeline.diagnose.remainder import reference_gains
 from kempf.pipeline.diagnose.screen import Candidate
+from kempf.pipeline.predict.free_run import FreeRun
 from kempf.schemas.effect import Effect
 from kempf.schemas.enumeration import listed
 
@@ -24,6 +26,11 @@ NOT_EXPLAINED = "improves the fit, but does not explain the misfit (see what rem
 POWER = 3.0
 #: log-likelihood that an effect must gain in a manoeuvre to be seen in it
 SEEN_IN_RUN = 2.0
+#: said of the free runs of such a ship
+_UNSTABLE = (
+    " She does not keep a straight course by herself, so that the free run of any model leaves hers: what counts is "
+    "the error one leg ahead."
+)
 #: a share of the whitened variance below which a significant effect is too small to matter
 NEGLIGIBLE = 5e-4
 
@@ -309,9 +316,11 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
 
 def _fall(first: Step, last: Step) -> str:
     a, b = first.held_out_error, last.held_out_error
-    fitted = f"from {_share(first.in_sample_error)} to {_share(last.in_sample_error)} %"
     force = last.intensities[0] / first.intensities[0]
     disturbance = f"the intensity of the lateral disturbance to {100 * force:.0f} % of what it was."
+    if last.ahead is not None and last.ahead.disagrees is not None:
+        return _fall_by_legs(first, last, disturbance)
+    fitted = f"from {_share(first.in_sample_error)} to {_share(last.in_sample_error)} %"
     if a is None or b is None:
         return f"The free-run error of fitted manoeuvres (none is held out) goes {fitted} of the motion, {disturbance}"
     held = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
@@ -320,16 +329,35 @@ def _fall(first: Step, last: Step) -> str:
         f"{fitted}, {disturbance}"
     )
     if not _keeps_course(last.fit.hull):
-        said += (
-            " She does not keep a straight course by herself, so that the free run of any model leaves hers: what "
-            "counts is the error one leg ahead."
-        )
+        said += _UNSTABLE
     elif b > a:
         said += (
             " The held-out error is no smaller: what speaks for the effects is the likelihood of held-out measurements "
             "and the disturbance."
         )
     return said
+
+
+def _fall_by_legs(first: Step, last: Step, disturbance: str) -> str:
+    """Say how the free runs change with the parameters that predictions take; medians, as some may run away."""
+    many = len(last.fitted)
+    samples = [("fitted", slice(None, many)), ("held-out", slice(many, None))]
+    falls = [
+        f"from {_median(first.by_legs[part])} to {_median(last.by_legs[part])} % of the motion in {name} manoeuvres"
+        for name, part in samples
+        if last.by_legs[part]
+    ]
+    off = sum(not run.relative_error < 1.0 for run in last.by_legs)
+    said = f"With parameters fitted to legs the median free-run error goes {listed(falls)}, {disturbance}"
+    assert last.ahead is not None
+    if not _keeps_course(last.ahead.fit.hull):
+        said += _UNSTABLE
+    return f"{said} {off} of {len(last.by_legs)} free runs leave the measured course altogether." if off else said
+
+
+def _median(runs: Sequence[FreeRun]) -> str:
+    middle = float(np.median(np.nan_to_num([run.relative_error for run in runs], nan=np.inf)))
+    return _share(middle if np.isfinite(middle) else np.nan)
 
 
 def _keeps_course(hull: Float) -> bool:

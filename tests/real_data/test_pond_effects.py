@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import examine
@@ -52,3 +54,7 @@ def test_her_diagnosis_names_the_three_with_sizes_that_predict(pond: Voyage) -> 
     assert first is not None and last is not None
     assert last.own.mean < 0.5 * first.own.mean and last.left_out.mean < 0.6 * first.left_out.mean
     assert last.held.mean < 0.3 * first.held.mean
+    (free,) = (line for line in said if "median free-run error" in line)
+    assert "in held-out manoeuvres" in free
+    before, after = (np.median([run.relative_error for run in step.by_legs]) for step in diagnosis.steps[::3])
+    assert after < 0.8 * before < 0.8 * np.median([run.relative_error for run in diagnosis.steps[0].fitted])

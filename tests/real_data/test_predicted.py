@@ -8,6 +8,7 @@ import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.compare_predicted import measured_beside
+from kempf.flows.jobs.compare_vessel import compare_vessel
 from kempf.flows.jobs.files import read_model
 from kempf.flows.jobs.predict_vessel import PredictRequest, predict_vessel
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
@@ -35,3 +36,8 @@ def test_circles_are_laid_beside_predictions_in_their_own_wind_and_way(pond: Voy
     (kept, std) = predicted.basis.surge.settled
     assert 1.05 < kept < 1.3
     assert std < 0.15
+    # a free run is as far ahead: the comparison shows what those parameters make of it beside the likelihood's
+    compared = compare_vessel(pond.warehouse, vessel, made.parameter_set_id).show()["summary"]
+    for sample in ("fitted", "held_out"):
+        mean = compared[sample]
+        assert mean["free_run_error_percent_fitted_to_legs"]["mean"] < 0.6 * mean["free_run_error_percent"]["mean"]

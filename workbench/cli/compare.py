@@ -187,6 +187,9 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
         shares = [f"{_CHANNELS[name]} {100 * inside[name]['share']:.1f} %" for name in there if name in inside]
         click.echo(f"  inside the 95 % interval: {', '.join(shares)}")
     click.echo(f"  free-run error (100 - fit %, mean over channels): {_with_error(mean['free_run_error_percent'])} %")
+    if mean["free_run_error_percent_fitted_to_legs"]:
+        by_legs = _with_error(mean["free_run_error_percent_fitted_to_legs"])
+        click.echo(f"  the same with the parameters fitted to legs, which predictions of manoeuvres take: {by_legs} %")
 
 
 def _print_where(title: str, where: dict[str, Any]) -> None:

@@ -1,0 +1,25 @@
+"""The parameters of a set that predict best: those fitted to legs, where they predict better than the likelihood's."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.warehouse.parameter_set import ParameterSet
+
+
+def fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float, float] | None:
+    """Return hull, effects, covariance and its factor of the fit one leg ahead.
+
+    None where that a step ahead predicts as well. The factor is by how much worse a manoeuvre is predicted that was
+    left out: of few manoeuvres the spread that a covariance is made of is itself fitted away (MacKinnon & White 1985,
+    "Some heteroskedasticity-consistent covariance matrix estimators", Journal of Econometrics 29).
+    """
+    ahead = ((one.fit or {}).get("rung") or {}).get("one_leg_ahead")
+    if ahead is None or ahead["better_than_one_step"] is None:
+        return None
+    values = np.array([each["value"] for each in ahead["parameters"].values()], dtype=np.float64)
+    covariance = np.array(ahead["covariance"], dtype=np.float64)
+    fitted, left = ahead.get("fitted_misfit"), ahead.get("left_out_misfit")
+    factor = float(np.sqrt(max(left / fitted, 1.0))) if fitted and left and np.isfinite(left) else 1.0
+    return (values[:6], values[6:], covariance, factor) if np.all(np.isfinite(covariance)) else None
