@@ -63,7 +63,11 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
         if before is not last.fit:
             # the ladder goes on without what is immaterial
             beside = score(last.fit, candidate.effect, ladder.workers)
-            pairs = ((beside, ladder.confirmed(last.fit, ladder.unseen(last), beside)), *pairs[1:])
+            again = ladder.confirmed(last.fit, ladder.unseen(last), beside)
+            if not np.isfinite(again.fit.log_likelihood):
+                found.suspected[candidate.effect.name] = "without what is immaterial beside it the refit diverges"
+                continue
+            pairs = ((beside, again), *pairs[1:])
         found.steps.append(ladder.stepped(pairs, worse, ahead, None))
         idle = _idle(found.steps)
         if idle is not None:

@@ -124,6 +124,11 @@ def confirm(
 
 def _left_out(fit: PooledFit, workers: Executor) -> Float:
     """Log-likelihood of each run under what the other runs say of the shared parameters, one step from the fit."""
+    if len(fit.linearised) < 2:
+        return np.zeros(len(fit.linearised))
+    if not (np.isfinite(fit.log_likelihood) and all(line.index for line in fit.linearised)):
+        # of a model that runs away there is nothing to step from
+        return np.full(len(fit.linearised), -np.inf)
     shared = N_HULL + len(fit.model.names)
     informations, scores = [], []
     for line in fit.linearised:
@@ -144,6 +149,4 @@ def _left_out(fit: PooledFit, workers: Executor) -> Float:
         point = Point(moved[:N_HULL], values, fit.levels[number])
         return sensitivity.passed(fit.runs[number], point).log_likelihood
 
-    if len(fit.linearised) < 2:
-        return np.zeros(len(fit.linearised))
     return np.array(list(workers.map(log_likelihood_of, range(len(fit.runs)))))
