@@ -1,15 +1,18 @@
-"""Simulated logs for the tests of the flows and of the command line: sailed once a session, read by all."""
+"""Simulated logs and what comes of them, for the tests of flows and command line: made once, read by all."""
 
 from __future__ import annotations
 
 import gzip
 import os
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import pytest
 import yaml
+
+from tests.made_once import made_once
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
@@ -62,3 +65,27 @@ def mariner() -> Ship:
 @pytest.fixture(scope="session")
 def ferry() -> Ship:
     return sail("ferry", 400.0, 2)
+
+
+@pytest.fixture(scope="session")
+def late_ingested(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with log, profile and warehouse ``w`` of a ship whose rudder answers late, to be copied."""
+    from tests import late
+
+    return made_once(tmp_path_factory, "late_ingested", late.take_in)
+
+
+@pytest.fixture(scope="session")
+def late_diagnosed(late_ingested: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same, diagnosed, with the answer in ``diagnosed.json``."""
+    from tests import late
+
+    return made_once(tmp_path_factory, "late_diagnosed", partial(late.diagnose, late_ingested))
+
+
+@pytest.fixture(scope="session")
+def late_added(late_diagnosed: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The same, with the lag in her model."""
+    from tests import late
+
+    return made_once(tmp_path_factory, "late_added", partial(late.add_the_lag, late_diagnosed))

@@ -8,16 +8,23 @@ and are names here: the same one must stand for the same thing all through the d
 
 from __future__ import annotations
 
+import atexit
 import os
 import re
 import secrets
 import subprocess
 import sys
 from dataclasses import dataclass, field
+from functools import cache
 from itertools import takewhile
 from pathlib import Path
+from shlex import quote
+from shutil import rmtree
+from tempfile import mkdtemp
 
 from tests.docs.python_session import PythonSession
+
+ROOT = Path(__file__).parents[2]
 
 _FENCE = re.compile(r"^```(\w*)\s*$")
 _PROMPTS = {"console": "$ ", "pycon": ">>> "}
@@ -91,12 +98,46 @@ def steps(text: str) -> list[Command | File]:
     return found
 
 
+def environment() -> dict[str, str]:
+    """Return what the commands of a page find in their environment."""
+    kept = {k: v for k, v in os.environ.items() if not k.startswith(("KEMPF_", "PREFECT_"))}
+    path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
+    return {**kept, "PATH": path, "NO_COLOR": "1", "PYTHONWARNINGS": "default"}
+
+
+@cache
+def forking() -> str:
+    """Start the process that forks for ``kempf``, which lives as long as this one; return its line for the shell."""
+    program, place = Path(__file__).with_name("forking.py"), Path(mkdtemp(prefix="kempf-")) / "socket"
+    process = subprocess.Popen(
+        [sys.executable, program, "serve", place],
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**environment(), "PYTHONPATH": str(ROOT)},
+    )
+    assert process.stdin is not None
+    assert process.stdout is not None
+
+    def end() -> None:
+        process.communicate()
+        rmtree(place.parent)
+
+    atexit.register(end)
+    assert process.stdout.readline() == b"ready\n"
+    return f'kempf() {{ {quote(sys.executable)} -I -S {quote(str(program))} ask {quote(str(place))} "$@"; }}'
+
+
+def sailed(folder: Path) -> str:
+    """Return the line for the shell by which the log of the late ship is copied from ``folder``, not sailed again."""
+    copied = " ".join(quote(str(folder / name)) for name in ("day.mcap", "late.yaml"))
+    sails = "-m benchmarks.diagnose.late_rudder ."
+    return f'python() {{ if [ "$*" = "{sails}" ]; then cp {copied} .; else command python "$@"; fi; }}'
+
+
 class Shell:
     """One shell in a folder; what it exports and where it goes hold for the commands that follow."""
 
     def __init__(self, folder: Path) -> None:
-        kept = {k: v for k, v in os.environ.items() if not k.startswith(("KEMPF_", "PREFECT_"))}
-        path = os.pathsep.join((str(Path(sys.executable).parent), os.environ.get("PATH", "")))
         self._shell = subprocess.Popen(
             ["bash", "--noprofile", "--norc"],
             stdin=subprocess.PIPE,
@@ -104,7 +145,7 @@ class Shell:
             stderr=subprocess.STDOUT,
             text=True,
             cwd=folder,
-            env={**kept, "PATH": path, "NO_COLOR": "1", "PYTHONWARNINGS": "default"},
+            env=environment(),
         )
 
     def run(self, line: str) -> tuple[list[str], int]:
@@ -141,8 +182,13 @@ class Names:
         return _PIECES.sub(lambda m: self.real.get(m[0], m[0]), line)
 
 
-def follow(text: str, folder: Path, *before: str) -> int:
+def follow(text: str, folder: Path, *before: str, forked: bool = sys.platform == "linux") -> int:
     """Run every command of a document in ``folder``, after those of ``before``; each must print what is shown.
+
+    Parameters
+    ----------
+    forked : bool
+        Fork for ``kempf`` from a process that has imported it; else each is a program of its own.
 
     Returns
     -------
@@ -152,9 +198,11 @@ def follow(text: str, folder: Path, *before: str) -> int:
     names, commands = Names(), 0
     sessions = sessions_in(folder)
     try:
-        for line in before:
+        everything = steps(text)
+        called = any(isinstance(step, Command) and step.line.startswith("kempf ") for step in everything)
+        for line in (*before, *([forking()] if forked and called else [])):
             sessions["console"].run(line)
-        for step in steps(text):
+        for step in everything:
             if isinstance(step, File):
                 (folder / step.name).write_text(step.content, encoding="utf-8")
                 continue

@@ -9,14 +9,14 @@ from typing import get_args
 
 from kempf.pipeline.diagnose.ridge_reference import TERMS
 from kempf.pipeline.diagnose.verdict import EffectFinding, Verdict
-from tests.docs.console import Command, follow, steps
+from tests.docs.console import Command, follow, sailed, steps
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "diagnosis.md").read_text(encoding="utf-8")
 
 
-def test_the_tour_runs_to_its_output(tmp_path: Path) -> None:
-    assert follow(TEXT, tmp_path, f"export PYTHONPATH='{ROOT}'")
+def test_the_tour_runs_to_its_output(late_ingested: Path, tmp_path: Path) -> None:
+    assert follow(TEXT, tmp_path, f"export PYTHONPATH='{ROOT}'", sailed(late_ingested))
     assert all(isinstance(step, Command) for step in steps(TEXT))
 
 

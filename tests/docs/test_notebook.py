@@ -7,14 +7,14 @@ from pathlib import Path
 
 from kempf.workbench.notebook.vessel_view import VesselView
 from kempf.workbench.notebook.warehouse_view import WarehouseView
-from tests.docs.console import follow
+from tests.docs.console import follow, sailed
 
 ROOT = Path(__file__).parents[2]
 TEXT = (ROOT / "docs" / "notebook.md").read_text(encoding="utf-8")
 
 
-def test_the_session_prints_what_is_shown(tmp_path: Path) -> None:
-    assert follow(TEXT, tmp_path, f"export PYTHONPATH='{ROOT}'") > 20
+def test_the_session_prints_what_is_shown(late_ingested: Path, tmp_path: Path) -> None:
+    assert follow(TEXT, tmp_path, f"export PYTHONPATH='{ROOT}'", sailed(late_ingested)) > 20
 
 
 def test_every_call_is_named() -> None:

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-import shutil
+import json
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from shutil import copy, copytree
 from typing import Any
 
 import pytest
@@ -15,19 +16,14 @@ from benchmarks.diagnose import late_rudder
 from kempf.flows.fleet.diagnosis_summary import summary
 from kempf.flows.fleet.flows import diagnose_batch
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import code_changed, inputs_of, rerun
 from kempf.flows.jobs.standing_model import PLAIN
-from kempf.schemas import effects
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh
+from tests.late import SOME, VESSEL, some_effects
 from tests.workbench.driving import kempf, refused
-
-VESSEL = late_rudder.VESSEL
-SOME = ("rudder_lag", "gyro_bias", "shallow_water")
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,22 +43,16 @@ class Late:
 
 
 @pytest.fixture(scope="module")
-def late(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Late]:
-    folder = tmp_path_factory.mktemp("late")
-    late_rudder.write(folder)
-    warehouse = fresh(folder / "w")
-    done = ingest(warehouse, [folder / "day.mcap"], given=read_profiles([folder / "late.yaml"]))
-    assert [len(o.segments) for o in done] == [3]
-    few = {name: effect for name, effect in effects.catalogue().items() if name in SOME}
-    with pytest.MonkeyPatch.context() as patched:
-        # the whole catalogue takes too long for a test
-        patched.setattr(effects, "catalogue", lambda: few)
-        yield Late(warehouse, late_rudder.LAG_S)
+def late(late_diagnosed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Late]:
+    folder = copytree(late_diagnosed, tmp_path_factory.mktemp("late") / "diagnosed")
+    with some_effects():
+        yield Late(fresh(folder / "w"), late_rudder.LAG_S)
 
 
 @pytest.fixture(scope="module")
-def diagnosed(late: Late) -> dict[str, Any]:
-    return dict(late.json("diagnose", "--vessel", VESSEL))
+def diagnosed(late_diagnosed: Path) -> dict[str, Any]:
+    """What `kempf diagnose` answered."""
+    return dict(json.loads((late_diagnosed / "diagnosed.json").read_text(encoding="utf-8")))
 
 
 def test_the_command_keeps_the_keys_that_people_script_against(late: Late, diagnosed: dict[str, Any]) -> None:
@@ -213,7 +203,7 @@ def test_an_effect_file_that_is_none_is_refused(late: Late, tmp_path: Path) -> N
 
 def test_an_effect_of_ones_own_with_a_name_of_the_catalogue_is_refused(late: Late, tmp_path: Path) -> None:
     file = tmp_path / "copied.yaml"
-    shutil.copy(Path(__file__).parents[2] / "schemas" / "effects" / "yaw_cubic.yaml", file)
+    copy(Path(__file__).parents[2] / "schemas" / "effects" / "yaw_cubic.yaml", file)
     vessel = ("yaw_cubic", "--vessel", VESSEL, "--json")
     refused(late.kempf("effects", "add", *vessel, "--file", file), 2, "effect_name")
     refused(late.kempf("effects", "add", *vessel, "--formula", "yaw: r**3"), 2, "effect_name")

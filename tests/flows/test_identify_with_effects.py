@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import copytree
 from types import SimpleNamespace
 from typing import Any, cast
 
@@ -10,8 +11,6 @@ import numpy as np
 import pytest
 
 from benchmarks.diagnose import late_rudder
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.vessel_model import _at_bounds
@@ -20,18 +19,14 @@ from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import catalogue
 from kempf.warehouse import aliases
 from kempf.warehouse.store import Warehouse
-from tests.flows.content import fresh
 from tests.workbench.driving import kempf, refused
 
 VESSEL = late_rudder.VESSEL
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("late")
-    late_rudder.write(folder)
-    warehouse = fresh(folder / "w")
-    ingest(warehouse, [folder / "day.mcap"], given=read_profiles([folder / "late.yaml"]))
+def place(late_ingested: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = copytree(late_ingested, tmp_path_factory.mktemp("late") / "ingested")
     (folder / "lag.yaml").write_text("name: as_built\neffects: [rudder_lag]\nrate_bias: false\n", encoding="utf-8")
     return folder
 

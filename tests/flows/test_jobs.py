@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from shutil import copytree
 
 import pytest
 import yaml
 
-from kempf.flows.jobs import demonstrate as demonstration
-from kempf.flows.jobs.demonstrate import demonstrate
 from kempf.flows.jobs.files import read_model, read_profiles
 from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel, inputs_of
 from kempf.flows.jobs.ingest_logs import ingest, settle_vessel
@@ -33,12 +32,18 @@ def loaded(harbour: Path) -> VesselProfile:
     return read_profiles([harbour / "profile.yaml"])
 
 
-@pytest.fixture
-def stocked(harbour: Path, tmp_path: Path) -> Warehouse:
-    warehouse = fresh(tmp_path / "w")
-    outcomes = ingest(warehouse, [harbour / "mariner.nmea.gz", harbour / "mariner.mcap"], given=loaded(harbour))
+@pytest.fixture(scope="module")
+def _stocked(harbour: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    place = tmp_path_factory.mktemp("stocked") / "w"
+    outcomes = ingest(fresh(place), [harbour / "mariner.nmea.gz", harbour / "mariner.mcap"], given=loaded(harbour))
     assert [o.outcome for o in outcomes] == ["new", "new"]
-    return warehouse
+    return place
+
+
+@pytest.fixture
+def stocked(_stocked: Path, tmp_path: Path) -> Warehouse:
+    """A copy of a warehouse with two logs of one zigzag, which the test may change."""
+    return fresh(copytree(_stocked, tmp_path / "w"))
 
 
 def test_progress_is_shown_from_the_first_to_the_last(harbour: Path, tmp_path: Path):
@@ -78,7 +83,7 @@ def test_a_given_profile_is_laid_over_the_stored_one(stocked: Warehouse):
         settle_vessel(stocked, None, VesselProfile())
 
 
-def test_identify_stores_each_set_once_and_points_to_the_last(stocked: Warehouse):
+def test_identify_stores_each_set_once_points_to_the_last_and_builds_it_again(stocked: Warehouse):
     first = identify_vessel(stocked, "mariner")
     assert [o.new for o in first] == [True, True]
     at = versions(stocked)
@@ -89,6 +94,14 @@ def test_identify_stores_each_set_once_and_points_to_the_last(stocked: Warehouse
     assert first[-1].parameter_set is not None
     current = {"current": first[-1].parameter_set.parameter_set_id}
     assert aliases.of_vessel(stocked, "mariner") == current
+    result = rerun(stocked, current["current"])
+    assert (result.verdict, result.differences, result.code_changed, result.packages_changed) == (
+        "bit-identical",
+        [],
+        False,
+        {},
+    )
+    assert versions(stocked) == at, "a rerun stores nothing"
     identify_vessel(stocked, "mariner", LEAST_SQUARES)  # a baseline is nobody's current model
     assert aliases.of_vessel(stocked, "mariner") == current
 
@@ -121,20 +134,6 @@ def test_a_set_is_a_function_of_its_inputs(stocked: Warehouse):
     one, two = (build({segment.log_id: instruments}, request) for _ in range(2))
     assert one == two
     assert len(parameter_sets.summaries(stocked)) == 0
-
-
-def test_rerun_says_bit_identical_and_stores_nothing(stocked: Warehouse):
-    (outcome, _) = identify_vessel(stocked, "mariner")
-    assert outcome.parameter_set is not None
-    at = versions(stocked)
-    result = rerun(stocked, outcome.parameter_set.parameter_set_id)
-    assert (result.verdict, result.differences, result.code_changed, result.packages_changed) == (
-        "bit-identical",
-        [],
-        False,
-        {},
-    )
-    assert versions(stocked) == at
 
 
 def test_reprocess_does_what_changed_and_no_more(stocked: Warehouse):
@@ -211,15 +210,3 @@ def test_an_unforeseen_error_keeps_its_cause():
     assert (wrapped_error.code, wrapped_error.exit_code, wrapped_error.__cause__) == ("internal", 1, error)
     known = KempfError("a", "b", "c")
     assert wrapped(known) is known
-
-
-def test_the_demonstration_finds_the_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr(demonstration, "_DAYS", demonstration._DAYS[:1])  # one day is quicker than three
-    shown = demonstrate(tmp_path / "demo")
-    assert [(s.psi0_deg, s.delta0_deg) for s in (o.segment for o in shown.identified)] == [(20, 20), (10, 10)]
-    assert [r.verdict for r in shown.reruns] == ["bit-identical"] * 2
-    for outcome in shown.identified:
-        assert outcome.parameter_set is not None
-        for p in outcome.parameter_set.parameters:
-            assert p.std is not None
-            assert abs(p.value - shown.truth[p.name]) < 4 * p.std

@@ -36,25 +36,30 @@ class Ship:
     def now(self) -> float:
         return len(self.log) * STEP_S * self.scale
 
-    def steer(self, order: float, until: Callable[[], bool], at_most_s: float = 2000.0) -> None:
-        end = self.now + at_most_s * self.scale
-        while not until() and self.now < end:
-            move = self.rudder_rate_deg_s * STEP_S
-            self.rudder += min(max(order - self.rudder, -move), move)
-            push = self.gain_per_s * self.rudder + self.drift_deg_s
-            resistance = self.straight * self.yaw_rate + self.cubic * self.yaw_rate**3
-            self.yaw_rate += STEP_S * (push - resistance) / self.time_constant_s
-            self.heading += STEP_S * self.yaw_rate
-            self.log.append((self.heading, self.rudder))
+    def steer(self, order: float, until: Callable[[], bool] | None = None, at_most_s: float = 2000.0) -> None:
+        end, log = self.now + at_most_s * self.scale, self.log
+        heading, yaw_rate, rudder, done = self.heading, self.yaw_rate, self.rudder, len(self.log)
+        move = self.rudder_rate_deg_s * STEP_S
+        while done * STEP_S * self.scale < end and not (until and until()):
+            rudder += min(max(order - rudder, -move), move)
+            push = self.gain_per_s * rudder + self.drift_deg_s
+            resistance = self.straight * yaw_rate + self.cubic * yaw_rate**3
+            yaw_rate += STEP_S * (push - resistance) / self.time_constant_s
+            heading += STEP_S * yaw_rate
+            log.append((heading, rudder))
+            done += 1
+            if until:
+                self.heading, self.yaw_rate, self.rudder = heading, yaw_rate, rudder
+        self.heading, self.yaw_rate, self.rudder = heading, yaw_rate, rudder
 
     def wait(self, order: float, seconds: float) -> None:
-        self.steer(order, lambda: False, seconds)
+        self.steer(order, at_most_s=seconds)
 
     def autopilot(self, course: float, seconds: float, gain: float = 1.0, damping: float = 8.0) -> None:
         end = self.now + seconds * self.scale
         while self.now < end:
             order = gain * (course - self.heading) - damping * self.yaw_rate
-            self.steer(float(np.clip(order, -20.0, 20.0)), lambda: False, 0.2)
+            self.steer(min(max(order, -20.0), 20.0), at_most_s=0.2)
 
     def zigzag(self, psi0: float, delta0: float, side: int, legs: int, neutral: float = 0.0) -> list[float]:
         """Run a zigzag about the present heading and return the instants of its executes, s."""

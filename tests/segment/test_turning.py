@@ -256,18 +256,6 @@ def test_one_way_of_a_spiral_cannot_show_a_loop() -> None:
     assert spiral.figures["loop_width_deg"].why == "the rudder went one way only"
 
 
-@pytest.mark.parametrize("seed", range(25))
-def test_hand_steering_is_nothing(seed: int) -> None:
-    """A helmsman who holds any angle for any time, about a course."""
-    random = np.random.default_rng(seed)
-    ship = Ship()
-    ship.wait(0.0, 60.0)
-    while ship.now < 1500.0:
-        towards = -1.0 if ship.heading > 0 else 1.0
-        ship.wait(towards * float(random.uniform(-3.0, 12.0)), float(random.uniform(6.0, 35.0)))
-    assert tiny(ship) == []
-
-
 def test_course_changes_are_nothing() -> None:
     ship = Ship()
     for course in (0.0, 90.0, -70.0, 100.0, 0.0, 160.0):
@@ -277,16 +265,6 @@ def test_course_changes_are_nothing() -> None:
         ship.steer(sign * 15.0, lambda sign=sign, goal=goal: sign * (goal - ship.heading) <= 10.0)  # type: ignore[misc]
         ship.steer(-sign * 15.0, lambda sign=sign: sign * ship.yaw_rate <= 0.0)  # type: ignore[misc]
         ship.wait(0.0, 120.0)
-    assert tiny(ship) == []
-
-
-@pytest.mark.parametrize("side", [1, -1])
-def test_williamson_turn_is_no_circle(side: int) -> None:
-    ship = Ship()
-    ship.wait(0.0, 60.0)
-    ship.steer(side * 35.0, lambda: side * ship.heading >= 60.0)
-    ship.steer(-side * 35.0, lambda: side * ship.heading <= -160.0)
-    ship.autopilot(-side * 180.0, 200.0)
     assert tiny(ship) == []
 
 

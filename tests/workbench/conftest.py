@@ -7,6 +7,7 @@ from shutil import copytree
 import pytest
 
 from tests.conftest import Ship
+from tests.made_once import made_once
 from tests.workbench.driving import kempf, tree
 
 
@@ -18,14 +19,16 @@ def logs(mariner: Ship, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="session")
 def _filled(logs: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("filled") / "warehouse"
-    paths = [logs / "mariner.nmea.gz", logs / "mariner.csv.gz"]
-    done = kempf("ingest", *paths, "--profile", logs / "profile.yaml", "--warehouse", folder)
-    assert done.code == 0, done
-    for estimator in ("least-squares", "ml"):
-        done = kempf("identify", "--vessel", "mariner", "--estimator", estimator, "--warehouse", folder)
+    def fill(folder: Path) -> None:
+        paths = [logs / "mariner.nmea.gz", logs / "mariner.csv.gz"]
+        done = kempf("ingest", *paths, "--profile", logs / "profile.yaml", "--warehouse", folder)
         assert done.code == 0, done
-    return folder
+        for estimator in ("least-squares", "ml"):
+            done = kempf("identify", "--vessel", "mariner", "--estimator", estimator, "--warehouse", folder)
+            assert done.code == 0, done
+
+    # a copy for each process: `filled` looks at every file
+    return copytree(made_once(tmp_path_factory, "filled", fill), tmp_path_factory.mktemp("filled") / "warehouse")
 
 
 @pytest.fixture

@@ -219,7 +219,7 @@ def test_the_warehouse_may_be_named_by_the_environment(filled: Path, monkeypatch
     assert tree(tmp_path) == {}
 
 
-def test_the_demonstration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+def test_the_demonstration_finds_the_truth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     from kempf.flows.jobs import demonstrate
 
     monkeypatch.setattr(demonstrate, "_DAYS", demonstrate._DAYS[1:2])  # one day is quicker than three
@@ -227,12 +227,18 @@ def test_the_demonstration(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     assert human.code == 0
     assert "Zigzags found" in human.out and "2 of 2 parameter sets bit-identical" in human.out
     assert human.out.count("error in std") == 2
+    zigzags = human.out.partition("Zigzags found")[2].partition("\n\n")[0].splitlines()
+    assert [sum(line.split()[:1] == [angles] for line in zigzags) for angles in ("20/20", "10/10")] == [1, 1]
     at = versions(tmp_path / "demo" / "warehouse")
     output = kempf("demo", "--folder", tmp_path / "demo", "--json").json
     assert set(output) == {"folder", "vessel", "truth", "ingested", "parameter_sets", "reruns"}
     assert list(output["truth"]) == HULL
     assert [o["outcome"] for o in output["ingested"]] == ["unchanged"]
     assert {r["verdict"] for r in output["reruns"]} == {"bit-identical"}
+    for made in output["parameter_sets"]:
+        for name, true in output["truth"].items():
+            found = made["parameters"][name]
+            assert abs(found["value"] - true) < 4 * found["std"], name
     assert versions(tmp_path / "demo" / "warehouse") == at
 
 

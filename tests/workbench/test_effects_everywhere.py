@@ -6,6 +6,7 @@ import json
 import runpy
 from collections.abc import Callable
 from pathlib import Path
+from shutil import copytree
 from typing import Any
 
 import click
@@ -24,11 +25,7 @@ class Late:
     """A warehouse with the plain model of a late ship and that with the lag, which is current."""
 
     def __init__(self, folder: Path) -> None:
-        late_rudder.write(folder)
-        self.folder, self.uri = folder, folder / "warehouse"
-        assert self.run("ingest", folder / "day.mcap", "--profile", folder / "late.yaml").code == 0
-        made = self.run("effects", "add", "rudder_lag", "--vessel", VESSEL)
-        assert made.code == 0, made
+        self.folder, self.uri = folder, folder / "w"
         sets = {s["model_name"]: s["parameter_set_id"] for s in self.json("params", "list")}
         self.plain, self.lag = sets["plain"], sets["plain + rudder_lag"]
 
@@ -47,8 +44,8 @@ class Late:
 
 
 @pytest.fixture(scope="module")
-def late(tmp_path_factory: pytest.TempPathFactory) -> Late:
-    return Late(tmp_path_factory.mktemp("late"))
+def late(late_added: Path, tmp_path_factory: pytest.TempPathFactory) -> Late:
+    return Late(copytree(late_added, tmp_path_factory.mktemp("late") / "added"))
 
 
 @pytest.fixture(scope="module")

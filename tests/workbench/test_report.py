@@ -16,12 +16,11 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from benchmarks.diagnose import late_rudder
+from benchmarks.diagnose.late_rudder import LAG_S
 from kempf.flows.jobs import diagnose_vessel
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.standing_model import PLAIN, Own
 from kempf.pipeline.diagnose.verdict import NOT_EXPLAINED, Verdict
-from kempf.schemas import effects
 from kempf.schemas.diagnosis_evidence import ConfusionMap, DiagnosisEvidence
 from kempf.warehouse import delta, diagnoses
 from kempf.warehouse.store import Warehouse
@@ -32,9 +31,9 @@ from kempf.workbench.report.build import MadeReport, content_of, make_report
 from kempf.workbench.report.content import ReportContent
 from kempf.workbench.report.page import page
 from kempf.workbench.report.wording import CLAIMING, wording_of
+from tests.late import VESSEL, some_effects
 from tests.workbench.driving import kempf, refused
 
-SOME = ("rudder_lag", "gyro_bias", "shallow_water")
 #: what only a report that claims an effect may say
 CLAIMS = re.compile(r"\black(s|ing)?\b|\bmissing\b|\beffects add\b|\bpresent\b|\bis adequate\b|\bincluding\b", re.I)
 #: words that a naval architect or a system identifier would not use (the glossary has the others)
@@ -86,26 +85,17 @@ def seen(html: str) -> _Seen:
 
 
 @pytest.fixture(scope="module")
-def place(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
+def place(late_diagnosed: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Path]:
     """A warehouse with three zigzags of a ship whose rudder answers late, diagnosed."""
-    folder = tmp_path_factory.mktemp("late")
-    late_rudder.write(folder)
-    few = {name: effect for name, effect in effects.catalogue().items() if name in SOME}
-    with pytest.MonkeyPatch.context() as patched:
-        # the whole catalogue takes too long for a test
-        patched.setattr(effects, "catalogue", lambda: few)
-        warehouse = folder / "w"
-        done = kempf("ingest", folder / "day.mcap", "--profile", folder / "late.yaml", "--warehouse", warehouse)
-        assert done.code == 0, done
-        assert kempf("diagnose", "--vessel", late_rudder.VESSEL, "--warehouse", warehouse).code == 0
-        yield warehouse
+    with some_effects():
+        yield copytree(late_diagnosed, tmp_path_factory.mktemp("late") / "diagnosed") / "w"
 
 
 @pytest.fixture(scope="module")
 def report(place: Path) -> MadeReport:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(diagnose_vessel, "examine", None)  # what is stored is not computed again
-        return make_report(Warehouse(str(place)), late_rudder.VESSEL, PLAIN, Own())
+        return make_report(Warehouse(str(place)), VESSEL, PLAIN, Own())
 
 
 @pytest.fixture(scope="module")
@@ -160,7 +150,7 @@ def test_every_word_agrees_with_the_verdict(
     content, evidence = as_verdict(verdict, stored, report.content.evidence)
     warehouse = Warehouse(str(place))
     wording = wording_of("late", content, evidence)
-    chosen = choose(warehouse, late_rudder.VESSEL)
+    chosen = choose(warehouse, VESSEL)
     shown = content_of("late", content, evidence, chosen, wording, warnings=(), ship={}, provenance=())
     html = page(shown)
     text = " ".join(seen(html).text)
@@ -198,19 +188,15 @@ def test_what_the_model_has_already_is_not_advised(report: MadeReport, stored: M
     assert "Nothing to include: the current model has first-order rudder lag already." in after.next_steps
 
 
-def test_advice_follows_what_the_vessel_has(place: Path, tmp_path: Path):
-    warehouse = copytree(place, tmp_path / "w")
-    assert "effects add" in _advice(warehouse)
-    assert kempf("effects", "add", "rudder_lag", "--vessel", late_rudder.VESSEL, "--warehouse", warehouse).code == 0
-    assert "effects add" not in _advice(warehouse)
+def test_advice_follows_what_the_vessel_has(place: Path, late_added: Path, tmp_path: Path):
+    assert "effects add" in _advice(place)
+    assert "effects add" not in _advice(copytree(late_added, tmp_path / "added") / "w")
 
 
 def _advice(warehouse: Path) -> str:
     with pytest.MonkeyPatch.context() as patched:
         patched.setattr(sections, "bytes_of", lambda _: b"<svg/>")
-        return " ".join(
-            make_report(Warehouse(str(warehouse)), late_rudder.VESSEL, PLAIN, Own()).content.wording.next_steps
-        )
+        return " ".join(make_report(Warehouse(str(warehouse)), VESSEL, PLAIN, Own()).content.wording.next_steps)
 
 
 def test_a_diagnosis_without_curves_is_made_again_and_says_so(
@@ -221,7 +207,7 @@ def test_a_diagnosis_without_curves_is_made_again_and_says_so(
         row = delta.read(warehouse, "diagnosis_evidence").rows(named=True)[0]
         delta.replace(table, "diagnosis_evidence", [{**row, "evidence_json": "{}"}], "TRUE")
     lines: list[str] = []
-    again = make_report(warehouse, late_rudder.VESSEL, PLAIN, Own(), say=lines.append)
+    again = make_report(warehouse, VESSEL, PLAIN, Own(), say=lines.append)
     assert lines == [f"{report.diagnosis_id} was stored without the curves that a report shows; diagnosing late again"]
     assert again.html == report.html
 
@@ -296,7 +282,7 @@ def test_numbers_of_the_page_are_those_that_are_stored(report: MadeReport, store
     parameters = {one.name: one for one in evidence.models[-1].parameters}
     assert {name: one.value for name, one in parameters.items() if "." not in name} == last["hull"]
     tau = parameters["rudder_lag.tau"]
-    assert abs(tau.value - late_rudder.LAG_S) < 3.0 * tau.std
+    assert abs(tau.value - LAG_S) < 3.0 * tau.std
     assert f"{tau.value:.3f} ± {tau.std:.3f} s" in html and "plain model, ± 1 s.e." in html
     assert dict(report.content.provenance)["diagnosis"] == report.diagnosis_id and report.diagnosis_id in html
     for one in evidence.manoeuvres:
@@ -334,12 +320,12 @@ def test_what_is_shown_is_text_and_never_markup(report: MadeReport, monkeypatch:
 
 def test_bytes_repeat(report: MadeReport, place: Path, tmp_path: Path):
     path = tmp_path / "ship.html"
-    done = kempf("report", "--vessel", late_rudder.VESSEL, "--output", path, "--warehouse", place, "--json")
+    done = kempf("report", "--vessel", VESSEL, "--output", path, "--warehouse", place, "--json")
     assert done.code == 0, done
     assert path.read_text(encoding="utf-8") == report.html
     assert done.json["diagnosis_id"] == report.diagnosis_id and done.json["out"] == str(path)
     assert done.json["verdict"] == "explained" and done.json["headline"] == report.content.wording.headline
-    asked = ("report", "--vessel", late_rudder.VESSEL, "--warehouse", place, "--json")
+    asked = ("report", "--vessel", VESSEL, "--warehouse", place, "--json")
     refused(kempf(*asked, "--output", path), 2, "cannot_write")
     refused(kempf(*asked, "--output", tmp_path / "nowhere" / "x.html"), 2, "cannot_write")
     nobody = ("report", "--vessel", "nobody", "--output", tmp_path / "n.html", "--warehouse", place, "--json")
