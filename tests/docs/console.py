@@ -8,23 +8,17 @@ and are names here: the same one must stand for the same thing all through the d
 
 from __future__ import annotations
 
-import atexit
 import os
 import re
 import secrets
 import subprocess
 import sys
 from dataclasses import dataclass, field
-from functools import cache
 from itertools import takewhile
 from pathlib import Path
 from shlex import quote
-from shutil import rmtree
-from tempfile import mkdtemp
 
 from tests.docs.python_session import PythonSession
-
-ROOT = Path(__file__).parents[2]
 
 _FENCE = re.compile(r"^```(\w*)\s*$")
 _PROMPTS = {"console": "$ ", "pycon": ">>> "}
@@ -105,28 +99,6 @@ def environment() -> dict[str, str]:
     return {**kept, "PATH": path, "NO_COLOR": "1", "PYTHONWARNINGS": "default"}
 
 
-@cache
-def forking() -> str:
-    """Start the process that forks for ``kempf``, which lives as long as this one; return its line for the shell."""
-    program, place = Path(__file__).with_name("forking.py"), Path(mkdtemp(prefix="kempf-")) / "socket"
-    process = subprocess.Popen(
-        [sys.executable, program, "serve", place],
-        stdin=subprocess.PIPE,
-        stdout=subprocess.PIPE,
-        env={**environment(), "PYTHONPATH": str(ROOT)},
-    )
-    assert process.stdin is not None
-    assert process.stdout is not None
-
-    def end() -> None:
-        process.communicate()
-        rmtree(place.parent)
-
-    atexit.register(end)
-    assert process.stdout.readline() == b"ready\n"
-    return f'kempf() {{ {quote(sys.executable)} -I -S {quote(str(program))} ask {quote(str(place))} "$@"; }}'
-
-
 def sailed(folder: Path) -> str:
     """Return the line for the shell by which the log of the late ship is copied from ``folder``, not sailed again."""
     copied = " ".join(quote(str(folder / name)) for name in ("day.mcap", "late.yaml"))
@@ -182,13 +154,8 @@ class Names:
         return _PIECES.sub(lambda m: self.real.get(m[0], m[0]), line)
 
 
-def follow(text: str, folder: Path, *before: str, forked: bool = sys.platform == "linux") -> int:
+def follow(text: str, folder: Path, *before: str) -> int:
     """Run every command of a document in ``folder``, after those of ``before``; each must print what is shown.
-
-    Parameters
-    ----------
-    forked : bool
-        Fork for ``kempf`` from a process that has imported it; else each is a program of its own.
 
     Returns
     -------
@@ -198,11 +165,9 @@ def follow(text: str, folder: Path, *before: str, forked: bool = sys.platform ==
     names, commands = Names(), 0
     sessions = sessions_in(folder)
     try:
-        everything = steps(text)
-        called = any(isinstance(step, Command) and step.line.startswith("kempf ") for step in everything)
-        for line in (*before, *([forking()] if forked and called else [])):
+        for line in before:
             sessions["console"].run(line)
-        for step in everything:
+        for step in steps(text):
             if isinstance(step, File):
                 (folder / step.name).write_text(step.content, encoding="utf-8")
                 continue
