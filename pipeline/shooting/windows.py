@@ -85,10 +85,13 @@ def _smoothed(run: GridRun, begins: Rows, reach: int) -> tuple[Float, Float]:
     for i in range(3):
         column = run.measured[:, i]
         noise = noise_of(column)
+        if np.isnan(noise):
+            # of a slow instrument no four readings follow each other on the grid
+            noise = noise_of(column[np.isfinite(column)])
         for w, begin in enumerate(begins):
             rows = np.arange(max(0, begin - reach), min(n, begin + reach + 1))
             rows = rows[np.isfinite(column[rows])]
-            if rows.size < 2:
+            if rows.size < 2 or np.isnan(noise):
                 continue
             away = (rows - begin + run.offset_s[rows, i] / run.step_s) / reach
             A = np.vander(away, min(3, rows.size - 1), increasing=True)
@@ -97,5 +100,5 @@ def _smoothed(run: GridRun, begins: Rows, reach: int) -> tuple[Float, Float]:
             left = column[rows] - A @ (inverse @ column[rows])
             spare = rows.size - A.shape[1]
             own = float(np.sqrt(left @ left / spare)) if spare > 1 else noise
-            std[w, i] = np.sqrt(inverse[0] @ inverse[0]) * np.nanmax([noise, own])
+            std[w, i] = np.sqrt(inverse[0] @ inverse[0]) * max(noise, own)
     return value, std

@@ -113,3 +113,19 @@ def test_the_same_bits_twice(dragged: tuple[Sailed, ShootingRange, Ahead]) -> No
     assert other is not None
     assert np.array_equal(other.fit.shared, found.fit.shared)
     assert np.array_equal(left_out(other.fit, WORKERS).misfits, found.left_out.misfits)
+
+
+def test_a_slow_instrument_on_a_fine_grid_has_its_noise_too() -> None:
+    run = sailed("cross_flow_drag").runs[0]
+    measured = run.measured.copy()
+    measured[1::2, 0] = np.nan
+    windows = windows_of(replace(run, measured=measured), 100.0)
+    full = windows_of(run, 100.0)
+    assert np.all(np.isfinite(windows.start)) and np.all(np.isfinite(windows.start_std))
+    # half of the readings: an error that is greater by the root of two, as far as their noise is what it was
+    ratio = np.median(windows.start_std[:, 0] / full.start_std[:, 0])
+    assert 1.0 < ratio < 2.0
+    # two readings in all say nothing of their noise, and no start is made up
+    measured[2:, 0] = np.nan
+    measured[1, 0] = measured[0, 0]
+    assert np.all(np.isnan(windows_of(replace(run, measured=measured), 100.0).start[:, 0]))
