@@ -86,7 +86,7 @@ def test_information_averages_to_the_exact_one_and_to_the_outer_product_of_score
     random = np.random.default_rng(5)
     scale = np.sqrt(np.diag(exact))
     scores, informations = [], []
-    for _ in range(1500):
+    for _ in range(600):
         drawn = case.measured.copy()
         drawn[np.isfinite(drawn)] = mean + root @ random.standard_normal(mean.size)
         _, score, information = evaluate(replace(case, measured=drawn))

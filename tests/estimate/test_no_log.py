@@ -143,7 +143,7 @@ def sailed(current_m_s: float, heading_deg: float = 40.0, seed: int = 3) -> tupl
         make_record(blind, start + round((z.start_s - 20) * SECOND_NS), start + round(z.end_s * SECOND_NS))
         for z in trial.truth.zigzags
     )
-    return trial, tuple(thinned(record, 800) for record in records)
+    return trial, tuple(thinned(record, 400) for record in records)
 
 
 @lru_cache(maxsize=16)

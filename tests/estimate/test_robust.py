@@ -208,7 +208,7 @@ def summit(hull: str) -> tuple[Likelihood, Search]:
     """The maximum on a thinned record, from the true ship."""
     sea = sailed(hull, seed={"mariner": 1, "ferry": 2, "tanker": 4}[hull], duration_s=900.0)
     spec = ModelSpec().with_arm(sea.truth.wind_arm_per_m)
-    objective = SETTINGS.bind(thinned(record_of(sea), 1200), spec, sea.truth.wind_arm_per_m)
+    objective = SETTINGS.bind(thinned(record_of(sea), 600), spec, sea.truth.wind_arm_per_m)
     return objective, from_ship(objective, truth_of(sea))
 
 
