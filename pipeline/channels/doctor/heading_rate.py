@@ -24,6 +24,9 @@ _TOGETHER = 0.6
 _STEADY_TURN, _BIAS_RAD_S = 1.5, float(np.deg2rad(0.05))
 #: A ship that swings to and fro turns so many times faster than that bias, and as fast as in the window before.
 _SWINGING, _SMOOTHLY = 4.0, 0.5
+#: Correlation of both rates of turn, below which the one does not follow the other, whatever its scale and bias. Parts
+#: of measured runs that swing have 0.75 and more.
+_FOLLOWS = 0.5
 _CHANNELS = ("heading", "yaw_rate")
 
 
@@ -54,15 +57,19 @@ def examine(log: Log, *, thorough: bool = True) -> list[Outcome]:
         return [untestable(name, _CHANNELS, "the heading is constant, or the two hardly overlap") for name in names]
     span = float(heading.time_utc_ns[-1] - heading.time_utc_ns[0]) / SECOND_NS
     return [
-        _turning(found, span, swings=_swings(heading, turned)),
+        _turning(found, span, another=_of_another_ship(heading, turned)),
         *([_clocks(log, found, (-late, late))] if thorough else []),
     ]
 
 
-def _swings(heading: Series, turned: Series) -> bool:
-    """Return whether a ship turns to and fro by more than noise and a gyro's bias: then any rate of hers shows it."""
+def _of_another_ship(heading: Series, turned: Series) -> bool:
+    """Return whether a ship turns to and fro by more than noise and a gyro's bias, and the yaw rate does not follow.
+
+    A robust slope takes the few windows of one turn among many straight ones for gross errors; a correlation is made of
+    the turn.
+    """
     edges = edges_of(heading, turned)
-    rate = np.diff(heading.at(edges, gap_limit_s(heading))) / (np.diff(edges) / SECOND_NS)
+    rate, shown = (np.diff(one.at(edges, gap_limit_s(one))) / (np.diff(edges) / SECOND_NS) for one in (heading, turned))
     both = np.isfinite(rate[1:]) & np.isfinite(rate[:-1])
     if not both.any():
         return False
@@ -70,12 +77,18 @@ def _swings(heading: Series, turned: Series) -> bool:
     size = float(np.nanmean(away**2))
     # the noise of a heading turns round from window to window, the ship does not
     smooth = float(np.mean(away[1:][both] * away[:-1][both]))
-    return bool(np.sqrt(size) > _SWINGING * _BIAS_RAD_S and smooth > _SMOOTHLY * size)
+    if np.sqrt(size) <= _SWINGING * _BIAS_RAD_S or smooth <= _SMOOTHLY * size:
+        return False
+    known = np.isfinite(rate) & np.isfinite(shown)
+    if not known.any():
+        return False
+    x, y = (one[known] - np.mean(one[known]) for one in (rate, shown))
+    return bool(np.sum(x * y) < _FOLLOWS * np.sqrt(np.sum(x**2) * np.sum(y**2)) or not np.any(y))
 
 
-def _turning(found: Alignment, span_s: float, *, swings: bool) -> Outcome:
+def _turning(found: Alignment, span_s: float, *, another: bool) -> Outcome:
     slope, std = found.slope, found.slope_std
-    if found.varying > _TOGETHER and not swings:
+    if found.varying > _TOGETHER and not another:
         # of a steady turn the changes about the mean are noise: the turn itself is compared, and a bias allowed for
         if found.turned < _STEADY_TURN:
             return untestable("heading_rate", _CHANNELS, "the two motions are not correlated")
