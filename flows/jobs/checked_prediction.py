@@ -43,6 +43,7 @@ def predict_checked(
     models = [one.model.scattered(share) for one in nearer.prediction.models]
     asked, length_m = made.prediction.manoeuvre, made.basis.profile.length_m
     prediction = predict(models, asked, made.basis.logs, length_m, count)
+    prediction = replace(prediction, run_away=(*made.prediction.run_away, *prediction.run_away))
     brought = any(one.model.conditioned for one in nearer.prediction.models)
     after = replace(held_against(_rows(own), len(zigzags)), scatter=share, before=before if brought else None)
     limits = limits_of(prediction, made.parameter_set)

@@ -18,7 +18,9 @@ def fitted_to_legs(one: ParameterSet) -> tuple[Float, Float, Float, float] | Non
     ahead = ((one.fit or {}).get("rung") or {}).get("one_leg_ahead")
     if ahead is None or ahead["better_than_one_step"] is None:
         return None
-    values = np.array([each["value"] for each in ahead["parameters"].values()], dtype=np.float64)
+    # by name, as JSON keeps no order; the covariance is in that of the set
+    names = [p.name for p in one.parameters if p.name in ahead["parameters"]]
+    values = np.array([ahead["parameters"][name]["value"] for name in names], dtype=np.float64)
     covariance = np.array(ahead["covariance"], dtype=np.float64)
     fitted, left = ahead.get("fitted_misfit"), ahead.get("left_out_misfit")
     factor = float(np.sqrt(max(left / fitted, 1.0))) if fitted and left and np.isfinite(left) else 1.0

@@ -368,6 +368,9 @@ def limits_of(made: Prediction, one: ParameterSet) -> tuple[str, ...]:
     if made.no_ships:
         count = made.no_ships + len(made.drawn)
         said.append(f"{made.no_ships} of {count} ships that the errors allow do not sail it and are in no interval")
+    for model in made.run_away:
+        effects = " + ".join(effect.name for effect in model.waters.model.effects)
+        said.append(f"{effects} fits the logs as well, but its ships run away here: that model is in no interval")
     if made.share_unstable >= 0.05:
         said.append(f"unstable on a straight course with a probability of {100.0 * made.share_unstable:.0f} %")
     if not one.convergence.get("converged"):

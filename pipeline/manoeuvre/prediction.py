@@ -42,6 +42,11 @@ class OfModel:
     unstable: int
 
     @property
+    def sails(self) -> bool:
+        """Whether the ship of the estimates sails the manoeuvre, and enough of those that were drawn."""
+        return self.sailed is not None and len(self.drawn) >= ENOUGH * (len(self.drawn) + self.no_ships)
+
+    @property
     def figures(self) -> dict[str, Figure]:
         """By name, from this model alone."""
         return figures_of(self.sailed, [self])
@@ -57,6 +62,8 @@ class Prediction:
     models: tuple[OfModel, ...]
     extrapolated: tuple[Beyond, ...]
     imo: tuple[Judged, ...]
+    #: Models that the data do not tell from the first one, whose ships run away or never come to the end: in no figure.
+    run_away: tuple[Identified, ...] = ()
 
     @property
     def sailed(self) -> Sailed:
@@ -93,7 +100,8 @@ def predict(
     Parameters
     ----------
     models : sequence of Identified
-        The one that is asked for, then those that the data do not tell from it.
+        The one that is asked for, then those that the data do not tell from it. Of these a model whose ships do not
+        sail the manoeuvre is left out: what fits the logs as well may be no ship beyond them.
     logs : Reach
         How far out the logs go.
     length_m : float or None
@@ -104,13 +112,14 @@ def predict(
     Raises
     ------
     DataRejected
-        ``predicts_no_ship``: the ship of the estimates, or too many of those that the data allow, does not sail it.
+        ``predicts_no_ship``: the ship of the first model's estimates, or too many of those that its errors allow, does
+        not sail it.
     """
-    made = tuple(_of_model(model, manoeuvre, count) for model in models)
-    drawn, lost = sum(len(one.drawn) for one in made), sum(one.no_ships for one in made)
-    first = made[0].sailed
-    if first is None or drawn < ENOUGH * (drawn + lost):
-        raise _no_ship(models[0], manoeuvre, first is None, lost, drawn + lost)
+    every = [_of_model(model, manoeuvre, count) for model in models]
+    first = every[0].sailed
+    if first is None or not every[0].sails:
+        raise _no_ship(models[0], manoeuvre, first is None, every[0].no_ships, count)
+    made = tuple(one for one in every if one.sails)
     samples = _samples(made)
     speed = models[0].waters.approach_m_s
     return Prediction(
@@ -119,6 +128,7 @@ def predict(
         made,
         beyond(first.reach, logs),
         judge(manoeuvre, samples, length_m, speed),
+        tuple(one.model for one in every if not one.sails),
     )
 
 

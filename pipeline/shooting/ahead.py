@@ -203,7 +203,10 @@ def shooting_range(
 
 
 def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Executor) -> tuple[Ahead | None, ...]:
-    """Return models one leg ahead, each begun from the sizes that the likelihood gives its effects.
+    """Return models one leg ahead.
+
+    Each is begun from the sizes that the likelihood gives its effects and, as in a diagnosis, from the model before it:
+    where something is lacking, the former may lie beyond a hill.
 
     Parameters
     ----------
@@ -220,7 +223,10 @@ def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Execut
     for fit in fits:
         near = made[-1] if made else shooting.plain
         if fit.model.effects:
-            near = shooting.refitted(fit.model, np.concatenate([near.fit.hull, fit.values]), near)
+            begun = [shooting.refitted(fit.model, np.concatenate([near.fit.hull, fit.values]), near)]
+            if len(fit.model.effects) == len(near.model.effects) + 1:
+                begun += [one for one in [shooting.with_effect(near, fit.model.effects[-1])] if one is not None]
+            near = min(begun, key=lambda one: one.fit.cost)
         made.append(shooting.beside(near, fit))
     return tuple(made)
 

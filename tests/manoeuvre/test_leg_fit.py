@@ -1,0 +1,41 @@
+"""Which parameters of a stored set predictions take."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import Any, cast
+
+import numpy as np
+
+from kempf.flows.jobs.leg_fit import fitted_to_legs
+from kempf.warehouse.parameter_set import ParameterSet
+
+NAMES = ("a11", "a12", "a21", "a22", "b1", "b2", "wind_force.c", "wind_force.k", "cross_flow_drag.c")
+
+
+def stored(better: dict[str, float] | None) -> ParameterSet:
+    """A set whose parameters fitted to legs count up, stored as JSON stores them: by name."""
+    ahead: dict[str, Any] = {
+        "parameters": {
+            name: {"value": float(k), "std": 0.1} for k, name in sorted(enumerate(NAMES), key=lambda p: p[1])
+        },
+        "covariance": np.diag(np.arange(1.0, 10.0)).tolist(),
+        "better_than_one_step": better,
+        "fitted_misfit": 1.0,
+        "left_out_misfit": 4.0,
+    }
+    made = SimpleNamespace(fit={"rung": {"one_leg_ahead": ahead}}, parameters=[SimpleNamespace(name=n) for n in NAMES])
+    return cast("ParameterSet", made)
+
+
+def test_parameters_fitted_to_legs_are_in_the_order_of_the_set_and_its_covariance() -> None:
+    found = fitted_to_legs(stored({"falls_by": 0.5}))
+    assert found is not None
+    hull, values, covariance, factor = found
+    assert hull.tolist() == [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    assert values.tolist() == [6.0, 7.0, 8.0]
+    assert covariance[8, 8] == 9.0 and factor == 2.0
+
+
+def test_where_the_likelihood_predicts_as_well_there_are_none() -> None:
+    assert fitted_to_legs(stored(None)) is None
