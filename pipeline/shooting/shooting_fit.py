@@ -62,7 +62,7 @@ class ShootingFit:
 
     @property
     def covariance(self) -> Float:
-        """Of the shared unknowns, shape (6 + p, 6 + p), from the spread of what the windows say.
+        """Of the shared unknowns, shape (6 + p, 6 + p), from the spread of what windows say; NaN for a diverged fit.
 
         Windows overlap, and what is misfitted hangs together from one to the next (Newey & West 1987, "A simple,
         positive semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix", Econometrica 55).
@@ -73,9 +73,11 @@ class ShootingFit:
             for lag in range(1, min(_LAGS, part.scores.shape[0] - 1) + 1):
                 both = part.scores[lag:].T @ part.scores[:-lag]
                 spread += (1.0 - lag / (_LAGS + 1.0)) * (both + both.T)
-        information = self.information
-        scale = np.sqrt(np.diag(information))
-        inverse = np.linalg.pinv(information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
+        here = normal_equations(self.shots, self.parts)
+        if not np.isfinite(here.cost):
+            return np.full(spread.shape, np.nan)
+        scale = here.scale
+        inverse = np.linalg.pinv(here.information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
         result: Float = inverse @ spread @ inverse
         return result
 

@@ -129,3 +129,15 @@ def test_a_slow_instrument_on_a_fine_grid_has_its_noise_too() -> None:
     measured[2:, 0] = np.nan
     measured[1, 0] = measured[0, 0]
     assert np.all(np.isnan(windows_of(replace(run, measured=measured), 100.0).start[:, 0]))
+
+
+def test_a_fit_that_diverges_has_no_covariance() -> None:
+    ship = sailed("cross_flow_drag")
+    runs = [windows_of(run, 100.0) for run in ship.runs[:2]]
+    away = EffectModel((effects.get("yaw_cubic"),))
+    hull = mariner_like(ship.runs[0].ship.length_m)
+    shared = np.concatenate([hull.array() * [-1e6, 1.0, 1.0, -1e6, 1.0, 1.0], [0.0]])
+    scales = shooting_range(ship.runs[:2], (), ship.spec, WORKERS).scales
+    fit = shooting_fit.fit([ShotRun(windows, away, ship.spec) for windows in runs], shared, scales, WORKERS)
+    assert not np.isfinite(fit.cost)
+    assert fit.covariance.shape == (7, 7) and np.all(np.isnan(fit.covariance))
