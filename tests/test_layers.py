@@ -53,7 +53,7 @@ OPENS = {
     *("sink_parquet", "write_parquet", "write_csv", "scan_parquet", "scan_csv", "scan_delta", "write_delta"),
 }
 #: The files that read what is shipped with the code, by importlib.resources: the catalogue is data that is part of it.
-READS_ITS_OWN_PACKAGE = ("schemas/effects/__init__.py",)
+READS_ITS_OWN_PACKAGE = ("schemas/effects/__init__.py", "schemas/instrument_noise/__init__.py")
 OUTSIDE = {"os", "pathlib", "shutil", "tempfile", "subprocess", "socket", "urllib", "requests", "glob"}
 
 

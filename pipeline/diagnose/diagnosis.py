@@ -17,7 +17,7 @@ import numpy as np
 
 from kempf.pipeline.diagnose.by_likelihood import certain_ones
 from kempf.pipeline.diagnose.by_prediction import predicting_better
-from kempf.pipeline.diagnose.forward_selection import staged
+from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder import Announce, Ladder, silent
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
@@ -137,6 +137,7 @@ def _begun(shooting: ShootingRange | None, base: PooledFit) -> Ahead | None:
     if shooting is None:
         return None
     made = shooting.plain
-    if base.model.effects:
-        made = shooting.refitted(base.model, np.concatenate([made.fit.hull, base.values]), made)
+    ship = base.ship
+    if ship.model.effects:
+        made = shooting.refitted(ship.model, np.concatenate([made.fit.hull, ship.values]), made)
     return shooting.beside(made, base)

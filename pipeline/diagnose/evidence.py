@@ -111,12 +111,12 @@ class _Judged:
 
 def _fitted_parameters(fit: PooledFit) -> tuple[FittedParameter, ...]:
     """Return the parameters of hull and effects with their standard errors."""
-    names = [*HULL_PARAMETERS, *fit.model.names]
-    units = [*HULL_PARAMETERS.values(), *(parameter.unit for _, parameter in fit.model.parameters)]
-    values = np.concatenate([fit.hull, fit.values])
+    ship = fit.ship
+    names = [*HULL_PARAMETERS, *ship.model.names]
+    units = [*HULL_PARAMETERS.values(), *(parameter.unit for _, parameter in ship.model.parameters)]
     return tuple(
         FittedParameter(name=name, unit=unit, value=float(value), std=float(std))
-        for name, unit, value, std in zip(names, units, values, fit.std, strict=True)
+        for name, unit, value, std in zip(names, units, ship.parameters, ship.std, strict=True)
     )
 
 
@@ -126,7 +126,7 @@ def _model(step: Step, first: Step) -> FittedModel:
     fitted = np.array([run.relative_error for run in step.fitted])
     held_out = np.array([run.relative_error for run in step.held])
     return FittedModel(
-        effects=tuple(effect.title for effect in step.fit.model.effects),
+        effects=tuple(effect.title for effect in step.fit.model.ship.effects),
         added="" if step is first or step.added is None else step.added.title,
         parameters=_fitted_parameters(step.fit),
         fitted_errors=fitted,

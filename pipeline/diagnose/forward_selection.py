@@ -1,8 +1,4 @@
-"""Fitting a model effect by effect: the plain ship first, each effect from where the score says it lies.
-
-Every fit of a model goes this way, in a diagnosis, when an effect is added by hand and when a stored set is built
-again, so that all three end at the same bits.
-"""
+"""Fitting a model with one effect more, from where the score says that it lies."""
 
 from __future__ import annotations
 
@@ -13,18 +9,13 @@ from dataclasses import replace
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.screen import Candidate, score
+from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.level_bounds import level_bounds
-from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
-from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
-from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect
-from kempf.schemas.errors import DataRejected
-from kempf.schemas.model_spec import ModelSpec
 
 #: iterations of an entry of the race, and of the climb to the end
 _RACE, _TO_THE_END = 6, 60
@@ -126,61 +117,3 @@ def _begin(candidate: Candidate) -> Float:
     if len(parameters[0].steps) > 1 and parameters[0].low == 0.0 and inside[0] <= 0.0:
         inside[0] = candidate.steps[0]
     return np.asarray(inside, dtype=np.float64)
-
-
-def staged(
-    runs: Sequence[GridRun],
-    spec: ModelSpec,
-    effects: Sequence[Effect],
-    workers: Executor,
-    settings: MaximumLikelihoodSettings = STANDARD,
-) -> tuple[PlainFit, list[PooledFit]]:
-    """Fit the plain ship, then with one effect more after the other.
-
-    Parameters
-    ----------
-    effects : sequence of Effect
-        In the order in which they were added.
-    settings : MaximumLikelihoodSettings, optional
-        Of the search of single runs.
-
-    Returns
-    -------
-    plain : PlainFit
-    fits : list of PooledFit
-        The plain model's first; the last one is the model.
-
-    Raises
-    ------
-    DataRejected
-        ``effect_not_testable``: these runs say nothing of an effect, or a channel measures it already; the
-        message says which.
-    """
-    plain = fit_plain(runs, spec, workers, settings)
-    fits = [plain.fit]
-    for effect in effects:
-        candidate = score(fits[-1], effect, workers)
-        if candidate.missing:
-            raise DataRejected(
-                "effect_not_testable",
-                f"{effect.title} needs the channel {', '.join(candidate.missing)}, which the logs lack.",
-                "Log it, or map it in the vessel profile if the log has it under another name.",
-                {"effect": effect.name, "missing": list(candidate.missing)},
-            )
-        if candidate.measured_by:
-            raise DataRejected(
-                "effect_not_testable",
-                f"The logs have {', '.join(candidate.measured_by)}, which measures {effect.title} already.",
-                "The model uses that channel; nothing need be added.",
-                {"effect": effect.name, "told_by": list(candidate.measured_by)},
-            )
-        if np.isnan(candidate.score):
-            raise DataRejected(
-                "effect_not_testable",
-                f"The model as it is absorbs {100 * candidate.absorption:.2f} % of {effect.title}: these data do not "
-                "determine its size.",
-                effect.separated_by or "Sail another kind of manoeuvre.",
-                {"effect": effect.name, "absorption": candidate.absorption},
-            )
-        fits.append(added(fits[-1], candidate, workers))
-    return plain, fits

@@ -67,7 +67,8 @@ class Step:
 
 def step_of(fit: PooledFit, held: Sequence[GridRun], ahead: Ahead | None) -> Step:
     """Return a fitted model as a rung by itself, with its free runs and nothing screened."""
-    added = fit.model.effects[-1] if fit.model.effects else None
+    effects = fit.model.ship.effects
+    added = effects[-1] if effects else None
     return make_step(fit, added, (), (), held, (), ahead=ahead)
 
 
@@ -102,7 +103,9 @@ def make_step(
     many = len(fit.runs)
     legs: tuple[FreeRun, ...] = ()
     if ahead is not None:
-        better = replace(fit, hull=ahead.fit.hull, values=ahead.fit.values)
+        values = fit.values.copy()
+        values[fit.model.of_ship] = ahead.fit.values
+        better = replace(fit, hull=ahead.fit.hull, values=values)
         legs = tuple(each(lambda run: free_run(better, run), runs))
     return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:], ahead, legs)
 
@@ -116,6 +119,7 @@ def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]
         The rung below one leg ahead, to compare with.
     """
     force, moment, current = step.intensities
+    ship = step.fit.ship
     return {
         "step": number,
         "added": None if step.added is None else step.added.name,
@@ -137,8 +141,13 @@ def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]
         "effects": {
             f"{effect.name}.{parameter.name}": {"value": float(v), "std": float(s), "unit": parameter.unit}
             for (effect, parameter), v, s in zip(
-                step.fit.model.parameters, step.fit.values, step.fit.std[6:], strict=True
+                ship.model.parameters, ship.values, ship.std[6:], strict=True
             )
+        },
+        "instrument_noise": {
+            name: float(value)
+            for name, value, own in zip(step.fit.model.names, step.fit.values, step.fit.model.of_ship, strict=True)
+            if not own
         },
     }
 

@@ -31,7 +31,7 @@ def where_left(diagnosis: Diagnosis, phases: Mapping[str, Sequence[PhaseInterval
     if not places:
         return None
     sample = "held_out" if diagnosis.held else "fitted"
-    return {"sample": sample, "beside": [e.name for e in step.fit.model.effects], **places}
+    return {"sample": sample, "beside": [e.name for e in step.fit.model.ship.effects], **places}
 
 
 def misfit_of(judged: Sequence[JudgedRun]) -> dict[str, Any]:

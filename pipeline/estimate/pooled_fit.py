@@ -44,6 +44,29 @@ class Linearised:
 
 
 @dataclass(frozen=True, eq=False)
+class ShipPart:
+    """What a fit says of the ship and her effects, without lasting noise of instruments."""
+
+    model: EffectModel
+    #: hull, values: Shapes (6,) and (p,).
+    hull: Float
+    values: Float
+    #: Shape (6 + p, 6 + p). With the noise unknown.
+    covariance: Float
+
+    @property
+    def parameters(self) -> Float:
+        """Hull and effects, shape (6 + p,)."""
+        return np.concatenate([self.hull, self.values])
+
+    @property
+    def std(self) -> Float:
+        """Standard errors, shape (6 + p,)."""
+        with np.errstate(invalid="ignore"):
+            return np.sqrt(np.diag(self.covariance))
+
+
+@dataclass(frozen=True, eq=False)
 class PooledFit:
     """A model fitted to several runs."""
 
@@ -70,6 +93,16 @@ class PooledFit:
         """Standard errors of hull and effects, shape (6 + p,)."""
         with np.errstate(invalid="ignore"):
             return np.sqrt(np.diag(self.covariance))
+
+    @property
+    def ship(self) -> ShipPart:
+        """What it says of the ship."""
+        return self.ship_part(self.covariance)
+
+    def ship_part(self, covariance: Float) -> ShipPart:
+        """Return what it says of the ship, with another covariance of all parameters, shape (6 + p, 6 + p)."""
+        own = np.concatenate([np.ones(N_HULL, dtype=np.bool_), self.model.of_ship])
+        return ShipPart(self.model.ship, self.hull, self.values[own[N_HULL:]], covariance[np.ix_(own, own)])
 
     @property
     def count(self) -> int:

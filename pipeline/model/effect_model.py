@@ -14,6 +14,7 @@ from kempf.pipeline.model.effects import RUDDER_COURSES
 from kempf.pipeline.model.terms.expression import compiled
 from kempf.schemas.effect import Effect, Parameter
 from kempf.schemas.errors import UsageError
+from kempf.schemas.instrument_noise import lasting
 from kempf.schemas.symbols import OWN_STATES, SYMBOLS
 
 _PLACE = {
@@ -47,10 +48,12 @@ class EffectModel:
         twice = sorted({name for name in names if names.count(name) > 1})
         if twice:
             raise UsageError("effect_twice", f"The model holds {twice[0]!r} twice.", "Name every effect once.")
-        if self.extra > dynamics.MOST_EXTRA:
+        own = [effect for effect in self.effects if not lasting(effect)]
+        brought = sum(len(effect.states) for effect in own)
+        if brought > dynamics.MOST_EXTRA:
             raise UsageError(
                 "too_many_states",
-                f"The effects {', '.join(names)} bring {self.extra} states along; {dynamics.MOST_EXTRA} is the most.",
+                f"The effects {', '.join(effect.name for effect in own)} bring {brought} states along; {dynamics.MOST_EXTRA} is the most.",
                 "Leave one of those with states of their own out.",
             )
 
@@ -78,6 +81,21 @@ class EffectModel:
     def high(self) -> Float:
         """Upper bounds, shape (p,)."""
         return np.array([p.high for _, p in self.parameters])
+
+    @cached_property
+    def of_ship(self) -> NDArray[np.bool_]:
+        """Which parameters are the ship's and not those of an instrument's lasting noise, shape (p,)."""
+        return np.array([not lasting(effect) for effect, _ in self.parameters], dtype=np.bool_)
+
+    @property
+    def ship(self) -> EffectModel:
+        """The model without lasting noise of instruments."""
+        return EffectModel(tuple(effect for effect in self.effects if not lasting(effect)))
+
+    @property
+    def noise(self) -> tuple[Effect, ...]:
+        """Lasting noise of instruments."""
+        return tuple(effect for effect in self.effects if lasting(effect))
 
     def at_bounds(self, values: Float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return which parameters have ended at their lower and which at their upper bound, but for rounding.

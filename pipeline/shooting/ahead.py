@@ -119,7 +119,7 @@ class ShootingRange:
 
     def beside(self, ahead: Ahead, fit: PooledFit) -> Ahead:
         """Return a model with how the likelihood's parameters of it predict legs, nothing shared being fitted."""
-        shared = np.concatenate([fit.hull, fit.values])
+        shared = fit.ship.parameters
         pairs = [(shot, part.at) for shot, part in zip(ahead.fit.shots, ahead.fit.parts, strict=True)]
         made = list(self.workers.map(lambda pair: alone(pair[0], shared, self.scales, pair[1]), pairs))
         return replace(ahead, one_step=LeftOut(np.array([m for m, _, _ in made]), tuple(e for _, _, e in made)))
@@ -222,10 +222,11 @@ def ahead_of(fits: Sequence[PooledFit], held: Sequence[GridRun], workers: Execut
     made: list[Ahead] = []
     for fit in fits:
         near = made[-1] if made else shooting.plain
-        if fit.model.effects:
-            begun = [shooting.refitted(fit.model, np.concatenate([near.fit.hull, fit.values]), near)]
-            if len(fit.model.effects) == len(near.model.effects) + 1:
-                begun += [one for one in [shooting.with_effect(near, fit.model.effects[-1])] if one is not None]
+        ship = fit.ship
+        if ship.model.effects:
+            begun = [shooting.refitted(ship.model, np.concatenate([near.fit.hull, ship.values]), near)]
+            if len(ship.model.effects) == len(near.model.effects) + 1:
+                begun += [one for one in [shooting.with_effect(near, ship.model.effects[-1])] if one is not None]
             near = min(begun, key=lambda one: one.fit.cost)
         made.append(shooting.beside(near, fit))
     return tuple(made)

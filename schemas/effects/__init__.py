@@ -9,6 +9,7 @@ from importlib.resources import files
 from kempf.schemas.effect import Effect
 from kempf.schemas.effect_file import invalid, read
 from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.schemas.instrument_noise import NAMES
 
 __all__ = ["catalogue", "get", "names", "require_free"]
 
@@ -60,6 +61,13 @@ def require_free(name: str) -> None:
     UsageError
         ``effect_name``.
     """
+    if name in NAMES:
+        raise UsageError(
+            "effect_name",
+            f"{name!r} is the name of a noise of instruments; your own effect needs another name.",
+            f"Rename it, my_{name} say.",
+            {"effect": name},
+        )
     if name in names():
         raise UsageError(
             "effect_name",
