@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.lasting_noise import with_lasting_noise
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.predict_vessel import Basis, Predicted
 from kempf.flows.jobs.vessel_runs import assembled
@@ -130,6 +131,7 @@ def _runs(
     fewer = replace(chosen, segments=kept, ingests={k: v for k, v in chosen.ingests.items() if k in logs})
     spec = ModelSpec.model_validate(dict(predicted.parameter_set.model_spec))
     made, model = assembled(warehouse, fewer, spec, progress), predicted.prediction.models[0].model.waters.model
+    model, _ = with_lasting_noise(predicted.parameter_set, model, np.zeros(len(model.names)))
     return {run.name: RunFilter(run, model, made.spec) for run in made.runs}
 
 
@@ -153,7 +155,9 @@ def _passed(run: RunFilter, predicted: Predicted) -> Passed | None:
     every = np.array(list(levels.values()), dtype=np.float64)
     own = np.array(levels[run.run.name], dtype=np.float64) if run.run.name in levels else np.mean(every, axis=0)
     model = predicted.prediction.models[0].model
-    return run.run_filter(model.hull, np.exp(own), model.effects, states=True)
+    ship = model.waters.model
+    _, values = with_lasting_noise(predicted.parameter_set, ship, np.asarray(model.effects))
+    return run.run_filter(model.hull, np.exp(own), values, states=True)
 
 
 def _start(run: RunFilter, passed: Passed | None, segment: Segment) -> Start:

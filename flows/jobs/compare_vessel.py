@@ -10,6 +10,7 @@ import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.lasting_noise import with_lasting_noise
 from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.standing_model import Own, known_effects, named
 from kempf.flows.jobs.vessel_runs import assembled
@@ -157,7 +158,7 @@ def compare_vessel(
 
 
 def _parameters(chosen: ParameterSet) -> tuple[Float, Float, EffectModel]:
-    """Return hull, parameters of the effects, and the model that they belong to."""
+    """Return hull, parameters of effects and lasting noise, and the model that they belong to."""
     known = known_effects(Own.from_json(chosen.settings.get("own") or {}))
     model = EffectModel(named(chosen.model_spec.get("effects", ()), known))
     found = {p.name: p.value for p in chosen.parameters}
@@ -171,7 +172,8 @@ def _parameters(chosen: ParameterSet) -> tuple[Float, Float, EffectModel]:
             {"lacking": lacking},
         )
     values = np.array([found[name] for name in names])
-    return values[: len(HULL_PARAMETERS)], values[len(HULL_PARAMETERS) :], model
+    model, effects = with_lasting_noise(chosen, model, values[len(HULL_PARAMETERS) :])
+    return values[: len(HULL_PARAMETERS)], effects, model
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from typing import Any
+
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
@@ -135,7 +137,9 @@ def _covariance(one: ParameterSet, wanted: list[str]) -> Float:
 
 
 def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
-    levels = {p.name: p.value for p in one.noise} or _levels_of_runs(one, spec)
+    levels = _with_what_lasts(
+        one, {p.name: p.value for p in one.noise if "." not in p.name} or _levels_of_runs(one, spec)
+    )
     usual, values, assumed = usual_levels(spec), {}, []
     for field, name in _LEVELS.items():
         standard = float(getattr(usual, field))
@@ -146,6 +150,16 @@ def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:
         elif level < least and f"{level:.2g}" != f"{least:.2g}":
             assumed.append(f"{name} is {level:.2g} in the set, too little for an estimator: {least:.2g} taken")
     return NoiseLevels(**values), assumed
+
+
+def _with_what_lasts(one: ParameterSet, levels: dict[str, Any]) -> dict[str, Any]:
+    """Return noise levels with the variance of what lasts: an estimator that knows no other takes it for fresh."""
+    lasting = {p.name: p.value or 0.0 for p in one.noise}
+    pairs = (("sigma_v", "lateral_speed_noise.c"), ("sigma_r", "yaw_rate_noise.c"), ("sigma_psi", "heading_noise.c"))
+    more = {
+        name: float(np.hypot(levels[name] or 0.0, lasting[c])) for name, c in pairs if name in levels and c in lasting
+    }
+    return {**levels, **more}
 
 
 def _levels_of_runs(one: ParameterSet, spec: ModelSpec) -> dict[str, float]:

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.lasting_noise import lasting_noise_of
 from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, channel_warnings, described, stored, without_arm
 from kempf.flows.jobs.standing_model import SEARCH, Own, inputs_of, known_effects, named, stored_model
 from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
@@ -153,7 +154,10 @@ def build_single(instruments: Mapping[str, Instruments], request: SetRequest) ->
     made = _as_parameter_set(fit, known, fitted, request)
     return replace(
         made,
-        noise=tuple(Stored(name, level, None, NOISE_PARAMETERS[name]) for name, level in fit.sigmas(0).items()),
+        noise=(
+            *(Stored(name, level, None, NOISE_PARAMETERS[name]) for name, level in fit.sigmas(0).items()),
+            *made.noise,
+        ),
         fit=known.one_step[0],
         warnings=(*record.warnings, *made.warnings),
         parent=request.spec.parent,
@@ -208,7 +212,7 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
 def _known(fit: PooledFit) -> PooledUncertainty:
     """Return the errors of a fit; of a model with effects those by which its diagnosis judges them."""
     known = uncertainty_of(fit)
-    return replace(known, covariance=fit.covariance, kind="information") if fit.model.effects else known
+    return replace(known, covariance=fit.covariance, kind="information") if fit.ship.model.effects else known
 
 
 def _pooling(plain: PlainFit) -> dict[str, Any]:
@@ -253,7 +257,8 @@ def _disagreement(plain: PlainFit) -> tuple[str, ...]:
 
 def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, request: SetRequest) -> ParameterSet:
     """Return what every set of a fit with effects holds."""
-    spec, covariance = request.spec, known.covariance
+    spec, ship = request.spec, fit.ship_part(known.covariance)
+    covariance = ship.covariance
     speed = float(np.mean([np.mean(one.run.speed_m_s) for one in fit.runs]))
     with np.errstate(invalid="ignore"):
         std = np.sqrt(np.diag(covariance))
@@ -262,8 +267,8 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
         model_name=" + ".join((spec.name, *spec.effects)),
         parameters=_parameters(fit, std),
         discrete=stored(discrete_values(fit.hull, np.nan_to_num(covariance[:6, :6]), speed, _STEP_S)),
-        noise=(),
-        covariance_names=(*HULL_PARAMETERS, *fit.model.names),
+        noise=lasting_noise_of(fit),
+        covariance_names=(*HULL_PARAMETERS, *ship.model.names),
         covariance=tuple(tuple(float(x) for x in row) for row in covariance),
         fit={},
         iterations=[],
@@ -296,10 +301,11 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
 
 def _at_bounds(fit: PooledFit) -> tuple[str, ...]:
     """Return a warning for every parameter of an effect that ended at a bound."""
-    lowest, highest = fit.model.at_bounds(fit.values)
+    ship = fit.ship
+    lowest, highest = ship.model.at_bounds(ship.values)
     return tuple(
-        f"at a bound, not estimated: {fit.model.names[k]} = {fit.values[k]:.3g}"
-        + ("; the effect as fitted changes nothing" if fit.values[k] == 0.0 else "")
+        f"at a bound, not estimated: {ship.model.names[k]} = {ship.values[k]:.3g}"
+        + ("; the effect as fitted changes nothing" if ship.values[k] == 0.0 else "")
         for k in np.flatnonzero(lowest | highest)
     )
 
@@ -312,9 +318,10 @@ def _gross_errors(fit: PooledFit, runs: VesselRuns) -> dict[str, dict[str, list[
 
 
 def _parameters(fit: PooledFit, std: Float) -> tuple[Stored, ...]:
-    values = np.concatenate([fit.hull, fit.values])
-    units = [*HULL_PARAMETERS.values(), *(p.unit for _, p in fit.model.parameters)]
-    names = [*HULL_PARAMETERS, *fit.model.names]
+    ship = fit.ship
+    values = ship.parameters
+    units = [*HULL_PARAMETERS.values(), *(p.unit for _, p in ship.model.parameters)]
+    names = [*HULL_PARAMETERS, *ship.model.names]
     return tuple(
         Stored(n, float(v), float(s) if np.isfinite(s) else None, u)
         for n, v, s, u in zip(names, values, std, units, strict=True)

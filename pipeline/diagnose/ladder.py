@@ -7,6 +7,7 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unseen
+from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
@@ -46,7 +47,7 @@ class Ladder:
 
     def unseen(self, step: Step) -> Unseen:
         """Return how a rung predicts what it did not see; its confirmation has asked that already."""
-        if step.chosen_from:
+        if step.chosen_from and step.chosen_from[0][1].fit is step.fit:
             return step.chosen_from[0][1].unseen
         return unseen(step.fit, self.held, self.workers)
 
@@ -66,10 +67,11 @@ class Ladder:
         """
         candidate, best = close[0]
         self.announce(f"screening beside {candidate.effect.title}")
-        screened = screen(best.fit, self.effects, self.workers)
+        fit = with_instrument_noise(best.fit, self.workers)
+        screened = screen(fit, self.effects, self.workers)
         if self.shooting is not None and ahead is not None:
-            ahead = self.shooting.beside(ahead, best.fit)
-        made = make_step(best.fit, candidate.effect, close, others, self.held, screened, self.workers, ahead)
+            ahead = self.shooting.beside(ahead, fit)
+        made = make_step(fit, candidate.effect, close, others, self.held, screened, self.workers, ahead)
         return replace(made, stability=stability)
 
     def without(self, idle: Effect, steps: Sequence[Step]) -> list[Step]:

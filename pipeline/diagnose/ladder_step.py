@@ -140,9 +140,7 @@ def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]
         "hull": dict(zip(_HULL, (float(x) for x in step.fit.hull), strict=True)),
         "effects": {
             f"{effect.name}.{parameter.name}": {"value": float(v), "std": float(s), "unit": parameter.unit}
-            for (effect, parameter), v, s in zip(
-                ship.model.parameters, ship.values, ship.std[6:], strict=True
-            )
+            for (effect, parameter), v, s in zip(ship.model.parameters, ship.values, ship.std[6:], strict=True)
         },
         "instrument_noise": {
             name: float(value)

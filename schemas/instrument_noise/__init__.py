@@ -23,7 +23,9 @@ _FOLDER = files(__name__)
 def lasting_noise() -> dict[str, Effect]:
     """Return every process by name, in alphabetical order."""
     return {
-        name: read(_FOLDER.joinpath(f"{name}.yaml").read_text(encoding="utf-8"), f"schemas/instrument_noise/{name}.yaml")
+        name: read(
+            _FOLDER.joinpath(f"{name}.yaml").read_text(encoding="utf-8"), f"schemas/instrument_noise/{name}.yaml"
+        )
         for name in NAMES
     }
 

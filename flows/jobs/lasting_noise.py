@@ -1,0 +1,35 @@
+"""Lasting noise of instruments in a parameter set: stored with its noise, and built again from there."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.schemas.instrument_noise import lasting_noise
+from kempf.warehouse.parameter_set import ParameterSet, StoredValue
+
+
+def lasting_noise_of(fit: PooledFit) -> tuple[StoredValue, ...]:
+    """Return the lasting noise of a fit, as ``process.parameter``."""
+    std = fit.std[fit.hull.size :]
+    return tuple(
+        StoredValue(name, float(value), float(error) if np.isfinite(error) else None, parameter.unit)
+        for name, value, error, own, (_, parameter) in zip(
+            fit.model.names, fit.values, std, fit.model.of_ship, fit.model.parameters, strict=True
+        )
+        if not own
+    )
+
+
+def with_lasting_noise(one: ParameterSet, model: EffectModel, values: Float) -> tuple[EffectModel, Float]:
+    """Return a ship's model and its values, shape (p,), with the lasting noise of a set at their end.
+
+    Noise levels of a set belong to this model.
+    """
+    found = {p.name: p.value for p in one.noise}
+    noise = tuple(process for name, process in lasting_noise().items() if f"{name}.c" in found)
+    whole = EffectModel((*model.effects, *noise))
+    own = [found[name] for name in whole.names[len(model.names) :]]
+    return whole, np.concatenate([values, np.array(own, dtype=np.float64)])
