@@ -22,9 +22,9 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
 from kempf.pipeline.estimate.plain_fit import LEVEL, PlainFit
 from kempf.pipeline.estimate.plausibility import plausibility_warnings

@@ -17,7 +17,6 @@ import numpy as np
 
 from kempf.pipeline.diagnose.by_likelihood import certain_ones
 from kempf.pipeline.diagnose.by_prediction import predicting_better
-from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder import Announce, Ladder, silent
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
@@ -26,6 +25,7 @@ from kempf.pipeline.diagnose.ridge_reference import RidgeReference, ridge_refere
 from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.plain_fit import PlainFit
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun

@@ -53,7 +53,8 @@ class EffectModel:
         if brought > dynamics.MOST_EXTRA:
             raise UsageError(
                 "too_many_states",
-                f"The effects {', '.join(effect.name for effect in own)} bring {brought} states along; {dynamics.MOST_EXTRA} is the most.",
+                f"The effects {', '.join(effect.name for effect in own)} bring {brought} states along; "
+                f"{dynamics.MOST_EXTRA} is the most.",
                 "Leave one of those with states of their own out.",
             )
 

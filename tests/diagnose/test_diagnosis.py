@@ -11,11 +11,12 @@ import pytest
 
 from kempf.pipeline.diagnose.confirm import Confirmation, Unseen
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
-from kempf.pipeline.diagnose.forward_selection import added, is_ship, staged
+from kempf.pipeline.diagnose.forward_selection import added, is_ship
 from kempf.pipeline.diagnose.remainder import something_left
 from kempf.pipeline.diagnose.screen import score
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.verdict import _refusal, as_json, finding, sentences, verdict
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit

@@ -21,8 +21,8 @@ from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import assembled
-from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.split import split
+from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.predict.free_run import free_run
 from kempf.schemas.effects import catalogue
 from kempf.schemas.errors import KempfError
