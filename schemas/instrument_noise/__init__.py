@@ -22,12 +22,11 @@ _FOLDER = files(__name__)
 @cache
 def lasting_noise() -> dict[str, Effect]:
     """Return every process by name, in alphabetical order."""
-    return {
-        name: read(
-            _FOLDER.joinpath(f"{name}.yaml").read_text(encoding="utf-8"), f"schemas/instrument_noise/{name}.yaml"
-        )
-        for name in NAMES
-    }
+    return {name: _process(f"{name}.yaml") for name in NAMES}
+
+
+def _process(file: str) -> Effect:
+    return read(_FOLDER.joinpath(file).read_text(encoding="utf-8"), f"schemas/instrument_noise/{file}")
 
 
 def lasting(effect: Effect) -> bool:

@@ -1,0 +1,70 @@
+"""Noise that lasts is found where there is some, and nowhere else; it is no part of the ship."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
+from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.schemas.effects import get, require_free
+from kempf.schemas.errors import UsageError
+from kempf.schemas.instrument_noise import NAMES, lasting, lasting_noise
+from tests.diagnose.sailing import WORKERS, sailed
+
+#: Heading in the runs' measurements; standard deviation, rad, and duration, s, of what is put on it.
+HEADING, STD, TAU = 2, 0.004, 6.0
+
+
+def test_fresh_noise_is_left_as_it_is():
+    ship = sailed()
+    _, (fit,) = staged(ship.runs[:3], ship.spec, (), WORKERS)
+    assert fit.model.effects == ()
+    assert with_instrument_noise(fit, WORKERS) is fit
+
+
+def test_a_heading_whose_errors_last_is_found_with_their_size_and_duration():
+    ship = sailed()
+    random = np.random.default_rng(5)
+    runs = []
+    for run in ship.runs[:3]:
+        keeps = np.exp(-run.step_s / TAU)
+        error = np.zeros(len(run.measured))
+        for k in range(1, error.size):
+            error[k] = keeps * error[k - 1] + STD * np.sqrt(1.0 - keeps**2) * random.standard_normal()
+        measured = run.measured.copy()
+        measured[:, HEADING] += error
+        runs.append(replace(run, measured=measured))
+    _, (fresh,) = staged(ship.runs[:3], ship.spec, (), WORKERS)
+    _, (fit,) = staged(runs, ship.spec, (), WORKERS)
+    found = dict(zip(fit.model.names, zip(fit.values, fit.std[6:], strict=True), strict=True))
+    assert {name.partition(".")[0] for name in found} == {"heading_noise"}
+    for name, truth in (("heading_noise.c", STD), ("heading_noise.tau", TAU)):
+        value, std = found[name]
+        assert abs(value - truth) < 4.0 * std < truth
+    # the ship is hers as before
+    assert fit.ship.model.effects == ()
+    assert fit.ship.covariance.shape == (6, 6)
+    assert np.all(np.abs(fit.hull - fresh.hull) < 4.0 * fit.ship.std)
+
+
+def test_the_ship_of_a_model_is_what_moves_her():
+    model = EffectModel((lasting_noise()["yaw_rate_noise"], get("wind_force"), lasting_noise()["heading_noise"]))
+    assert [effect.name for effect in model.ship.effects] == ["wind_force"]
+    assert [effect.name for effect in model.noise] == ["yaw_rate_noise", "heading_noise"]
+    assert model.of_ship.tolist() == [False, False, True, True, False, False]
+
+
+def test_noise_brings_its_states_beside_those_of_effects():
+    own = (get("waves"), get("memory"))
+    assert EffectModel((*own, *lasting_noise().values())).extra == 6
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_effect_bears_the_name_of_a_noise(name):
+    assert lasting(lasting_noise()[name])
+    with pytest.raises(UsageError, match="noise of instruments"):
+        require_free(name)
