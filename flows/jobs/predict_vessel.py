@@ -1,6 +1,6 @@
 """The job that predicts a standard manoeuvre from a parameter set, its rivals and the logs behind it.
 
-Nothing is fitted but the speed's equation; what is stored are models that the data do not tell from the set.
+Nothing is fitted but the speed's equation; what is stored are models that fit as well as that of the set.
 """
 
 from __future__ import annotations
@@ -369,8 +369,7 @@ def limits_of(made: Prediction, one: ParameterSet) -> tuple[str, ...]:
         count = made.no_ships + len(made.drawn)
         said.append(f"{made.no_ships} of {count} ships that the errors allow do not sail it and are in no interval")
     for model in made.run_away:
-        effects = " + ".join(effect.name for effect in model.waters.model.effects)
-        said.append(f"{effects} fits the logs as well, but its ships run away here: that model is in no interval")
+        said.append(f"{model.title} fits the logs as well, but its ships run away here: that model is in no interval")
     if made.share_unstable >= 0.05:
         said.append(f"unstable on a straight course with a probability of {100.0 * made.share_unstable:.0f} %")
     if not one.convergence.get("converged"):

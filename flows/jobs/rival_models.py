@@ -1,4 +1,4 @@
-"""The models of a vessel that her data do not tell from a given one: members of the confusion sets of her diagnosis."""
+"""The models of a vessel that fit as well as a given one: members of her diagnosis' confusion sets."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Rivals:
 
 
 def rivals_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silent) -> Rivals:
-    """Return the sets of the models that the data of a set do not tell from its own.
+    """Return the sets of the models that fit the data of a set as well as its own.
 
     A confusion set of the vessel's newest diagnosis names the effects that fit alike; a model with another member in an
     effect's place is read where it is stored, and fitted to the same manoeuvres and stored where it is not. No alias

@@ -53,6 +53,11 @@ class Identified:
     settled_std: float = 0.0
 
     @property
+    def title(self) -> str:
+        """Names of its effects, or that it has none."""
+        return " + ".join(effect.name for effect in self.waters.model.effects) or "plain"
+
+    @property
     def ship(self) -> Ship:
         """The ship of the estimates."""
         return Ship(self.waters, self.hull, self.effects, self.surge.best, self.rudder_rate.rad_s)

@@ -62,7 +62,7 @@ class Prediction:
     models: tuple[OfModel, ...]
     extrapolated: tuple[Beyond, ...]
     imo: tuple[Judged, ...]
-    #: Models that the data do not tell from the first one, whose ships run away or never come to the end: in no figure.
+    #: Models that fit as well as the first one, whose ships run away or never come to the end: in no figure.
     run_away: tuple[Identified, ...] = ()
 
     @property
@@ -100,7 +100,7 @@ def predict(
     Parameters
     ----------
     models : sequence of Identified
-        The one that is asked for, then those that the data do not tell from it. Of these a model whose ships do not
+        The one that is asked for, then those that fit as well. Of these a model whose ships do not
         sail the manoeuvre is left out: what fits the logs as well may be no ship beyond them.
     logs : Reach
         How far out the logs go.

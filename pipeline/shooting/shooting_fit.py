@@ -68,14 +68,14 @@ class ShootingFit:
         positive semi-definite, heteroskedasticity and autocorrelation consistent covariance matrix", Econometrica 55).
         """
         spread = np.zeros((self.shared.size, self.shared.size))
+        if not np.isfinite(self.cost):
+            return np.full(spread.shape, np.nan)
         for part in self.parts:
             spread += part.scores.T @ part.scores
             for lag in range(1, min(_LAGS, part.scores.shape[0] - 1) + 1):
                 both = part.scores[lag:].T @ part.scores[:-lag]
                 spread += (1.0 - lag / (_LAGS + 1.0)) * (both + both.T)
         here = normal_equations(self.shots, self.parts)
-        if not np.isfinite(here.cost):
-            return np.full(spread.shape, np.nan)
         scale = here.scale
         inverse = np.linalg.pinv(here.information / np.outer(scale, scale), hermitian=True) / np.outer(scale, scale)
         result: Float = inverse @ spread @ inverse

@@ -60,8 +60,8 @@ def command(
 ) -> None:
     """Predict a standard manoeuvre from a parameter set, every figure with its 95 % interval.
 
-    The intervals are those of ships that the errors of the set allow, of it and of every model that the data do not
-    tell from it. What lies beyond the drift, yaw rate, rudder and speed of the logs is named.
+    The intervals are those of ships that the errors of the set allow, of it and of every model that fits the
+    data as well. What is beyond the drift, yaw rate, rudder and speed of the logs is named.
     """
     from kempf.flows.jobs.checked_prediction import predict_checked
     from kempf.flows.jobs.compare_predicted import measured_beside
@@ -186,8 +186,7 @@ def _print_models(made: Predicted) -> None:
     rows = []
     for one in made.prediction.models:
         figure = one.figures[first]
-        effects = " + ".join(effect.name for effect in one.model.waters.model.effects) or "plain"
-        rows.append([effects, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit])
+        rows.append([one.model.title, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit])
     print_table([f"{words} of the model", "value", "95 % interval", "unit"], rows)
 
 
