@@ -127,6 +127,10 @@ def compare_vessel(
     progress(0, len(filtered), "predicting")
     levels = _levels(filtered, held, hull, values, chosen)
     legs = fitted_to_legs(chosen)
+    if legs is not None:
+        # the likelihood's lasting noise beside them: it moves no ship
+        _, values = with_lasting_noise(chosen, model.ship, legs[1])
+        legs = (legs[0], values, *legs[2:])
     runs, found, skipped = [], [], dict(data.skipped)
     for k, (one, segment) in enumerate(zip(filtered, ordered, strict=True)):
         progress(k, len(filtered), f"predicting {segment.segment_id}")

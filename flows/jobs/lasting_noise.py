@@ -13,13 +13,8 @@ from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 
 def lasting_noise_of(fit: PooledFit) -> tuple[StoredValue, ...]:
     """Return the lasting noise of a fit, as ``process.parameter``."""
-    std = fit.std[fit.hull.size :]
     return tuple(
-        StoredValue(name, float(value), float(error) if np.isfinite(error) else None, parameter.unit)
-        for name, value, error, own, (_, parameter) in zip(
-            fit.model.names, fit.values, std, fit.model.of_ship, fit.model.parameters, strict=True
-        )
-        if not own
+        StoredValue(name, value, std if np.isfinite(std) else None, unit) for name, value, std, unit in fit.noise
     )
 
 

@@ -21,14 +21,13 @@ from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
 from kempf.pipeline.estimate.plain_fit import LEVEL, PlainFit
 from kempf.pipeline.estimate.plausibility import plausibility_warnings
-from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.pooled_fit import PooledFit, ShipPart
 from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncertainty_of
 from kempf.pipeline.estimate.record.left_out import instants_left_out
 from kempf.pipeline.estimate.result import discrete_values
@@ -260,12 +259,10 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
     spec, ship = request.spec, fit.ship_part(known.covariance)
     covariance = ship.covariance
     speed = float(np.mean([np.mean(one.run.speed_m_s) for one in fit.runs]))
-    with np.errstate(invalid="ignore"):
-        std = np.sqrt(np.diag(covariance))
     return ParameterSet(
         **described(request),
         model_name=" + ".join((spec.name, *spec.effects)),
-        parameters=_parameters(fit, std),
+        parameters=_parameters(ship),
         discrete=stored(discrete_values(fit.hull, np.nan_to_num(covariance[:6, :6]), speed, _STEP_S)),
         noise=lasting_noise_of(fit),
         covariance_names=(*HULL_PARAMETERS, *ship.model.names),
@@ -288,9 +285,9 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
         },
         warnings=(
             *(() if fit.converged else (f"not converged: {fit.reason}",)),
-            *_at_bounds(fit),
+            *_at_bounds(ship),
             *dict.fromkeys(
-                sentence for one in known.one_step for sentence in plausibility_warnings(fit.hull, std[:6], one)
+                sentence for one in known.one_step for sentence in plausibility_warnings(fit.hull, ship.std[:6], one)
             ),
             *without_arm(spec, arm_of(spec, request.profile)),
             *channel_warnings(request.origin),
@@ -299,9 +296,8 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
     )
 
 
-def _at_bounds(fit: PooledFit) -> tuple[str, ...]:
+def _at_bounds(ship: ShipPart) -> tuple[str, ...]:
     """Return a warning for every parameter of an effect that ended at a bound."""
-    ship = fit.ship
     lowest, highest = ship.model.at_bounds(ship.values)
     return tuple(
         f"at a bound, not estimated: {ship.model.names[k]} = {ship.values[k]:.3g}"
@@ -317,12 +313,10 @@ def _gross_errors(fit: PooledFit, runs: VesselRuns) -> dict[str, dict[str, list[
     return {name: instants for name, instants in left_out.items() if instants}
 
 
-def _parameters(fit: PooledFit, std: Float) -> tuple[Stored, ...]:
-    ship = fit.ship
-    values = ship.parameters
+def _parameters(ship: ShipPart) -> tuple[Stored, ...]:
     units = [*HULL_PARAMETERS.values(), *(p.unit for _, p in ship.model.parameters)]
     names = [*HULL_PARAMETERS, *ship.model.names]
     return tuple(
         Stored(n, float(v), float(s) if np.isfinite(s) else None, u)
-        for n, v, s, u in zip(names, values, std, units, strict=True)
+        for n, v, s, u in zip(names, ship.parameters, ship.std, units, strict=True)
     )

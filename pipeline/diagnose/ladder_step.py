@@ -143,9 +143,7 @@ def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]
             for (effect, parameter), v, s in zip(ship.model.parameters, ship.values, ship.std[6:], strict=True)
         },
         "instrument_noise": {
-            name: float(value)
-            for name, value, own in zip(step.fit.model.names, step.fit.values, step.fit.model.of_ship, strict=True)
-            if not own
+            name: {"value": value, "std": std, "unit": unit} for name, value, std, unit in step.fit.noise
         },
     }
 

@@ -99,6 +99,13 @@ class PooledFit:
         """What it says of the ship."""
         return self.ship_part(self.covariance)
 
+    @property
+    def noise(self) -> tuple[tuple[str, float, float, str], ...]:
+        """Lasting noise of instruments: name, value, standard error and unit of each of its parameters."""
+        parameters = zip(self.model.names, self.model.parameters, self.values, self.std[N_HULL:], strict=True)
+        every = [(name, float(x), float(std), p.unit) for name, (_, p), x, std in parameters]
+        return tuple(one for one, own in zip(every, self.model.of_ship, strict=True) if not own)
+
     def ship_part(self, covariance: Float) -> ShipPart:
         """Return what it says of the ship, with another covariance of all parameters, shape (6 + p, 6 + p)."""
         own = np.concatenate([np.ones(N_HULL, dtype=np.bool_), self.model.of_ship])

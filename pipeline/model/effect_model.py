@@ -93,11 +93,6 @@ class EffectModel:
         """The model without lasting noise of instruments."""
         return EffectModel(tuple(effect for effect in self.effects if not lasting(effect)))
 
-    @property
-    def noise(self) -> tuple[Effect, ...]:
-        """Lasting noise of instruments."""
-        return tuple(effect for effect in self.effects if lasting(effect))
-
     def at_bounds(self, values: Float) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
         """Return which parameters have ended at their lower and which at their upper bound, but for rounding.
 

@@ -54,7 +54,6 @@ def test_a_heading_whose_errors_last_is_found_with_their_size_and_duration():
 def test_the_ship_of_a_model_is_what_moves_her():
     model = EffectModel((lasting_noise()["yaw_rate_noise"], get("wind_force"), lasting_noise()["heading_noise"]))
     assert [effect.name for effect in model.ship.effects] == ["wind_force"]
-    assert [effect.name for effect in model.noise] == ["yaw_rate_noise", "heading_noise"]
     assert model.of_ship.tolist() == [False, False, True, True, False, False]
 
 

@@ -14,7 +14,7 @@ from benchmarks.diagnose import late_rudder
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.vessel_model import _at_bounds
-from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.pooled_fit import ShipPart
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import catalogue
 from kempf.warehouse import aliases
@@ -98,10 +98,10 @@ def test_an_effect_at_its_bound_is_warned_of() -> None:
     model = EffectModel((catalogue()["backlash"], catalogue()["rudder_lag"]))
     (_, backlash), (_, lag) = model.parameters
     ended = SimpleNamespace(model=model, values=np.array([backlash.low, 0.5 * (lag.low + lag.high)]))
-    assert _at_bounds(cast(PooledFit, ended)) == (
+    assert _at_bounds(cast(ShipPart, ended)) == (
         "at a bound, not estimated: backlash.c = 0; the effect as fitted changes nothing",
     )
     ended.values = np.array([backlash.high, lag.high])
-    assert [said.split(" = ")[0] for said in _at_bounds(cast(PooledFit, ended))] == [
+    assert [said.split(" = ")[0] for said in _at_bounds(cast(ShipPart, ended))] == [
         f"at a bound, not estimated: {name}" for name in model.names
     ]
