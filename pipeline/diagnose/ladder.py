@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, confirm, unseen
 from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
@@ -37,13 +37,21 @@ class Ladder:
     announce: Announce
     #: The model with everything that was found, immaterial or not: what is left is looked for beside it.
     probe: PooledFit
+    #: Refits that were climbed to the end: who predicts and who asks the likelihood ask for the same ones.
+    refits: dict[tuple[PooledFit, str], Confirmation] = field(default_factory=dict)
 
     def confirmed(
         self, base: PooledFit, alone: Unseen, candidate: Candidate, most_bic: float = float("inf")
     ) -> Confirmation:
         """Refit a model with one effect more, see `kempf.pipeline.diagnose.confirm.confirm`."""
+        known = self.refits.get((base, candidate.effect.name))
+        if known is not None:
+            return known
         self.announce(f"refitting with {candidate.effect.title}")
-        return confirm(base, alone, candidate, self.held, self.workers, most_bic)
+        made = confirm(base, alone, candidate, self.held, self.workers, most_bic)
+        if not made.outdone:
+            self.refits[base, candidate.effect.name] = made
+        return made
 
     def unseen(self, step: Step) -> Unseen:
         """Return how a rung predicts what it did not see; its confirmation has asked that already."""
