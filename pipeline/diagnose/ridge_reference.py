@@ -23,6 +23,7 @@ from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect, Parameter
 
 _BOTH = {
+    "1": "V**2/L",
     "v|v|": "v*abs(v)/L",
     "r|r|": "r*abs(r)*L",
     "|v|r": "abs(v)*r",

@@ -161,6 +161,18 @@ def test_what_the_reference_should_see_and_does_not_is_no_effect(
     assert quiet.before is not None and quiet.before.foreseen(bias) < 0.05 * float(bias @ bias)
 
 
+def test_a_constant_moment_is_seen_by_the_reference_too() -> None:
+    """The rudder's neutral angle: what acts all the time alike is made of no drift, turn, order or heading."""
+    ship = sailed("neutral_angle", strength=1)
+    found = ship.diagnosis(("neutral_angle", "yaw_quadratic", "gyro_bias"))
+    assert verdict(found) == "explained"
+    c, std = value_of(found, "neutral_angle.c")
+    assert abs(c - ship.c) < 3.0 * std
+    assert found.before is not None
+    foreseen = found.before.foreseen(found.steps[1].chosen_from[0][0].direction)
+    assert found.before.gain > 0.8 * foreseen > 10.0
+
+
 def test_what_the_logs_lack_or_zigzags_cannot_tell_is_not_testable(calm: tuple[Sailed, Diagnosis]) -> None:
     _, found = calm
     findings = {one.effect.name: finding(found, one) for one in found.steps[0].screened}
