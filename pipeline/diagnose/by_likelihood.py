@@ -64,8 +64,8 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
             # the ladder goes on without what is immaterial
             beside = score(last.fit, candidate.effect, ladder.workers)
             again = ladder.confirmed(last.fit, ladder.unseen(last), beside)
-            if not np.isfinite(again.fit.log_likelihood):
-                found.suspected[candidate.effect.name] = "without what is immaterial beside it the refit diverges"
+            if not again.holds:
+                found.suspected[candidate.effect.name] = "without what is immaterial beside it nothing of it holds"
                 continue
             pairs = ((beside, again), *pairs[1:])
         found.steps.append(ladder.stepped(pairs, worse, ahead, None))
