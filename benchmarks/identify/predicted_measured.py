@@ -7,8 +7,9 @@ those held out among them. Each is predicted as it was sailed: with its own appr
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -34,6 +35,11 @@ from kempf.warehouse.store import Warehouse
 
 _MODELS = Path(__file__).parents[2] / "docs" / "models"
 _CIRCLE = ("steady_yaw_rate_deg_s", "advance_m", "transfer_m", "tactical_diameter_m", "speed_loss_percent")
+_TANK_M = 7.0
+#: The tank's ship in another basin, 35 deg of rudder, m: measured by MARIN with a model of the same length, and from
+#: captive tests by the MMG standard method; Yasukawa & Yoshimura 2015, "Introduction of MMG standard method for ship
+#: maneuvering predictions", J. Mar. Sci. Technol. 20, table 4, there in lengths
+_PUBLISHED = {"advance_m": (3.25 * _TANK_M, 3.31 * _TANK_M), "tactical_diameter_m": (3.34 * _TANK_M, 3.36 * _TANK_M)}
 _FIRST_TWO = ("overshoots_deg.0", "overshoots_deg.1")
 
 
@@ -84,7 +90,9 @@ def circles(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
     return [*lines, *result_page.table(heads, rows), ""]
 
 
-def zigzags(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
+def zigzags(
+    warehouse: Warehouse, vessel: str, source: Source, published: Mapping[str, tuple[float, float]]
+) -> list[str]:
     """Return the part of the page with the zigzags of a ship."""
     made = predict_checked(warehouse, vessel, PredictRequest("zigzag", source.set_id))
     checked = made.own_zigzags
@@ -110,7 +118,7 @@ def zigzags(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
         "",
         *result_page.table(["zigzag", "sample", "first overshoot, deg", "second overshoot, deg"], rows),
         "",
-        *_calm_circle(warehouse, vessel, source),
+        *_calm_circle(warehouse, vessel, source, published),
     ]
 
 
@@ -130,7 +138,9 @@ def _shares(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
     return lines
 
 
-def _calm_circle(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
+def _calm_circle(
+    warehouse: Warehouse, vessel: str, source: Source, published: Mapping[str, tuple[float, float]]
+) -> list[str]:
     """Return a 35 deg circle in calm water with its intervals: how much the model is worth beyond zigzags."""
     try:
         made = predict_checked(warehouse, vessel, PredictRequest("turning-circle", source.set_id))
@@ -143,8 +153,13 @@ def _calm_circle(warehouse: Warehouse, vessel: str, source: Source) -> list[str]
         assert one.low is not None
         assert one.high is not None
         width = 100.0 * (one.high - one.low) / abs(one.value)
-        rows.append([name, f"{one.value:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{width:.0f} %"])
+        row = [name, f"{one.value:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{width:.0f} %"]
+        if published:
+            others = published.get(name, ())
+            row += [f"{x:.4g}: {100.0 * (one.value / x - 1.0):+.1f} %" for x in others] or ["", ""]
+        rows.append(row)
     heads = ["her circle with 35 deg of rudder, calm water", "value", "95 % interval", "width"]
+    heads += ["measured by MARIN: ours off by", "MMG from captive tests: ours off by"] if published else []
     return [*result_page.table(heads, rows), ""]
 
 
@@ -158,7 +173,9 @@ def _cell(figure: Beside | None) -> str:
     return f"{figure.measured:.3g}: {one.value:.3g} ({one.low:.3g} to {one.high:.3g}{mark})"
 
 
-def _of(ship: Ship, spec: ModelSpec | None, named: ModelSpec | None) -> list[str]:
+def _of(
+    ship: Ship, spec: ModelSpec | None, named: ModelSpec | None, published: Mapping[str, tuple[float, float]]
+) -> list[str]:
     lines = [f"## {ship.name}", ""]
     with TemporaryDirectory() as place:
         warehouse = Warehouse(place)
@@ -166,11 +183,12 @@ def _of(ship: Ship, spec: ModelSpec | None, named: ModelSpec | None) -> list[str
         for source in sources(warehouse, ship.name, spec, named):
             point(warehouse, parameter_sets.get(warehouse, source.set_id))
             turned = any(s.kind == "turning_circle" for s in segments.every(warehouse, ship.name))
-            for part in (circles, zigzags) if turned else (zigzags,):
+            parts = {"circles": circles} if turned else {}
+            for name, part in (parts | {"zigzags": partial(zigzags, published=published)}).items():
                 try:
                     lines += part(warehouse, ship.name, source)
                 except KempfError as error:
-                    lines += [f"### Refused: {part.__name__} by {source.words}", "", error.message, ""]
+                    lines += [f"### Refused: {name} by {source.words}", "", error.message, ""]
     return lines
 
 
@@ -184,8 +202,8 @@ def main() -> None:
         "Cells: measured, then predicted with its 95 % interval. Circles are never fitted; what wind and stream do to "
         "the track beyond their mean is in the measurement alone.",
         "",
-        *_of(measured_ships.pond(given.data), None, read_model(given.model)),
-        *_of(measured_ships.tank(given.data), read_model(_MODELS / "tank.yaml"), None),
+        *_of(measured_ships.pond(given.data), None, read_model(given.model), {}),
+        *_of(measured_ships.tank(given.data), read_model(_MODELS / "tank.yaml"), None, _PUBLISHED),
     ]
     result_page.write("identify.predicted_measured", "Predicted manoeuvres of measured ships", lines)
 
