@@ -62,7 +62,7 @@ def _one_more(ladder: Ladder, shooting: ShootingRange, steps: list[Step]) -> lis
     for ahead in choice.close[:_MEMBERS]:
         candidate = testable[ahead.model.effects[-1].name]
         found = ladder.confirmed(last.fit, alone, candidate)
-        if np.isfinite(found.fit.log_likelihood) and not (found.at_bound or found.absent):
+        if _stands(candidate, found) and not found.absent:
             tried.append((candidate, found, ahead))
     steps = _put_on(ladder, shooting, steps, tried, choice.stability)
     idle = _idle(ladder, steps) if steps else None
@@ -95,9 +95,20 @@ def _members(ladder: Ladder, last: Step, effects: Sequence[Effect]) -> list[Memb
     for effect in effects:
         candidate = _testable(last)[effect.name]
         confirmation, ahead = ladder.confirmed(last.fit, ladder.unseen(last), candidate), ladder.ahead(last, effect)
-        if ahead is not None and np.isfinite(confirmation.fit.log_likelihood) and not confirmation.at_bound:
+        if ahead is not None and _stands(candidate, confirmation):
             found.append((candidate, confirmation, ahead))
     return found
+
+
+def _stands(candidate: Candidate, found: Confirmation) -> bool:
+    """Return whether the likelihood has nothing against what legs chose.
+
+    Disturbances carry a force one step ahead, so that the likelihood may be blind to it; a reading they do not carry,
+    and an error of an instrument must hold by likelihood too.
+    """
+    if candidate.effect.group == "sensor" and not found.holds:
+        return False
+    return np.isfinite(found.fit.log_likelihood) and not found.at_bound
 
 
 def _put_on(

@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from kempf.pipeline.diagnose.by_prediction import _stands
 from kempf.pipeline.diagnose.confirm import Confirmation, Unseen
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.diagnose.forward_selection import added, is_ship
@@ -242,6 +243,16 @@ def test_the_speed_lost_in_a_turn_is_looked_for_only_where_no_log_shows_it() -> 
     assert np.isfinite(one["score"])
 
 
+def test_what_legs_show_of_an_instrument_must_hold_by_likelihood_too(calm: tuple[Sailed, Diagnosis]) -> None:
+    """A disturbance may carry a force that is missing, one step ahead; it never carries a reading."""
+    _, found = calm
+    for name, stands in (("gyro_bias", False), ("cross_flow_drag", True)):
+        candidate = next(one for one in found.steps[0].screened if one.effect.name == name)
+        assert _stands(candidate, refitted(1.0)) is stands
+        assert _stands(candidate, refitted())
+        assert not _stands(candidate, replace(refitted(), at_bound=True))
+
+
 def test_a_channel_that_the_runs_lack_is_named() -> None:
     ship = sailed("none")
     runs = tuple(replace(run, channels=run.channels - {"water_depth"}) for run in ship.runs)
@@ -251,18 +262,23 @@ def test_a_channel_that_the_runs_lack_is_named() -> None:
     assert np.isnan(one["score"])
 
 
-def test_an_effect_that_the_refit_leaves_nothing_of_is_not_claimed() -> None:
-    """From a hull at a lower maximum a refit may gain much by the hull alone."""
-    sound = Confirmation(
+def refitted(likelihood_ratio: float = 500.0) -> Confirmation:
+    """A refit that gains so much everywhere, worth two parameters."""
+    return Confirmation(
         fit=cast(PooledFit, SimpleNamespace(log_likelihood=100.0)),
-        likelihood_ratio=500.0,
-        bic_change=-490.0,
+        likelihood_ratio=likelihood_ratio,
+        bic_change=10.0 - likelihood_ratio,
         fold_gains=np.ones(3),
         held_out_gains=np.ones(1),
         at_bound=False,
         absent=False,
         unseen=Unseen(np.ones(3), np.ones(1)),
     )
+
+
+def test_an_effect_that_the_refit_leaves_nothing_of_is_not_claimed() -> None:
+    """From a hull at a lower maximum a refit may gain much by the hull alone."""
+    sound = refitted()
     assert sound.holds
     nothing = replace(sound, absent=True)
     assert not nothing.holds and _refusal(nothing) == "the refit leaves nothing of it"
