@@ -27,7 +27,9 @@ CHANNEL_OF = {channel.column: channel for channel in CHANNELS.values()}
 #: some that a rudder, a hull and a sensor can have; the whole catalogue takes too long for a test
 SOME = ("rudder_lag", "dead_time", "cross_flow_drag", "sway_quadratic", "yaw_quadratic", "gyro_bias")
 WORKERS = ThreadPoolExecutor(2)
-_STEP_S, _LEAD_S, _LEGS = 2.0, 20.0, 4
+_LEGS = 4
+#: step of the grid and time before the first execute, s: a boat does everything in a twentieth of the time
+_TIMES_S = {"mariner": (2.0, 20.0), "usv": (0.1, 5.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,9 +47,11 @@ class Sailed:
 
 
 @lru_cache(maxsize=8)
-def sailed(effect: str = "none", *, strength: int = 2, seed: int = 3, noise: float = 1.0) -> Sailed:
-    """Sail a day of the mariner-like ship in a moderate sea."""
-    hull = programme.ship("mariner", seed)
+def sailed(
+    effect: str = "none", *, strength: int = 2, seed: int = 3, noise: float = 1.0, name: str = "mariner"
+) -> Sailed:
+    """Sail a day of a ship in a moderate sea."""
+    hull, (step_s, lead_s) = programme.ship(name, seed), _TIMES_S[name]
     weather = programme.weather(hull, "moderate", seed, 0)
     hidden: HiddenEffect | None = (CATALOGUE | OUTSIDERS).get(effect)
     c = sail.strength_of(hull, (weather,), hidden, strength, seed) if hidden else 0.0
@@ -59,10 +63,10 @@ def sailed(effect: str = "none", *, strength: int = 2, seed: int = 3, noise: flo
     spec = ModelSpec(rate_bias=False, wind_arm_per_m=hull.wind_arm_per_m)
     ship = ShipConstants(hull.length_m, hull.draught_m, hull.wind_arm_per_m)
     records = [
-        make_record(instruments, *(settings.start_utc_ns + round(t * SECOND_NS) for t in (e[0] - _LEAD_S, e[_LEGS])))
+        make_record(instruments, *(settings.start_utc_ns + round(t * SECOND_NS) for t in (e[0] - lead_s, e[_LEGS])))
         for e in voyage.executes_s
     ]
-    runs = tuple(make_run(f"run {k}", r, instruments, spec, ship, _STEP_S) for k, r in enumerate(records))
+    runs = tuple(make_run(f"run {k}", r, instruments, spec, ship, step_s) for k, r in enumerate(records))
     return Sailed(runs, spec, c)
 
 

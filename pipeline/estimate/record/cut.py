@@ -13,6 +13,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 from kempf.pipeline.channels.smooth import without_spikes
+from kempf.pipeline.channels.standing import averaged_where_standing
 from kempf.pipeline.estimate.record.channel_faults import EXAMINED, check_channels
 from kempf.pipeline.estimate.record.checks import check_course, check_manoeuvre, check_sway, check_way
 from kempf.pipeline.estimate.record.jumps import find_jumps
@@ -70,7 +71,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     warnings += said
     check_course(lateral)
     lateral = _without_jumps(lateral, warnings)
-    moved = with_corners(rudder, rudder_std)
+    moved = with_corners(averaged_where_standing(rudder, rudder_std), rudder_std)
     timed = [lateral.time_utc_ns, heading.time_utc_ns, moved.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
