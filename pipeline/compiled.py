@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import inspect
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import numba
@@ -25,6 +26,7 @@ FILLING: dict[str, Any] = {
 }
 #: for what runs at every instant: put into its caller, too
 STEP: dict[str, Any] = {**FILLING, "forceinline": True}
+_OPTIONS = Path(__file__).read_bytes()
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
@@ -39,8 +41,11 @@ def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:
 
 
 def _went_in(function: Any) -> str:
-    """Return a digest of the functions that a function calls and of the constants that it and they use."""
-    digest = hashlib.sha256()
+    """Return a digest of the functions that a function calls, of the constants that it and they use, and of this file.
+
+    Options named here do not stand in the source of a function that takes them.
+    """
+    digest = hashlib.sha256(_OPTIONS)
     for part in _parts(function, {function}):
         digest.update(part)
     return digest.hexdigest()

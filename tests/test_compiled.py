@@ -34,13 +34,15 @@ print(outer(1.0), sum(outer.stats.cache_hits.values()))
 """
 
 
-def said(folder: Path, held: float, factor: float) -> tuple[float, int]:
-    """Run `outer` in a process of its own: its value, and whether it was found compiled."""
+def said(folder: Path, held: float, factor: float, before: str = "pass") -> tuple[float, int]:
+    """Run `outer` in a process of its own, after a statement: its value, and whether it was found compiled."""
     text = INNER.format(held=held, factor=factor)
     if not (folder / "inner.py").exists() or (folder / "inner.py").read_text() != text:
         (folder / "inner.py").write_text(text)
     root = Path(__file__).parents[1]
-    command = f"import sys; sys.path[:0] = [{str(root)!r}, {str(folder)!r}]; sys.argv = ['outer']; import outer"
+    command = (
+        f"import sys; sys.path[:0] = [{str(root)!r}, {str(folder)!r}]; sys.argv = ['outer']; {before}; import outer"
+    )
     run = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
     value, hits = run.stdout.split()
     return float(value), int(hits)
@@ -55,6 +57,15 @@ def test_a_change_in_another_file_is_compiled_in(tmp_path: Path, changed: str) -
         assert said(tmp_path, 20.0, 2.0) == (22.0, 0)
     else:
         assert said(tmp_path, 10.0, 3.0) == (13.0, 0)
+
+
+def test_a_change_of_the_options_is_compiled_in(tmp_path: Path) -> None:
+    """A function compiled under other options of the arithmetic would go on giving other last bits."""
+    (tmp_path / "outer.py").write_text(OUTER)
+    assert said(tmp_path, 10.0, 2.0) == (12.0, 0)
+    other = "import kempf.pipeline.compiled as c; c._OPTIONS += b' '"
+    assert said(tmp_path, 10.0, 2.0, other) == (12.0, 0)
+    assert said(tmp_path, 10.0, 2.0, other) == (12.0, 1)
 
 
 def test_no_kernel_takes_its_arithmetic_from_its_caller() -> None:
