@@ -16,7 +16,7 @@ import numpy as np
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.lasting_noise import lasting_noise_of
 from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, channel_warnings, described, stored, without_arm
-from kempf.flows.jobs.standing_model import SEARCH, Own, inputs_of, known_effects, named, stored_model
+from kempf.flows.jobs.standing_model import SEARCH, SINGLE, Own, inputs_of, known_effects, named, stored_model
 from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
@@ -147,7 +147,28 @@ def build_single(instruments: Mapping[str, Instruments], request: SetRequest) ->
     KempfError
         The segment cannot be identified from, or an effect cannot be determined from it.
     """
+    return _single(_fitted_request(instruments, request), request)
+
+
+def build_with_lasting_noise(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet | None:
+    """Compute the set of one manoeuvre of the plain model with the lasting noise of her instruments (decision 0042).
+
+    Parameters
+    ----------
+    instruments : mapping of str to Instruments
+        Series by log.
+
+    Returns
+    -------
+    ParameterSet or None
+        None where the manoeuvre shows no lasting noise, or the search for it did not converge.
+    """
     fitted = _fitted_request(instruments, request)
+    fit = fitted.fits[-1]
+    return _single(fitted, request) if fit.noise and fit.converged else None
+
+
+def _single(fitted: Fitted, request: SetRequest) -> ParameterSet:
     fit, (record,) = fitted.fits[-1], fitted.runs.records
     known = _known(fit)
     made = _as_parameter_set(fit, known, fitted, request)
@@ -167,7 +188,9 @@ def _fitted_request(instruments: Mapping[str, Instruments], request: SetRequest)
     spec, settings = request.spec, request.inputs.settings
     bounds = list(zip(request.segment_ids, request.inputs.bounds, strict=True))
     runs = assemble(instruments, request.profile, bounds, spec)
-    return _fitted_model(runs, spec, Own.from_json(settings.get("own") or {}), settings.get(SEARCH))
+    # the plain model of one manoeuvre has no settings but those of its search
+    search = settings if request.inputs.estimator == SINGLE and not spec.effects else settings.get(SEARCH)
+    return _fitted_model(runs, spec, Own.from_json(settings.get("own") or {}), search)
 
 
 def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> ParameterSet:

@@ -9,6 +9,8 @@ from kempf.schemas.model_spec import HULL_PARAMETERS
 
 #: lag-1 autocorrelation of whitened innovations above which the standard errors are not to be believed
 _NOT_WHITE = 0.3
+#: standard errors of a lag-1 autocorrelation within which noise may be fresh at every reading
+_CHANCE = 3.0
 #: a 95 % interval that holds fewer than this share of the measurements is too narrow
 _TOO_FEW = 0.90
 
@@ -23,6 +25,18 @@ def not_white(fit: dict[str, Any]) -> tuple[str, ...]:
     """
     channels = fit.get("channels", {})
     return tuple(name for name, channel in channels.items() if abs(channel["lag1_autocorrelation"]) > _NOT_WHITE)
+
+
+def may_last(fit: dict[str, Any]) -> bool:
+    """Return whether prediction errors of a measurement resemble their predecessors by more than chance.
+
+    Parameters
+    ----------
+    fit : dict
+        See `kempf.pipeline.estimate.one_step_fit.one_step_fit`.
+    """
+    channels = fit.get("channels", {}).values()
+    return any(abs(channel["lag1_autocorrelation"]) > _CHANCE / channel["n"] ** 0.5 for channel in channels)
 
 
 def plausibility_warnings(hull: Float, std: Float, fit: dict[str, Any]) -> tuple[str, ...]:

@@ -20,7 +20,7 @@ Float = NDArray[np.float64]
 #: Time constant of the receiver's velocity, and time over which its noise and that of gyro and compass remember, s.
 _SMOOTHED_S, _REMEMBERS_S = 0.8, {"gnss": 5.0, "yaw_rate": 1.0, "heading": 3.0}
 #: Time over which the log averages, s, and by how much the rudder's feedback is off.
-_AVERAGED_S, _RUDDER_OFF = 5.0, 0.02
+_AVERAGED_S, RUDDER_OFF = 5.0, 0.02
 #: A boat's are quicker by so much.
 _QUICKER = 0.4
 
@@ -63,7 +63,7 @@ def as_sold(record: InstrumentRecord, clean: InstrumentRecord, *, quick: bool) -
             column = values["speed_through_water_m_s"]
             values["speed_through_water_m_s"] = _averaged(column, time_s, factor * _AVERAGED_S)
         case "rudder":
-            values["rudder_angle_rad"] = (1.0 + _RUDDER_OFF) * values["rudder_angle_rad"]
+            values["rudder_angle_rad"] = (1.0 + RUDDER_OFF) * values["rudder_angle_rad"]
         case _:
             return record
     return replace(record, values=values)

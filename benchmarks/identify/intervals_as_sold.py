@@ -1,0 +1,143 @@
+"""Whether 95 % intervals hold with instruments as they are sold: ``python -m benchmarks.identify.intervals_as_sold``.
+
+Every ship sails her two days twice in the simulator of the hidden cases, with nothing hidden: once with instruments
+whose noise is fresh at every reading, once with instruments as they are sold (a receiver that smooths, noise that
+lasts, a log that averages, a rudder 2 % off). Both go through the whole job, from raw logs to stored sets.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from benchmarks import result_page
+from benchmarks.diagnose.hidden_effects import programme
+from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
+from benchmarks.diagnose.hidden_effects.cases import Case
+from benchmarks.diagnose.hidden_effects.write import logs_of
+from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.identify_vessel import Request, identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.pool_vessel import pool_vessel
+from kempf.flows.jobs.standing_model import PLAIN, Own
+from kempf.flows.jobs.vessel_model import store_model
+from kempf.pipeline.simulate.hulls import HULLS
+from kempf.pipeline.simulate.random_streams import stream
+from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+#: kinds of sets: one zigzag alone; all pooled by `kempf identify`; all as `kempf diagnose` and `effects add` fit them
+KINDS = ("alone", "pooled", "model")
+#: of a normal distribution
+_HALF_WIDTH = 1.959964
+_SEED = 20261124
+_COUNT = 24
+
+
+@dataclass(frozen=True, eq=False)
+class Error:
+    """Errors of one set's hull, in its own standard errors."""
+
+    kind: str
+    sold: bool
+    hull: str
+    #: Shape (6,). Those of `HULL_PARAMETERS`; the ship's b1 and b2 are those of the rudder that the log shows.
+    errors: NDArray[np.float64]
+
+
+def errors_of(number: int) -> list[Error]:
+    """Sail one ship with both kinds of instruments and identify her."""
+    random = stream(_SEED, f"ship {number}")
+    hull = tuple(HULLS)[number % len(HULLS)]
+    weather = programme.DISTURBANCES[number // len(HULLS) % len(programme.DISTURBANCES)]
+    seed = int(random.integers(1, 2**31))
+    case = Case(f"ship-{number}", "none", "none", hull, 1.0, weather, 0, False, ("mcap", "mcap"), seed)  # noqa: FBT003
+    return [one for sold in (False, True) for one in _identified(replace(case, sold=sold))]
+
+
+def _identified(case: Case) -> Iterator[Error]:
+    files, answer = logs_of(case)
+    own = answer["hull_parameters"]
+    true = np.array([own[name] for name in HULL_PARAMETERS])
+    if case.sold:
+        true[4:] /= 1.0 + RUDDER_OFF
+    with TemporaryDirectory() as place:
+        for name, content in files.items():
+            (Path(place) / name).write_bytes(content)
+        warehouse = Warehouse(f"{place}/warehouse")
+        logs = sorted(Path(place) / name for name in files if name != "profile.yaml")
+        ingest(warehouse, logs, None, read_profiles([Path(place) / "profile.yaml"]))
+        outcomes = identify_vessel(warehouse, case.case_id, Request())
+        pooled = pool_vessel(warehouse, case.case_id, Request(), outcomes)
+        model, _ = store_model(warehouse, choose(warehouse, case.case_id), PLAIN, Own())
+        sets = [("alone", o.parameter_set) for o in outcomes if o.parameter_set]
+        sets += [("pooled", pooled[0])] if pooled else []
+        for kind, one in [*sets, ("model", model)]:
+            yield Error(kind, case.sold, case.hull, _errors(one, true))
+
+
+def _errors(one: ParameterSet, true: NDArray[np.float64]) -> NDArray[np.float64]:
+    found = {p.name: p for p in one.parameters}
+    each = [(found[name].value - t, found[name].std) for name, t in zip(HULL_PARAMETERS, true, strict=True)]
+    return np.array([error / std if std else np.nan for error, std in each])
+
+
+def page(errors: Sequence[Error], count: int) -> list[str]:
+    """Return the lines of the page."""
+    lines = [
+        f"{count} ships, each sailed with both kinds of instruments. Inside: the share of the 95 % intervals of a11 to "
+        "b2 that hold the truth, with its own 95 % interval over ships; wanted 93 to 97 %.",
+        "",
+    ]
+    rows = []
+    for sold in (False, True):
+        for kind in KINDS:
+            own = [e for e in errors if e.kind == kind and e.sold == sold]
+            z = np.array([e.errors for e in own])
+            good = np.isfinite(z)
+            inside = np.where(good, np.abs(z) < _HALF_WIDTH, np.nan)
+            size = [f"{np.sqrt(np.nanmean(z[:, k] ** 2)):.2f}" for k in range(len(HULL_PARAMETERS))]
+            worst = [h for h in HULLS if any(e.hull == h for e in own)]
+            by = [np.nanmean([np.abs(e.errors) < _HALF_WIDTH for e in own if e.hull == h]) for h in worst]
+            lowest = int(np.argmin(by))
+            rows.append(
+                [
+                    "as sold" if sold else "fresh noise",
+                    {"alone": "one zigzag", "pooled": "pooled", "model": "pooled, as diagnosed"}[kind],
+                    str(len(own)),
+                    f"{100 * np.nanmean(inside):.0f} %",
+                    *size,
+                    f"{worst[lowest]} {100 * by[lowest]:.0f} %",
+                ]
+            )
+    head = ["instruments", "set", "sets", "inside", *(f"rms {n}" for n in HULL_PARAMETERS), "lowest hull"]
+    return [*lines, *result_page.table(head, rows)]
+
+
+def main() -> None:
+    """Sail, identify and write ``results/intervals_as_sold.md``."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--ships", type=int, default=_COUNT)
+    parser.add_argument("--processes", type=int, default=2)
+    given = parser.parse_args()
+    with ProcessPoolExecutor(given.processes) as pool:
+        found = list(pool.map(errors_of, range(given.ships)))
+    errors = [one for ship in found for one in ship]
+    lines = page(errors, given.ships)
+    options = "" if given.ships == _COUNT else f"--ships {given.ships}"
+    result_page.write(
+        "identify.intervals_as_sold", "Intervals with instruments as they are sold", lines, options=options
+    )
+
+
+if __name__ == "__main__":
+    main()
