@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import hashlib
 import inspect
+import sys
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from typing import Any
 
 import numba
@@ -26,7 +26,7 @@ FILLING: dict[str, Any] = {
 }
 #: for what runs at every instant: put into its caller, too
 STEP: dict[str, Any] = {**FILLING, "forceinline": True}
-_OPTIONS = Path(__file__).read_bytes()
+_OPTIONS = inspect.getsource(sys.modules[__name__]).encode()
 
 
 def njit(**options: Any) -> Callable[[Callable[..., Any]], Any]:

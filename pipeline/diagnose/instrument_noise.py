@@ -26,8 +26,8 @@ def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
     """Return a fit with what its innovations show of lasting noise.
 
     Noise follows no manoeuvre and could imitate a little of everything. It is taken where it says more of the
-    innovations than any effect of the catalogue, and gains clearly. One manoeuvre alone can claim no effect: there it is
-    taken where it gains clearly.
+    innovations than any effect of the catalogue, and gains clearly. One manoeuvre alone can claim no effect: there
+    it is taken where it gains clearly.
 
     Parameters
     ----------

@@ -1,0 +1,69 @@
+"""A ship with instruments as they are sold, from raw log to stored sets of single manoeuvres."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
+from benchmarks.diagnose.hidden_effects.cases import Case
+from benchmarks.diagnose.hidden_effects.write import logs_of
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.schemas.instrument_noise import NAMES
+from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+from tests.workbench.driving import kempf
+
+FRESH = Case(
+    "shearwater", "none", "none", "mariner", 1.0, "calm", strength=0, sold=False, formats=("mcap", "mcap"), seed=5
+)
+
+
+def identified(case: Case, place: Path) -> tuple[Warehouse, list[ParameterSet], np.ndarray]:
+    """Her first day: warehouse, sets of the zigzags, and what the hull truly is, shape (6,)."""
+    files, answer = logs_of(case)
+    for name, content in files.items():
+        (place / name).write_bytes(content)
+    warehouse = Warehouse(str(place / "w"))
+    first = min(name for name in files if name != "profile.yaml")
+    ingest(warehouse, [place / first], None, read_profiles([place / "profile.yaml"]))
+    sets = [outcome.parameter_set for outcome in identify_vessel(warehouse, case.case_id)]
+    true = np.array([answer["hull_parameters"][name] for name in HULL_PARAMETERS])
+    true[4:] /= 1.0 + RUDDER_OFF * case.sold
+    return warehouse, [one for one in sets if one is not None], true
+
+
+def lasting(one: ParameterSet) -> set[str]:
+    return {p.name.partition(".")[0] for p in one.noise} & set(NAMES)
+
+
+def errors(one: ParameterSet, true: np.ndarray) -> np.ndarray:
+    found = {p.name: p for p in one.parameters}
+    pairs = zip(HULL_PARAMETERS, true, strict=True)
+    return np.array([(found[name].value - truth) / (found[name].std or 0.0) for name, truth in pairs])
+
+
+def test_each_manoeuvre_states_errors_that_hold_the_truth(tmp_path: Path) -> None:
+    warehouse, sets, true = identified(replace(FRESH, sold=True), tmp_path)
+    assert len(sets) == 4
+    for one in sets:
+        assert lasting(one) >= {"heading_noise", "yaw_rate_noise"}, one.parameter_set_id
+        assert one.convergence["converged"] and one.fit["channels"]["yaw_rate"]["n"] > 100
+    z = np.array([errors(one, true) for one in sets])
+    assert np.all(np.sqrt(np.mean(z**2, axis=0)) < 2.0), z
+    assert rerun(warehouse, sets[0].parameter_set_id).verdict == "bit-identical"
+    for words in (("compare",), ("predict", "zigzag", "--angles", "10/10")):
+        of = ("--vessel", FRESH.case_id, "--set", sets[0].parameter_set_id, "--warehouse", tmp_path / "w", "--json")
+        assert kempf(*words, *of).code == 0, words
+
+
+def test_fresh_noise_is_fitted_as_fresh_noise(tmp_path: Path) -> None:
+    _, sets, true = identified(FRESH, tmp_path)
+    assert [lasting(one) for one in sets] == [set()] * 4
+    assert np.all(np.abs([errors(one, true) for one in sets]) < 4.0)
