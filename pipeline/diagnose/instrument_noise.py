@@ -26,8 +26,7 @@ def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
     """Return a fit with what its innovations show of lasting noise.
 
     Noise follows no manoeuvre and could imitate a little of everything. It is taken where it says more of the
-    innovations than any effect of the catalogue, and gains clearly. One manoeuvre alone can claim no effect: there
-    it is taken where it gains clearly.
+    innovations than any effect of the catalogue, and gains clearly.
 
     Parameters
     ----------
@@ -36,7 +35,7 @@ def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
     workers : Executor
         Share the work; nothing depends on it.
     """
-    effects = catalogue() if len(fit.runs) > 1 else {}
+    effects = catalogue()
     while True:
         there = {effect.name for effect in fit.model.effects}
         left = {name: noise for name, noise in lasting_noise().items() if name not in there}
