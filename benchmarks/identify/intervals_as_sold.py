@@ -8,11 +8,12 @@ lasts, a log that averages, a rudder 2 % off). Both go through the whole job, fr
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -63,10 +64,7 @@ def errors_of(number: int) -> list[Error]:
 
 def _identified(case: Case) -> Iterator[Error]:
     files, answer = logs_of(case)
-    own = answer["hull_parameters"]
-    true = np.array([own[name] for name in HULL_PARAMETERS])
-    if case.sold:
-        true[4:] /= 1.0 + RUDDER_OFF
+    true = hull_of(case, answer)
     with TemporaryDirectory() as place:
         for name, content in files.items():
             (Path(place) / name).write_bytes(content)
@@ -78,10 +76,18 @@ def _identified(case: Case) -> Iterator[Error]:
         sets = [("alone", o.parameter_set) for o in outcomes if o.parameter_set]
         sets += [("pooled", pooled[0])] if pooled else []
         for kind, one in sets:
-            yield Error(kind, case.sold, case.hull, _errors(one, true))
+            yield Error(kind, case.sold, case.hull, in_std(one, true))
 
 
-def _errors(one: ParameterSet, true: NDArray[np.float64]) -> NDArray[np.float64]:
+def hull_of(case: Case, answer: Mapping[str, Any]) -> NDArray[np.float64]:
+    """Return what the hull of a case truly is, shape (6,); b1 and b2 of the rudder that her log shows."""
+    true = np.array([answer["hull_parameters"][name] for name in HULL_PARAMETERS])
+    true[4:] /= 1.0 + RUDDER_OFF * case.sold
+    return true
+
+
+def in_std(one: ParameterSet, true: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the errors of a set's hull in its own standard errors, shape (6,); NaN where it states none."""
     found = {p.name: p for p in one.parameters}
     each = [(found[name].value - t, found[name].std) for name, t in zip(HULL_PARAMETERS, true, strict=True)]
     return np.array([error / std if std else np.nan for error, std in each])

@@ -151,7 +151,7 @@ def build_single(instruments: Mapping[str, Instruments], request: SetRequest) ->
 
 
 def build_with_lasting_noise(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet | None:
-    """Compute the set of one manoeuvre of the plain model with the lasting noise of her instruments (decision 0042).
+    """Compute the set of one manoeuvre of the plain model with the lasting noise of her instruments (decision 0044).
 
     Parameters
     ----------

@@ -7,15 +7,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
 from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.write import logs_of
+from benchmarks.identify.intervals_as_sold import hull_of, in_std
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.schemas.instrument_noise import NAMES
-from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 from tests.workbench.driving import kempf
@@ -34,19 +33,11 @@ def identified(case: Case, place: Path) -> tuple[Warehouse, list[ParameterSet], 
     first = min(name for name in files if name != "profile.yaml")
     ingest(warehouse, [place / first], None, read_profiles([place / "profile.yaml"]))
     sets = [outcome.parameter_set for outcome in identify_vessel(warehouse, case.case_id)]
-    true = np.array([answer["hull_parameters"][name] for name in HULL_PARAMETERS])
-    true[4:] /= 1.0 + RUDDER_OFF * case.sold
-    return warehouse, [one for one in sets if one is not None], true
+    return warehouse, [one for one in sets if one is not None], hull_of(case, answer)
 
 
 def lasting(one: ParameterSet) -> set[str]:
     return {p.name.partition(".")[0] for p in one.noise} & set(NAMES)
-
-
-def errors(one: ParameterSet, true: np.ndarray) -> np.ndarray:
-    found = {p.name: p for p in one.parameters}
-    pairs = zip(HULL_PARAMETERS, true, strict=True)
-    return np.array([(found[name].value - truth) / (found[name].std or 0.0) for name, truth in pairs])
 
 
 def test_each_manoeuvre_states_errors_that_hold_the_truth(tmp_path: Path) -> None:
@@ -55,7 +46,7 @@ def test_each_manoeuvre_states_errors_that_hold_the_truth(tmp_path: Path) -> Non
     for one in sets:
         assert lasting(one) >= {"heading_noise", "yaw_rate_noise"}, one.parameter_set_id
         assert one.convergence["converged"] and one.fit["channels"]["yaw_rate"]["n"] > 100
-    z = np.array([errors(one, true) for one in sets])
+    z = np.array([in_std(one, true) for one in sets])
     assert np.all(np.sqrt(np.mean(z**2, axis=0)) < 2.0), z
     assert rerun(warehouse, sets[0].parameter_set_id).verdict == "bit-identical"
     for words in (("compare",), ("predict", "zigzag", "--angles", "10/10")):
@@ -66,4 +57,4 @@ def test_each_manoeuvre_states_errors_that_hold_the_truth(tmp_path: Path) -> Non
 def test_fresh_noise_is_fitted_as_fresh_noise(tmp_path: Path) -> None:
     _, sets, true = identified(FRESH, tmp_path)
     assert [lasting(one) for one in sets] == [set()] * 4
-    assert np.all(np.abs([errors(one, true) for one in sets]) < 4.0)
+    assert np.all(np.abs([in_std(one, true) for one in sets]) < 4.0)
