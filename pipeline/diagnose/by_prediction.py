@@ -54,12 +54,15 @@ def _one_more(ladder: Ladder, shooting: ShootingRange, steps: list[Step]) -> lis
     last = steps[-1]
     assert last.ahead is not None
     testable = _testable(last)
-    choice = better_ahead(shooting, last.ahead, [c.effect for c in testable.values()])
+    scores = {name: float(np.nan_to_num(candidate.score)) for name, candidate in testable.items()}
+    choice = better_ahead(shooting, last.ahead, [c.effect for c in testable.values()], scores)
     if choice is None or choice.stability < STABLE:
         return []
+    best, *others = choice.close
+    others.sort(key=lambda one: -scores[one.model.effects[-1].name])
     alone = ladder.unseen(last)
     tried: list[Member] = []
-    for ahead in choice.close[:_MEMBERS]:
+    for ahead in [best, *others][:_MEMBERS]:
         candidate = testable[ahead.model.effects[-1].name]
         found = ladder.confirmed(last.fit, alone, candidate)
         if _stands(candidate, found) and not found.absent:

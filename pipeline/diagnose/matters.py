@@ -8,7 +8,7 @@ alike, are the likelihood's.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -65,17 +65,27 @@ def comparisons(before: Ahead, after: Ahead) -> list[Paired]:
     return [*found, paired(before.held, after.held)] if before.held.errors else found
 
 
-def better_ahead(shooting: ShootingRange, base: Ahead, effects: Sequence[Effect]) -> Choice | None:
+def better_ahead(
+    shooting: ShootingRange, base: Ahead, effects: Sequence[Effect], scores: Mapping[str, float] | None = None
+) -> Choice | None:
     """Return the models with one effect more that predict clearly better than ``base``, None where none does.
 
     Parameters
     ----------
     effects : sequence of Effect
         To be tried.
+    scores : mapping, optional
+        Score of each effect by name. The likeliest one worth it is refitted even where the screen by legs foresees less
+        of it than of many, as forms of one effect predict legs alike to a per cent.
     """
-    found = shooting.screened(base, effects)[:_REFITS]
-    worth = [effect for foreseen, effect in found if foreseen < (1.0 - LEAST_FALL) * base.fit.cost]
-    tried = [made for made in (shooting.with_effect(base, effect) for effect in worth) if made is not None]
+    foreseen = shooting.screened(base, effects)
+    worth = [effect for cost, effect in foreseen if cost < (1.0 - LEAST_FALL) * base.fit.cost]
+    short = worth[:_REFITS]
+    if scores is not None and worth:
+        likeliest = max(worth, key=lambda effect: scores[effect.name])
+        short += [likeliest] if likeliest not in short else []
+    refitted = (shooting.with_effect(base, effect) for effect in short)
+    tried = [made for made in refitted if made is not None]
     good = [one for one in tried if not (at_bounds(one) or worsens(base, one))]
     if not good:
         return None

@@ -10,9 +10,11 @@ import pytest
 
 from kempf.pipeline.diagnose.immaterial import Weight
 from kempf.pipeline.diagnose.legs import in_std
-from kempf.pipeline.diagnose.matters import falls, worsens
-from kempf.pipeline.shooting.ahead import Ahead
+from kempf.pipeline.diagnose.matters import better_ahead, falls, worsens
+from kempf.pipeline.shooting.ahead import Ahead, ShootingRange
 from kempf.pipeline.shooting.left_out import LeftOut
+from kempf.schemas.effect import Effect
+from kempf.schemas.effects import catalogue
 
 
 def ahead(level: float, spread: float = 0.1, seed: int = 1, *, held: float | None = None) -> Ahead:
@@ -66,3 +68,24 @@ def test_sums_that_hang_together_are_less_sure_than_their_parts() -> None:
     assert in_std(independent) == pytest.approx(6.0, abs=1.5)
     assert in_std(blocks.reshape(20, 20).sum(axis=1)) < 0.5 * in_std(blocks)
     assert in_std(np.array([3.0])) == 0.0
+
+
+@pytest.mark.parametrize(("best_by_likelihood", "refitted_too"), [(1, False), (9, True), (11, False)])
+def test_the_likeliest_effect_worth_it_is_refitted_wherever_the_screen_by_legs_ranks_it(
+    best_by_likelihood: int, refitted_too: bool
+) -> None:
+    effects = list(catalogue().values())[:12]
+    # eleven are worth a refit, the last one is not
+    screened = [(0.5 + 0.01 * k if k < 11 else 0.999, effect) for k, effect in enumerate(effects)]
+    refits: list[str] = []
+
+    def with_effect(base: Ahead, effect: Effect) -> None:
+        refits.append(effect.name)
+
+    shooting = cast("ShootingRange", SimpleNamespace(screened=lambda base, of: screened, with_effect=with_effect))
+    plain = cast("Ahead", SimpleNamespace(fit=SimpleNamespace(cost=1.0)))
+    scores = {effect.name: float(k == best_by_likelihood) for k, effect in enumerate(effects)}
+    assert better_ahead(shooting, plain, effects, scores) is None
+    first_six = [effect.name for effect in effects[:6]]
+    # where the likeliest is worth nothing ahead, the likeliest of the others is the first of them
+    assert refits == [*first_six, effects[best_by_likelihood].name] if refitted_too else refits == first_six
