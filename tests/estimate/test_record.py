@@ -10,9 +10,11 @@ import pytest
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.estimate.record.cut import make_record
+from kempf.pipeline.estimate.record.grid_run import plain_run
 from kempf.pipeline.estimate.record.sampled import sample
 from kempf.pipeline.estimate.search.starts import thinned
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.model_spec import ModelSpec
 from tests.estimate.simulated import bounds, changed, instruments_of, record_of, sailed, without
 
 TRIAL = sailed("ferry", seed=1, duration_s=400.0)
@@ -91,6 +93,14 @@ def test_every_measurement_stands_at_its_own_instant_once() -> None:
     assert record.warnings == ()
     assert record.noise_start[0] == pytest.approx(0.05, rel=0.25)
     assert record.noise_start[1] == pytest.approx(np.deg2rad(0.03), rel=0.25)
+
+
+def test_no_mean_of_readings_lies_beyond_the_grid() -> None:
+    # a step that does not divide the record: readings follow its last instant
+    for length_m in (40.0, 61.0, 77.0):
+        run = plain_run("run", record_of(TRIAL), ModelSpec(), 0.0, length_m)
+        own = (run.time_s[:, None] + run.offset_s)[np.isfinite(run.measured)]
+        assert own.min() >= 0.0 and own.max() <= run.time_s[-1] + 1e-9
 
 
 def test_the_heading_is_the_measurement_where_there_is_no_yaw_rate() -> None:

@@ -2,10 +2,10 @@
 
 State x = (v, r, psi, F, M, e, m_1 .. m_k, c_1, c_2, b): the chain, the error of the speed
 (`kempf.pipeline.estimate.record.speed_error`), the states that effects bring along, the current to the north and east
-(or the paper's V_T), the bias of the rate gyro. Between measurements the mean moves by the classical fourth-order
-Runge-Kutta rule with the terms of every effect in it, the covariance by the linearisation at the middle of the step
-(Jazwinski 1970, "Stochastic Processes and Filtering Theory", ch. 8; the exact exponential's series to the fourth
-order). A measurement off the grid by a moment is predicted there to first order in that moment.
+(or the paper's V_T), the bias of the rate gyro. Between measurements the mean
+moves by the classical fourth-order Runge-Kutta rule with the terms of every effect in it, in two substeps, and the
+covariance in one by the linearisation at the middle of the step (Jazwinski 1970, "Stochastic Processes and Filtering
+Theory", ch. 8). A measurement off the grid by a moment is predicted there to first order in that moment.
 
 Several sets of parameters go through one run side by side, in lanes (`kempf.pipeline.model.batch`): a derivative is the
 difference of two passes, and a fit asks for a dozen at a time.
@@ -18,10 +18,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from kempf.pipeline.compiled import FILLING, njit
+from kempf.pipeline.compiled import FILLING, STEP, njit
 from kempf.pipeline.estimate.filters.ekf_covariance import (
-    add_noise,
+    add_at_once,
+    add_from_middle,
     carry_covariance,
+    couplings,
     exponential,
     mirror,
     take_in,
@@ -80,59 +82,79 @@ def _live_states(P0, width):  # type: ignore[no-untyped-def]
 
 @njit(**FILLING)
 def _substep(  # type: ignore[no-untyped-def]
-    x, P, rows, rudders, h, drive, decay, ship, live, after, table, values, slopes, stack, by, total, room, lanes
+    x, rows, rudders, h, ship, live, linearised, table, values, slopes, stack, by, total, room, lanes
 ):
-    """Move means and covariances over one substep.
-
-    ``drive`` holds the intensities squared of F, M, the rudder's error, the current, e, then of effects' states.
-    """
-    k1, k2, k3, k4, xs, A, J, Phi, term, work, nodes, w, W, coupled = room
+    """Move means over one substep; with ``linearised`` the equations and the rudder's work are kept where it begins."""
+    k1, k2, k3, k4, xs, A, w = room
     width = k1.shape[0]
-    dynamics(x, rows[0], rudders[0], ship, width, 0, table, values, slopes, stack, by, total, k1, J, lanes)
+    dynamics(
+        x, rows[0], rudders[0], ship, width, linearised * width, table, values, slopes, stack, by, total, k1, A, lanes
+    )
+    if linearised:
+        for b in range(each(lanes)):
+            # what a unit of rudder does
+            w[0, V, b], w[0, R, b] = ship[0][4, b] * values[SPEED, b] ** 2, ship[0][5, b] * values[SPEED, b] ** 2
     for i in live:
         for b in range(each(lanes)):
             xs[i, b] = x[i, b] + 0.5 * h * k1[i, b]
-    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k2, J, lanes)
+    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k2, A, lanes)
     for i in live:
         for b in range(each(lanes)):
             xs[i, b] = x[i, b] + 0.5 * h * k2[i, b]
-    dynamics(xs, rows[1], rudders[1], ship, width, width, table, values, slopes, stack, by, total, k3, A, lanes)
-    for b in range(each(lanes)):
-        # what a unit of rudder does at the middle
-        w[V, b], w[R, b] = ship[0][4, b] * values[SPEED, b] ** 2, ship[0][5, b] * values[SPEED, b] ** 2
+    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k3, A, lanes)
     for i in live:
         for b in range(each(lanes)):
             xs[i, b] = x[i, b] + h * k3[i, b]
-    dynamics(xs, rows[2], rudders[2], ship, width, 0, table, values, slopes, stack, by, total, k4, J, lanes)
+    dynamics(xs, rows[2], rudders[2], ship, width, 0, table, values, slopes, stack, by, total, k4, A, lanes)
     for i in live:
         for b in range(each(lanes)):
             x[i, b] += h / 6.0 * (k1[i, b] + 2.0 * k2[i, b] + 2.0 * k3[i, b] + k4[i, b])
-    for i in after:
+
+
+@njit(**FILLING)
+def _noise_at_once(P, w, h, drive, driven, lanes):  # type: ignore[no-untyped-def]
+    """Add to P the noise that comes in during h seconds, as if at this instant."""
+    if driven[2]:
+        for i in (V, R):
+            for j in (V, R):
+                add_at_once(P, i, j, drive[2], h, w, lanes)
+    for turn in range(driven.shape[0] - 2):
+        source, state = _source(turn)
+        if driven[source]:
+            add_at_once(P, state, state, drive[source], h, w, lanes)
+
+
+@njit(**STEP)
+def _source(turn):  # type: ignore[no-untyped-def]
+    """Return the row of ``drive`` and the state that it drives: F, M, the speed's error, states of effects."""
+    if turn < 3:
+        return (0, 1, 4)[turn], (F, M, E)[turn]
+    return turn + 2, N_BEFORE + turn - 3
+
+
+@njit(**FILLING)
+def _spread(P, A, w, h, drive, driven, decay, live, after, room, lanes):  # type: ignore[no-untyped-def]
+    """Move covariances over one step, linearised at its middle.
+
+    ``drive`` holds the intensities squared of F, M, the rudder's error, the current, e, then of effects' states;
+    ``driven`` which of them there are in any lane.
+    """
+    Half, Phi, term, work, W, along, direct, reached = room
+    couplings(A, live, direct, reached, lanes)
+    exponential(A, h, live, direct, reached, Half, Phi, term, work, lanes)
+    _noise_at_once(P, w, h / 6.0, drive, driven, lanes)
+    carry_covariance(P, Phi, decay, live, after, W, reached, lanes)
+    for i in after[: after.size - (after.size > 0 and after[after.size - 1] == P.shape[0] - 1)]:
         for b in range(each(lanes)):
-            x[i, b] *= decay[i]
-    exponential(A, h, live, Phi, term, work, coupled, lanes)
-    carry_covariance(P, Phi, decay, live, after, W, coupled, lanes)
-    for i in after:
-        if i < x.shape[0] - 1:
-            for b in range(each(lanes)):
-                P[i, i, b] += drive[3, b] * h
-    # the rudder's error first, whose direction stands there
-    for turn in range(4 + width - N_BEFORE):
-        source = (2, 0, 1, 4)[turn] if turn < 4 else turn + 1
-        driven = False
-        for b in range(each(lanes)):
-            driven = driven or drive[source, b] > 0.0
-        if turn > 0:
-            state = (F, M, E)[turn - 1] if turn < 4 else N_BEFORE + turn - 4
-            for i in range(width):
-                for b in range(each(lanes)):
-                    w[i, b] = 1.0 if i == state else 0.0
-        if driven:
-            add_noise(P, A, w, drive[source], h, live, coupled, term, work, nodes, lanes)
+            P[i, i, b] += drive[3, b] * h
+    if driven[2]:
+        add_from_middle(P, Half, reached, drive[2], 4.0 * h / 6.0, w, (V, R), live, along, work, lanes)
+    for turn in range(driven.shape[0] - 2):
+        source, state = _source(turn)
+        if driven[source]:
+            add_from_middle(P, Half, reached, drive[source], 4.0 * h / 6.0, w, (state,), live, along, work, lanes)
     mirror(P, live, lanes)
-    for i in range(width):
-        for b in range(each(lanes)):
-            w[i, b] = 0.0
+    _noise_at_once(P, w, h / 6.0, drive, driven, lanes)
 
 
 @njit(**FILLING)
@@ -304,35 +326,39 @@ def extended(  # type: ignore[no-untyped-def]
     drive = np.zeros((5 + width - N_BEFORE, B))
     _begin(P, table, values, slopes, stack, by, total, drive, lanes)
     k1, J = np.zeros((width, B)), np.zeros((width, width, B))
-    vector, matrix = (width, B), (width, width, B)
-    room = (
-        *(k1, np.zeros(vector), np.zeros(vector), np.zeros(vector), np.zeros(vector), np.zeros(matrix), J),
-        *(np.zeros(matrix), np.zeros(matrix), np.zeros(matrix), np.zeros((3, width, B))),
-        *(
-            np.zeros(vector),
-            np.zeros((n, n, B)),
-            np.zeros((width, width), dtype=np.bool_),
-        ),
+    vector, matrix, pattern = (width, B), (width, width, B), (width, width)
+    A, w, state = np.zeros(matrix), np.ones((1, width, B)), np.zeros(vector)
+    moving = (k1, np.zeros(vector), np.zeros(vector), np.zeros(vector), state, A, w)
+    spreading = (
+        *(np.zeros(matrix), np.zeros(matrix), np.zeros(matrix), np.zeros(matrix), np.zeros((n, n, B))),
+        *(np.zeros((1, width, B)), np.zeros(pattern, dtype=np.bool_), np.zeros(pattern, dtype=np.bool_)),
     )
     gain, weight = np.zeros((1, n, B)), np.zeros((1, n, B))
     h, stood, decay = np.zeros((n, B)), np.zeros((n, B)), np.ones(n)
     at_measurements = (k1, J, gain, weight, h, stood, np.zeros(B), np.zeros(B))
-    decay[n - 3 : n - 1] = np.exp(-rates[2] * step_s / SUBSTEPS)
+    decay[n - 3 : n - 1] = np.exp(-rates[2] * step_s)
     drive[0], drive[3], drive[4] = levels[0] ** 2, levels[2] ** 2, 2.0 * rates[3] * P0[E, E]
     if P0[M, M] > 0.0:
         drive[1] = levels[1] ** 2
+    driven = np.zeros(drive.shape[0], dtype=np.bool_)
+    for source in range(drive.shape[0]):
+        driven[source] = np.any(drive[source] > 0.0)
     # what does not move acts all the same: a constant force in a free run
-    room[4][:] = x[:width]
+    state[:] = x[:width]
     log_likelihood = np.zeros(B)
     for k in range(measured.shape[0]):
         if k > 0:
-            drive[2] = rudder_noise[k] ** 2
+            drive[2], driven[2] = rudder_noise[k] ** 2, rudder_noise[k] > 0.0
             for sub in range(SUBSTEPS):
                 i = ROWS * (k - 1) + 2 * sub
                 _substep(
-                    *(x, P, inputs[i : i + 3], rudder[i : i + 3], step_s / SUBSTEPS, drive, decay, ship),
-                    *(live, after, table, values, slopes, stack, by, total, room, lanes),
+                    *(x, inputs[i : i + 3], rudder[i : i + 3], step_s / SUBSTEPS, ship, live, sub == 1),
+                    *(table, values, slopes, stack, by, total, moving, lanes),
                 )
+            for i in after:
+                for b in range(B):
+                    x[i, b] *= decay[i]
+            _spread(P, A, w, step_s, drive, driven, decay, live, after, spreading, lanes)
         _measurements(
             *(k, x, P, inputs[ROWS * k], rudder[ROWS * k], measured[k], offset_s[k], withheld[k], current_row[k]),
             *(

@@ -1,9 +1,9 @@
-"""Covariance of the extended filter: over a substep, by white noise, and what a measurement takes off it; compiled.
+"""Covariance of the extended filter: from one instant to the next, and what a measurement takes off it; compiled.
 
-Only the live states are touched: most models have no moment, no bias, no states of effects. Series and rule to the
-fourth order, as in `pipeline.estimate.filters.ekf` (Van Loan 1978, IEEE Trans. Automatic Control 23, for the integral).
-Most of what couples two states is nothing, and passed over. Every number stands in lanes (see
-`kempf.pipeline.model.batch`).
+Only the live states are touched: most models have no moment, no bias, no states of effects. The exponential is that of
+half a step by its series to the fourth order, squared; the integral of the noise goes by Simpson's rule over the whole
+step, whose three nodes are then known (Van Loan 1978, IEEE Trans. Automatic Control 23, for the integral). Most of what
+couples two states is nothing, and passed over. Every number stands in lanes (see `kempf.pipeline.model.batch`).
 """
 
 from __future__ import annotations
@@ -13,15 +13,20 @@ from kempf.pipeline.model.batch import each
 
 
 @njit(**FILLING)
-def _couplings(A, live, found, lanes):  # type: ignore[no-untyped-def]
-    """Fill ``found`` with which elements of a matrix are anything in any lane."""
+def couplings(A, live, direct, reached, lanes):  # type: ignore[no-untyped-def]
+    """Fill which elements of A are anything in any lane, and which elements of its exponential may be."""
     for i in live:
         for j in live:
-            found[i, j] = False
+            made = 0
             for b in range(each(lanes)):
-                if A[i, j, b] != 0.0:
-                    found[i, j] = True
-                    break
+                made += A[i, j, b] != 0.0
+            direct[i, j] = made > 0
+            reached[i, j] = made > 0 or i == j
+    for m in live:
+        for i in live:
+            if reached[i, m]:
+                for j in live:
+                    reached[i, j] = reached[i, j] or reached[m, j]
 
 
 @njit(**STEP)
@@ -32,34 +37,43 @@ def _add_product(out, i, j, A, k, m, B, p, q, lanes):  # type: ignore[no-untyped
 
 
 @njit(**FILLING)
-def exponential(A, h, live, Phi, term, work, coupled, lanes):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
-    """Fill Phi with exp(A h) to the fourth order, over the live states; the others stay what they are.
+def _multiply(A, of_A, B, of_B, live, out, lanes):  # type: ignore[no-untyped-def]
+    """Fill ``out`` with A B over the live states, both being nothing outside their patterns."""
+    for i in live:
+        for j in live:
+            for b in range(each(lanes)):
+                out[i, j, b] = 0.0
+        for m in live:
+            if of_A[i, m]:
+                for j in live:
+                    if of_B[m, j]:
+                        _add_product(out, i, j, A, i, m, B, m, j, lanes)
 
-    ``coupled`` becomes which elements of Phi there are.
+
+@njit(**FILLING)
+def exponential(A, h, live, direct, reached, Half, Phi, term, work, lanes):  # type: ignore[no-untyped-def]
+    """Fill Half with exp(A h / 2) and Phi with exp(A h), over the live states; the others stay what they are.
+
+    ``direct`` and ``reached`` are those of `couplings`.
     """
-    _couplings(A, live, coupled, lanes)
     for i in live:
         for j in live:
             one = 1.0 if i == j else 0.0
             for b in range(each(lanes)):
-                term[i, j, b] = h * A[i, j, b]
-                Phi[i, j, b] = one + term[i, j, b]
+                term[i, j, b] = 0.5 * h * A[i, j, b]
+            for b in range(each(lanes)):
+                Half[i, j, b] = one + term[i, j, b]
     for order in range(2, 5):
-        s = h / order
+        s = 0.5 * h / order
+        _multiply(A, direct, term, reached, live, work, lanes)
         for i in live:
             for j in live:
-                for b in range(each(lanes)):
-                    work[i, j, b] = 0.0
-            for m in live:
-                if coupled[i, m]:
-                    for j in live:
-                        _add_product(work, i, j, A, i, m, term, m, j, lanes)
-        for i in live:
-            for j in live:
-                for b in range(each(lanes)):
-                    term[i, j, b] = s * work[i, j, b]
-                    Phi[i, j, b] += term[i, j, b]
-    _couplings(Phi, live, coupled, lanes)
+                if reached[i, j]:
+                    for b in range(each(lanes)):
+                        term[i, j, b] = s * work[i, j, b]
+                    for b in range(each(lanes)):
+                        Half[i, j, b] += term[i, j, b]
+    _multiply(Half, reached, Half, reached, live, Phi, lanes)
 
 
 @njit(**FILLING)
@@ -101,46 +115,36 @@ def carry_covariance(P, Phi, decay, live, after, W, coupled, lanes):  # type: ig
 
 
 @njit(**FILLING)
-def add_noise(P, A, w, q, h, live, coupled, term, work, node, lanes):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
-    """Add to P what white noise of intensity q along w does over h seconds: Simpson's rule on exp(A s) w.
+def add_at_once(P, i, j, q, h, w, lanes):  # type: ignore[no-untyped-def]
+    """Add to P[i, j] what white noise of intensity q along w[0] brings in h seconds, as if at this instant."""
+    for b in range(each(lanes)):
+        P[i, j, b] += h * q[b] * w[0, i, b] * w[0, j, b]
 
-    Of P only the lower triangle is filled; see `mirror`. ``coupled`` tells which elements of exp(A h) there are, and so
-    of A at least.
+
+@njit(**FILLING)
+def add_from_middle(P, Half, reached, q, h, w, sources, live, along, work, lanes):  # type: ignore[no-untyped-def]
+    """Add to the lower triangle of P what white noise along w[0] brings in h seconds, as if half a step ago.
+
+    Parameters
+    ----------
+    w, along : ndarray, shape (1, n, lanes)
+        w is anything for ``sources`` alone; the other is room.
+    work : ndarray, shape (n, n, lanes)
+        Room; its first column is used.
     """
     for i in live:
         for b in range(each(lanes)):
-            term[i, 0, b] = w[i, b]
-            node[0, i, b] = w[i, b]
+            along[0, i, b] = 0.0
+        for m in sources:
+            if reached[i, m]:
+                _add_product(along, 0, i, Half, i, m, w, 0, m, lanes)
         for b in range(each(lanes)):
-            node[1, i, b] = w[i, b]
-        for b in range(each(lanes)):
-            node[2, i, b] = w[i, b]
-    half = 1.0
-    for order in range(1, 5):
-        half *= 0.5
-        s = h / order
-        for i in live:
-            for b in range(each(lanes)):
-                work[i, 0, b] = 0.0
-            for j in live:
-                if coupled[i, j]:
-                    _add_product(work, i, 0, A, i, j, term, j, 0, lanes)
-        for i in live:
-            for b in range(each(lanes)):
-                term[i, 0, b] = s * work[i, 0, b]
-            for b in range(each(lanes)):
-                node[1, i, b] += half * term[i, 0, b]
-            for b in range(each(lanes)):
-                node[2, i, b] += term[i, 0, b]
-    for k in range(3):
-        weight = h / 6.0 * (4.0 if k == 1 else 1.0)
-        for i in live:
-            for b in range(each(lanes)):
-                term[i, 0, b] = weight * q[b] * node[k, i, b]
-            for j in live:
-                if j > i:
-                    break
-                _add_product(P, i, j, term, i, 0, node, k, j, lanes)
+            work[i, 0, b] = h * q[b] * along[0, i, b]
+    for i in live:
+        for j in live:
+            if j > i:
+                break
+            _add_product(P, i, j, work, i, 0, along, 0, j, lanes)
 
 
 @njit(**FILLING)

@@ -59,6 +59,8 @@ def cells(time_s: Float, step_s: float) -> NDArray[np.int64]:
 def cell_means(time_s: Float, column: Float, step_s: float, n: int) -> tuple[Float, Float]:
     """Return the mean of the readings around each instant of the grid, and how much later than it their mean time is.
 
+    Readings after the last instant belong to none: the filters go no further.
+
     Parameters
     ----------
     time_s, column : ndarray, shape (m,)
@@ -72,9 +74,8 @@ def cell_means(time_s: Float, column: Float, step_s: float, n: int) -> tuple[Flo
         NaN and 0 where a cell has no reading.
     """
     good = np.isfinite(column)
-    cell = cells(time_s[good], step_s)
-    inside = cell < n
-    cell = cell[inside]
+    inside = time_s[good] <= step_s * (n - 1)
+    cell = cells(time_s[good][inside], step_s)
     counts = np.bincount(cell, minlength=n)
     with np.errstate(invalid="ignore", divide="ignore"):
         mean = np.bincount(cell, column[good][inside], minlength=n) / counts
