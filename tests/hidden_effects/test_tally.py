@@ -20,6 +20,7 @@ def judged(
     ratio: float = 100.0,
     value: float = 1.0,
     last: float = 2.0,
+    immaterial: str | None = None,
 ):
     parameters = {"c": {"value": value, "std": 0.1, "unit": "1"}}
     named = [{"effects": s, "refits": [{"effect": n, "parameters": parameters} for n in s]} for s in sets]
@@ -27,7 +28,10 @@ def judged(
         {"fitted_misfit": 0.1 + one, "left_out_misfit": 0.2 + one, "held_out_misfit": one} for one in (3.0, last)
     )
     ladder = [{"held_out_error": 0.4, "one_leg_ahead": first}, {"held_out_error": 0.22, "one_leg_ahead": then}]
-    told = {"verdict": verdict, "sets": named, "ladder": ladder, "candidates": []}
+    aside = (
+        [{"effects": [immaterial], "refits": [{"effect": immaterial, "parameters": parameters}]}] if immaterial else []
+    )
+    told = {"verdict": verdict, "sets": named, "immaterial": aside, "ladder": ladder, "candidates": []}
     truth = {"kind": kind, "effect": effect, "hull": "ferry", "noise": 1.0, "disturbance": "calm", "strength": 1}
     truth |= {"parameters": {"c": 1.0}, "sold": verdict == "ambiguous"}
     oracle = {"likelihood_ratio": ratio, "held_out": 0.21} if kind == "catalogue" else {}
@@ -43,24 +47,28 @@ CASES = [
     judged("catalogue", "rudder_lag", "ambiguous", [["dead_time", "rudder_lag"]], value=1.3),
     judged("catalogue", "rudder_lag", "explained", [["rate_limit"]], last=3.3),
     judged("catalogue", "rudder_lag", "adequate", [], ratio=20.0),
+    judged("catalogue", "waves", "adequate", [], value=1.1, immaterial="waves"),
+    judged("none", "none", "adequate", [], immaterial="waves"),
 ]
 
 
 def test_every_target_counts_what_it_says() -> None:
     found = {asked: told for asked, _, told in targets(CASES)}
     begins = {
-        "true effect in a named set": "67 % (2 of 3",
-        "of these with the 3 m boat": "no case",
-        "of these with instruments": "100 % (1 of 1",
-        "every ladder falls": "88 % (7 of 8",
+        "true effect in a named set": "75 % (3 of 4",
+        "of these claimed": "50 % (2 of 4",
+        "named with the 3 m boat": "no case",
+        "named with instruments": "100 % (1 of 1",
+        "every ladder falls": "90 % (9 of 10",
         "exact name": "50 % (1 of 2",
         "mean size": "1.33",
-        "any claim": "50 % (1 of 2",
+        "any claim": "33 % (1 of 3",
+        "anything certain": "33 % (1 of 3",
         "outside the catalogue: refused": "50 % (1 of 2",
         "outside the catalogue: a confident": "50 % (1 of 2",
-        "present though": "0 % (0 of 8",
-        "held-out error": "100 % (3 of 3",
-        "95 % interval": "50 % (1 of 2",
+        "present though": "0 % (0 of 10",
+        "held-out error": "100 % (4 of 4",
+        "95 % interval": "67 % (2 of 3",
     }
     for asked, told in begins.items():
         (line,) = [text for name, text in found.items() if name.startswith(asked)]
@@ -77,7 +85,7 @@ def test_the_interval_of_a_share_is_wilsons() -> None:
 
 def test_the_page_and_its_picture_are_made(tmp_path: Path) -> None:
     lines = page(CASES, 336)
-    assert lines[0].startswith("8 of 336 cases were diagnosed: 4 catalogue, 2 none, 2 outsider.")
+    assert lines[0].startswith("10 of 336 cases were diagnosed: 5 catalogue, 3 none, 2 outsider.")
     assert next(line for line in lines if line.startswith("| rudder_lag")).startswith("| rudder_lag | 4 | 3 | 2 | 2 |")
     draw_confusion(CASES, tmp_path / "map.png")
     assert (tmp_path / "map.png").stat().st_size > 5000

@@ -70,7 +70,7 @@ def page(cases: Sequence[Judged], asked: int) -> list[str]:
             none = kind(own, "none")
             rows.append(
                 (
-                    *(what, str(level), str(len(own)), str(share(seen, lambda c: c.in_set))),
+                    *(what, str(level), str(len(own)), str(share(seen, lambda c: c.found))),
                     str(share(none, lambda c: c.verdict != "adequate")),
                 )
             )
@@ -85,12 +85,12 @@ def page(cases: Sequence[Judged], asked: int) -> list[str]:
 def _row(name: str, cases: Sequence[Judged]) -> tuple[str, ...]:
     own = [c for c in cases if c.truth["effect"] == name]
     seen = [c for c in own if c.detectable]
-    instead = Counter(c.named for c in own if not c.in_set).most_common(3)
+    instead = Counter(c.named for c in own if not c.found).most_common(3)
     plain = [c.against_plain for c in own if c.against_plain is not None]
     best = [c.against_oracle for c in own if c.against_oracle is not None]
     covered = [c.covered for c in own if c.covered is not None]
     return (
-        *(name, str(len(own)), str(len(seen)), str(sum(c.in_set for c in own)), str(sum(c.in_set for c in seen))),
+        *(name, str(len(own)), str(len(seen)), str(sum(c.found for c in own)), str(sum(c.found for c in seen))),
         ", ".join(f"{what} {n}" for what, n in instead),
         f"{median(plain):.2f}" if plain else "",
         f"{median(best):.2f}" if best else "",
@@ -111,7 +111,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     cases = judged(truth, given.answers, oracles)
     draw_confusion(cases, result_page.RESULTS / f"{_NAME}.png")
     result_page.write(
-        *(_NAME, "Hidden effects: named, refused, missed", page(cases, opened["n"])),
+        *(f"diagnose.{_NAME}", "Hidden effects: named, refused, missed", page(cases, opened["n"])),
         options=f"--cases {opened['n']} --seed {opened['seed']}",
     )
 
