@@ -146,6 +146,7 @@ class Predicted:
                 "loss_by_drift_and_turn": float(self.basis.surge.best[1]),
                 "loss_by_yaw_rate": float(self.basis.surge.best[2]),
                 "loss_by_rudder": float(self.basis.surge.best[3]),
+                "loss_by_wind": float(self.basis.surge.best[4]),
                 "std": [float(x) for x in self.basis.surge.std],
             },
             "rudder_rate_deg_s": {

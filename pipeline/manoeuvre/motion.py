@@ -23,7 +23,7 @@ N_TRACK = 9
 SAILED, RAN_AWAY, NEVER_CAME = 0, 1, 2
 #: parts of the ship's vector, `kempf.pipeline.manoeuvre.ship.Ship.vector`
 LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_DRIFT, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE = range(8)
-EXPONENT, SCALE, FORCE, ARM, SETTLED, WIND, WIND_FROM, SHAFT = range(8, 16)
+EXPONENT, SCALE, FORCE, ARM, SETTLED, WIND, WIND_FROM, SHAFT, LOSS_BY_WIND = range(8, 17)
 _TRUE_HEADING = 2 + SYMBOLS.index("K") - CHANNEL
 _RUN_TIME = 2 + SYMBOLS.index("t") - CHANNEL
 _WIND_SPEED, _WIND_ANGLE, _SHAFT, _DEPTH = (2 + SYMBOLS.index(name) - CHANNEL for name in ("U", "gamma", "n", "h"))
@@ -35,10 +35,14 @@ _ROUNDS = 40
 
 
 @njit(**FILLING)
-def _kept(numbers, v, r, rudder):  # type: ignore[no-untyped-def]
-    """Return the forward speed that thrust and resistance keep with this drift, turn and rudder, m/s."""
+def _kept(numbers, u, v, r, rudder, heading):  # type: ignore[no-untyped-def]
+    """Return the forward speed that thrust and resistance keep with this drift, turn, rudder and wind, m/s."""
     unit, settled = numbers[LENGTH] / numbers[SETTLED], numbers[SETTLED]
     lost = numbers[LOSS_BY_RATE] * (unit * r) ** 2 + numbers[LOSS_BY_RUDDER] * rudder * rudder
+    if numbers[WIND] > 0.0:
+        away = numbers[WIND_FROM] - heading
+        ahead, abeam = numbers[WIND] * np.cos(away) + u, numbers[WIND] * np.sin(away) + v
+        lost += numbers[LOSS_BY_WIND] * (ahead * np.hypot(ahead, abeam) - u * u) / settled**2
     return settled * (1.0 + numbers[LOSS_BY_DRIFT] * unit * r * v / settled - lost)
 
 
@@ -54,7 +58,11 @@ def rates(x, s, rudder, sea, numbers, fx, fs):  # type: ignore[no-untyped-def]
         row[_WIND_SPEED], row[_WIND_ANGLE] = np.hypot(ahead, abeam), np.arctan2(abeam, ahead)
     dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, fx, J, ONE)
     length, settled = numbers[LENGTH], numbers[SETTLED]
-    fs[0] = (_kept(numbers, x[V, 0], x[R, 0], rudder[0]) - s[0]) * settled / (numbers[TIME_LENGTHS] * length)
+    fs[0] = (
+        (_kept(numbers, s[0], x[V, 0], x[R, 0], rudder[0], x[PSI, 0]) - s[0])
+        * settled
+        / (numbers[TIME_LENGTHS] * length)
+    )
     # the speed that effects make of the logged one is the one that she has
     u, v, cosine, sine = values[SPEED, 0], x[V, 0], np.cos(x[PSI, 0]), np.sin(x[PSI, 0])
     fs[1], fs[2], fs[3] = u * cosine - v * sine, u * sine + v * cosine, np.hypot(u, v)
@@ -142,7 +150,7 @@ def balanced(numbers, hull, effects, day, table, extra, given, rate_given, start
             if column > 0:
                 moved[column - 1] += 1e-6 * scale[column - 1]
             r, delta = (given, moved[1]) if rate_given else (moved[1], given)
-            s[0] = _kept(numbers, moved[0], r, delta)
+            s[0] = _kept(numbers, V0, moved[0], r, delta, 0.0)
             x[V, 0], x[R, 0], x[F, 0], rudder[0] = moved[0], r, numbers[FORCE], delta
             x[N_BEFORE:, 0] = moved[2:]
             rates(x, s, rudder, sea, numbers, fx, fs)
@@ -166,7 +174,7 @@ def balanced(numbers, hull, effects, day, table, extra, given, rate_given, start
             break
     start[:] = z
     r, delta = (given, z[1]) if rate_given else (z[1], given)
-    u = _kept(numbers, z[0], r, delta)
+    u = _kept(numbers, V0, z[0], r, delta, 0.0)
     return u, largest < 1e-7 and u > _SLOWEST * V0
 
 
@@ -211,7 +219,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, phases,
 
     Parameters
     ----------
-    numbers : ndarray, shape (16,)
+    numbers : ndarray, shape (17,)
         See the constants of this file.
     hull : ndarray, shape (6, 1)
     effects : ndarray, shape (p,)

@@ -76,21 +76,21 @@ class Ship:
     hull: Float
     #: Shape (p,). Parameters of the effects.
     effects: Float
-    #: Shape (4,). Time constant of the speed in lengths `Waters.scale_m`, loss by -scale v r / V_s^2, by
-    #: (scale r / V_s)^2 and by delta^2.
+    #: Shape (5,). Time constant of the speed in lengths `Waters.scale_m`, loss by -scale v r / V_s^2, by
+    #: (scale r / V_s)^2, by delta^2, and by the wind's W / V_s^2 of `kempf.pipeline.manoeuvre.surge`.
     surge: Float
     rudder_rate_rad_s: float
 
     @property
     def numbers(self) -> Float:
-        """What the compiled motion reads, shape (16,)."""
-        w, (tau, by_drift, by_rate, by_rudder) = self.waters, self.surge
+        """What the compiled motion reads, shape (17,)."""
+        w, (tau, by_drift, by_rate, by_rudder, by_wind) = self.waters, self.surge
         share = w.scale_m / w.length_m
         surge = (tau * share, by_drift * share, by_rate * share**2, by_rudder)
         settled = w.approach_m_s if w.settled_m_s is None else w.settled_m_s
         rest = (
             *(self.rudder_rate_rad_s, w.rudder_speed_exponent, w.scale_m, w.wind_force_m_s2, w.wind_arm_per_m),
-            *(settled, w.true_wind_m_s, w.true_wind_from_rad, settled * w.shaft_share),
+            *(settled, w.true_wind_m_s, w.true_wind_from_rad, settled * w.shaft_share, by_wind),
         )
         return np.array([w.length_m, w.draught_m, w.approach_m_s, *surge, *rest])
 

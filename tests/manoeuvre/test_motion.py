@@ -153,3 +153,21 @@ def test_a_late_helmsman_makes_the_overshoot_larger() -> None:
     assert prompt is not None
     assert delayed is not None
     assert delayed.figures["overshoots_deg.0"] > prompt.figures["overshoots_deg.0"] + 2.0
+
+
+def test_a_head_wind_costs_speed_and_a_following_one_gives_it_back() -> None:
+    ship = ship_of(HULLS["mariner"])
+    by_wind, wind = 0.02, 10.0
+    surge = ship.surge.copy()
+    surge[4] = by_wind
+    own = ship.waters.approach_m_s
+
+    def speed(true_wind_m_s: float, whence: float) -> float:
+        waters = replace(ship.waters, true_wind_m_s=true_wind_m_s, true_wind_from_rad=whence)
+        track = replace(ship, waters=waters, surge=surge).sail(np.array([[nan, 0.0, 0.0, 3000.0]]))
+        return float(track.column(motion.FORWARD)[-1])
+
+    against, along = speed(wind, 0.0), speed(wind, pi)
+    assert speed(0.0, 0.0) == pytest.approx(own)
+    assert against == pytest.approx(own * (1.0 - by_wind * ((wind + against) ** 2 - against**2) / own**2), rel=1e-6)
+    assert along == pytest.approx(own * (1.0 + by_wind * ((wind - along) ** 2 + along**2) / own**2), rel=1e-6)
