@@ -51,10 +51,13 @@ class Waters:
     #: wind_force_m_s2, wind_arm_per_m: A steady wind, F and l of eq. (16); none unless one is to be compared with.
     wind_force_m_s2: float = 0.0
     wind_arm_per_m: float = 0.0
-    #: true_wind_m_s, true_wind_from_rad: A steady wind for effects that ask for it; from where, clockwise from the
-    #: course of the approach.
+    #: true_wind_m_s, true_wind_from_rad: A steady wind, for the speed and for effects that ask for it; from where,
+    #: clockwise from the course of the approach.
     true_wind_m_s: float = 0.0
     true_wind_from_rad: float = 0.0
+    #: Shape (k, 3). Its course in the manoeuvre where it is known: instant from the beginning, s, and its parts from
+    #: ahead and from starboard of the approach, m/s; without rows it is the steady one.
+    air: Float = field(default_factory=lambda: np.zeros((0, 3)), repr=False, compare=False)
     #: The speed that the shaft keeps on a straight course; that of the approach where she has settled on it.
     settled_m_s: float | None = None
     #: What effects take for the speed that the shaft keeps, as a share of it: as in the logs they were identified from.
@@ -120,7 +123,7 @@ class Ship:
         track, ends = np.empty((_MOST_ROWS, motion.N_TRACK)), np.full(len(phases), -1, dtype=np.int64)
         step = self.waters.own_time_s / steps_a_length
         how, rows = motion.sail(
-            *(*self._shared(), kinds, sizes, self.waters.start.vector()),
+            *(*self._shared(), kinds, sizes, self.waters.start.vector(), np.ascontiguousarray(self.waters.air)),
             *(np.ascontiguousarray(phases, dtype=np.float64), step, track, ends),
         )
         return Track(track[:rows].copy(), ends, int(how))

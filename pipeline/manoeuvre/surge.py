@@ -1,6 +1,7 @@
 """The speed of a ship in a turn, identified from what her log showed in the manoeuvres.
 
-    dV/dt = (V_0 (1 + k_vr L v r / V_s^2 - k_r (L r / V_s)^2 - k_d delta^2 - k_w W / V_s^2) - V) V_s / (tau L)
+    dV/dt = (V_0 (1 - loss) - V) V_s / (tau L),
+    loss = -k_vr L v r / V_s^2 + k_r (L r / V_s)^2 + k_d delta^2 (V / V_s)^p + k_w W / V_s^2
 
 V_s is the speed that the shaft keeps on a straight course, V_0 that of one manoeuvre, tau the time in ship lengths in
 which she finds it; the rest is what turn and rudder cost of it in the long run, without a dimension. Thrust falls and
@@ -9,9 +10,9 @@ drifts while she turns loses by the momentum of her sideways motion, (m + m_y) v
 by X_vr: k_vr / tau is 1 to 1.6 (Yasukawa & Yoshimura 2015, "Introduction of MMG standard method for ship maneuvering
 predictions", J. Mar. Sci. Technol. 20; Norrbin 1971, "Theory and observations on the use of a mathematical model for
 ship manoeuvring in deep and confined waters", SSPA publication 68). Where no lateral speed was measured, or where the
-log shows it better, the loss goes by the yaw rate alone, as drift goes with turn. Beside drift the yaw rate squared has
-either sign: a centre of gravity before midships pushes her on in a turn, m x_G r^2, and what the hull's longitudinal
-force has of it, X_rr, does the one or the other.
+log shows it better, the loss goes by the yaw rate alone, as drift goes with turn.
+
+The rudder's drag goes with its force, and so with the power p of the speed that the model has it go by.
 
 W is the wind over the deck, its speed times its part from ahead, less what her own way makes of it in calm air: a head
 wind costs speed and a following one gives some. k_w / tau is the air's density times the drag area, over twice the
@@ -43,8 +44,6 @@ BY_DRIFT, BY_RATE, BY_RUDDER, BY_WIND = KINDS = range(4)
 #: of k_vr / tau, of k_r where turn alone counts, of k_d and of k_w / tau: with (L r / V)^2 of 0.1 to 0.2 in a hard turn
 #: a loss of 20 to 60 %; 0.4 rad of rudder cost some percent
 LOSS_MEAN, LOSS_STD = np.array([1.3, 2.0, 0.3, 0.001]), np.array([0.6, 2.0, 0.3, 0.001])
-#: of k_r / tau beside drift, which has the other loss: of either sign
-_BESIDE_STD = 0.3
 #: of V_0 about V_s: of a run that begins settled, and of one that gathers way; from where on it is the latter
 _SETTLED_STD, _UNSETTLED_STD, _UNSETTLED = 0.03, 0.15, 0.1
 _GRID = np.exp(np.linspace(np.log(1.0), np.log(64.0), 121))
@@ -76,7 +75,7 @@ class SurgeFit:
     def best(self) -> Float:
         """The most probable tau with its k_vr, k_r, k_d and k_w, shape (5,)."""
         k = int(np.argmax(self.probability))
-        return np.array([self.tau[k], *_costing(self.loss[k])])
+        return np.array([self.tau[k], *np.maximum(self.loss[k], 0.0)])
 
     @property
     def std(self) -> Float:
@@ -96,7 +95,7 @@ class SurgeFit:
         return replace(self, tau=self.tau[part], probability=np.ones(1), loss=self.loss[part], covariance=none)
 
     def drawn(self, normal: Float) -> Float:
-        """Return tau, k_vr, k_r, k_d and k_w of draws, shape (n, 5), from standard normal numbers, shape (n, 5)."""
+        """Return tau, k_vr, k_r, k_d and k_w of draws, shape (n, 5), from standard normal numbers, shape (n, 4)."""
         from scipy.stats import norm
 
         part = np.searchsorted(np.cumsum(self.probability), norm.cdf(normal[:, 0]) * (1.0 - 1e-12))
@@ -108,26 +107,17 @@ class SurgeFit:
             kinds, root = roots[k]
             loss = self.loss[k].copy()
             loss[kinds] += root @ z[: len(kinds)]
-            found[i] = [self.tau[k], *_costing(loss)]
+            found[i] = [self.tau[k], *np.maximum(loss, 0.0)]
         return found
 
     def _root(self, k: int) -> tuple[list[int], Float]:
-        """Return the kinds of loss of a part, the one by turning first, and the square root of their covariance."""
+        """Return the kinds of loss of a part and the square root of their covariance."""
         C = self.covariance[k]
-        turning = (BY_DRIFT, BY_RUDDER, BY_RATE) if self.loss[k, BY_DRIFT] != 0.0 else (BY_RATE, BY_RUDDER)
-        kinds = [kind for kind in (*turning, BY_WIND) if C[kind, kind] > 0.0]
+        kinds = [kind for kind in KINDS if C[kind, kind] > 0.0]
         return kinds, np.linalg.cholesky(C[np.ix_(kinds, kinds)]) if kinds else np.zeros((0, 0))
 
 
-def _costing(loss: Float) -> Float:
-    """Return losses that cost speed; beside drift the yaw rate squared may give some."""
-    found: Float = np.maximum(loss, 0.0)
-    if found[BY_DRIFT] > 0.0:
-        found[BY_RATE] = loss[BY_RATE]
-    return found
-
-
-def surge_of(runs: Sequence[GridRun], length_m: float) -> SurgeFit:
+def surge_of(runs: Sequence[GridRun], length_m: float, rudder_speed_exponent: float = 2.0) -> SurgeFit:
     """Identify the speed's equation from the manoeuvres of a ship.
 
     Parameters
@@ -136,8 +126,10 @@ def surge_of(runs: Sequence[GridRun], length_m: float) -> SurgeFit:
         With the speed through the water that the log showed, or over ground where there is none.
     length_m : float
         Of the ship.
+    rudder_speed_exponent : float, optional
+        Power of the speed in the rudder's force.
     """
-    logs = [log for log in (_Log.of(run, length_m) for run in runs) if log is not None]
+    logs = [log for log in (_Log.of(run, length_m, rudder_speed_exponent) for run in runs) if log is not None]
     if not logs:
         return _prior(("the speed in turns is a guess: no log shows it",))
     made = _posterior(logs, _forms(logs))
@@ -158,7 +150,7 @@ def _forms(logs: Sequence[_Log]) -> list[tuple[int, ...]]:
     """Return the kinds of loss that may act together, as far as all logs have what they go by."""
     turning: list[tuple[int, ...]] = [(BY_RATE,)]
     if all(np.isfinite(log.costs[:, BY_DRIFT]).all() for log in logs):
-        turning = [(BY_DRIFT,), (BY_DRIFT, BY_RATE), *turning]
+        turning = [(BY_DRIFT,), *turning]
     forms = [kinds for one in turning for kinds in (one, (*one, BY_RUDDER))]
     if all(np.isfinite(log.costs[:, BY_WIND]).all() for log in logs):
         forms += [(*kinds, BY_WIND) for kinds in forms]
@@ -205,7 +197,7 @@ class _Log:
     settled_std: float
 
     @classmethod
-    def of(cls, run: GridRun, length_m: float) -> _Log | None:
+    def of(cls, run: GridRun, length_m: float, exponent: float) -> _Log | None:
         speed, settled = run.speed_m_s, settled_speed(run)
         rate = _yaw_rate(run, length_m)
         if rate is None or not settled > 0.0 or not np.all(np.isfinite(speed)) or speed.size < 20:
@@ -216,7 +208,8 @@ class _Log:
             shaft = shaft / np.mean(shaft)
         lateral, unit = _lateral(run, length_m), length_m / settled
         drift = np.full(speed.size, np.nan) if lateral is None else -lateral * rate * unit / settled
-        costs = np.column_stack([drift, (unit * rate) ** 2, run.rudder_rad**2, _head_wind(run) / settled**2])
+        rudder = run.rudder_rad**2 * np.maximum(speed / settled, 0.0) ** exponent
+        costs = np.column_stack([drift, (unit * rate) ** 2, rudder, _head_wind(run) / settled**2])
         gathers_way = abs(speed[0] / settled - 1.0) > _UNSETTLED
         std = _UNSETTLED_STD if gathers_way else _SETTLED_STD
         return cls(run.step_s * settled / length_m, speed / settled, shaft, costs, settled, std)
@@ -331,7 +324,8 @@ def _solved(logs: Sequence[_Log], columns: Columns, tau: float, kinds: Sequence[
         right += lost.T @ log.speed / variance - C.T @ solved[:, 0]
         information += lost.T @ lost / variance - C.T @ solved[:, 1:]
         logdet += slogdet(A)[1]
-    mean_before, std_before = _prior_of_losses(kinds, tau)
+    unit = np.array([tau, 1.0, 1.0, tau])[kinds]
+    mean_before, std_before = LOSS_MEAN[kinds] * unit, LOSS_STD[kinds] * unit
     prior = np.diag(1.0 / std_before**2)
     whole = information + prior
     target = right + prior @ mean_before
@@ -341,15 +335,6 @@ def _solved(logs: Sequence[_Log], columns: Columns, tau: float, kinds: Sequence[
     covariance = np.asarray(inv(whole), dtype=np.float64)
     settled = tuple(float(part[0] - part[1:] @ mean) for part in own_parts)
     return _Solved(float(cost + area), mean, covariance, settled)
-
-
-def _prior_of_losses(kinds: Sequence[int], tau: float) -> tuple[Float, Float]:
-    """Return mean and standard deviation of the losses that act together, at a tau."""
-    unit = np.array([tau, 1.0, 1.0, tau])
-    mean, std = LOSS_MEAN * unit, LOSS_STD * unit
-    if BY_DRIFT in kinds:
-        mean[BY_RATE], std[BY_RATE] = 0.0, _BESIDE_STD * tau
-    return mean[list(kinds)], std[list(kinds)]
 
 
 def _left(logs: Sequence[_Log], columns: Columns, kinds: Sequence[int]) -> list[Float]:
