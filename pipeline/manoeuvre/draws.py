@@ -94,7 +94,7 @@ class Identified:
         theta = np.concatenate([self.hull, self.effects]) + normal[:, : 6 + p] @ _root(self.covariance).T
         low, high = self.waters.model.low, self.waters.model.high
         # numbers of their own, so that hull and effects are drawn alike whatever costs her speed
-        beside = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((3, count))
+        beside = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((4, count))
         of_the_day, more = beside[:2], beside[2:].T
         surge = self.surge.drawn(np.hstack([normal[:, 6 + p : 9 + p], more]))
         # a rate is positive whatever its error

@@ -9,8 +9,10 @@ resistance rises with the speed, so that their difference is close to a straight
 drifts while she turns loses by the momentum of her sideways motion, (m + m_y) v r / (m + m_x), and regains some of it
 by X_vr: k_vr / tau is 1 to 1.6 (Yasukawa & Yoshimura 2015, "Introduction of MMG standard method for ship maneuvering
 predictions", J. Mar. Sci. Technol. 20; Norrbin 1971, "Theory and observations on the use of a mathematical model for
-ship manoeuvring in deep and confined waters", SSPA publication 68). Where no lateral speed was measured, or where the
-log shows it better, the loss goes by the yaw rate alone, as drift goes with turn.
+ship manoeuvring in deep and confined waters", SSPA publication 68). Beside drift the yaw rate squared has either sign: a
+centre of gravity before midships pushes her on in a turn, m x_G r^2, and what the hull's longitudinal force has of it,
+X_rr, does the one or the other. Where no lateral speed was measured, or where the log shows it better, the loss goes by
+the yaw rate alone, as drift goes with turn.
 
 The rudder's drag goes with its force, and so with the power p of the speed that the model has it go by.
 
@@ -44,6 +46,8 @@ BY_DRIFT, BY_RATE, BY_RUDDER, BY_WIND = KINDS = range(4)
 #: of k_vr / tau, of k_r where turn alone counts, of k_d and of k_w / tau: with (L r / V)^2 of 0.1 to 0.2 in a hard turn
 #: a loss of 20 to 60 %; 0.4 rad of rudder cost some percent
 LOSS_MEAN, LOSS_STD = np.array([1.3, 2.0, 0.3, 0.001]), np.array([0.6, 2.0, 0.3, 0.001])
+#: of k_r / tau beside drift, of either sign: x_G m and X_rr of usual ships come to -0.15 to 0.05
+BESIDE_MEAN, BESIDE_STD = -0.05, 0.2
 #: of V_0 about V_s: of a run that begins settled, and of one that gathers way; from where on it is the latter
 _SETTLED_STD, _UNSETTLED_STD, _UNSETTLED = 0.03, 0.15, 0.1
 _GRID = np.exp(np.linspace(np.log(1.0), np.log(64.0), 121))
@@ -75,7 +79,7 @@ class SurgeFit:
     def best(self) -> Float:
         """The most probable tau with its k_vr, k_r, k_d and k_w, shape (5,)."""
         k = int(np.argmax(self.probability))
-        return np.array([self.tau[k], *np.maximum(self.loss[k], 0.0)])
+        return np.array([self.tau[k], *_costing(self.loss[k])])
 
     @property
     def std(self) -> Float:
@@ -95,7 +99,7 @@ class SurgeFit:
         return replace(self, tau=self.tau[part], probability=np.ones(1), loss=self.loss[part], covariance=none)
 
     def drawn(self, normal: Float) -> Float:
-        """Return tau, k_vr, k_r, k_d and k_w of draws, shape (n, 5), from standard normal numbers, shape (n, 4)."""
+        """Return tau, k_vr, k_r, k_d and k_w of draws, shape (n, 5), from standard normal numbers, shape (n, 5)."""
         from scipy.stats import norm
 
         part = np.searchsorted(np.cumsum(self.probability), norm.cdf(normal[:, 0]) * (1.0 - 1e-12))
@@ -107,7 +111,7 @@ class SurgeFit:
             kinds, root = roots[k]
             loss = self.loss[k].copy()
             loss[kinds] += root @ z[: len(kinds)]
-            found[i] = [self.tau[k], *np.maximum(loss, 0.0)]
+            found[i] = [self.tau[k], *_costing(loss)]
         return found
 
     def _root(self, k: int) -> tuple[list[int], Float]:
@@ -115,6 +119,14 @@ class SurgeFit:
         C = self.covariance[k]
         kinds = [kind for kind in KINDS if C[kind, kind] > 0.0]
         return kinds, np.linalg.cholesky(C[np.ix_(kinds, kinds)]) if kinds else np.zeros((0, 0))
+
+
+def _costing(loss: Float) -> Float:
+    """Return losses that cost speed; beside drift the yaw rate squared may give some."""
+    found: Float = np.maximum(loss, 0.0)
+    if found[BY_DRIFT] > 0.0:
+        found[BY_RATE] = loss[BY_RATE]
+    return found
 
 
 def surge_of(runs: Sequence[GridRun], length_m: float, rudder_speed_exponent: float = 2.0) -> SurgeFit:
@@ -150,7 +162,7 @@ def _forms(logs: Sequence[_Log]) -> list[tuple[int, ...]]:
     """Return the kinds of loss that may act together, as far as all logs have what they go by."""
     turning: list[tuple[int, ...]] = [(BY_RATE,)]
     if all(np.isfinite(log.costs[:, BY_DRIFT]).all() for log in logs):
-        turning = [(BY_DRIFT,), *turning]
+        turning = [(BY_DRIFT,), (BY_DRIFT, BY_RATE), *turning]
     forms = [kinds for one in turning for kinds in (one, (*one, BY_RUDDER))]
     if all(np.isfinite(log.costs[:, BY_WIND]).all() for log in logs):
         forms += [(*kinds, BY_WIND) for kinds in forms]
@@ -326,6 +338,9 @@ def _solved(logs: Sequence[_Log], columns: Columns, tau: float, kinds: Sequence[
         logdet += slogdet(A)[1]
     unit = np.array([tau, 1.0, 1.0, tau])[kinds]
     mean_before, std_before = LOSS_MEAN[kinds] * unit, LOSS_STD[kinds] * unit
+    if BY_DRIFT in kinds and BY_RATE in kinds:
+        beside = kinds.index(BY_RATE)
+        mean_before[beside], std_before[beside] = BESIDE_MEAN * tau, BESIDE_STD * tau
     prior = np.diag(1.0 / std_before**2)
     whole = information + prior
     target = right + prior @ mean_before
