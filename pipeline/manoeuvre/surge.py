@@ -9,10 +9,10 @@ resistance rises with the speed, so that their difference is close to a straight
 drifts while she turns loses by the momentum of her sideways motion, (m + m_y) v r / (m + m_x), and regains some of it
 by X_vr: k_vr / tau is 1 to 1.6 (Yasukawa & Yoshimura 2015, "Introduction of MMG standard method for ship maneuvering
 predictions", J. Mar. Sci. Technol. 20; Norrbin 1971, "Theory and observations on the use of a mathematical model for
-ship manoeuvring in deep and confined waters", SSPA publication 68). Beside drift the yaw rate squared has either sign: a
-centre of gravity before midships pushes her on in a turn, m x_G r^2, and what the hull's longitudinal force has of it,
-X_rr, does the one or the other. Where no lateral speed was measured, or where the log shows it better, the loss goes by
-the yaw rate alone, as drift goes with turn.
+ship manoeuvring in deep and confined waters", SSPA publication 68). Beside drift the yaw rate squared has either sign:
+a centre of gravity before midships pushes her on in a turn, m x_G r^2, and what the hull's longitudinal force has of
+it, X_rr, does the one or the other. Where no lateral speed was measured, or where the log shows it better, the loss
+goes by the yaw rate alone, as drift goes with turn.
 
 The rudder's drag goes with its force, and so with the power p of the speed that the model has it go by.
 
