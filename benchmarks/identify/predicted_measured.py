@@ -7,15 +7,17 @@ those held out among them. Each is predicted as it was sailed: with its own appr
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 
 import numpy as np
 
 from benchmarks import measured_ships, result_page
+from benchmarks.identify import peers
 from benchmarks.measured_ships import Ship
 from kempf.flows.jobs.as_sailed import as_sailed
 from kempf.flows.jobs.checked_prediction import predict_checked
@@ -24,7 +26,7 @@ from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre, beside
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.predict_vessel import PredictRequest
+from kempf.flows.jobs.predict_vessel import Predicted, PredictRequest
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, point
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
@@ -35,11 +37,6 @@ from kempf.warehouse.store import Warehouse
 
 _MODELS = Path(__file__).parents[2] / "docs" / "models"
 _CIRCLE = ("steady_yaw_rate_deg_s", "advance_m", "transfer_m", "tactical_diameter_m", "speed_loss_percent")
-_TANK_M = 7.0
-#: The tank's ship in another basin, 35 deg of rudder, m: measured by MARIN with a model of the same length, and from
-#: captive tests by the MMG standard method; Yasukawa & Yoshimura 2015, "Introduction of MMG standard method for ship
-#: maneuvering predictions", J. Mar. Sci. Technol. 20, table 4, there in lengths
-_PUBLISHED = {"advance_m": (3.25 * _TANK_M, 3.31 * _TANK_M), "tactical_diameter_m": (3.34 * _TANK_M, 3.36 * _TANK_M)}
 _FIRST_TWO = ("overshoots_deg.0", "overshoots_deg.1")
 
 
@@ -90,10 +87,8 @@ def circles(warehouse: Warehouse, vessel: str, source: Source) -> list[str]:
     return [*lines, *result_page.table(heads, rows), ""]
 
 
-def zigzags(
-    warehouse: Warehouse, vessel: str, source: Source, published: Mapping[str, tuple[float, float]]
-) -> list[str]:
-    """Return the part of the page with the zigzags of a ship."""
+def zigzags(warehouse: Warehouse, vessel: str, source: Source, *, others: bool) -> list[str]:
+    """Return the part of the page with the zigzags of a ship, beside those of others where there are some."""
     made = predict_checked(warehouse, vessel, PredictRequest("zigzag", source.set_id))
     checked = made.own_zigzags
     assert checked is not None
@@ -108,7 +103,12 @@ def zigzags(
     for one, (segment, _) in zip(measured, pairs, strict=True):
         figures = {figure.name: figure for figure in one.figures}
         angles = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} {one.side}"
-        rows.append([angles, one.sample.replace("_", " "), *[_cell(figures.get(name)) for name in _FIRST_TWO]])
+        row = [angles, one.sample.replace("_", " "), *[_cell(figures.get(name)) for name in _FIRST_TWO]]
+        gear = made.basis.rudder_rate.rad_s
+        theirs = [peers.overshoots(segment.psi0_deg, segment.delta0_deg, one.side, gear)] if others else []
+        rows.append([*row, *theirs])
+    heads = ["zigzag", "sample", "first overshoot, deg", "second overshoot, deg"]
+    heads += ["MMG from captive tests, both"] if others else []
     return [
         f"### Overshoots by {source.words}",
         "",
@@ -116,9 +116,9 @@ def zigzags(
         "",
         *_shares(measured),
         "",
-        *result_page.table(["zigzag", "sample", "first overshoot, deg", "second overshoot, deg"], rows),
+        *result_page.table(heads, rows),
         "",
-        *_calm_circle(warehouse, vessel, source, published),
+        *_calm_circle(warehouse, vessel, source, others=others),
     ]
 
 
@@ -138,9 +138,7 @@ def _shares(measured: Sequence[MeasuredManoeuvre]) -> list[str]:
     return lines
 
 
-def _calm_circle(
-    warehouse: Warehouse, vessel: str, source: Source, published: Mapping[str, tuple[float, float]]
-) -> list[str]:
+def _calm_circle(warehouse: Warehouse, vessel: str, source: Source, *, others: bool) -> list[str]:
     """Return a 35 deg circle in calm water with its intervals: how much the model is worth beyond zigzags."""
     try:
         made = predict_checked(warehouse, vessel, PredictRequest("turning-circle", source.set_id))
@@ -153,14 +151,22 @@ def _calm_circle(
         assert one.low is not None
         assert one.high is not None
         width = 100.0 * (one.high - one.low) / abs(one.value)
-        row = [name, f"{one.value:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{width:.0f} %"]
-        if published:
-            others = published.get(name, ())
-            row += [f"{x:.4g}: {100.0 * (one.value / x - 1.0):+.1f} %" for x in others] or ["", ""]
-        rows.append(row)
-    heads = ["her circle with 35 deg of rudder, calm water", "value", "95 % interval", "width"]
-    heads += ["measured by MARIN: ours off by", "MMG from captive tests: ours off by"] if published else []
-    return [*result_page.table(heads, rows), ""]
+        rows.append([name, f"{one.value:.4g}", f"{one.low:.4g} to {one.high:.4g}", f"{width:.0f} %"])
+    surge = made.basis.surge
+    lines = [
+        f"Of the logged speed its equation leaves {1000.0 * surge.error_m_s:.1f} mm/s rms: tau {surge.best[0]:.1f} "
+        f"lengths, k_vr {surge.best[1]:.2f}, k_r {surge.best[2]:.2f}, k_d {surge.best[3]:.2f}, k_w "
+        f"{surge.best[4]:.4f} ([predict.md](../../docs/predict.md)).",
+        "",
+        *result_page.table(["her circle with 35 deg of rudder, calm water", "value", "95 % interval", "width"], rows),
+        "",
+    ]
+
+    def elsewhere(side: Any, rudder_rate_deg_s: float) -> Predicted:
+        request = PredictRequest("turning-circle", source.set_id, side=side, rudder_rate_deg_s=rudder_rate_deg_s)
+        return predict_checked(warehouse, vessel, request)
+
+    return [*lines, *peers.circles_beside(elsewhere)] if others else lines
 
 
 def _cell(figure: Beside | None) -> str:
@@ -173,9 +179,7 @@ def _cell(figure: Beside | None) -> str:
     return f"{figure.measured:.3g}: {one.value:.3g} ({one.low:.3g} to {one.high:.3g}{mark})"
 
 
-def _of(
-    ship: Ship, spec: ModelSpec | None, named: ModelSpec | None, published: Mapping[str, tuple[float, float]]
-) -> list[str]:
+def _of(ship: Ship, spec: ModelSpec | None, named: ModelSpec | None, *, others: bool = False) -> list[str]:
     lines = [f"## {ship.name}", ""]
     with TemporaryDirectory() as place:
         warehouse = Warehouse(place)
@@ -184,7 +188,7 @@ def _of(
             point(warehouse, parameter_sets.get(warehouse, source.set_id))
             turned = any(s.kind == "turning_circle" for s in segments.every(warehouse, ship.name))
             parts = {"circles": circles} if turned else {}
-            for name, part in (parts | {"zigzags": partial(zigzags, published=published)}).items():
+            for name, part in (parts | {"zigzags": partial(zigzags, others=others)}).items():
                 try:
                     lines += part(warehouse, ship.name, source)
                 except KempfError as error:
@@ -199,11 +203,11 @@ def main() -> None:
     parser.add_argument("--model", type=Path, default=_MODELS / "pond.yaml", help="Of the pond's ship, with effects.")
     given = parser.parse_args()
     lines = [
-        "Cells: measured, then predicted with its 95 % interval. Circles are never fitted; what wind and stream do to "
-        "the track beyond their mean is in the measurement alone.",
+        "Cells: measured, then predicted with its 95 % interval. Circles are never fitted. A measured manoeuvre is "
+        "predicted in its wind as it was logged; a stream is in the measurement alone.",
         "",
-        *_of(measured_ships.pond(given.data), None, read_model(given.model), {}),
-        *_of(measured_ships.tank(given.data), read_model(_MODELS / "tank.yaml"), None, _PUBLISHED),
+        *_of(measured_ships.pond(given.data), None, read_model(given.model)),
+        *_of(measured_ships.tank(given.data), read_model(_MODELS / "tank.yaml"), None, others=True),
     ]
     result_page.write("identify.predicted_measured", "Predicted manoeuvres of measured ships", lines)
 

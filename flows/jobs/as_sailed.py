@@ -59,10 +59,13 @@ class AsSailed:
             wind_arm_per_m=self.arm_per_m,
             true_wind_m_s=self.began.wind_m_s,
             true_wind_from_rad=self.began.wind_from_rad,
+            air=self.began.air,
             settled_m_s=None if shaft is None or kept is None else ratio * kept * shaft,
             start=self.began.start,
         )
-        return replace(model, waters=waters, wind_force_std_m_s2=self.wind_force_m_s2[1], settled_std=std / ratio)
+        # the gear is that of the logs, whatever other one a prediction was asked for
+        own = replace(model, waters=waters, rudder_rate=basis.rudder_rate)
+        return replace(own, wind_force_std_m_s2=self.wind_force_m_s2[1], settled_std=std / ratio)
 
 
 def as_sailed(
@@ -100,7 +103,7 @@ def _one(predicted: Predicted, asked: Manoeuvre, segment: Segment, log: Instrume
         segment=segment,
         manoeuvre=_as_ordered(asked, segment),
         speed_m_s=speed_m_s,
-        began=replace(seen, wind_from_rad=seen.wind_from_rad - radians(segment.base_heading_deg)),
+        began=seen.counted_from(radians(segment.base_heading_deg)),
         wind_force_m_s2=_steady_wind(run, passed) if run and passed else (0.0, 0.0),
         arm_per_m=run.run.ship.arm_per_m if run else 0.0,
         sample="fitted" if fitted else "held_out",

@@ -6,7 +6,7 @@ Nothing is fitted but the speed's equation; what is stored are models that fit a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from math import degrees, isfinite, radians
 from typing import Any, Literal
 
@@ -74,6 +74,8 @@ class PredictRequest:
     side: Literal["starboard", "port"] = "starboard"
     #: Of the approach; None takes the mean of those that were sailed.
     speed_m_s: float | None = None
+    #: Of another steering gear; None takes the rudder's rate that the logs show.
+    rudder_rate_deg_s: float | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,12 +148,13 @@ class Predicted:
                 "loss_by_drift_and_turn": float(self.basis.surge.best[1]),
                 "loss_by_yaw_rate": float(self.basis.surge.best[2]),
                 "loss_by_rudder": float(self.basis.surge.best[3]),
+                "loss_by_wind": float(self.basis.surge.best[4]),
                 "std": [float(x) for x in self.basis.surge.std],
             },
             "rudder_rate_deg_s": {
-                "value": degrees(self.basis.rudder_rate.rad_s),
-                "std": degrees(self.basis.rudder_rate.std_rad_s),
-                "executes": self.basis.rudder_rate.executes,
+                "value": degrees(made.models[0].model.rudder_rate.rad_s),
+                "std": degrees(made.models[0].model.rudder_rate.std_rad_s),
+                "executes": made.models[0].model.rudder_rate.executes,
             },
             "own_zigzags": None if self.own_zigzags is None else asdict(self.own_zigzags),
             "assumed": list(self.assumed),
@@ -174,7 +177,8 @@ def predict_vessel(
     NotFound
         ``no_parameter_set``, ``no_vessel``, ``no_runs``.
     UsageError
-        ``speed_out_of_range``, ``rudder_out_of_range``, ``angles_out_of_range``, ``set_of_another_vessel``.
+        ``speed_out_of_range``, ``rudder_rate_out_of_range``, ``rudder_out_of_range``, ``angles_out_of_range``,
+        ``set_of_another_vessel``.
     DataRejected
         ``set_without_covariance``, ``predicts_no_ship``.
     """
@@ -185,11 +189,20 @@ def predict_vessel(
             f"The approach speed is {request.speed_m_s:g} m/s, expected more than 0.",
             "Give the speed through the water in m/s with --speed, or leave it out.",
         )
+    if request.rudder_rate_deg_s is not None and not 0.0 < request.rudder_rate_deg_s < float("inf"):
+        raise UsageError(
+            "rudder_rate_out_of_range",
+            f"The rudder's rate is {request.rudder_rate_deg_s:g} deg/s, expected more than 0.",
+            "Give the rate at which the gear puts the rudder over with --rudder-rate, or leave it out.",
+        )
     one, _ = chosen_set(warehouse, vessel, request.set_id)
     basis = basis_of(warehouse, one, progress)
     speed = request.speed_m_s or basis.approach_m_s
     rivals = rivals_of(warehouse, one, progress)
     models = [identified(ship_of_set(warehouse, each, speed), basis) for each in (one, *rivals.sets)]
+    if request.rudder_rate_deg_s is not None:
+        gear = RudderRate(radians(request.rudder_rate_deg_s), 0.0, 0, "")
+        models = [replace(model, rudder_rate=gear) for model in models]
     progress(0, 1, f"sailing {len(models) * count} ships")
     made = predict(models, manoeuvre, basis.logs, basis.profile.length_m, count)
     progress(1, 1, "sailed")
@@ -259,7 +272,8 @@ def basis_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silen
     profile = vessels.get(warehouse, str(inputs["profile_sha256"]))
     runs = assemble(instruments, profile, bounds, ModelSpec.model_validate(dict(one.model_spec)))
     scale = profile.length_m or _scale_m(one)
-    return Basis(profile, runs, surge_of(runs.runs, scale), rudder_rate(runs.records), covered(runs.runs, scale), scale)
+    surge = surge_of(runs.runs, scale, runs.spec.rudder_speed_exponent)
+    return Basis(profile, runs, surge, rudder_rate(runs.records), covered(runs.runs, scale), scale)
 
 
 def identified(ship: ShipOfSet, basis: Basis) -> Identified:
@@ -330,6 +344,9 @@ def _assumed(request: PredictRequest, basis: Basis, models: Sequence[Identified]
     if request.speed_m_s is None:
         said.append(f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres of the set")
     rate = basis.rudder_rate
+    if request.rudder_rate_deg_s is not None:
+        rate = RudderRate(radians(request.rudder_rate_deg_s), 0.0, 0, "")
+        said.append(f"the rudder goes over at {request.rudder_rate_deg_s:.3g} deg/s, as asked for")
     if rate.executes:
         said.append(f"the rudder goes over at {degrees(rate.rad_s):.3g} deg/s, as in {rate.executes} executes")
     said += [word for word in (rate.remark, *basis.surge.remarks) if word]

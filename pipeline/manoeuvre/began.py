@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,17 @@ class Began:
     #: wind_m_s, wind_from_rad: Mean true wind from the first execute on; from where, clockwise from north.
     wind_m_s: float
     wind_from_rad: float
+    #: Shape (k, 3). Its course, as far as the log has it: instant from the execute on, s, and its parts from north and
+    #: from east, m/s; without rows where the log hardly has it.
+    air: Float = field(default_factory=lambda: np.zeros((0, 3)), repr=False, compare=False)
+
+    def counted_from(self, heading_rad: float) -> Began:
+        """Return it with directions counted from a heading instead of north."""
+        north, east = self.air[:, 1], self.air[:, 2]
+        ahead = north * np.cos(heading_rad) + east * np.sin(heading_rad)
+        beside = east * np.cos(heading_rad) - north * np.sin(heading_rad)
+        air = np.column_stack([self.air[:, 0], ahead, beside])
+        return replace(self, wind_from_rad=self.wind_from_rad - heading_rad, air=air)
 
 
 def began(instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_time_s: float) -> Began:
@@ -50,8 +61,11 @@ def began(instruments: Instruments, execute_utc_ns: int, end_utc_ns: int, own_ti
     wind = _wind(instruments, later)
     known = np.isfinite(wind)
     mean = complex(np.mean(wind[known])) if known.mean() > 0.5 else 0.0 + 0.0j
+    since = (later[known] - execute_utc_ns) / SECOND_NS
+    air = np.column_stack([since, wind[known].real, wind[known].imag])
     shaft = _mean(_read(instruments, "shaft_speed", later))
-    return Began(Start(forward_m_s=forward, yaw_rate_rad_s=rate), shaft, abs(mean), float(np.angle(mean)))
+    start = Start(forward_m_s=forward, yaw_rate_rad_s=rate)
+    return Began(start, shaft, abs(mean), float(np.angle(mean)), air if known.mean() > 0.5 else air[:0])
 
 
 def _mean(course: Float) -> float | None:

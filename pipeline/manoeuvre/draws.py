@@ -93,11 +93,13 @@ class Identified:
         normal = norm.ppf(np.clip(sequence.random(count), 1e-12, 1.0 - 1e-12))
         theta = np.concatenate([self.hull, self.effects]) + normal[:, : 6 + p] @ _root(self.covariance).T
         low, high = self.waters.model.low, self.waters.model.high
-        surge = self.surge.drawn(normal[:, 6 + p : 9 + p])
+        # numbers of their own, so that hull and effects are drawn alike whatever costs her speed
+        beside = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((4, count))
+        of_the_day, more = beside[:2], beside[2:].T
+        surge = self.surge.drawn(np.hstack([normal[:, 6 + p : 9 + p], more]))
         # a rate is positive whatever its error
         share = self.rudder_rate.std_rad_s / self.rudder_rate.rad_s
         rate = self.rudder_rate.rad_s * np.exp(share * normal[:, -1])
-        of_the_day = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((2, count))
         wind, settled = self.wind_force_std_m_s2 * of_the_day[0], 1.0 + self.settled_std * of_the_day[1]
         for k in range(count):
             values = np.clip(theta[k, 6:], low, high)

@@ -1,7 +1,7 @@
 """The mean motion of a ship of eq. (16) with effects, with her speed and her track, compiled.
 
 The lateral motion is that of `pipeline.model.dynamics`, by which the filter moves: no effect is written out again. The
-speed is `pipeline.manoeuvre.surge`'s. There is no wave or current, nothing random, and no wind but a steady one.
+speed is `pipeline.manoeuvre.surge`'s. There is no wave or current, nothing random, and no wind but a given one.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ N_TRACK = 9
 SAILED, RAN_AWAY, NEVER_CAME = 0, 1, 2
 #: parts of the ship's vector, `kempf.pipeline.manoeuvre.ship.Ship.vector`
 LENGTH, DRAUGHT, APPROACH, TIME_LENGTHS, LOSS_BY_DRIFT, LOSS_BY_RATE, LOSS_BY_RUDDER, RUDDER_RATE = range(8)
-EXPONENT, SCALE, FORCE, ARM, SETTLED, WIND, WIND_FROM, SHAFT = range(8, 16)
+EXPONENT, SCALE, FORCE, ARM, SETTLED, WIND, WIND_FROM, SHAFT, LOSS_BY_WIND = range(8, 17)
 _TRUE_HEADING = 2 + SYMBOLS.index("K") - CHANNEL
 _RUN_TIME = 2 + SYMBOLS.index("t") - CHANNEL
 _WIND_SPEED, _WIND_ANGLE, _SHAFT, _DEPTH = (2 + SYMBOLS.index(name) - CHANNEL for name in ("U", "gamma", "n", "h"))
@@ -35,11 +35,25 @@ _ROUNDS = 40
 
 
 @njit(**FILLING)
-def _kept(numbers, v, r, rudder):  # type: ignore[no-untyped-def]
-    """Return the forward speed that thrust and resistance keep with this drift, turn and rudder, m/s."""
+def _kept(numbers, u, v, r, rudder, heading):  # type: ignore[no-untyped-def]
+    """Return the forward speed that thrust and resistance keep with this drift, turn, rudder and wind, m/s."""
     unit, settled = numbers[LENGTH] / numbers[SETTLED], numbers[SETTLED]
-    lost = numbers[LOSS_BY_RATE] * (unit * r) ** 2 + numbers[LOSS_BY_RUDDER] * rudder * rudder
+    steered = rudder * rudder * max(u / settled, 0.0) ** numbers[EXPONENT]
+    lost = numbers[LOSS_BY_RATE] * (unit * r) ** 2 + numbers[LOSS_BY_RUDDER] * steered
+    if numbers[WIND] > 0.0:
+        away = numbers[WIND_FROM] - heading
+        ahead, abeam = numbers[WIND] * np.cos(away) + u, numbers[WIND] * np.sin(away) + v
+        lost += numbers[LOSS_BY_WIND] * (ahead * np.hypot(ahead, abeam) - u * u) / settled**2
     return settled * (1.0 + numbers[LOSS_BY_DRIFT] * unit * r * v / settled - lost)
+
+
+@njit(**FILLING)
+def _steady(numbers, v, r, rudder):  # type: ignore[no-untyped-def]
+    """Return the forward speed of a steady turn, on the course of the approach where there is a wind, m/s."""
+    u = numbers[APPROACH]
+    for _ in range(_ROUNDS):
+        u = _kept(numbers, u, v, r, rudder, 0.0)
+    return u
 
 
 @njit(**FILLING)
@@ -54,7 +68,11 @@ def rates(x, s, rudder, sea, numbers, fx, fs):  # type: ignore[no-untyped-def]
         row[_WIND_SPEED], row[_WIND_ANGLE] = np.hypot(ahead, abeam), np.arctan2(abeam, ahead)
     dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, fx, J, ONE)
     length, settled = numbers[LENGTH], numbers[SETTLED]
-    fs[0] = (_kept(numbers, x[V, 0], x[R, 0], rudder[0]) - s[0]) * settled / (numbers[TIME_LENGTHS] * length)
+    fs[0] = (
+        (_kept(numbers, s[0], x[V, 0], x[R, 0], rudder[0], x[PSI, 0]) - s[0])
+        * settled
+        / (numbers[TIME_LENGTHS] * length)
+    )
     # the speed that effects make of the logged one is the one that she has
     u, v, cosine, sine = values[SPEED, 0], x[V, 0], np.cos(x[PSI, 0]), np.sin(x[PSI, 0])
     fs[1], fs[2], fs[3] = u * cosine - v * sine, u * sine + v * cosine, np.hypot(u, v)
@@ -101,7 +119,7 @@ def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignor
     values[SHIP + 8, 0], values[SHIP + 9, 0] = numbers[APPROACH], 1.0
     for i in range(p):
         values[PARAMETER + i, 0] = values_of_effects[i]
-    # no wind but the steady one, the shaft turning on, deep water, upright; n0 is 1 and V0 the speed of the approach
+    # no wind but the given one, the shaft turning on, deep water, upright; n0 is 1 and V0 the speed of the approach
     row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = numbers[SHAFT] / numbers[APPROACH], 1e12, day
     ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
     stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))
@@ -142,7 +160,7 @@ def balanced(numbers, hull, effects, day, table, extra, given, rate_given, start
             if column > 0:
                 moved[column - 1] += 1e-6 * scale[column - 1]
             r, delta = (given, moved[1]) if rate_given else (moved[1], given)
-            s[0] = _kept(numbers, moved[0], r, delta)
+            s[0] = _steady(numbers, moved[0], r, delta)
             x[V, 0], x[R, 0], x[F, 0], rudder[0] = moved[0], r, numbers[FORCE], delta
             x[N_BEFORE:, 0] = moved[2:]
             rates(x, s, rudder, sea, numbers, fx, fs)
@@ -166,7 +184,7 @@ def balanced(numbers, hull, effects, day, table, extra, given, rate_given, start
             break
     start[:] = z
     r, delta = (given, z[1]) if rate_given else (z[1], given)
-    u = _kept(numbers, z[0], r, delta)
+    u = _steady(numbers, z[0], r, delta)
     return u, largest < 1e-7 and u > _SLOWEST * V0
 
 
@@ -206,12 +224,12 @@ def _step(x, s, begun, before, speed, h, t, sea, numbers, gear, held, room, xn, 
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, phases, step_s, track, ends):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one loop
+def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, air, phases, step_s, track, ends):  # type: ignore[no-untyped-def]  # noqa: PLR0912, PLR0915 - one loop
     """Sail a manoeuvre, from a steady straight course on or as it really began.
 
     Parameters
     ----------
-    numbers : ndarray, shape (16,)
+    numbers : ndarray, shape (17,)
         See the constants of this file.
     hull : ndarray, shape (6, 1)
     effects : ndarray, shape (p,)
@@ -222,6 +240,9 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, phases,
         See `kempf.pipeline.manoeuvre.helm.pass_through`.
     start : ndarray, shape (4,)
         Forward and lateral speed, m/s, yaw rate, rad/s, and rudder, rad, to begin with; NaN: as on a straight course.
+    air : ndarray, shape (k, 3)
+        Course of the true wind: instant, s, and its parts from north and from east, m/s, linear in between and constant
+        beyond; without rows the steady one of the numbers. The approach is in the steady one.
     phases : ndarray, shape (q, 4)
         Rudder order, rad (NaN: the one that holds a straight course); side (+1, -1) to which the heading has to pass
         the target that ends the phase, 0 for none; target, rad; longest duration, s.
@@ -267,6 +288,7 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, phases,
     rates(x, s, room[8], sea, numbers, room[0], room[4])
     _record(track[0], t, x, s, reading, sea)
     limit, V0, scale = numbers[RUDDER_RATE], numbers[APPROACH], numbers[SCALE]
+    numbers, row_of_air = numbers.copy(), 0
     for k in range(phases.shape[0]):
         order, side, target, longest = phases[k]
         if np.isnan(order):
@@ -279,6 +301,8 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, phases,
             if begin + longest - t < h:
                 h, arrives = begin + longest - t, False
             speed = np.sign(gap) * limit
+            if air.shape[0] > 0:
+                row_of_air = _blow(air, row_of_air, t + 0.5 * h, numbers)
             felt = _step(x, s, begun, reading, speed, h, t, sea, numbers, gear, n, room, xn, sn)
             crossed = side != 0.0 and side * (xn[PSI, 0] - target) >= 0.0
             if crossed:
@@ -315,6 +339,20 @@ def sail(numbers, hull, effects, day, table, extra, kinds, sizes, start, phases,
                 break
         ends[k] = n - 1
     return SAILED, n
+
+
+@njit(**FILLING)
+def _blow(air, row, t, numbers):  # type: ignore[no-untyped-def]
+    """Write the wind at an instant into the numbers; return the row of the course to look from the next time."""
+    while row < air.shape[0] - 2 and air[row + 1, 0] < t:
+        row += 1
+    after = min(row + 1, air.shape[0] - 1)
+    span = air[after, 0] - air[row, 0]
+    share = min(max((t - air[row, 0]) / span, 0.0), 1.0) if span > 0.0 else 0.0
+    north = air[row, 1] + share * (air[after, 1] - air[row, 1])
+    east = air[row, 2] + share * (air[after, 2] - air[row, 2])
+    numbers[WIND], numbers[WIND_FROM] = np.hypot(north, east), np.arctan2(east, north)
+    return row
 
 
 @njit(**FILLING)

@@ -51,10 +51,13 @@ class Waters:
     #: wind_force_m_s2, wind_arm_per_m: A steady wind, F and l of eq. (16); none unless one is to be compared with.
     wind_force_m_s2: float = 0.0
     wind_arm_per_m: float = 0.0
-    #: true_wind_m_s, true_wind_from_rad: A steady wind for effects that ask for it; from where, clockwise from the
-    #: course of the approach.
+    #: true_wind_m_s, true_wind_from_rad: A steady wind, for the speed and for effects that ask for it; from where,
+    #: clockwise from the course of the approach.
     true_wind_m_s: float = 0.0
     true_wind_from_rad: float = 0.0
+    #: Shape (k, 3). Its course in the manoeuvre where it is known: instant from the beginning, s, and its parts from
+    #: ahead and from starboard of the approach, m/s; without rows it is the steady one.
+    air: Float = field(default_factory=lambda: np.zeros((0, 3)), repr=False, compare=False)
     #: The speed that the shaft keeps on a straight course; that of the approach where she has settled on it.
     settled_m_s: float | None = None
     #: What effects take for the speed that the shaft keeps, as a share of it: as in the logs they were identified from.
@@ -76,21 +79,21 @@ class Ship:
     hull: Float
     #: Shape (p,). Parameters of the effects.
     effects: Float
-    #: Shape (4,). Time constant of the speed in lengths `Waters.scale_m`, loss by -scale v r / V_s^2, by
-    #: (scale r / V_s)^2 and by delta^2.
+    #: Shape (5,). Time constant of the speed in lengths `Waters.scale_m`, loss by -scale v r / V_s^2, by
+    #: (scale r / V_s)^2, by delta^2, and by the wind's W / V_s^2 of `kempf.pipeline.manoeuvre.surge`.
     surge: Float
     rudder_rate_rad_s: float
 
     @property
     def numbers(self) -> Float:
-        """What the compiled motion reads, shape (16,)."""
-        w, (tau, by_drift, by_rate, by_rudder) = self.waters, self.surge
+        """What the compiled motion reads, shape (17,)."""
+        w, (tau, by_drift, by_rate, by_rudder, by_wind) = self.waters, self.surge
         share = w.scale_m / w.length_m
         surge = (tau * share, by_drift * share, by_rate * share**2, by_rudder)
         settled = w.approach_m_s if w.settled_m_s is None else w.settled_m_s
         rest = (
             *(self.rudder_rate_rad_s, w.rudder_speed_exponent, w.scale_m, w.wind_force_m_s2, w.wind_arm_per_m),
-            *(settled, w.true_wind_m_s, w.true_wind_from_rad, settled * w.shaft_share),
+            *(settled, w.true_wind_m_s, w.true_wind_from_rad, settled * w.shaft_share, by_wind),
         )
         return np.array([w.length_m, w.draught_m, w.approach_m_s, *surge, *rest])
 
@@ -120,7 +123,7 @@ class Ship:
         track, ends = np.empty((_MOST_ROWS, motion.N_TRACK)), np.full(len(phases), -1, dtype=np.int64)
         step = self.waters.own_time_s / steps_a_length
         how, rows = motion.sail(
-            *(*self._shared(), kinds, sizes, self.waters.start.vector()),
+            *(*self._shared(), kinds, sizes, self.waters.start.vector(), np.ascontiguousarray(self.waters.air)),
             *(np.ascontiguousarray(phases, dtype=np.float64), step, track, ends),
         )
         return Track(track[:rows].copy(), ends, int(how))

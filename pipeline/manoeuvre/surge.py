@@ -1,6 +1,7 @@
 """The speed of a ship in a turn, identified from what her log showed in the manoeuvres.
 
-    dV/dt = (V_0 (1 + k_vr L v r / V_s^2 - k_r (L r / V_s)^2 - k_d delta^2) - V) V_s / (tau L)
+    dV/dt = (V_0 (1 - loss) - V) V_s / (tau L),
+    loss = -k_vr L v r / V_s^2 + k_r (L r / V_s)^2 + k_d delta^2 (V / V_s)^p + k_w W / V_s^2
 
 V_s is the speed that the shaft keeps on a straight course, V_0 that of one manoeuvre, tau the time in ship lengths in
 which she finds it; the rest is what turn and rudder cost of it in the long run, without a dimension. Thrust falls and
@@ -8,11 +9,21 @@ resistance rises with the speed, so that their difference is close to a straight
 drifts while she turns loses by the momentum of her sideways motion, (m + m_y) v r / (m + m_x), and regains some of it
 by X_vr: k_vr / tau is 1 to 1.6 (Yasukawa & Yoshimura 2015, "Introduction of MMG standard method for ship maneuvering
 predictions", J. Mar. Sci. Technol. 20; Norrbin 1971, "Theory and observations on the use of a mathematical model for
-ship manoeuvring in deep and confined waters", SSPA publication 68). Where no lateral speed was measured, or where the
-log shows it better, the loss goes by the yaw rate alone, as drift goes with turn.
+ship manoeuvring in deep and confined waters", SSPA publication 68). Beside drift the yaw rate squared has either sign:
+a centre of gravity before midships pushes her on in a turn, m x_G r^2, and what the hull's longitudinal force has of
+it, X_rr, does the one or the other. Where no lateral speed was measured, or where the log shows it better, the loss
+goes by the yaw rate alone, as drift goes with turn.
 
-For a given tau and one of both forms all else enters linearly. So tau is gone through on a grid, and at each value the
-rest is a linear regression with priors: the posterior is exact but for the grid, and needs no start.
+The rudder's drag goes with its force, and so with the power p of the speed that the model has it go by.
+
+W is the wind over the deck, its speed times its part from ahead, less what her own way makes of it in calm air: a head
+wind costs speed and a following one gives some. k_w / tau is the air's density times the drag area, over twice the
+mass per length: about 0.001 (Isherwood 1972, "Wind resistance of merchant ships", Trans. RINA 115), which for a small
+model in a breeze is a tenth of her speed.
+
+For a given tau and one of the forms all else enters linearly. So tau is gone through on a grid, and at each value the
+rest is a linear regression with priors: the posterior is exact but for the grid, and needs no start. Which of the terms
+there are beside the one by turning is left to their evidence.
 """
 
 from __future__ import annotations
@@ -30,11 +41,13 @@ from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 #: of tau: ships come back to their speed in some lengths to some dozens of them; median, and its logarithm's spread
 TAU_MEDIAN, TAU_SPREAD = 8.0, 0.7
-#: of k_vr / tau, of k_r and of k_d: with (L r / V)^2 of 0.1 to 0.2 in a hard turn a loss of 20 to 60 %; 0.4 rad of
-#: rudder cost some percent
-LOSS_MEAN, LOSS_STD = np.array([1.3, 2.0, 0.3]), np.array([0.6, 2.0, 0.3])
-#: the kinds of loss: by drift and turn, by turn alone, by the rudder
-BY_DRIFT, BY_RATE, BY_RUDDER = range(3)
+#: the kinds of loss: by drift and turn, by the turn, by the rudder, by the wind
+BY_DRIFT, BY_RATE, BY_RUDDER, BY_WIND = KINDS = range(4)
+#: of k_vr / tau, of k_r where turn alone counts, of k_d and of k_w / tau: with (L r / V)^2 of 0.1 to 0.2 in a hard turn
+#: a loss of 20 to 60 %; 0.4 rad of rudder cost some percent
+LOSS_MEAN, LOSS_STD = np.array([1.3, 2.0, 0.3, 0.001]), np.array([0.6, 2.0, 0.3, 0.001])
+#: of k_r / tau beside drift, of either sign: x_G m and X_rr of usual ships come to -0.15 to 0.05
+BESIDE_MEAN, BESIDE_STD = -0.05, 0.2
 #: of V_0 about V_s: of a run that begins settled, and of one that gathers way; from where on it is the latter
 _SETTLED_STD, _UNSETTLED_STD, _UNSETTLED = 0.03, 0.15, 0.1
 _GRID = np.exp(np.linspace(np.log(1.0), np.log(64.0), 121))
@@ -52,7 +65,7 @@ class SurgeFit:
     #: Shape (g,). tau, in ship lengths, and its probabilities.
     tau: Float
     probability: Float
-    #: loss, covariance: Shape (g, 3) and (g, 3, 3). k_vr, k_r and k_d of every part; 0 where one is left out.
+    #: loss, covariance: Shape (g, 4) and (g, 4, 4). k_vr, k_r, k_d and k_w of every part; 0 where one is left out.
     loss: Float
     covariance: Float
     #: V_0 / V_s, mean and standard deviation over the manoeuvres.
@@ -64,13 +77,13 @@ class SurgeFit:
 
     @property
     def best(self) -> Float:
-        """The most probable tau with its k_vr, k_r and k_d, shape (4,)."""
+        """The most probable tau with its k_vr, k_r, k_d and k_w, shape (5,)."""
         k = int(np.argmax(self.probability))
-        return np.array([self.tau[k], *np.maximum(self.loss[k], 0.0)])
+        return np.array([self.tau[k], *_costing(self.loss[k])])
 
     @property
     def std(self) -> Float:
-        """Standard deviations of tau, k_vr, k_r and k_d, shape (4,)."""
+        """Standard deviations of tau, k_vr, k_r, k_d and k_w, shape (5,)."""
         p = self.probability
         means = [p @ self.tau, *(p @ self.loss)]
         spread = p @ (self.tau - means[0]) ** 2
@@ -86,25 +99,37 @@ class SurgeFit:
         return replace(self, tau=self.tau[part], probability=np.ones(1), loss=self.loss[part], covariance=none)
 
     def drawn(self, normal: Float) -> Float:
-        """Return tau, k_vr, k_r and k_d of draws, shape (n, 4), from standard normal numbers, shape (n, 3)."""
+        """Return tau, k_vr, k_r, k_d and k_w of draws, shape (n, 5), from standard normal numbers, shape (n, 5)."""
         from scipy.stats import norm
 
         part = np.searchsorted(np.cumsum(self.probability), norm.cdf(normal[:, 0]) * (1.0 - 1e-12))
-        found = np.empty((len(normal), 4))
-        for i, (k, z) in enumerate(zip(np.minimum(part, self.tau.size - 1), normal[:, 1:], strict=True)):
-            # a part has one kind of loss by turning, and at most the rudder's beside it
-            turning = BY_DRIFT if self.loss[k, BY_DRIFT] != 0.0 else BY_RATE
-            C = self.covariance[k]
-            first = np.sqrt(C[turning, turning])
-            along = C[turning, BY_RUDDER] / first if first > 0.0 else 0.0
+        found = np.empty((len(normal), 5))
+        roots: dict[int, tuple[list[int], Float]] = {}
+        for i, (k, z) in enumerate(zip(np.minimum(part, self.tau.size - 1).tolist(), normal[:, 1:], strict=True)):
+            if k not in roots:
+                roots[k] = self._root(k)
+            kinds, root = roots[k]
             loss = self.loss[k].copy()
-            loss[turning] += first * z[0]
-            loss[BY_RUDDER] += along * z[0] + np.sqrt(max(C[BY_RUDDER, BY_RUDDER] - along**2, 0.0)) * z[1]
-            found[i] = [self.tau[k], *np.maximum(loss, 0.0)]
+            loss[kinds] += root @ z[: len(kinds)]
+            found[i] = [self.tau[k], *_costing(loss)]
         return found
 
+    def _root(self, k: int) -> tuple[list[int], Float]:
+        """Return the kinds of loss of a part and the square root of their covariance."""
+        C = self.covariance[k]
+        kinds = [kind for kind in KINDS if C[kind, kind] > 0.0]
+        return kinds, np.linalg.cholesky(C[np.ix_(kinds, kinds)]) if kinds else np.zeros((0, 0))
 
-def surge_of(runs: Sequence[GridRun], length_m: float) -> SurgeFit:
+
+def _costing(loss: Float) -> Float:
+    """Return losses that cost speed; beside drift the yaw rate squared may give some."""
+    found: Float = np.maximum(loss, 0.0)
+    if found[BY_DRIFT] > 0.0:
+        found[BY_RATE] = loss[BY_RATE]
+    return found
+
+
+def surge_of(runs: Sequence[GridRun], length_m: float, rudder_speed_exponent: float = 2.0) -> SurgeFit:
     """Identify the speed's equation from the manoeuvres of a ship.
 
     Parameters
@@ -113,13 +138,13 @@ def surge_of(runs: Sequence[GridRun], length_m: float) -> SurgeFit:
         With the speed through the water that the log showed, or over ground where there is none.
     length_m : float
         Of the ship.
+    rudder_speed_exponent : float, optional
+        Power of the speed in the rudder's force.
     """
-    logs = [log for log in (_Log.of(run, length_m) for run in runs) if log is not None]
+    logs = [log for log in (_Log.of(run, length_m, rudder_speed_exponent) for run in runs) if log is not None]
     if not logs:
         return _prior(("the speed in turns is a guess: no log shows it",))
-    drifts = all(np.isfinite(log.costs[:, BY_DRIFT]).all() for log in logs)
-    turning = (BY_DRIFT, BY_RATE) if drifts else (BY_RATE,)
-    made = _posterior(logs, [kinds for one in turning for kinds in ((one,), (one, BY_RUDDER))])
+    made = _posterior(logs, _forms(logs))
     best = int(np.argmax(made.probability))
     own = BY_DRIFT if made.loss[best, BY_DRIFT] != 0.0 else BY_RATE
     unit = made.tau[best] if own == BY_DRIFT else 1.0
@@ -133,6 +158,17 @@ def surge_of(runs: Sequence[GridRun], length_m: float) -> SurgeFit:
     return made
 
 
+def _forms(logs: Sequence[_Log]) -> list[tuple[int, ...]]:
+    """Return the kinds of loss that may act together, as far as all logs have what they go by."""
+    turning: list[tuple[int, ...]] = [(BY_RATE,)]
+    if all(np.isfinite(log.costs[:, BY_DRIFT]).all() for log in logs):
+        turning = [(BY_DRIFT,), (BY_DRIFT, BY_RATE), *turning]
+    forms = [kinds for one in turning for kinds in (one, (*one, BY_RUDDER))]
+    if all(np.isfinite(log.costs[:, BY_WIND]).all() for log in logs):
+        forms += [(*kinds, BY_WIND) for kinds in forms]
+    return forms
+
+
 def settled_speed(run: GridRun) -> float:
     """Return the speed that the shaft of a run keeps on a straight course, m/s; that of the approach where unknown."""
     if "shaft_speed" not in run.channels or not run.approach_per_s > 0.0:
@@ -141,7 +177,20 @@ def settled_speed(run: GridRun) -> float:
 
 
 def _shaft(run: GridRun) -> Float:
-    column = 2 + list(CHANNEL_SYMBOLS.values()).index("shaft_speed")
+    return _channel(run, "shaft_speed")
+
+
+def _head_wind(run: GridRun) -> Float:
+    """Return W at the instants, m^2/s^2; NaN where no wind is logged."""
+    if not {"wind_speed", "wind_angle"} <= set(run.channels):
+        return np.full(run.speed_m_s.size, np.nan)
+    over_deck = _channel(run, "wind_speed")
+    found: Float = over_deck**2 * np.cos(_channel(run, "wind_angle")) - run.speed_m_s**2
+    return found
+
+
+def _channel(run: GridRun, name: str) -> Float:
+    column = 2 + list(CHANNEL_SYMBOLS.values()).index(name)
     found: Float = run.inputs[:: (run.inputs.shape[0] - 1) // (run.speed_m_s.size - 1), column]
     return found
 
@@ -153,14 +202,14 @@ class _Log:
     step: float
     speed: Float
     shaft: Float
-    #: Shape (n, 3). By kind of loss; NaN where it is not known.
+    #: Shape (n, 4). By kind of loss; NaN where it is not known.
     costs: Float
     settled_m_s: float
     #: Prior standard deviation of V_0 / V_s.
     settled_std: float
 
     @classmethod
-    def of(cls, run: GridRun, length_m: float) -> _Log | None:
+    def of(cls, run: GridRun, length_m: float, exponent: float) -> _Log | None:
         speed, settled = run.speed_m_s, settled_speed(run)
         rate = _yaw_rate(run, length_m)
         if rate is None or not settled > 0.0 or not np.all(np.isfinite(speed)) or speed.size < 20:
@@ -171,13 +220,14 @@ class _Log:
             shaft = shaft / np.mean(shaft)
         lateral, unit = _lateral(run, length_m), length_m / settled
         drift = np.full(speed.size, np.nan) if lateral is None else -lateral * rate * unit / settled
-        costs = np.column_stack([drift, (unit * rate) ** 2, run.rudder_rad**2])
+        rudder = run.rudder_rad**2 * np.maximum(speed / settled, 0.0) ** exponent
+        costs = np.column_stack([drift, (unit * rate) ** 2, rudder, _head_wind(run) / settled**2])
         gathers_way = abs(speed[0] / settled - 1.0) > _UNSETTLED
         std = _UNSETTLED_STD if gathers_way else _SETTLED_STD
         return cls(run.step_s * settled / length_m, speed / settled, shaft, costs, settled, std)
 
-    def columns(self, tau: float, kinds: Sequence[int]) -> tuple[Float, Float]:
-        """Return the columns of V_0, of the first speed and of the losses, each through the lag of tau."""
+    def columns(self, tau: float) -> tuple[Float, Float]:
+        """Return the columns of V_0, of the first speed and of all losses, each through the lag of tau."""
         kept = np.exp(-self.step / tau)
 
         def lagged(course: Float) -> Float:
@@ -186,7 +236,7 @@ class _Log:
             return found
 
         own = np.column_stack([lagged(self.shaft), kept ** np.arange(self.speed.size)])
-        lost = np.column_stack([-lagged(self.costs[:, j]) for j in kinds])
+        lost = np.column_stack([-lagged(self.costs[:, j]) for j in KINDS])
         return own, lost
 
 
@@ -224,21 +274,29 @@ def _smooth(run: GridRun, laid: Float, length_m: float) -> Float:
     return smooth
 
 
+Columns = list[tuple[Float, Float]]
+
+
 def _posterior(logs: Sequence[_Log], forms: Sequence[tuple[int, ...]]) -> SurgeFit:
     """Return the posterior over all forms of the loss and all tau; errors that remember count as fewer."""
+    columns = [[log.columns(tau) for log in logs] for tau in _GRID]
     # where the logs alone are best, their errors are smallest: so large they are
-    every = [_left(logs, tau, kinds) for kinds in forms for tau in _GRID]
+    every = [_left(logs, own, kinds) for kinds in forms for own in columns]
     left = min(every, key=lambda parts: sum(float(e @ e) for e in parts))
     count = sum(e.size for e in left)
     error = max(float(np.sqrt(sum(float(e @ e) for e in left) / count)), _LEAST_ERROR)
     variance = error**2 * _memory(left)
-    parts = [(tau, kinds, _solved(logs, tau, kinds, variance)) for kinds in forms for tau in _GRID]
+    parts = [
+        (tau, kinds, _solved(logs, own, tau, kinds, variance))
+        for kinds in forms
+        for tau, own in zip(_GRID, columns, strict=True)
+    ]
     tau = np.array([part[0] for part in parts])
     # the area of the other parameters counts, as in any marginal likelihood
     score = np.array([solved.score for _, _, solved in parts]) + (np.log(tau / TAU_MEDIAN) / TAU_SPREAD) ** 2
     p = np.exp(-0.5 * (score - score.min()))
     p /= p.sum()
-    loss, covariance = np.zeros((tau.size, 3)), np.zeros((tau.size, 3, 3))
+    loss, covariance = np.zeros((tau.size, 4)), np.zeros((tau.size, 4, 4))
     for k, (_, kinds, solved) in enumerate(parts):
         loss[k, kinds] = solved.mean
         covariance[k][np.ix_(kinds, kinds)] = solved.covariance
@@ -260,13 +318,13 @@ class _Solved:
     settled: tuple[float, ...]
 
 
-def _solved(logs: Sequence[_Log], tau: float, kinds: Sequence[int], variance: float) -> _Solved:
+def _solved(logs: Sequence[_Log], columns: Columns, tau: float, kinds: Sequence[int], variance: float) -> _Solved:
     """Return the posterior of the losses at a tau."""
     losses, kinds = len(kinds), list(kinds)
     information, right, constant, logdet = np.zeros((losses, losses)), np.zeros(losses), 0.0, 0.0
     own_parts = []
-    for log in logs:
-        own, lost = log.columns(tau, kinds)
+    for log, (own, every) in zip(logs, columns, strict=True):
+        lost = every[:, kinds]
         # V_0 has a prior at V_s, the first speed a wide one
         precision = np.array([1.0 / log.settled_std**2, 1.0])
         A = own.T @ own / variance + np.diag(precision)
@@ -278,12 +336,15 @@ def _solved(logs: Sequence[_Log], tau: float, kinds: Sequence[int], variance: fl
         right += lost.T @ log.speed / variance - C.T @ solved[:, 0]
         information += lost.T @ lost / variance - C.T @ solved[:, 1:]
         logdet += slogdet(A)[1]
-    unit = np.where(np.array(kinds) == BY_DRIFT, tau, 1.0)
+    unit = np.array([tau, 1.0, 1.0, tau])[kinds]
     mean_before, std_before = LOSS_MEAN[kinds] * unit, LOSS_STD[kinds] * unit
+    if BY_DRIFT in kinds and BY_RATE in kinds:
+        beside = kinds.index(BY_RATE)
+        mean_before[beside], std_before[beside] = BESIDE_MEAN * tau, BESIDE_STD * tau
     prior = np.diag(1.0 / std_before**2)
     whole = information + prior
     target = right + prior @ mean_before
-    mean = np.linalg.solve(whole, target)
+    mean = np.asarray(np.linalg.solve(whole, target), dtype=np.float64)
     cost = constant + mean_before @ prior @ mean_before - target @ mean
     area = logdet + slogdet(whole)[1] - slogdet(prior)[1]
     covariance = np.asarray(inv(whole), dtype=np.float64)
@@ -291,14 +352,14 @@ def _solved(logs: Sequence[_Log], tau: float, kinds: Sequence[int], variance: fl
     return _Solved(float(cost + area), mean, covariance, settled)
 
 
-def _left(logs: Sequence[_Log], tau: float, kinds: Sequence[int]) -> list[Float]:
+def _left(logs: Sequence[_Log], columns: Columns, kinds: Sequence[int]) -> list[Float]:
     """Return what the model leaves of every log's speed, without priors.
 
     V_0 and the first speed of each log are taken out first (Frisch & Waugh 1933), so that the losses alone are solved.
     """
     speeds, costs = [], []
-    for log in logs:
-        own, lost = log.columns(tau, kinds)
+    for log, (own, every) in zip(logs, columns, strict=True):
+        lost = every[:, list(kinds)]
         base = np.linalg.qr(own)[0]
         speeds.append(log.speed - base @ (base.T @ log.speed))
         costs.append(lost - base @ (base.T @ lost))
@@ -323,6 +384,6 @@ def _memory(left: Sequence[Float]) -> float:
 def _prior(remarks: tuple[str, ...]) -> SurgeFit:
     p = np.exp(-0.5 * (np.log(_GRID / TAU_MEDIAN) / TAU_SPREAD) ** 2)
     n = _GRID.size
-    loss, covariance = np.zeros((n, 3)), np.zeros((n, 3, 3))
+    loss, covariance = np.zeros((n, 4)), np.zeros((n, 4, 4))
     loss[:, BY_RATE], covariance[:, BY_RATE, BY_RATE] = LOSS_MEAN[BY_RATE], LOSS_STD[BY_RATE] ** 2
     return SurgeFit(_GRID, p / p.sum(), loss, covariance, (1.0, _SETTLED_STD), float("nan"), remarks)

@@ -25,8 +25,10 @@ def test_the_numbers_are_those_of_the_code() -> None:
     assert f"{draws.DRAWS} ships are drawn" in TEXT
     assert f"{degrees(SOLAS_RAD_S):.2f} deg/s" in TEXT
     assert f"tau {surge.TAU_MEDIAN:g} lengths within a factor of 2" in TEXT
-    drift, rate, rudder = (f"{mean:g} ± {std:g}" for mean, std in zip(surge.LOSS_MEAN, surge.LOSS_STD, strict=True))
-    assert f"k_vr {drift} of tau, k_r {rate}, k_d {rudder}" in " ".join(TEXT.split())
+    means, stds = [*surge.LOSS_MEAN, surge.BESIDE_MEAN], [*surge.LOSS_STD, surge.BESIDE_STD]
+    drift, rate, rudder, wind, beside = (f"{mean:g} ± {std:g}" for mean, std in zip(means, stds, strict=True))
+    said = f"k_vr {drift} of tau, k_r {rate} alone and {beside} of tau beside drift, k_d {rudder}, k_w {wind} of tau"
+    assert said in " ".join(TEXT.split())
     assert pytest.approx(0.8) == prediction.ENOUGH
 
 

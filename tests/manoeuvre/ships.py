@@ -20,7 +20,7 @@ def ship_of(hull: SimulatedHull, **with_effects: tuple[float, ...]) -> Ship:
     model = EffectModel(tuple(effects.get(name) for name in with_effects))
     waters = Waters(model, hull.length_m, hull.draught_m, hull.trial_speed_m_s, hull.length_m)
     values = np.array([x for group in with_effects.values() for x in group])
-    surge = np.array([hull.surge_time_lengths, 0.0, hull.speed_loss, 0.0])
+    surge = np.array([hull.surge_time_lengths, 0.0, hull.speed_loss, 0.0, 0.0])
     return Ship(waters, np.array(astuple(hull.parameters)), values, surge, hull.rudder_rate_rad_s)
 
 
@@ -40,7 +40,7 @@ def identified(ship: Ship, relative: float = 0.02, name: str = "ps-0000000000000
         np.array([tau]),
         np.ones(1),
         np.array([loss]),
-        np.diag([0.0, (0.05 * loss[1]) ** 2, 0.0])[None],
+        np.diag([0.0, (0.05 * loss[1]) ** 2, 0.0, 0.0])[None],
         settled=(1.0, 0.0),
         error_m_s=0.01,
         remarks=(),

@@ -153,3 +153,52 @@ def test_a_late_helmsman_makes_the_overshoot_larger() -> None:
     assert prompt is not None
     assert delayed is not None
     assert delayed.figures["overshoots_deg.0"] > prompt.figures["overshoots_deg.0"] + 2.0
+
+
+def test_a_head_wind_costs_speed_and_a_following_one_gives_it_back() -> None:
+    ship = ship_of(HULLS["mariner"])
+    by_wind, wind = 0.02, 10.0
+    surge = ship.surge.copy()
+    surge[4] = by_wind
+    own = ship.waters.approach_m_s
+
+    def speed(true_wind_m_s: float, whence: float) -> float:
+        waters = replace(ship.waters, true_wind_m_s=true_wind_m_s, true_wind_from_rad=whence)
+        track = replace(ship, waters=waters, surge=surge).sail(np.array([[nan, 0.0, 0.0, 3000.0]]))
+        return float(track.column(motion.FORWARD)[-1])
+
+    against, along = speed(wind, 0.0), speed(wind, pi)
+    assert speed(0.0, 0.0) == pytest.approx(own)
+    assert against == pytest.approx(own * (1.0 - by_wind * ((wind + against) ** 2 - against**2) / own**2), rel=1e-6)
+    assert along == pytest.approx(own * (1.0 + by_wind * ((wind - along) ** 2 + along**2) / own**2), rel=1e-6)
+
+
+def test_a_wind_that_changes_acts_when_it_blows() -> None:
+    ship = ship_of(HULLS["mariner"])
+    surge = ship.surge.copy()
+    surge[4] = 0.05
+
+    def speeds(**wind: object) -> np.ndarray:
+        one = replace(ship, waters=replace(ship.waters, **wind), surge=surge)  # type: ignore[arg-type]
+        track = one.sail(np.array([[nan, 0.0, 0.0, 600.0]]))
+        return np.interp([290.0, 590.0], track.column(motion.TIME), track.column(motion.FORWARD))
+
+    steady = speeds(true_wind_m_s=10.0, true_wind_from_rad=0.0)
+    calm_first = np.array([[0.0, 0.0, 0.0], [300.0, 0.0, 0.0], [301.0, 10.0, 0.0]])
+    early, late = speeds(air=calm_first)
+    assert early == pytest.approx(ship.waters.approach_m_s, rel=1e-6)
+    assert late == pytest.approx(steady[0], rel=2e-3)
+    same = np.array([[0.0, 10.0, 0.0], [600.0, 10.0, 0.0]])
+    np.testing.assert_allclose(speeds(air=same), steady, rtol=1e-3)
+
+
+def test_a_slow_gear_makes_the_advance_longer_by_the_way_that_it_takes() -> None:
+    ship = ship_of(HULLS["mariner"])
+    fast, slow = (
+        TurningCircle(radians(35.0)).sailed(replace(ship, rudder_rate_rad_s=radians(rate))) for rate in (10.0, 2.5)
+    )
+    assert fast is not None
+    assert slow is not None
+    # half the time that the rudder is late, at the speed of the approach
+    longer = 0.5 * (35.0 / 2.5 - 35.0 / 10.0) * ship.waters.approach_m_s
+    assert slow.figures["advance_m"] - fast.figures["advance_m"] == pytest.approx(longer, rel=0.15)

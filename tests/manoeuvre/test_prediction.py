@@ -37,7 +37,7 @@ def test_an_interval_holds_95_percent_of_ships_drawn_otherwise() -> None:
     estimates, inside = model.hull, []
     for _ in range(300):
         hull = estimates * (1.0 + 0.03 * random.standard_normal(6))
-        surge = model.surge.best * [1.0, 1.0, 1.0 + 0.05 * random.standard_normal(), 1.0]
+        surge = model.surge.best * [1.0, 1.0, 1.0 + 0.05 * random.standard_normal(), 1.0, 1.0]
         one = type(model.ship)(model.waters, hull, model.effects, surge, model.rudder_rate.rad_s)
         sailed = CIRCLE.sailed(one)
         assert sailed is not None

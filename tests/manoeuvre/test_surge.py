@@ -6,6 +6,7 @@ from math import radians
 import numpy as np
 import pytest
 
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import GridRun, plain_run
 from kempf.pipeline.estimate.record.record import Record
@@ -34,8 +35,8 @@ def run_of(record: Record) -> GridRun:
 def test_time_and_loss_are_those_of_the_simulator(loss: float) -> None:
     fit = surge_of([run_of(record_of(speed_loss=loss))], LENGTH)
     assert not fit.remarks
-    tau, by_drift, by_rate, by_rudder = fit.best
-    assert by_drift == 0.0
+    tau, by_drift, by_rate, by_rudder, by_wind = fit.best
+    assert by_drift == by_wind == 0.0
     assert by_rudder < 0.1
     assert abs(by_rate - loss) < 3.0 * fit.std[2] < 0.3 * loss
     assert abs(tau - 6.0) < 3.0 * fit.std[0] < 3.0
@@ -46,26 +47,68 @@ def test_a_ship_that_loses_nothing_is_seen_to() -> None:
     assert max(fit.best[1] * 0.03, fit.best[2]) < 0.03
 
 
-def test_a_loss_by_drift_and_turn_is_seen_to_be_one_whatever_the_shaft_keeps() -> None:
-    run = run_of(record_of(speed_loss=0.3))
-    v, r = np.nan_to_num(run.measured[:, 0]), np.nan_to_num(run.measured[:, 1])
-    tau, by_drift, settled = 7.0, 9.0, 8.4
-    # Euler's rule along the motion that was measured, from a speed well below the one that the shaft keeps
-    speed = [5.0]
-    for k in range(v.size - 1):
-        loss = by_drift * LENGTH * min(v[k] * r[k], 0.0) / settled
-        speed.append(speed[-1] + run.step_s * (settled + loss - speed[-1]) * settled / (tau * LENGTH))
+def losing(run: GridRun, tau: float, losses: Float, settled: float = 8.4, begin: float = 5.0) -> GridRun:
+    """A run whose speed goes by the equation along the motion that was measured, by Euler's rule, in still air."""
+    speed = [begin]
+    for k in range(run.speed_m_s.size - 1):
+        kept = settled * (1.0 - losses[k])
+        speed.append(speed[-1] + run.step_s * (kept - speed[-1]) * settled / (tau * LENGTH))
     inputs = run.inputs.copy()
     inputs[:, 0] = np.interp(run.fine_time_s, run.time_s, speed)
-    shaft = 2 + list(CHANNEL_SYMBOLS.values()).index("shaft_speed")
-    inputs[:, shaft] = 2.0
-    changed = {"channels": run.channels | {"shaft_speed"}, "approach_m_s": 5.0, "approach_per_s": 2.0 * 5.0 / settled}
-    fit = surge_of([replace(run, inputs=inputs, **changed)], LENGTH)  # type: ignore[arg-type]
-    assert settled_speed(replace(run, inputs=inputs, **changed)) == pytest.approx(settled)  # type: ignore[arg-type]
-    assert fit.best[1] == pytest.approx(by_drift, rel=0.1)
-    assert fit.best[2] == 0.0
-    assert fit.best[0] == pytest.approx(tau, rel=0.1)
+    inputs[:, 2 + list(CHANNEL_SYMBOLS.values()).index("shaft_speed")] = 2.0
+    changed = {"approach_m_s": begin, "approach_per_s": 2.0 * begin / settled}
+    return replace(run, inputs=inputs, channels=run.channels | {"shaft_speed"}, **changed)  # type: ignore[arg-type]
+
+
+def turning(run: GridRun, settled: float = 8.4) -> tuple[Float, Float]:
+    """Return -L v r / V_s^2 and (L r / V_s)^2 of a run."""
+    v, r = np.nan_to_num(run.measured[:, 0]), np.nan_to_num(run.measured[:, 1])
+    return -LENGTH * np.minimum(v * r, 0.0) / settled**2, (LENGTH * r / settled) ** 2
+
+
+def test_a_loss_by_drift_and_turn_is_seen_to_be_one_whatever_the_shaft_keeps() -> None:
+    run = run_of(record_of(speed_loss=0.3))
+    tau, by_drift = 7.0, 9.0
+    run = losing(run, tau, by_drift * turning(run)[0])
+    fit = surge_of([run], LENGTH)
+    assert settled_speed(run) == pytest.approx(8.4)
+    assert fit.best[1] == pytest.approx(by_drift, rel=0.15)
+    # what the yaw rate has beside it, the data put near nothing
+    assert abs(fit.best[2]) < 2.0 * max(fit.std[2], 0.1)
+    assert fit.best[0] == pytest.approx(tau, rel=0.15)
     assert fit.settled[0] == pytest.approx(1.0, abs=0.02)
+
+
+def test_what_the_yaw_rate_gives_beside_the_drift_is_seen_and_may_push_her_on() -> None:
+    run = run_of(record_of(speed_loss=0.3))
+    measured = run.measured.copy()
+    # drift that does not go with the turn: else one of the two says as much as both
+    measured[:, 0] = -LENGTH * measured[:, 1] * (0.3 + 0.2 * np.sin(run.time_s / 40.0))
+    run = replace(run, measured=measured)
+    drift, rate = turning(run)
+    fit = surge_of([losing(run, 7.0, 12.0 * drift - 1.5 * rate, begin=8.4)], LENGTH)
+    assert fit.best[2] < -0.5
+    cost = fit.best[1] * drift + fit.best[2] * rate
+    np.testing.assert_allclose(cost.max(), (12.0 * drift - 1.5 * rate).max(), rtol=0.15)
+    drawn = fit.drawn(np.random.default_rng(0).standard_normal((500, 5)))
+    assert np.mean(drawn[:, 2] < 0.0) > 0.8
+
+
+def test_what_a_head_wind_costs_is_seen_and_calm_air_costs_nothing() -> None:
+    run = run_of(record_of(speed_loss=0.3))
+    t, names = run.time_s, list(CHANNEL_SYMBOLS.values())
+    inputs = run.inputs.copy()
+    ahead = 12.0 * np.cos(2.0 * np.pi * run.fine_time_s / 300.0)
+    inputs[:, 2 + names.index("wind_speed")] = np.abs(ahead)
+    inputs[:, 2 + names.index("wind_angle")] = np.where(ahead < 0.0, np.pi, 0.0)
+    windy = replace(run, inputs=inputs, channels=run.channels | {"wind_speed", "wind_angle"})
+    own = 12.0 * np.cos(2.0 * np.pi * t / 300.0)
+    # W: the wind over the deck from ahead, less that of her own way
+    way = 8.0
+    losses = 0.3 * turning(run)[1] * 2.0 + 0.04 * (own * np.abs(own) - way**2) / 8.4**2
+    fit = surge_of([losing(windy, 7.0, losses)], LENGTH)
+    assert fit.best[4] == pytest.approx(0.04, rel=0.25)
+    assert surge_of([losing(run, 7.0, losses)], LENGTH).best[4] == 0.0
 
 
 def test_without_turns_the_loss_is_a_guess_and_said_to_be() -> None:
@@ -83,7 +126,7 @@ def test_without_turns_the_loss_is_a_guess_and_said_to_be() -> None:
 
 def test_draws_spread_as_the_posterior_says_and_lose_no_negative_speed() -> None:
     fit = surge_of([run_of(record_of(speed_loss=0.3))], LENGTH)
-    drawn = fit.drawn(np.random.default_rng(0).standard_normal((4000, 3)))
+    drawn = fit.drawn(np.random.default_rng(0).standard_normal((4000, 5)))
     np.testing.assert_allclose(drawn.std(axis=0), fit.std, rtol=0.2, atol=0.02)
     assert np.all(drawn >= 0.0)
 

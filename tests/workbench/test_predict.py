@@ -49,6 +49,19 @@ def test_a_turning_circle_has_an_interval_at_every_figure_and_says_what_lies_bey
     assert again == shown
 
 
+def test_another_steering_gear_is_asked_for_and_said(warehouse: Path) -> None:
+    own = predicted(warehouse, "turning-circle", "--json").json
+    slow = predicted(warehouse, "turning-circle", "--rudder-rate", 1, "--json").json
+    assert slow["rudder_rate_deg_s"] == {"value": pytest.approx(1.0), "std": 0.0, "executes": 0}
+    assert own["rudder_rate_deg_s"]["executes"] > 0
+    # 35 deg at 1 deg/s instead of 5 take 28 s longer: half of that at the speed of the approach
+    longer = slow["figures"]["advance_m"]["value"] - own["figures"]["advance_m"]["value"]
+    assert longer == pytest.approx(0.5 * 28.0 * own["speed_m_s"], rel=0.25)
+    assert any("at 1 deg/s, as asked for" in said for said in slow["assumed"])
+    # her own zigzags were steered with her own gear
+    assert slow["own_zigzags"] == own["own_zigzags"]
+
+
 def test_a_circle_within_what_was_sailed_is_that_of_the_simulator(warehouse: Path) -> None:
     shown = predicted(warehouse, "turning-circle", "--rudder", 20, "--speed", 7.7175, "--side", "port", "--json").json
     truth = _sailed_in_calm_water(-20.0)
@@ -100,6 +113,7 @@ def test_every_manoeuvre_is_printed_and_drawn(kind: str, warehouse: Path, tmp_pa
     [
         (["turning-circle", "--speed", 0], "speed_out_of_range", "expected more than 0"),
         (["turning-circle", "--speed", "nan"], "speed_out_of_range", "expected more than 0"),
+        (["turning-circle", "--rudder-rate", 0], "rudder_rate_out_of_range", "expected more than 0"),
         (["turning-circle", "--rudder", 0], "rudder_out_of_range", "up to 60"),
         (["pull-out", "--rudder", 90], "rudder_out_of_range", "up to 60"),
         (["zigzag", "--angles", "20"], "angles_unreadable", "pair of angles"),

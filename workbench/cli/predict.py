@@ -41,6 +41,13 @@ _KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
 @click.option(
     "--speed", type=float, metavar="M/S", help="Of the approach; default: the mean of those that were sailed."
 )
+@click.option(
+    "--rudder-rate",
+    "rudder_rate",
+    type=float,
+    metavar="DEG/S",
+    help="Of another steering gear; default: as in the logs.",
+)
 @click.option("--compare", is_flag=True, help="Lay it over the measured manoeuvres of the same kind and angles.")
 @figure_option("Draw the manoeuvre with its interval")
 @warehouse_option
@@ -53,6 +60,7 @@ def command(
     angles: str | None,
     side: Any,
     speed: float | None,
+    rudder_rate: float | None,
     compare: bool,
     figure: Path | None,
     uri: str,
@@ -71,7 +79,7 @@ def command(
     require_figures(figure, code="cannot_write")
     _require_fitting(manoeuvre, rudder_deg, angles)
     heading, rudder = _angles(angles) if angles is not None else (20.0, 20.0)
-    request = PredictRequest(manoeuvre, set_id, rudder_deg, (heading, rudder), side, speed)
+    request = PredictRequest(manoeuvre, set_id, rudder_deg, (heading, rudder), side, speed, rudder_rate)
     with progress_bar() as progress:
         made = predict_checked(Warehouse(uri), vessel, request, progress)
         measured = measured_beside(Warehouse(uri), made, progress) if compare else None

@@ -1,0 +1,39 @@
+"""The MMG standard method of a peer: that it is what was published."""
+
+from math import radians
+
+import pytest
+
+from benchmarks.baselines.mmg_standard import Peer
+from benchmarks.identify import peers
+
+
+@pytest.fixture(scope="module")
+def peer() -> Peer:
+    return Peer.of(peers.data())
+
+
+def test_the_circle_is_the_published_one(peer: Peer) -> None:
+    made = peer.circle(radians(35.0))
+    published = next(one for one in peers.data()["circles"] if one["kind"] == "predicted")
+    assert made.advance_m / peer.length_m == pytest.approx(published["advance"], rel=0.02)
+    assert made.tactical_diameter_m / peer.length_m == pytest.approx(published["tactical_diameter"], rel=0.04)
+
+
+def test_the_propeller_drives_her_at_the_revolutions_of_the_model_tests(peer: Peer) -> None:
+    # HSVA's model kept 10.2 1/s with a propeller 6 % smaller
+    assert 10.0 < peer.revolutions_per_s < 11.0
+
+
+def test_overshoots_are_larger_with_less_rudder_for_the_heading(peer: Peer) -> None:
+    few, many = (peer.overshoots_deg(radians(10.0), radians(angle), 1) for angle in (10.0, 20.0))
+    assert len(few) == 2
+    assert many[0] > few[0] > 3.0
+    assert few[1] > few[0]
+
+
+def test_every_figure_of_a_peer_has_a_source_and_says_how_it_was_read() -> None:
+    for one in peers.data()["circles"]:
+        assert one["source"]
+        assert "second-hand" in one["read"]
+        assert one["side"] in {"starboard", "port"}
