@@ -51,19 +51,21 @@ def _noise(found: Repeats, what: str) -> str:
     if found.share is None or found.std is None:
         few = "no two legs repeat"
         if found.pairs:
-            few = f"only {found.pairs} pair{'s' * (found.pairs != 1)} of legs nearly repeat"
+            few = (
+                f"only {found.pairs} pair{' of legs nearly repeats' if found.pairs == 1 else 's of legs nearly repeat'}"
+            )
         return f"How much of {what} is noise of the experiment is not known: {few} each other in different manoeuvres."
     share = min(max(found.share, 0.0), 1.0)
     return (
-        f"Of {what}, {100.0 * share:.0f} ± {100.0 * found.std:.0f} % (1 s.e.) is noise of the experiment: so much do "
-        f"legs differ that nearly repeat each other, {found.pairs} pairs in {found.manoeuvres} manoeuvres."
+        f"Of {what}, {100.0 * share:.0f} ± {100.0 * found.std:.0f} % (1 s.e.) is noise of the experiment, by "
+        f"{found.pairs} pairs of legs in {found.manoeuvres} manoeuvres that nearly repeat each other."
     )
 
 
 def _sits(found: Places, what: str) -> str:
     channel = int(np.nanargmax(found.channels))
     name, share = _CHANNELS[channel].replace("_", " "), 100.0 * found.channels[channel]
-    said = f"{what[:1].upper()}{what[1:]} sits mostly in {name} ({share:.0f} % of it)"
+    said = f"{what[:1].upper()}{what[1:]} is largest in {name} ({share:.0f} % of it)"
     regime, manoeuvre = found.most("leg", *_OF), found.most("manoeuvre")
     named = [_held(place) for place in (regime, manoeuvre) if place is not None and place.excess > NAMED]
     if not named:
@@ -76,7 +78,7 @@ def _held(place: Place) -> str:
     if place.by == "manoeuvre":
         return f"the manoeuvre {place.name} has {holds}"
     if place.by == "leg":
-        return f"{f'leg {place.name} of manoeuvres' if place.name != '0' else 'the approach'} has {holds}"
+        return f"{f'leg {place.name} of the manoeuvres' if place.name != '0' else 'the approach'} has {holds}"
     return f"the third of the time with {place.name} {_OF[place.by]} has {100.0 * place.share:.0f} % of it"
 
 
