@@ -194,7 +194,8 @@ def _sized(effect: Effect, confirmation: Confirmation) -> str:
 
 
 def _with_size(effect: Effect, values: Float, std: Float) -> str:
-    shown = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, values, std, strict=True)]
+    within = [v % (2.0 * np.pi) if p.is_direction else v for p, v in zip(effect.parameters, values, strict=True)]
+    shown = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, within, std, strict=True)]
     return f"{effect.title}, {', '.join(shown)}"
 
 
