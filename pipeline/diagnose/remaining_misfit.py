@@ -12,8 +12,6 @@ from kempf.pipeline.shooting.ahead import Ahead
 from kempf.pipeline.shooting.places import Place, Places, places
 from kempf.pipeline.shooting.repeats import Repeats, repeats
 
-#: part of the misfit that a place must hold beyond its part of the windows to be named
-NAMED = 0.1
 _CHANNELS = ("lateral_speed", "yaw_rate", "heading")
 _OF = {"rudder": "rudder", "yaw_rate": "yaw rate", "drift": "drift"}
 
@@ -67,9 +65,9 @@ def _sits(found: Places, what: str) -> str:
     name, share = _CHANNELS[channel].replace("_", " "), 100.0 * found.channels[channel]
     said = f"{what[:1].upper()}{what[1:]} is largest in {name} ({share:.0f} % of it)"
     regime, manoeuvre = found.most("leg", *_OF), found.most("manoeuvre")
-    named = [_held(place) for place in (regime, manoeuvre) if place is not None and place.excess > NAMED]
+    named = [_held(place) for place in (regime, manoeuvre) if place is not None]
     if not named:
-        return f"{said} and is spread evenly over manoeuvres, legs, rudder angles, yaw rates and drift."
+        return f"{said}; no manoeuvre, leg, rudder angle, yaw rate or drift stands out."
     return f"{said}; {' and '.join(named)}."
 
 
@@ -79,7 +77,10 @@ def _held(place: Place) -> str:
         return f"the manoeuvre {place.name} has {holds}"
     if place.by == "leg":
         return f"{f'leg {place.name} of the manoeuvres' if place.name != '0' else 'the approach'} has {holds}"
-    return f"the third of the time with {place.name} {_OF[place.by]} has {100.0 * place.share:.0f} % of it"
+    part = f"the third of the time with {place.name} {_OF[place.by]}"
+    if place.name == "middle":
+        part = f"the middle third of the time by {_OF[place.by]}"
+    return f"{part} has {100.0 * place.share:.0f} % of it"
 
 
 def as_json(remaining: RemainingMisfit) -> dict[str, Any]:

@@ -12,6 +12,8 @@ from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.moves import moved
 from kempf.pipeline.shooting.windows import Windows
 
+#: part of the misfit that a place holds beyond its part of the windows, and how many times that part, to stand out
+EXCESS, TIMES = 0.1, 1.5
 #: by rudder, turn and drift the windows are cut into so many parts of one size
 _PARTS = ("least", "middle", "most")
 
@@ -34,6 +36,11 @@ class Place:
         """How much more of the misfit they hold than as many windows would if all were alike."""
         return self.share - self.of_windows
 
+    @property
+    def stands_out(self) -> bool:
+        """Whether that is much: of a few manoeuvres one holds somewhat more than the others by chance."""
+        return self.excess > EXCESS and self.share > TIMES * self.of_windows
+
 
 @dataclass(frozen=True)
 class Places:
@@ -45,8 +52,9 @@ class Places:
     places: tuple[Place, ...]
 
     def most(self, *by: str) -> Place | None:
-        """Return the place of these cuts that holds most beyond its part of the windows; None without a place."""
-        return max((place for place in self.places if place.by in by), key=lambda one: one.excess, default=None)
+        """Return the place of these cuts that holds most beyond its part of the windows; None where none stands out."""
+        there = (place for place in self.places if place.by in by and place.stands_out)
+        return max(there, key=lambda one: one.excess, default=None)
 
 
 def places(windows: Sequence[Windows], errors: Sequence[Float]) -> Places | None:
