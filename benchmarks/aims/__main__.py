@@ -80,6 +80,7 @@ def tank(data: Path, workers: Executor) -> list[str]:
 def pond(data: Path, workers: Executor) -> list[str]:
     """Return the part of the page with the runs on a pond."""
     made, circles = _with_circles(measured_ships.pond(data))
+    refused = len(circles & made.skipped.keys())
     zigzags = [run for run in made.runs if run.name not in circles]
     chosen, apart = split(zigzags)
     shooting = in_units(
@@ -96,7 +97,8 @@ def pond(data: Path, workers: Executor) -> list[str]:
     return [
         "## The prototype's models of the ship on a pond",
         "",
-        f"{len(chosen)} zigzags fitted, {len(apart)} held out, {len(turned)} circles never fitted, windows of "
+        f"{len(chosen)} zigzags fitted, {len(apart)} held out, {len(turned)} circles never fitted ({refused} more hold "
+        "one order of the rudder alone, which makes no record), windows of "
         f"{shooting.horizon_s:.3g} s, units of 0.01 m/s, 0.3 deg/s and 2 deg. The prototype's: 6 zigzags and 2 random "
         "runs fitted, 3 zigzags held out, 15 circles.",
         "",

@@ -59,7 +59,9 @@ def _of_folds(rows: Sequence[Row]) -> str:
 def _verdict() -> list[str]:
     found = section("hsva_ladder", "hsva_kvlcc2:")
     share = found.found(r"in manoeuvres left out, (\d+ % is explained)")
-    noise = found.found(r"(Of what is left, [^.]* is noise of the experiment|How much of what is left[^.]*not known)")
+    noise = found.found(
+        r"(Of what is left, [^\n]*? is noise of the experiment|How much of what is left[^\n]*? not known)"
+    )
     return [part for part in (found.heading.partition(": ")[2], share, noise) if part]
 
 
