@@ -46,7 +46,7 @@ bench: $(RIVALS)
 		identify.monte_carlo identify.current_frame documents.draw_paper identify.course_keeping identify.estimator_speed \
 		identify.estimators baselines.vessel_models diagnose.trials_diagnosis diagnose.trials_as_sold diagnose.hsva_ladder \
 		diagnose.hsva_folds diagnose.pond_ladder diagnose.diagnosis_speed identify.prediction identify.predicted_measured ingest.doctor_measured \
-		ingest.mcap_speed ingest.nmea_speed fleet.adopt fleet.command_speed; \
+		ingest.mcap_speed ingest.nmea_speed fleet.adopt fleet.command_speed aims; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 
 # The long ones, half an hour and more each on two cores.

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import math
 import re
 from typing import Annotated, Any, Literal
 
@@ -58,6 +59,11 @@ class Parameter(Frozen):
     def shapes(self) -> bool:
         """Whether it shapes the effect and does not make it."""
         return not self.low <= 0.0 <= self.high
+
+    @property
+    def is_direction(self) -> bool:
+        """Whether it is a direction, of which whole turns do not count: its bounds are more than one apart."""
+        return self.unit == "rad" and self.high - self.low > 2.0 * math.pi
 
     @property
     def absent(self) -> float:

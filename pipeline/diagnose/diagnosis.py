@@ -21,6 +21,7 @@ from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder import Announce, Ladder, silent
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
 from kempf.pipeline.diagnose.remainder import something_left
+from kempf.pipeline.diagnose.remaining_misfit import RemainingMisfit, remaining_misfit
 from kempf.pipeline.diagnose.ridge_reference import RidgeReference, ridge_reference_of
 from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
@@ -55,6 +56,8 @@ class Diagnosis:
     #: Significant one step ahead, but not beyond what errors that hang together allow, or making predictions worse: by
     #: name, why.
     suspected: Mapping[str, str]
+    #: What the last model claimed leaves one leg ahead; None with a single run, or where it runs away.
+    remaining: RemainingMisfit | None
     fitted: tuple[GridRun, ...]
     held: tuple[GridRun, ...]
     plain: PlainFit
@@ -107,6 +110,7 @@ def diagnose(
         after = ridge_reference_of(ladder.probe, workers)
     left = something_left(steps, before, after)
     kept = _claimed(steps) if left else len(steps)
+    ahead = steps[kept - 1].ahead
     return Diagnosis(
         way=tuple(fits),
         steps=tuple(steps[:kept]),
@@ -116,6 +120,7 @@ def diagnose(
         after=after,
         immaterial=tuple(found.immaterial),
         suspected=found.suspected,
+        remaining=None if ahead is None else remaining_misfit(ahead, workers),
         fitted=tuple(filtered.run for filtered in base.runs),
         held=tuple(held),
         plain=plain,

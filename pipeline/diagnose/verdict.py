@@ -14,6 +14,8 @@ from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step, rung
 from kempf.pipeline.diagnose.remainder import reference_gains
+from kempf.pipeline.diagnose.remaining_misfit import as_json as remaining_json
+from kempf.pipeline.diagnose.remaining_misfit import said as remaining_said
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.schemas.effect import Effect
@@ -192,7 +194,8 @@ def _sized(effect: Effect, confirmation: Confirmation) -> str:
 
 
 def _with_size(effect: Effect, values: Float, std: Float) -> str:
-    shown = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, values, std, strict=True)]
+    within = [v % (2.0 * np.pi) if p.is_direction else v for p, v in zip(effect.parameters, values, strict=True)]
+    shown = [_shown(p.name, v, s, p.unit) for p, v, s in zip(effect.parameters, within, std, strict=True)]
     return f"{effect.title}, {', '.join(shown)}"
 
 
@@ -267,7 +270,18 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         if diagnosis.after.formula:
             terms = "; ".join(f"{term.target}: {term.expression}" for term in diagnosis.after.formula)
             said.append(f"Exploratory, not a finding; a formula to try: {terms}.")
+    if len(diagnosis.steps) == 1 and what != "insufficient_data":
+        said += _left(diagnosis)
     return said
+
+
+def _left(diagnosis: Diagnosis) -> list[str]:
+    """Say how much of what the last model leaves is noise, and where it sits."""
+    if diagnosis.remaining is None:
+        return []
+    return remaining_said(
+        diagnosis.remaining, "what is left" if len(diagnosis.steps) > 1 else "the misfit one leg ahead"
+    )
 
 
 def _together(diagnosis: Diagnosis) -> list[str]:
@@ -305,6 +319,7 @@ def _ahead(diagnosis: Diagnosis) -> list[str]:
         said.append(
             f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained."
         )
+    said += _left(diagnosis)
     if last.disagrees is not None:
         said.append(
             f"Fits one step and one leg ahead still disagree: with parameters fitted to legs the misfit is "
@@ -400,6 +415,7 @@ def as_json(diagnosis: Diagnosis) -> dict[str, Any]:
         ],
         "suspected": [{"effect": name, "why": why} for name, why in diagnosis.suspected.items()],
         "share_explained": share_explained(diagnosis),
+        "remaining_misfit": None if diagnosis.remaining is None else remaining_json(diagnosis.remaining),
         "refused": [
             _refit(c, k) | {"why": diagnosis.suspected.get(c.effect.name) or _refusal(k)}
             for step in _climbed(diagnosis)

@@ -13,6 +13,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.model.terms.ordinary import driven_by_noise
 from kempf.pipeline.shooting import shooting_fit
 from kempf.pipeline.shooting.left_out import LeftOut, left_out
 from kempf.pipeline.shooting.normal_equations import NormalEquations
@@ -164,9 +165,14 @@ class ShootingRange:
         return self.refitted(model, shared, base)
 
     def screened(self, base: Ahead, effects: Iterable[Effect]) -> list[tuple[float, Effect]]:
-        """Return what the sum of squares would fall to with each effect, by linearisation, the smallest first."""
+        """Return what the sum of squares would fall to with each effect, by linearisation, the smallest first.
+
+        What only noise drives, as waves, moves no window, and is left out.
+        """
         found = []
         for effect in effects:
+            if driven_by_noise(effect):
+                continue
             model = base.model.with_effect(effect)
             made = [one for one in (self._begun(model, base, size) for size in _sizes(effect)) if one is not None]
             if made:

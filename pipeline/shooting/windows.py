@@ -22,7 +22,7 @@ _FEWEST = 8
 
 @dataclass(frozen=True, eq=False)
 class Windows:
-    """The windows of one manoeuvre; each begins in the middle of the one before."""
+    """The windows of one manoeuvre; each begins in the middle of the one before, where nothing else is asked for."""
 
     run: GridRun
     #: First and last instant of every window, shape (w,).
@@ -53,18 +53,20 @@ def leg_s(runs: Sequence[GridRun]) -> float:
     return float(np.median([run.time_s[-1] / max(moves(run.rudder_rad), 1) for run in runs]))
 
 
-def windows_of(run: GridRun, horizon_s: float) -> Windows:
+def windows_of(run: GridRun, horizon_s: float, every: float = 0.5) -> Windows:
     """Cut a manoeuvre into windows.
 
     Parameters
     ----------
     horizon_s : float
         Length of a window; a manoeuvre that is shorter is one window.
+    every : float, optional
+        Part of a window after which the next one begins.
     """
     n = run.measured.shape[0]
     length = int(np.clip(round(horizon_s / run.step_s), _FEWEST, n - 1))
-    half = max(1, length // 2)
-    begins = np.arange(0, max(1, n - 1 - half), half, dtype=np.int64)
+    apart, half = max(1, int(every * length)), max(1, length // 2)
+    begins = np.arange(0, max(1, n - 1 - half), apart, dtype=np.int64)
     ends = np.minimum(begins + length, n - 1)
     start, std = _smoothed(run, begins, max(2, round(_SMOOTHED * length)))
     return Windows(run, begins, ends, start, std)

@@ -36,7 +36,7 @@ _CHANGES = ((1.1e-3, 300.0), (0.056, 1800.0))
 #: time constants that a state may forget in within one piece of a step
 _FORGETS = 4.0
 #: units of the states that effects of the catalogue bring along
-_UNITS = {"memory_m1": "m/s", "waves_m1": "rad", "waves_m2": "rad/s"}
+_UNITS = {"memory_m1": "m/s", "waves_m1": "rad", "waves_m2": "rad"}
 
 
 @dataclass(frozen=True)

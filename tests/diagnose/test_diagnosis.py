@@ -54,15 +54,22 @@ def value_of(diagnosis: Diagnosis, name: str) -> tuple[float, float]:
 
 
 def test_nothing_is_claimed_of_a_ship_without_an_effect(calm: tuple[Sailed, Diagnosis]) -> None:
-    _, found = calm
+    ship, found = calm
     assert verdict(found) == "adequate"
     assert len(found.steps) == 1
     assert len(found.fitted) == 3 and len(found.held) == 1
     shown = as_json(found)
     assert shown["sets"] == [] and {c["verdict"] for c in shown["candidates"]} <= {"absent", "not_testable"}
     assert shown["ladder"][0]["held_out_error"] < 0.1
-    (said,) = sentences(found)
+    said, noise, place = sentences(found)
     assert said == "No effect of the catalogue improves the prediction of manoeuvres that were not fitted."
+    # her zigzags are each on a heading of its own: nothing repeats itself
+    assert noise.startswith("How much of the misfit one leg ahead is noise of the experiment is not known: ")
+    assert place.startswith("The misfit one leg ahead is largest in ")
+    remaining = shown["remaining_misfit"]
+    assert remaining["noise_share"] is None and remaining["pairs"] < 10
+    assert sum(remaining["channels"].values()) == pytest.approx(1.0)
+    assert {one["name"] for one in remaining["places"] if one["by"] == "manoeuvre"} == {run.name for run in ship.runs}
 
 
 def test_a_lag_is_found_with_its_size_and_the_held_out_error_falls(late: tuple[Sailed, Diagnosis]) -> None:
@@ -79,7 +86,8 @@ def test_a_lag_is_found_with_its_size_and_the_held_out_error_falls(late: tuple[S
     assert found.before is not None and found.after is not None
     assert found.after.gain < 0.2 * found.before.gain
     said = sentences(found)
-    assert f"tau = {tau:.3f} ± {std:.3f} s (1 s.e.)" in said[0] and "held-out" in said[3]
+    assert f"tau = {tau:.3f} ± {std:.3f} s (1 s.e.)" in said[0] and "held-out" in said[5]
+    assert "noise of the experiment" in said[3] and said[4].startswith("What is left is largest in ")
 
 
 def test_a_lag_that_leaves_no_ship_without_it_is_found_with_its_size() -> None:

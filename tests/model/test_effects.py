@@ -101,7 +101,7 @@ def test_every_parameter_can_be_absent_and_is_tried_within_its_bounds(effect: Ef
         assert all(step != 0.0 and parameter.low < step < parameter.high for step in parameter.steps)
     first = effect.parameters[0]
     assert first.low <= 0.0 < first.high
-    assert [p.name for p in effect.parameters if p.shapes] == (["k"] if effect.name == "waves" else [])
+    assert [p.name for p in effect.parameters if p.shapes] == (["k", "chi"] if effect.name == "waves" else [])
     assert len(first.steps) == (3 if effect.name in ("backlash", "dead_time", "rate_limit") else 1)
 
 
@@ -219,18 +219,28 @@ def test_sensor_effects_follow_from_eq_18() -> None:
     assert at(ALL["antenna_lever"].terms["lateral_speed"], {"x": 12.0}, r=r) == pytest.approx(0.24)
 
 
-def test_waves_have_the_spread_and_the_frequency_that_are_asked_for() -> None:
-    effect, L = ALL["waves"], 80.0
-    values = {"c": 0.02, "k": 1.3}
-    w = 1.3 * np.sqrt(9.81 / L)
+@pytest.mark.parametrize("heading", [0.3, 1.7, 3.6])
+def test_waves_have_the_spread_and_the_frequency_that_are_asked_for(heading: float) -> None:
+    effect, L, V, g = ALL["waves"], 80.0, 7.0, 9.81
+    values = {"c": 0.02, "k": 1.3, "chi": 0.5}
+    w0 = 1.3 * np.sqrt(g / L)
+    # met from ahead more often, from astern less
+    w = w0 + w0**2 * V * np.cos(0.5 - heading) / g
     first, second = effect.states
-    A = np.array([[0.0, 1.0], [at(second.derivative, values, L=L, m1=1.0), at(second.derivative, values, L=L, m2=1.0)]])
+    sea = {"L": L, "V": V, "K": heading}
+    A = np.array(
+        [
+            [at(state.derivative, values, **{"m1": 0.0, "m2": 0.0, name: 1.0}, **sea) for name in ("m1", "m2")]
+            for state in (first, second)
+        ]
+    )
     q = at(second.noise, values, L=L)
     stationary = np.diag([at(first.initial_std, values, L=L) ** 2, at(second.initial_std, values, L=L) ** 2])
     assert A @ stationary + stationary @ A.T + np.diag([0.0, q**2]) == pytest.approx(np.zeros((2, 2)), abs=1e-15)
     assert stationary[0, 0] == pytest.approx(0.02**2)
-    assert np.abs(np.linalg.eigvals(A)) == pytest.approx([w, w])
-    assert at(first.derivative, values, m2=0.3) == 0.3
+    assert np.abs(np.linalg.eigvals(A)) == pytest.approx([abs(w), abs(w)])
+    # the rate that is measured is that of the yaw
+    assert at(effect.terms["yaw_rate"], values, m2=0.3, **sea) == at(first.derivative, values, m2=0.3, **sea)
 
 
 def test_what_stands_for_eq_16_scales_it() -> None:

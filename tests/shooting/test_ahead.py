@@ -10,6 +10,7 @@ import pytest
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
+from kempf.pipeline.model.terms.ordinary import driven_by_noise
 from kempf.pipeline.shooting import shooting_fit
 from kempf.pipeline.shooting.ahead import Ahead, ShootingRange, shooting_range
 from kempf.pipeline.shooting.left_out import LeftOut, left_out
@@ -82,6 +83,16 @@ def test_the_screen_foresees_what_a_refit_finds(dragged: tuple[Sailed, ShootingR
     ranked = shooting.screened(shooting.plain, [effects.get("gyro_bias"), DRAG, effects.get("rudder_stall")])
     assert ranked[0][1].name == "cross_flow_drag"
     assert ranked[0][0] == pytest.approx(found.fit.cost, rel=0.2)
+
+
+def test_what_only_noise_drives_is_not_screened_by_windows(dragged: tuple[Sailed, ShootingRange, Ahead]) -> None:
+    _, shooting, _ = dragged
+    noisy = [effect.name for effect in effects.catalogue().values() if driven_by_noise(effect)]
+    assert noisy == ["waves"]
+    assert shooting.screened(shooting.plain, [effects.get("waves")]) == []
+    # it would have moved nothing
+    made = shooting.with_effect(shooting.plain, effects.get("waves"))
+    assert made is None or made.left_out.mean == pytest.approx(shooting.plain.left_out.mean, rel=1e-2)
 
 
 def test_leaving_out_is_what_fitting_to_the_others_gives(dragged: tuple[Sailed, ShootingRange, Ahead]) -> None:

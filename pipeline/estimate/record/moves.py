@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
 
@@ -32,12 +33,30 @@ def moves(values: Float) -> int:
     >>> moves(np.repeat([0.0, 35.0], 30))
     1
     """
-    values = _without_spikes(values)
-    low, high = float(np.min(values)), float(np.max(values))
+    return int(moved(values)[-1])
+
+
+def moved(values: Float) -> NDArray[np.int64]:
+    """Count the same up to every value, shape (n,).
+
+    Examples
+    --------
+    >>> moved(np.repeat([0.0, 20.0, -20.0, 20.0], 30))[[0, 45, 75, 105]]
+    array([0, 1, 2, 3])
+    """
+    smooth = _without_spikes(values)
+    low, high = float(np.min(smooth)), float(np.max(smooth))
     third = (high - low) / 3.0
-    side = np.where(values > high - third, 1, np.where(values < low + third, -1, 0))
-    held = side[side != 0]
-    return int(np.count_nonzero(np.diff(held))) + int(side[0] == 0 and held.size > 0)
+    side = np.where(smooth > high - third, 1, np.where(smooth < low + third, -1, 0))
+    held = np.flatnonzero(side)
+    steps = np.zeros(smooth.size, dtype=np.int64)
+    steps[held[1:]] = np.diff(side[held]) != 0
+    if held.size:
+        steps[held[0]] = side[0] == 0
+    counted = np.cumsum(steps)
+    lost = values.size - smooth.size
+    before = np.full(lost // 2, counted[0])
+    return np.concatenate([before, counted, np.full(lost - lost // 2, counted[-1])])
 
 
 def _without_spikes(values: Float) -> Float:

@@ -137,6 +137,16 @@ def require_ordinary(effect: Effect) -> None:
             )
 
 
+def driven_by_noise(effect: Effect) -> bool:
+    """Return whether nothing but noise moves the states of an effect, and nothing else does what it does.
+
+    Such an effect changes no prediction of a motion, however strong it is.
+    """
+    own = tuple(state.name for state in effect.states)
+    texts = [*effect.terms.values(), *(state.derivative for state in effect.states)]
+    return bool(own) and not any(np.any(answer(text, _typical(effect, 0), own).value) for text in texts)
+
+
 def _typical(effect: Effect, k: int) -> dict[str, float]:
     return {p.name: p.steps[min(k, len(p.steps) - 1)] for p in effect.parameters}
 
