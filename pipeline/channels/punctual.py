@@ -6,7 +6,7 @@ fit takes for sway and for weaker damping: to a boat that answers in a second, a
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from kempf.pipeline.channels.averaging import readings_averaged
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.lateness import velocity_lateness
+from kempf.pipeline.channels.lateness import Lateness, velocity_lateness
 from kempf.pipeline.channels.series import SECOND_NS, Series
 
 #: time before and after a segment in which its instruments are looked at, s
@@ -23,31 +23,37 @@ _AROUND_S = 1800
 _SURE, _FINEST = 3.0, 0.1
 
 
-def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> tuple[Instruments, tuple[str, ...]]:
-    """Return the series of a log about a segment with speeds that are not late, and what was done to them.
+@dataclass(frozen=True, eq=False)
+class Punctual:
+    """A log whose speeds are not late."""
+
+    #: The very same where nothing was late.
+    instruments: Instruments
+    #: A sentence for each speed that was.
+    said: tuple[str, ...]
+    #: Standard error of the lateness that was taken from the velocity over ground, s; 0 where none was.
+    velocity_late_std_s: float
+
+
+def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Punctual:
+    """Return a log with speeds that are not late, for one of its segments.
 
     Parameters
     ----------
     start_utc_ns, end_utc_ns : int
         Bounds of the segment, UTC ns.
-
-    Returns
-    -------
-    instruments : Instruments
-        The same where nothing is late.
-    said : tuple of str
-        A sentence for each speed that was.
     """
     around = _AROUND_S * SECOND_NS
     near = {name: one.between(start_utc_ns - around, end_utc_ns + around) for name, one in instruments.series.items()}
     own = {name: one for name, one in near.items() if len(one) > 1}
     changed: dict[str, Series] = {}
     said = []
-    late_s = _velocity_late_s(own)
-    if late_s > 0.0 and "velocity_forward" not in own:
-        changed |= unsmoothed(own["speed_over_ground"], own["course_over_ground"], late_s)
+    late = _velocity_lateness(own) if "velocity_forward" not in own else None
+    if late is not None:
+        changed |= unsmoothed(own["speed_over_ground"], own["course_over_ground"], late.late_s)
         said.append(
-            f"the GNSS velocity is {late_s:.2g} s late beside the fixes, as where a receiver smooths it: undone"
+            f"the GNSS velocity is {late.late_s:.2g} ± {late.std_s:.1g} s (1 s.e.) late beside the fixes, as where it "
+            "is smoothed: undone"
         )
     log = own.get("speed_through_water")
     many = readings_averaged(log) if log is not None else 1.0
@@ -56,18 +62,19 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> tu
         said.append(
             f"the speed log shows means over {many * log.period_s:.2g} s: taken at their middle, one after the other"
         )
-    return (replace(instruments, series={**instruments.series, **changed}) if changed else instruments), tuple(said)
+    whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
+    return Punctual(whole, tuple(said), 0.0 if late is None else late.std_s)
 
 
-def _velocity_late_s(series: dict[str, Series]) -> float:
-    """Return by how much the velocity over ground is late beside the fixes, s; 0 where it is not, or none knows."""
+def _velocity_lateness(series: dict[str, Series]) -> Lateness | None:
+    """Return by how much the velocity over ground is late beside the fixes; None where nothing shows that it is."""
     log = Log(series)
     track, velocity = log.track(), log.velocity("course")
     if track is None or velocity is None:
-        return 0.0
+        return None
     found = velocity_lateness(track, velocity)
     least = _FINEST * series["course_over_ground"].period_s
-    return found.late_s if found is not None and found.late_s > max(_SURE * found.std_s, least) else 0.0
+    return found if found is not None and found.late_s > max(_SURE * found.std_s, least) else None
 
 
 def unsmoothed(speed: Series, course: Series, late_s: float) -> dict[str, Series]:

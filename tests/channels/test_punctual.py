@@ -65,9 +65,10 @@ def test_a_smoothed_velocity_is_as_late_as_its_filter_makes_it() -> None:
 
 def test_it_is_undone_and_said() -> None:
     ship, there = boat(smoothed_s=0.4), boat()
-    found, said = punctual(ship, 0, int(LONG_S * SECOND_NS))
-    assert any("late beside the fixes" in sentence for sentence in said)
-    off = [found.series["course_over_ground"], ship.series["course_over_ground"]]
+    found = punctual(ship, 0, int(LONG_S * SECOND_NS))
+    assert any("late beside the fixes" in sentence for sentence in found.said)
+    assert 0.0 < found.velocity_late_std_s < 0.1
+    off = [found.instruments.series["course_over_ground"], ship.series["course_over_ground"]]
     off_rad = [float(np.std(one.value - there.series["course_over_ground"].value)) for one in off]
     assert off_rad[0] < 0.3 * off_rad[1]
 
@@ -76,9 +77,10 @@ def test_what_is_not_late_stays_as_it_is() -> None:
     # a receiver that is late as a whole is an effect to be named, and shows nothing here
     for late_s in (0.0, 0.3):
         ship = boat(late_s)
-        found, said = punctual(ship, 0, int(LONG_S * SECOND_NS))
-        assert found is ship
-        assert said == ()
+        found = punctual(ship, 0, int(LONG_S * SECOND_NS))
+        assert found.instruments is ship
+        assert found.said == ()
+        assert found.velocity_late_std_s == 0.0
 
 
 def test_a_log_of_means_is_read_at_their_middle_one_after_the_other() -> None:
@@ -87,9 +89,9 @@ def test_a_log_of_means_is_read_at_their_middle_one_after_the_other() -> None:
     speed = SPEED + 0.05 * np.sin(2.0 * np.pi * TIME / 60.0) + log.value - SPEED
     shown = np.convolve(np.concatenate([np.full(9, speed[0]), speed]), np.full(10, 0.1), mode="valid")
     late = Instruments({**ship.series, "speed_through_water": Series(log.time_utc_ns, shown)}, {}, ())
-    found, said = punctual(late, 0, int(LONG_S * SECOND_NS))
-    assert any("means over 2 s" in sentence for sentence in said)
-    means = found.series["speed_through_water"]
+    found = punctual(late, 0, int(LONG_S * SECOND_NS))
+    assert any("means over 2 s" in sentence for sentence in found.said)
+    means = found.instruments.series["speed_through_water"]
     assert np.all(np.diff(means.time_utc_ns) == 10 * log.time_utc_ns[1])
     at = (means.time_utc_ns / SECOND_NS)[1:]
     assert np.std(means.value[1:] - SPEED - 0.05 * np.sin(2.0 * np.pi * at / 60.0)) < 0.01

@@ -52,9 +52,9 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         A channel is missing, not finite, has a gap that cannot be bridged, stands still or contradicts another; the
         rudder or the ship did not move; `docs/bad_input.md` has every code.
     """
-    as_delivered = instruments
-    instruments, said = punctual(instruments, start_utc_ns, end_utc_ns)
-    warnings: list[str] = [*said]
+    as_delivered, on_time = instruments, punctual(instruments, start_utc_ns, end_utc_ns)
+    instruments = on_time.instruments
+    warnings: list[str] = [*on_time.said]
     heading = _need(instruments, "heading", start_utc_ns, end_utc_ns)
     rudder = _need(instruments, "rudder_angle", start_utc_ns, end_utc_ns)
     course = _need(instruments, "course_over_ground", start_utc_ns, end_utc_ns)
@@ -105,6 +105,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         lateral=lateral,
         noise_start=noise,
         warnings=tuple(warnings),
+        velocity_late_std_s=on_time.velocity_late_std_s,
     )
 
 
