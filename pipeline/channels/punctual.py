@@ -45,9 +45,11 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
     """
     around = _AROUND_S * SECOND_NS
     near = {name: one.between(start_utc_ns - around, end_utc_ns + around) for name, one in instruments.series.items()}
-    own = {name: one for name, one in near.items() if len(one) > 1}
+    # what holds values that are no numbers is refused later, by name
+    own = {name: one for name, one in near.items() if len(one) > 1 and np.all(np.isfinite(one.value))}
     changed: dict[str, Series] = {}
     said = []
+    # of a velocity that was turned out of the ship's frame it is not known what was smoothed
     late = _velocity_lateness(own) if "velocity_forward" not in own else None
     if late is not None:
         changed |= unsmoothed(own["speed_over_ground"], own["course_over_ground"], late.late_s)
