@@ -20,7 +20,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Series
 #: time before and after a segment in which its instruments are looked at, s
 _AROUND_S = 1800
 #: standard errors of a lateness below which it is none, and periods: finer than its readings no velocity is known
-_SURE, _FINEST = 3.0, 0.1
+_SURE, _FINEST = 3.0, 0.2
 
 
 @dataclass(frozen=True, eq=False)
