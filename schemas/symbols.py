@@ -24,6 +24,9 @@ STATE_SYMBOLS: dict[str, str] = {
     "m2": "state of an effect",
     "m3": "state of an effect",
     "m4": "state of an effect",
+    "m5": "state of an instrument",
+    "m6": "state of an instrument",
+    "m7": "state of an instrument",
 }
 #: computed on the way, with derivatives
 COMPUTED_SYMBOLS: dict[str, str] = {
@@ -57,6 +60,8 @@ CHANNEL_SYMBOLS: dict[str, str] = {
 LOGGED_CHANNELS: tuple[str, ...] = (*CHANNEL_SYMBOLS.values(), "speed_through_water")
 #: states that an effect may bring along
 OWN_STATES: tuple[str, ...] = ("m1", "m2", "m3", "m4")
+#: those that errors of instruments bring along beside them; no formula speaks of them by these names
+INSTRUMENT_STATES: tuple[str, ...] = ("m5", "m6", "m7")
 RUN_SYMBOLS: dict[str, str] = {
     "K": "true heading, rad",
     "t": "time from the beginning of the run, s",

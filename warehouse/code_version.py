@@ -53,7 +53,7 @@ STAGES: dict[Stage, Entry] = {
         (
             *("channels.instruments", "estimate.estimators", "estimate.pooled_uncertainty"),
             *("estimate.no_log.companions", "estimate.record.cut", "estimate.record.left_out"),
-            *("diagnose.staged", "diagnose.ladder_step", "diagnose.split"),
+            *("diagnose.staged", "diagnose.ladder_step", "diagnose.split", "diagnose.late_velocity"),
         ),
         ("ingest",),
     ),

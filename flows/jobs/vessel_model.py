@@ -22,6 +22,7 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
+from kempf.pipeline.diagnose.late_velocity import covariance_of_lateness
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
@@ -234,7 +235,10 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
 def _known(fit: PooledFit) -> PooledUncertainty:
     """Return the errors of a fit; of a model with effects those by which its diagnosis judges them."""
     known = uncertainty_of(fit)
-    return replace(known, covariance=fit.covariance, kind="information") if fit.ship.model.effects else known
+    if fit.ship.model.effects:
+        known = replace(known, covariance=fit.covariance, kind="information")
+    with ThreadPoolExecutor(max_workers=usable()) as workers:
+        return replace(known, covariance=known.covariance + covariance_of_lateness(fit, workers))
 
 
 def _pooling(plain: PlainFit) -> dict[str, Any]:

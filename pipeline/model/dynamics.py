@@ -95,9 +95,15 @@ def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lane
             J[R, V, b], J[R, R, b], J[R, F, b], J[R, M, b] = hull[2, b] * U, hull[3, b] * U, arm, 1.0
             J[PSI, R, b], J[F, F, b], J[M, M, b], J[E, E, b] = 1.0, -mu_F, -mu_M, -mu_E
             J[V, E, b], J[R, E, b] = hull[4, b] * square * gain, hull[5, b] * square * gain
+            delta, steeper = values[DELTA, b] + gain * x[E, b], exponent * square / U if U != 0.0 else 0.0
+            v, r = x[V, b], x[R, b]
             for j in range(width):
-                J[V, j, b] += hull[4, b] * square * slopes[DELTA, j, b]
-                J[R, j, b] += hull[5, b] * square * slopes[DELTA, j, b]
+                # effects may let the speed go with the states, as they may the rudder
+                by_rudder, by_speed = slopes[DELTA, j, b], slopes[SPEED, j, b]
+                J[V, j, b] += hull[4, b] * square * by_rudder
+                J[R, j, b] += hull[5, b] * square * by_rudder
+                J[V, j, b] += (hull[0, b] * v + hull[1, b] * r + hull[4, b] * steeper * delta) * by_speed
+                J[R, j, b] += (hull[2, b] * v + hull[3, b] * r + hull[5, b] * steeper * delta) * by_speed
     if busy:
         for kind in range(2 + width - N_BEFORE):
             target = kind if kind < 2 else N_BEFORE + kind - 2

@@ -15,7 +15,7 @@ from kempf.pipeline.model.terms.expression import compiled
 from kempf.schemas.effect import Effect, Parameter
 from kempf.schemas.errors import UsageError
 from kempf.schemas.instrument_noise import lasting
-from kempf.schemas.symbols import OWN_STATES, SYMBOLS
+from kempf.schemas.symbols import INSTRUMENT_STATES, OWN_STATES, SYMBOLS
 
 _PLACE = {
     "speed": dynamics.ON_SPEED,
@@ -115,7 +115,7 @@ class EffectModel:
         start, held, slot, first = 0, 0, 0, dynamics.PARAMETER
         for effect in self.effects:
             variables = dict(_INDEX)
-            for name in OWN_STATES:
+            for name in (*OWN_STATES, *INSTRUMENT_STATES):
                 del variables[name]
             for i, state in enumerate(effect.states):
                 variables[state.name] = dynamics.N_BEFORE + slot + i

@@ -11,6 +11,7 @@ from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
+from kempf.pipeline.channels.punctual import punctual
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 from kempf.pipeline.channels.smooth import without_spikes
 from kempf.pipeline.channels.standing import averaged_where_standing
@@ -25,6 +26,8 @@ from kempf.schemas.errors import DataRejected
 #: a log slower than this changes little in between; longer gaps are refused
 _MAX_SPEED_GAP_S = 60.0
 _MIN_INSTANTS = 40
+#: time beyond the segment over which the log is taken at least, s, and how many values of it are enough
+_BEYOND_S, _FEWEST_OF_LOG = 5.0, 12
 #: a relative error of the speed is counted against no less than this
 _SLOWEST_M_S = 0.1
 _MIN_RUDDER_STD_RAD = np.deg2rad(0.2)
@@ -49,7 +52,9 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         A channel is missing, not finite, has a gap that cannot be bridged, stands still or contradicts another; the
         rudder or the ship did not move; `docs/bad_input.md` has every code.
     """
-    warnings: list[str] = []
+    as_delivered, on_time = instruments, punctual(instruments, start_utc_ns, end_utc_ns)
+    instruments = on_time.instruments
+    warnings: list[str] = [*on_time.said]
     heading = _need(instruments, "heading", start_utc_ns, end_utc_ns)
     rudder = _need(instruments, "rudder_angle", start_utc_ns, end_utc_ns)
     course = _need(instruments, "course_over_ground", start_utc_ns, end_utc_ns)
@@ -66,7 +71,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     yaw = _cut(instruments, "yaw_rate", start_utc_ns, end_utc_ns)
     if yaw is None:
         warnings.append("no yaw rate channel: the yaw rate is estimated through the heading")
-    usable, said = check_channels(_window(instruments, start_utc_ns, end_utc_ns))
+    usable, said = check_channels(_window(as_delivered, start_utc_ns, end_utc_ns))
     yaw = yaw if usable else None
     warnings += said
     check_course(lateral)
@@ -100,6 +105,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         lateral=lateral,
         noise_start=noise,
         warnings=tuple(warnings),
+        velocity_late_std_s=on_time.velocity_late_std_s,
     )
 
 
@@ -121,7 +127,9 @@ def _measured(instants: Nanoseconds, lateral: LateralSpeed, yaw: Series | None, 
     return measured
 
 
-def _cut(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> Series | None:
+def _cut(
+    instruments: Instruments, channel: str, start_ns: int, end_ns: int, fewest: int = _MIN_INSTANTS // 2
+) -> Series | None:
     series = instruments.get(channel)
     if series is None:
         return None
@@ -134,7 +142,7 @@ def _cut(instruments: Instruments, channel: str, start_ns: int, end_ns: int) -> 
             "Ingest the log again: ingest refuses such values one by one and keeps the rest.",
             {"channel": channel, "values": len(part), "not_finite": wrong},
         )
-    return part if len(part) >= _MIN_INSTANTS // 2 else None
+    return part if len(part) >= fewest else None
 
 
 def _window(instruments: Instruments, start_ns: int, end_ns: int) -> Log:
@@ -169,7 +177,7 @@ def _speed(
 
     The log, else the forward part of the GNSS velocity.
     """
-    log = _cut(instruments, "speed_through_water", start_ns - 5 * SECOND_NS, end_ns + 5 * SECOND_NS)
+    log = _cut_log(instruments, start_ns, end_ns)
     if log is None:
         good = np.isfinite(lateral.forward_m_s)
         log = Series(lateral.time_utc_ns[good], lateral.forward_m_s[good])
@@ -186,6 +194,15 @@ def _speed(
             "Check the speed channel and its unit, or choose a segment under way.",
         )
     return speed, slow.error_std, slow.error_time_s
+
+
+def _cut_log(instruments: Instruments, start_ns: int, end_ns: int) -> Series | None:
+    whole = instruments.get("speed_through_water")
+    if whole is None:
+        return None
+    # so that its values stand before and behind the segment
+    beyond = round(max(_BEYOND_S, 2.0 * np.nan_to_num(whole.period_s)) * SECOND_NS)
+    return _cut(instruments, "speed_through_water", start_ns - beyond, end_ns + beyond, _FEWEST_OF_LOG)
 
 
 def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:

@@ -71,6 +71,8 @@ class GridRun:
     channels: frozenset[str]
     ship: ShipConstants
     day: int
+    #: See `kempf.pipeline.estimate.record.record.Record`.
+    velocity_late_std_s: float = 0.0
 
     @property
     def time_s(self) -> Float:
@@ -276,6 +278,7 @@ def make_run(
         channels=frozenset(have),
         ship=ship,
         day=day,
+        velocity_late_std_s=record.velocity_late_std_s,
     )
 
 

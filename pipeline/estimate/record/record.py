@@ -65,3 +65,5 @@ class Record(Instants):
     #: Eq. (18) with its standard errors.
     lateral: LateralSpeed
     warnings: tuple[str, ...]
+    #: Standard error of the lateness that was taken from the velocity over ground, s; 0 where it was not late.
+    velocity_late_std_s: float = 0.0

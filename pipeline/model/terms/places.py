@@ -9,7 +9,14 @@ from typing import Literal
 from kempf.pipeline.model.terms.expression import names_in
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
-from kempf.schemas.symbols import CHANNEL_SYMBOLS, OWN_STATES, RUN_SYMBOLS, STATE_SYMBOLS, SYMBOLS
+from kempf.schemas.symbols import (
+    CHANNEL_SYMBOLS,
+    INSTRUMENT_STATES,
+    OWN_STATES,
+    RUN_SYMBOLS,
+    STATE_SYMBOLS,
+    SYMBOLS,
+)
 
 Kind = Literal["speed", "rudder", "force", "measured", "noise"]
 
@@ -73,7 +80,8 @@ def symbols_beside(own_states: Sequence[str]) -> list[str]:
     own_states : sequence of str
         States that the effect in question brings along.
     """
-    return [name for name in SYMBOLS if name not in OWN_STATES or name in own_states]
+    others = {*OWN_STATES, *INSTRUMENT_STATES} - {*own_states}
+    return [name for name in SYMBOLS if name not in others]
 
 
 def require_in_place(place: Place, own_states: tuple[str, ...] = ()) -> None:

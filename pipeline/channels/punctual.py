@@ -1,0 +1,121 @@
+"""The speeds of a log at the instants that they belong to: what receiver and log smoothed is undone (decision 0045).
+
+Receivers smooth the velocity over ground, and speed logs show the mean of their last seconds. Both are late, which a
+fit takes for sway and for weaker damping: to a boat that answers in a second, a second is much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kempf.pipeline.channels.averaging import readings_averaged
+from kempf.pipeline.channels.doctor.log import Log
+from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.lateness import Lateness, velocity_lateness
+from kempf.pipeline.channels.series import SECOND_NS, Series
+
+#: time before and after a segment in which its instruments are looked at, s
+_AROUND_S = 1800
+#: standard errors of a lateness below which it is none, and periods: finer than its readings no velocity is known
+_SURE, _FINEST = 3.0, 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class Punctual:
+    """A log whose speeds are not late."""
+
+    #: The very same where nothing was late.
+    instruments: Instruments
+    #: A sentence for each speed that was.
+    said: tuple[str, ...]
+    #: Standard error of the lateness that was taken from the velocity over ground, s; 0 where none was.
+    velocity_late_std_s: float
+
+
+def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Punctual:
+    """Return a log with speeds that are not late, for one of its segments.
+
+    Parameters
+    ----------
+    start_utc_ns, end_utc_ns : int
+        Bounds of the segment, UTC ns.
+    """
+    around = _AROUND_S * SECOND_NS
+    near = {name: one.between(start_utc_ns - around, end_utc_ns + around) for name, one in instruments.series.items()}
+    # what holds values that are no numbers is refused later, by name
+    own = {name: one for name, one in near.items() if len(one) > 1 and np.all(np.isfinite(one.value))}
+    changed: dict[str, Series] = {}
+    said = []
+    # of a velocity that was turned out of the ship's frame it is not known what was smoothed
+    late = _velocity_lateness(own) if "velocity_forward" not in own else None
+    if late is not None:
+        changed |= unsmoothed(own["speed_over_ground"], own["course_over_ground"], late.late_s)
+        said.append(
+            f"the GNSS velocity is {late.late_s:.2g} ± {late.std_s:.1g} s (1 s.e.) late beside the fixes, as where it "
+            "is smoothed: undone"
+        )
+    log = own.get("speed_through_water")
+    many = readings_averaged(log) if log is not None else 1.0
+    if log is not None and many > 1.0:
+        changed["speed_through_water"] = apart(log, many)
+        said.append(
+            f"the speed log shows means over {many * log.period_s:.2g} s: taken at their middle, one after the other"
+        )
+    whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
+    return Punctual(whole, tuple(said), 0.0 if late is None else late.std_s)
+
+
+def _velocity_lateness(series: dict[str, Series]) -> Lateness | None:
+    """Return by how much the velocity over ground is late beside the fixes; None where nothing shows that it is."""
+    log = Log(series)
+    track, velocity = log.track(), log.velocity("course")
+    if track is None or velocity is None:
+        return None
+    found = velocity_lateness(track, velocity)
+    least = _FINEST * series["course_over_ground"].period_s
+    return found if found is not None and found.late_s > max(_SURE * found.std_s, least) else None
+
+
+def unsmoothed(speed: Series, course: Series, late_s: float) -> dict[str, Series]:
+    """Return speed and course over ground of a velocity that a filter of first order has made late.
+
+    Parameters
+    ----------
+    speed, course : Series
+        m/s and rad, unwrapped.
+    late_s : float
+        By how much, s.
+
+    Notes
+    -----
+    A receiver that goes from fix to fix has y_k = y_{k-1} + (w_k - y_{k-1}) / (1 + tau / T), tau being its lateness and
+    T the time between two fixes; so w_k = y_k + tau (y_k - y_{k-1}) / T.
+    """
+    beside = speed.at(course.time_utc_ns, gap_limit_s(speed))
+    known = np.isfinite(beside)
+    time, shown = course.time_utc_ns[known], beside[known] * np.exp(1j * course.value[known])
+    step = np.diff(time) / SECOND_NS
+    near = step <= gap_limit_s(course)
+    value = shown.copy()
+    value[1:] += np.where(near, late_s / step, 0.0) * np.diff(shown)
+    turned = np.angle(value * np.conj(shown))
+    return {
+        "speed_over_ground": Series(time, np.abs(value)),
+        "course_over_ground": Series(time, course.value[known] + turned),
+    }
+
+
+def apart(log: Series, many: float) -> Series:
+    """Return means that share no reading, each at the middle of its time.
+
+    Parameters
+    ----------
+    many : float
+        Over how many readings each value is a mean.
+    """
+    every = int(np.ceil(many))
+    middle = round(0.5 * (many - 1.0) * log.period_s * SECOND_NS)
+    return Series(log.time_utc_ns[::every] - middle, log.value[::every])
