@@ -66,18 +66,14 @@ def _verdict() -> list[str]:
 
 
 def _circle() -> list[str]:
-    found = [
-        f"{row['her circle with 35 deg of rudder, calm water'].removesuffix('_m').replace('_', ' ')}: "
-        f"{row['value']} m ({row['95 % interval']}), off the measured one, {_off(row)}"
+    return [
+        f"{row['35 deg of rudder, m']}: {row[ours]} m, off the measured one, {row['measured by MARIN']} m, by "
+        f"{row['off by']}"
         for one in sections("predicted_measured")
         for row in one.rows
-        if row.get("measured by MARIN: ours off by")
+        for ours in row
+        if ours.startswith("from her zigzags") and row.get("measured by MARIN")
     ]
-    return found
-
-
-def _off(row: Row) -> str:
-    return row["measured by MARIN: ours off by"].replace(": ", " m, by ")
 
 
 def _overshoots() -> list[str]:

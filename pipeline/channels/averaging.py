@@ -20,8 +20,13 @@ _OWN = 0.2
 _FRESH = (0.001, 0.01, 0.03, 0.1)
 #: what lasting noise keeps from one reading to the next, as tried
 _KEPT = np.linspace(0.0, 0.95, 20)
-#: log-likelihood by which a mean must say more than any noise that lasts
-_LEAST_GAIN = 10.0
+#: log-likelihood by which a mean must say more than any noise that lasts; where none averages it says up to 4 more
+_LEAST_GAIN = 25.0
+#: parts of the spectrum, each of which but the slowest it must fit, and by how many standard errors it may miss one:
+#: where the ship's own changes of speed are above the noise, every shape misses
+_PARTS, _MISSES = 8, 4.0
+#: part of the ordinates of a tapered periodogram that are independent
+_INDEPENDENT = 2.0 / 3.0
 #: share of readings that may be missing
 _LOST = 0.02
 
@@ -57,9 +62,9 @@ def readings_averaged(log: Series) -> float:
     means = [_mean(w, many) for many in range(2, _LONGEST + 1)]
     lengths = {2.0 + k: mean for k, mean in enumerate(means)}
     lengths |= {2.5 + k: 0.5 * (one + more) for k, (one, more) in enumerate(pairwise(means))}
-    says = {many: max(_likelihood(power, shape + fresh) for fresh in _FRESH) for many, shape in lengths.items()}
-    best = max(says, key=lambda many: says[many])
-    return best if says[best] > lasting + _LEAST_GAIN else 1.0
+    shapes = ((many, shape + fresh) for many, shape in lengths.items() for fresh in _FRESH)
+    best, shape = max(shapes, key=lambda one: _likelihood(power, one[1]))
+    return best if _likelihood(power, shape) > lasting + _LEAST_GAIN and _fits(power, shape) else 1.0
 
 
 def _mean(w: Float, many: int) -> Float:
@@ -74,10 +79,17 @@ def _lasting(w: Float) -> list[Float]:
     return [shape + fresh for shape in shapes for fresh in (0.0, *_FRESH)]
 
 
+def _fits(power: Float, shape: Float) -> bool:
+    """Return whether a shape fits a spectrum in all of its parts, but for the one where most of the ship's own is."""
+    parts = np.array_split(power / shape, _PARTS)[1:]
+    usual = np.mean(np.concatenate(parts))
+    return all(abs(np.mean(part) / usual - 1.0) * np.sqrt(_INDEPENDENT * part.size) < _MISSES for part in parts)
+
+
 def _likelihood(power: Float, shape: Float) -> float:
     """Return the log-likelihood of a spectrum of this shape and the size that suits best.
 
     A tapered periodogram has neighbours that resemble each other: two of three ordinates count.
     """
     size = float(np.mean(power / shape))
-    return -2.0 / 3.0 * float(np.sum(np.log(shape)) + power.size * np.log(size))
+    return -_INDEPENDENT * float(np.sum(np.log(shape)) + power.size * np.log(size))

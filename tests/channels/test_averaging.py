@@ -46,6 +46,17 @@ def test_noise_that_lasts_is_no_mean(kept: float) -> None:
     assert readings_averaged(ship_and(noise)) == 1.0
 
 
+def test_a_speed_whose_changes_are_above_its_noise_is_no_mean() -> None:
+    # a boat's speed falls and rises within seconds: her spectrum has gaps of its own
+    rng, value = np.random.default_rng(3), np.empty(COUNT)
+    time, value[0] = 0.5 * np.arange(COUNT), 1.8
+    turning = np.abs(np.sin(2.0 * np.pi * time / 11.0)) > 0.6
+    for k in range(1, COUNT):
+        value[k] = value[k - 1] + 0.4 * (1.8 - 0.5 * turning[k] - value[k - 1])
+    value += 1e-4 * rng.standard_normal(COUNT)
+    assert readings_averaged(Series((time * SECOND_NS).astype(np.int64), value)) == 1.0
+
+
 def test_a_short_log_or_one_with_gaps_says_nothing() -> None:
     log = ship_and(np.convolve(white(COUNT + 4), np.full(5, 0.2), mode="valid"))
     assert readings_averaged(Series(log.time_utc_ns[:100], log.value[:100])) == 1.0

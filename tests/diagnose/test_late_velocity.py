@@ -5,10 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from kempf.pipeline.diagnose.late_velocity import covariance_of_lateness
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.plain_fit import fit_plain
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import get
 from tests.diagnose.sailing import WORKERS, sailed
@@ -41,13 +43,18 @@ def test_two_logs_err_by_themselves_and_what_was_not_late_errs_by_nothing() -> N
     ship = sailed()
     runs = [replace(run, velocity_late_std_s=LATE_S, day=k % 2) for k, run in enumerate(ship.runs[:4])]
     fit = fit_plain(runs, ship.spec, WORKERS).fit
-    two = covariance_of_lateness(fit, WORKERS)
-    one = covariance_of_lateness(replace(fit, runs=tuple(_same_day(run) for run in fit.runs)), WORKERS)
-    # what shows in the velocity: sway, and by drift the rest
-    assert np.all((np.diag(two) < np.diag(one))[:5])
-    fresh = fit_plain(ship.runs[:3], ship.spec, WORKERS).fit
-    assert not np.any(covariance_of_lateness(fresh, WORKERS))
+    both, first, second = (covariance_of_lateness(_late_on(fit, days), WORKERS) for days in ((0, 1), (0,), (1,)))
+    assert both == pytest.approx(first + second, rel=1e-9, abs=1e-12 * np.max(np.abs(both)))
+    size = np.sqrt(np.diag(both))
+    for one, rank in ((both, 2), (first, 1), (second, 1)):
+        assert np.linalg.matrix_rank(one / np.outer(size, size), tol=1e-6) == rank
+    assert not np.any(covariance_of_lateness(_late_on(fit, ()), WORKERS))
 
 
-def _same_day(one: RunFilter) -> RunFilter:
-    return replace(one, run=replace(one.run, day=0))
+def _late_on(fit: PooledFit, days: tuple[int, ...]) -> PooledFit:
+    """A fit whose velocities were late on some days only."""
+    runs = [
+        replace(one, run=replace(one.run, velocity_late_std_s=LATE_S if one.run.day in days else 0.0))
+        for one in fit.runs
+    ]
+    return replace(fit, runs=tuple(runs))

@@ -26,7 +26,7 @@ from kempf.schemas.errors import DataRejected
 #: a log slower than this changes little in between; longer gaps are refused
 _MAX_SPEED_GAP_S = 60.0
 _MIN_INSTANTS = 40
-#: time beyond the segment over which the log is taken at least, s, and how many values of it are enough
+#: time beyond the segment over which the log is taken at least, s, and how many means that share no reading are enough
 _BEYOND_S, _FEWEST_OF_LOG = 5.0, 12
 #: a relative error of the speed is counted against no less than this
 _SLOWEST_M_S = 0.1
@@ -81,9 +81,8 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
     instants = instants[inside]
-    speed, error_std, error_time_s = _speed(
-        *(instruments, lateral, heading, rudder, instants, start_utc_ns, end_utc_ns, warnings)
-    )
+    log = _cut_log(instruments, as_delivered, start_utc_ns, end_utc_ns)
+    speed, error_std, error_time_s = _speed(log, lateral, heading, rudder, instants, warnings)
     instants, speed = _trimmed(instants, speed, warnings)
     delta = moved.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
@@ -164,20 +163,17 @@ def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) ->
 
 
 def _speed(
-    instruments: Instruments,
+    log: Series | None,
     lateral: LateralSpeed,
     heading: Series,
     rudder: Series,
     instants: Nanoseconds,
-    start_ns: int,
-    end_ns: int,
     warnings: list[str],
 ) -> tuple[Float, float, float]:
     """Speed through the water at the instants, standard deviation of its error, m/s, and the error's time, s.
 
     The log, else the forward part of the GNSS velocity.
     """
-    log = _cut_log(instruments, start_ns, end_ns)
     if log is None:
         good = np.isfinite(lateral.forward_m_s)
         log = Series(lateral.time_utc_ns[good], lateral.forward_m_s[good])
@@ -196,13 +192,17 @@ def _speed(
     return speed, slow.error_std, slow.error_time_s
 
 
-def _cut_log(instruments: Instruments, start_ns: int, end_ns: int) -> Series | None:
-    whole = instruments.get("speed_through_water")
-    if whole is None:
-        return None
-    # so that its values stand before and behind the segment
-    beyond = round(max(_BEYOND_S, 2.0 * np.nan_to_num(whole.period_s)) * SECOND_NS)
-    return _cut(instruments, "speed_through_water", start_ns - beyond, end_ns + beyond, _FEWEST_OF_LOG)
+def _cut_log(on_time: Instruments, as_delivered: Instruments, start_ns: int, end_ns: int) -> Series | None:
+    """Return the speed log about the segment, None where too little of it was delivered."""
+    name, margin = "speed_through_water", round(_BEYOND_S * SECOND_NS)
+    delivered = _cut(as_delivered, name, start_ns - margin, end_ns + margin)
+    sparse = on_time.series.get(name)
+    if delivered is None or sparse is None or sparse is as_delivered.series.get(name):
+        return delivered
+    # means that share no reading are few: so that some stand before and behind the segment
+    beyond = max(margin, round(2.0 * np.nan_to_num(sparse.period_s) * SECOND_NS))
+    apart = _cut(on_time, name, start_ns - beyond, end_ns + beyond, _FEWEST_OF_LOG)
+    return delivered if apart is None else apart
 
 
 def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:
