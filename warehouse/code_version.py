@@ -57,7 +57,7 @@ STAGES: dict[Stage, Entry] = {
         ),
         ("ingest",),
     ),
-    "diagnose": Entry(("diagnose.diagnosis", "diagnose.evidence", "diagnose.verdict"), ("segment", "estimate")),
+    "diagnose": Entry(("diagnose.diagnosis", "diagnose.diagnosis_json", "diagnose.evidence"), ("segment", "estimate")),
 }
 #: Rooms that a result is a function of.
 _ROOMS = ("pipeline", "schemas")

@@ -37,7 +37,7 @@ from kempf.schemas.model_spec import ModelSpec
 
 @dataclass(frozen=True, eq=False)
 class Diagnosis:
-    """What a diagnosis found; `kempf.pipeline.diagnose.verdict` puts it in words."""
+    """What a diagnosis found; `kempf.pipeline.diagnose.sentences` puts it in words."""
 
     #: The plain model, then with one given effect more after the other; the last one is diagnosed.
     way: tuple[PooledFit, ...]

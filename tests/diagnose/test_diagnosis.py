@@ -12,13 +12,16 @@ import pytest
 from kempf.pipeline.diagnose.by_prediction import _stands
 from kempf.pipeline.diagnose.confirm import Confirmation, Unseen
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
+from kempf.pipeline.diagnose.diagnosis_json import as_json
+from kempf.pipeline.diagnose.effect_finding import finding, refusal
 from kempf.pipeline.diagnose.forward_selection import added, is_ship
 from kempf.pipeline.diagnose.remainder import something_left
 from kempf.pipeline.diagnose.screen import score
+from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
-from kempf.pipeline.diagnose.verdict import _refusal, as_json, finding, sentences, verdict
+from kempf.pipeline.diagnose.verdict import verdict
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.terms.own import from_expression
@@ -289,7 +292,7 @@ def test_an_effect_that_the_refit_leaves_nothing_of_is_not_claimed() -> None:
     sound = refitted()
     assert sound.holds
     nothing = replace(sound, absent=True)
-    assert not nothing.holds and _refusal(nothing) == "the refit leaves nothing of it"
+    assert not nothing.holds and refusal(nothing) == "the refit leaves nothing of it"
 
 
 @pytest.mark.parametrize("wrong", range(6))

@@ -12,8 +12,9 @@ from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import silent
 from kempf.pipeline.diagnose.joint import better_together
 from kempf.pipeline.diagnose.matters import better_ahead
+from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.split import split
-from kempf.pipeline.diagnose.verdict import sentences, verdict
+from kempf.pipeline.diagnose.verdict import verdict
 from kempf.pipeline.shooting.ahead import shooting_range
 from tests.diagnose.sailing import WORKERS
 from tests.real_data.voyage import Voyage

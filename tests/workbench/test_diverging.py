@@ -6,7 +6,7 @@ from math import isnan
 
 import numpy as np
 
-from kempf.pipeline.diagnose.verdict import _share
+from kempf.pipeline.diagnose.sentences import _share
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.workbench.cli.ladder import free_run_percent
 

@@ -20,7 +20,8 @@ from benchmarks.diagnose.late_rudder import LAG_S
 from kempf.flows.jobs import diagnose_vessel
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.standing_model import PLAIN, Own
-from kempf.pipeline.diagnose.verdict import NOT_EXPLAINED, Verdict
+from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED
+from kempf.pipeline.diagnose.verdict import Verdict
 from kempf.schemas.diagnosis_evidence import ConfusionMap, DiagnosisEvidence
 from kempf.warehouse import delta, diagnoses
 from kempf.warehouse.store import Warehouse

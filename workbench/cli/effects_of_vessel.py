@@ -31,8 +31,8 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
     from kempf.flows.jobs.diagnose_vessel import examine
     from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.flows.jobs.standing_model import Own, standing_model
+    from kempf.pipeline.diagnose.diagnosis_json import as_json as diagnosis_as_json
     from kempf.pipeline.diagnose.settings import DiagnosisSettings
-    from kempf.pipeline.diagnose.verdict import as_json as diagnosis_as_json
     from kempf.warehouse.canonical import plain
     from kempf.warehouse.store import Warehouse
 

@@ -1,0 +1,162 @@
+"""What a diagnosis says of each effect of the catalogue, and why."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from kempf.pipeline.diagnose.confirm import Confirmation
+from kempf.pipeline.diagnose.diagnosis import Diagnosis
+from kempf.pipeline.diagnose.immaterial import Immaterial
+from kempf.pipeline.diagnose.ladder_step import Step
+from kempf.pipeline.diagnose.screen import Candidate
+from kempf.pipeline.diagnose.sizes import sized, stated
+from kempf.schemas.effect import Effect
+from kempf.schemas.enumeration import listed
+
+#: said of an effect that improves the prediction while something that repeats itself is left
+NOT_EXPLAINED = "improves the fit, but does not explain the misfit (see what remains)"
+#: an effect whose possible size is smaller than this many standard errors cannot be seen
+POWER = 3.0
+#: a share of the whitened variance below which a significant effect is too small to matter
+NEGLIGIBLE = 5e-4
+
+
+@dataclass(frozen=True)
+class EffectFinding:
+    """One effect's verdict, and why."""
+
+    #: ``present`` is what matters; ``immaterial`` is certain and changes nothing that a user predicts.
+    verdict: Literal["present", "immaterial", "suspected", "negligible", "not_testable", "absent"]
+    why: str
+
+
+def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
+    """Return the verdict on one candidate of the first screen.
+
+    Parameters
+    ----------
+    candidate : Candidate
+        Of the plain model's screen.
+    """
+    effect = candidate.effect
+    found = _refitted(diagnosis, candidate.effect)
+    if found is not None:
+        return found
+    untestable = _untestable(candidate)
+    if untestable:
+        return EffectFinding("not_testable", untestable)
+    if candidate.p_adjusted >= diagnosis.settings.level:
+        return EffectFinding("absent", _absent(candidate))
+    if effect.name in diagnosis.suspected:
+        return EffectFinding("suspected", diagnosis.suspected[effect.name])
+    measured = sum(line.u.size // 2 for line in diagnosis.steps[0].fit.linearised)
+    if candidate.score / measured < NEGLIGIBLE:
+        return EffectFinding(
+            "negligible", f"it explains {_percent(candidate.score / measured)} of the innovations' variance"
+        )
+    return _explained_away(diagnosis, candidate)
+
+
+def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
+    """Return the verdict on an effect that a step was made of, or that is immaterial; None on any other."""
+    for number, step in enumerate(diagnosis.steps[1:], start=1):
+        members = {c.effect.name: k for c, k in step.chosen_from}
+        if effect.name in members:
+            others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
+            alike = f"; these data would fit {listed(others)} as well" if others else ""
+            size = stated(diagnosis, step, effect, members[effect.name])
+            return EffectFinding("present", f"step {number}: {size}{alike}")
+    for step in diagnosis.imitating:
+        for member, confirmation in step.chosen_from:
+            if member.effect.name == effect.name:
+                return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized(effect, confirmation)}")
+    for one in diagnosis.immaterial:
+        for member, confirmation in one.chosen_from:
+            if member.effect.name == effect.name:
+                return EffectFinding("immaterial", f"{sized(effect, confirmation)}; {changes(one)}")
+    return None
+
+
+def changes(one: Immaterial) -> str:
+    """Say how little an effect changes."""
+    return (
+        f"with it the misfit one leg ahead changes by {-100.0 * one.weight.fall:+.1f} %, and no parameter of the hull "
+        f"moves by more than {100.0 * one.weight.shift:.1f} % beyond its error"
+    )
+
+
+def _untestable(candidate: Candidate) -> str:
+    """Say why these data do not determine an effect; empty where they do."""
+    if candidate.missing:
+        return f"not in the logs: {listed(list(candidate.missing))}"
+    if candidate.measured_by:
+        return f"the logs have {listed(list(candidate.measured_by))}, which measures it already"
+    if np.isnan(candidate.score):
+        share = _percent(candidate.absorption)
+        return f"the model as it is absorbs {share} of it. {candidate.effect.separated_by}"
+    weak = _too_weak(candidate)
+    return f"{weak} {candidate.effect.separated_by}" if weak else ""
+
+
+def _explained_away(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
+    """Say why an effect that looked present by itself is not claimed."""
+    name = candidate.effect.name
+    added = [step.added.title for step in diagnosis.steps[1:] if step.added is not None]
+    last = {c.effect.name: c for c in diagnosis.steps[-1].screened}.get(name)
+    refits = [k for step in climbed(diagnosis) for c, k in step.refused if c.effect.name == name]
+    if added and (last is None or np.isnan(last.score) or last.p_adjusted >= diagnosis.settings.level):
+        return EffectFinding("absent", f"no longer significant once {listed(added)} is included")
+    if refits:
+        return EffectFinding("absent", f"significant by itself; refused after the refit: {refusal(refits[-1])}")
+    return EffectFinding("absent", "significant by itself; not refitted, as others explain more")
+
+
+def climbed(diagnosis: Diagnosis) -> tuple[Step, ...]:
+    """Return every step that was taken, also those whose effects only imitate what is left."""
+    return (*diagnosis.steps, *diagnosis.imitating)
+
+
+def refusal(confirmation: Confirmation) -> str:
+    """Say which test a refitted effect did not stand."""
+    gains = np.concatenate([confirmation.fold_gains, confirmation.held_out_gains])
+    if not np.isfinite(confirmation.fit.log_likelihood):
+        return "the refitted model diverges"
+    if confirmation.outdone:
+        return "another effect is so much better that its fit was not finished"
+    if confirmation.at_bound or confirmation.absent:
+        limit = "its size is at the limit of what is physical"
+        return limit if confirmation.at_bound else "the refit leaves nothing of it"
+    if confirmation.bic_change > -6.0:
+        return f"the improvement does not justify its parameters (BIC {confirmation.bic_change:+.1f})"
+    if np.mean(gains > 0.0) <= 0.5 or np.sum(gains) <= 0.0:
+        return (
+            f"it predicts only {int(np.sum(gains > 0.0))} of {gains.size} manoeuvres better that it was not fitted to"
+        )
+    return "another effect is clearly better"
+
+
+def _too_weak(candidate: Candidate) -> str:
+    """Say that even the largest physical size would not be seen; empty where it would."""
+    made = np.isfinite(candidate.std)
+    parameters = [p for p, m in zip(candidate.effect.parameters, made, strict=True) if m]
+    reach = np.array([max(abs(p.low), abs(p.high)) for p in parameters])
+    if np.all(reach < POWER * candidate.std[made]):
+        error = f"{candidate.std[made][0]:.2g} {parameters[0].unit}".rstrip()
+        return f"its standard error, {error}, is as large as any size that is physical."
+    return ""
+
+
+def _absent(candidate: Candidate) -> str:
+    p, made = candidate.effect.parameters[0], np.isfinite(candidate.std)
+    if not made[0]:
+        return "not seen"
+    limit = abs(candidate.change[0]) + 2.0 * candidate.std[0]
+    return f"not seen; upper limit (95 %): |{p.name}| < {limit:.2g} {p.unit if p.unit != '1' else ''}".rstrip()
+
+
+def _percent(share: float) -> str:
+    text = f"{100 * share:.2f}" if share < 0.9995 else f"{100 * share:.4f}"
+    return f"{text} %"

@@ -1,0 +1,182 @@
+"""What a person should read first of a diagnosis, in words that a naval architect can act on."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.diagnosis import Diagnosis
+from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED, changes
+from kempf.pipeline.diagnose.ladder_step import Step
+from kempf.pipeline.diagnose.remainder import reference_gains
+from kempf.pipeline.diagnose.remaining_misfit import said as remaining_said
+from kempf.pipeline.diagnose.sizes import sized, stated
+from kempf.pipeline.diagnose.verdict import share_explained, verdict
+from kempf.pipeline.predict.free_run import FreeRun
+from kempf.schemas.enumeration import listed
+
+#: said of the free runs of such a ship
+_UNSTABLE = (
+    " She does not keep a straight course by herself, so that the free run of any model leaves hers: what counts is "
+    "the error one leg ahead."
+)
+
+
+def sentences(diagnosis: Diagnosis) -> list[str]:
+    """Return what a person should read first, a sentence each."""
+    said = []
+    what = verdict(diagnosis)
+    for step in diagnosis.steps[1:]:
+        (candidate, best), *others = step.chosen_from
+        line = f"{candidate.effect.plain.rstrip('.')}: {stated(diagnosis, step, candidate.effect, best)}"
+        if others:
+            line += f"; the same data would fit {listed([c.effect.title for c, _ in others])}"
+            line += f". What distinguishes them: {candidate.effect.separated_by}"
+        said.append(line.rstrip(".") + ".")
+    said += _together(diagnosis)
+    if len(diagnosis.steps) > 1:
+        said += _ahead(diagnosis)
+        said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
+    for step in diagnosis.imitating:
+        (candidate, best), *_ = step.chosen_from
+        size = sized(candidate.effect, best)
+        said.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
+    for one in diagnosis.immaterial:
+        (candidate, best), *_ = one.chosen_from
+        said.append(f"Certain but immaterial: {sized(candidate.effect, best)}; {changes(one)}.")
+    if what == "insufficient_data":
+        said.append(
+            "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, "
+            "at two rudder angles, on two headings."
+        )
+    if what == "adequate":
+        said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
+    if what in ("unexplained", "partly_explained") and diagnosis.after is not None:
+        if what == "partly_explained" or reference_gains(diagnosis.before, diagnosis.after):
+            said.append(
+                "None of the known effects explains what remains: a smooth force of unknown origin still gains "
+                f"{diagnosis.after.gain:.0f} of log-likelihood in manoeuvres that it was not fitted to."
+            )
+        else:
+            said.append(
+                f"None of the known effects explains the misfit: {len(diagnosis.steps) - 1} of them were needed, and "
+                "the first explains too little to be the cause."
+            )
+        if diagnosis.after.formula:
+            terms = "; ".join(f"{term.target}: {term.expression}" for term in diagnosis.after.formula)
+            said.append(f"Exploratory, not a finding; a formula to try: {terms}.")
+    if len(diagnosis.steps) == 1 and what != "insufficient_data":
+        said += _left(diagnosis)
+    return said
+
+
+def _left(diagnosis: Diagnosis) -> list[str]:
+    """Say how much of what the last model leaves is noise, and where it sits."""
+    if diagnosis.remaining is None:
+        return []
+    return remaining_said(
+        diagnosis.remaining, "what is left" if len(diagnosis.steps) > 1 else "the misfit one leg ahead"
+    )
+
+
+def _together(diagnosis: Diagnosis) -> list[str]:
+    """Say which effects were chosen together, once for every set of them."""
+    titles = {step.added.name: step.added.title for step in diagnosis.steps[1:] if step.added is not None}
+    sets = dict.fromkeys(step.together for step in diagnosis.steps if step.together)
+    words = [listed([titles[name] for name in names]) for names in sets]
+    return [
+        f"{said[:1].upper()}{said[1:]} belong together: each of them alone makes no prediction clearly better. They "
+        "were chosen by manoeuvres left out, and the held-out ones, which had no part in the choice, confirm them."
+        for said in words
+    ]
+
+
+def _ahead(diagnosis: Diagnosis) -> list[str]:
+    """Say how the prediction one leg ahead changes: fitted, left out and held out, best and worst manoeuvre."""
+    first, last = diagnosis.steps[0].ahead, diagnosis.steps[-1].ahead
+    if first is None or last is None:
+        return []
+    parts = [("the fitted manoeuvres", first.own, last.own), ("the same left out", first.left_out, last.left_out)]
+    if first.held.errors:
+        parts.append(("those held out", first.held, last.held))
+    falls = [
+        f"from {np.mean(first.percent(a)):.1f} to {np.mean(last.percent(b)):.1f} % in {name}" for name, a, b in parts
+    ]
+    before, after = first.percent(first.left_out), last.percent(last.left_out)
+    best, worst = int(np.argmin(after - before)), int(np.argmax(after - before))
+    said = [
+        f"One leg ahead ({last.horizon_s:.3g} s) the error, of the motion, goes {listed(falls)}; left out, it goes "
+        f"from {before[best]:.1f} to {after[best]:.1f} % in the manoeuvre that gains most, from {before[worst]:.1f} to "
+        f"{after[worst]:.1f} % in the one that gains least."
+    ]
+    share = share_explained(diagnosis)
+    if share is not None:
+        said.append(
+            f"Of the misfit (mean square) one leg ahead, in manoeuvres left out, {100.0 * share:.0f} % is explained."
+        )
+    said += _left(diagnosis)
+    if last.disagrees is not None:
+        said.append(
+            f"Fits one step and one leg ahead still disagree: with parameters fitted to legs the misfit is "
+            f"{100.0 * last.disagrees.falls_by:.0f} % smaller, so that something is still lacking; predictions of "
+            "manoeuvres take those."
+        )
+    return said
+
+
+def _fall(first: Step, last: Step) -> str:
+    a, b = first.held_out_error, last.held_out_error
+    force = last.intensities[0] / first.intensities[0]
+    disturbance = f"the intensity of the lateral disturbance to {100 * force:.0f} % of what it was."
+    if last.ahead is not None and last.ahead.disagrees is not None:
+        return _fall_by_legs(first, last, disturbance)
+    fitted = f"from {_share(first.in_sample_error)} to {_share(last.in_sample_error)} %"
+    if a is None or b is None:
+        return f"The free-run error of fitted manoeuvres (none is held out) goes {fitted} of the motion, {disturbance}"
+    held = f"{len(last.held)} held-out manoeuvre{'s' * (len(last.held) > 1)}"
+    said = (
+        f"The free-run error of {held} goes from {_share(a)} to {_share(b)} % of the motion, of the fitted ones "
+        f"{fitted}, {disturbance}"
+    )
+    if not _keeps_course(last.fit.hull):
+        said += _UNSTABLE
+    elif b > a:
+        said += (
+            " The held-out error is no smaller: what speaks for the effects is the likelihood of held-out measurements "
+            "and the disturbance."
+        )
+    return said
+
+
+def _fall_by_legs(first: Step, last: Step, disturbance: str) -> str:
+    """Say how the free runs change with the parameters that predictions take; medians, as some may run away."""
+    many = len(last.fitted)
+    samples = [("fitted", slice(None, many)), ("held-out", slice(many, None))]
+    falls = [
+        f"from {_median(first.by_legs[part])} to {_median(last.by_legs[part])} % of the motion in {name} manoeuvres"
+        for name, part in samples
+        if last.by_legs[part]
+    ]
+    off = sum(not run.relative_error < 1.0 for run in last.by_legs)
+    said = f"With parameters fitted to legs the median free-run error goes {listed(falls)}, {disturbance}"
+    assert last.ahead is not None
+    if not _keeps_course(last.ahead.fit.hull):
+        said += _UNSTABLE
+    return f"{said} {off} of {len(last.by_legs)} free runs leave the measured course altogether." if off else said
+
+
+def _median(runs: Sequence[FreeRun]) -> str:
+    middle = float(np.median(np.nan_to_num([run.relative_error for run in runs], nan=np.inf)))
+    return _share(middle if np.isfinite(middle) else np.nan)
+
+
+def _keeps_course(hull: Float) -> bool:
+    """Return whether a hull goes straight ahead with the rudder amidships: both roots of eq. (16) are damped."""
+    a11, a12, a21, a22 = hull[:4]
+    return bool(a11 + a22 < 0.0 and a11 * a22 - a12 * a21 > 0.0)
+
+
+def _share(error: float) -> str:
+    return "divergence" if np.isnan(error) else f"{100 * error:.1f}"
