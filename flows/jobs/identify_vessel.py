@@ -14,7 +14,7 @@ from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, as_parameter_s
 from kempf.flows.jobs.pending import Waiting, waiting
 from kempf.flows.jobs.refresh_logs import Refreshed, refresh_logs
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, SINGLE, Own, effect_settings
-from kempf.flows.jobs.vessel_model import build_single, build_with_lasting_noise
+from kempf.flows.jobs.vessel_model import build_single, build_with_errors_that_last
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
@@ -285,8 +285,8 @@ def build(instruments: Mapping[str, Instruments], request: SetRequest) -> Parame
     else:
         given = (spec.with_arm(arm), arm or 0.0, dict(inputs.settings), profile.length_m)
         result = estimate(inputs.estimator, record, *given)
-        if inputs.estimator == SINGLE and may_last(result.fit):
-            made = build_with_lasting_noise(instruments, request)
+        if inputs.estimator == SINGLE and (may_last(result.fit) or record.velocity_late_std_s > 0.0):
+            made = build_with_errors_that_last(instruments, request)
             if made is not None:
                 return made
     return as_parameter_set(result, request, without_arm(spec, arm))

@@ -151,8 +151,11 @@ def build_single(instruments: Mapping[str, Instruments], request: SetRequest) ->
     return _single(_fitted_request(instruments, request), request)
 
 
-def build_with_lasting_noise(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet | None:
-    """Compute the set of one manoeuvre of the plain model with the lasting noise of her instruments (decision 0044).
+def build_with_errors_that_last(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet | None:
+    """Compute the set of one manoeuvre of the plain model with errors of her instruments that last.
+
+    They are lasting noise (decision 0044), and what is not known of a lateness that was taken from a velocity (decision
+    0045): it is the same in the whole manoeuvre.
 
     Parameters
     ----------
@@ -162,11 +165,12 @@ def build_with_lasting_noise(instruments: Mapping[str, Instruments], request: Se
     Returns
     -------
     ParameterSet or None
-        None where the manoeuvre shows no lasting noise, or the search for it did not converge.
+        None where the manoeuvre shows neither, or the search did not converge.
     """
     fitted = _fitted_request(instruments, request)
     fit = fitted.fits[-1]
-    return _single(fitted, request) if fit.noise and fit.converged else None
+    late = any(one.run.velocity_late_std_s > 0.0 for one in fit.runs)
+    return _single(fitted, request) if (fit.noise or late) and fit.converged else None
 
 
 def _single(fitted: Fitted, request: SetRequest) -> ParameterSet:

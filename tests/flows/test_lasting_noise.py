@@ -6,14 +6,17 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.write import logs_of
 from benchmarks.identify.intervals_as_sold import hull_of, in_std
+from kempf.flows.jobs import vessel_model
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.rerun_set import rerun
+from kempf.pipeline.diagnose import instrument_noise
 from kempf.schemas.instrument_noise import NAMES
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -52,6 +55,24 @@ def test_each_manoeuvre_states_errors_that_hold_the_truth(tmp_path: Path) -> Non
     for words in (("compare",), ("predict", "zigzag", "--angles", "10/10")):
         of = ("--vessel", FRESH.case_id, "--set", sets[0].parameter_set_id, "--warehouse", tmp_path / "w", "--json")
         assert kempf(*words, *of).code == 0, words
+
+
+def test_a_set_holds_what_is_not_known_of_a_lateness_also_where_no_noise_lasts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    boat = replace(FRESH, case_id="tern", hull="usv", sold=True)
+    monkeypatch.setattr(instrument_noise, "_LEAST_SCORE", np.inf)
+    stds = []
+    for name in ("with", "without"):
+        place = tmp_path / name
+        place.mkdir()
+        _, sets, _ = identified(boat, place)
+        assert all(any("late beside the fixes" in said for said in one.warnings) for one in sets)
+        assert [lasting(one) for one in sets] == [set()] * 4
+        stds.append([next(p.std for p in one.parameters if p.name == "a21") for one in sets])
+        monkeypatch.setattr(vessel_model, "covariance_of_lateness", lambda fit, _: np.zeros_like(fit.covariance))
+    # sway, and by drift the yaw
+    assert np.all(np.array(stds[0]) > 1.02 * np.array(stds[1])), stds
 
 
 def test_fresh_noise_is_fitted_as_fresh_noise(tmp_path: Path) -> None:
