@@ -53,7 +53,7 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         )
     if what == "adequate":
         said.append("No effect of the catalogue improves the prediction of manoeuvres that were not fitted.")
-    if what in ("unexplained", "partly_explained") and diagnosis.after is not None:
+    if diagnosis.something_left and diagnosis.after is not None:
         if what == "partly_explained" or reference_gains(diagnosis.before, diagnosis.after):
             said.append(
                 "None of the known effects explains what remains: a smooth force of unknown origin still gains "
