@@ -96,13 +96,13 @@ def _doctor() -> list[str]:
 
 def _hidden() -> list[str]:
     asked = section("hidden_effects", "Hidden effects").rows
-    wanted = ("true effect in a named set", "any claim without an effect")
-    plain = [f"{row['asked']}: {row['found']}" for row in asked if row["asked"].startswith(wanted)]
+    wanted = ("true effect in a named set", "named with instruments as", "any claim without", "anything certain")
+    cases = [f"{row['asked']}: {row['found']}" for row in asked if row["asked"].startswith(wanted)]
     sold = section("trials_as_sold", "Six trial ships").rows
     verdicts = Counter(row["verdict"] for row in sold)
     said = ", ".join(f"{many} {verdict}" for verdict, many in sorted(verdicts.items()))
     return [
-        *(f"instruments with fresh noise: {one}" for one in plain),
+        *cases,
         f"as sold, {len(sold)} trial ships whose truth is not told here: {said}" if sold else "",
     ]
 
