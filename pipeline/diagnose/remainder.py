@@ -4,19 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+import numpy as np
+
+from kempf.pipeline.diagnose.forward_selection import is_ship
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.ridge_reference import RidgeReference
 
 #: log-likelihood that the flexible reference must still gain, in runs that did not fit it: something is left
-LEFT_OVER = 12.0
+LEFT_OVER = 8.0
 #: and the share that this must be of what it gained beside the plain model: of an effect that was rightly named a
 #: little stays unexplained, and the stronger the effect, the more log-likelihood that little is worth
 LEFT_SHARE = 0.07
 #: so many effects, of which the first has less than this share of the gain, together imitate something else
 MANY, FIRST_SHARE = 3, 0.8
 #: what explains the innovations must show to the flexible reference as far as the reference can see it: it lacks at
-#: most this share of what it would gain, or so little log-likelihood as chance takes away
-UNSEEN_SHARE, UNSEEN = 0.5, 5.0
+#: most this share of what it would gain, or what chance takes away
+UNSEEN_SHARE = 0.5
+#: standard errors of chance, and the reference's gain where there is only noise, one standard deviation
+UNSEEN, REFERENCE_NOISE = 3.0, 2.0
 
 
 def something_left(steps: Sequence[Step], before: RidgeReference | None, after: RidgeReference | None) -> bool:
@@ -50,5 +55,10 @@ def _unseen_by_reference(steps: Sequence[Step], before: RidgeReference | None) -
     # what predictions of legs chose is there, though disturbances carry it so well that one step ahead nothing shows
     if before is None or len(steps) < 2 or steps[1].stability is not None:
         return False
+    # a hull that has bent to be no ship has made of the effect what neither it nor the reference is made of
+    if not is_ship(steps[0].fit.hull):
+        return False
     foreseen = before.foreseen(steps[1].chosen_from[0][0].direction)
-    return foreseen - before.gain > max(UNSEEN, UNSEEN_SHARE * foreseen)
+    # the log-likelihood that a signal is worth varies with noise by the root of twice what is to be expected of it
+    chance = np.sqrt(2.0 * max(foreseen, 0.0) + REFERENCE_NOISE**2)
+    return bool(foreseen - before.gain > max(UNSEEN * chance, UNSEEN_SHARE * foreseen))

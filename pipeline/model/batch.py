@@ -13,6 +13,8 @@ from kempf.pipeline.compiled import STEP, njit
 ONE, LANES = (1,), (16, 16)
 #: how many go through together
 MOST = LANES[0]
+#: numbers that the processor takes at once: where lanes are cheap and many, their number is a multiple of it
+VECTOR = 4
 
 
 @njit(**STEP)

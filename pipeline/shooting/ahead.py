@@ -21,7 +21,7 @@ from kempf.pipeline.shooting.paired import Paired, paired
 from kempf.pipeline.shooting.reduced import Scales
 from kempf.pipeline.shooting.scales import scaled
 from kempf.pipeline.shooting.shooting_fit import ShootingFit, alone
-from kempf.pipeline.shooting.shot_run import N_HULL, ShotRun
+from kempf.pipeline.shooting.shot_run import N_HULL, Moved, ShotRun
 from kempf.pipeline.shooting.windows import Windows, leg_s, windows_of
 from kempf.schemas.effect import Effect
 from kempf.schemas.model_spec import ModelSpec
@@ -155,7 +155,7 @@ class ShootingRange:
         shared = np.concatenate([base.fit.shared, absent])
         shots = [ShotRun(windows, model, self.spec) for windows in self.fitted]
         at = [replace(part.at, shared=shared) for part in base.fit.parts]
-        return shooting_fit.linearised(shots, at, self.scales, self.workers)
+        return shooting_fit.linearised(shots, at, self.scales, self.workers, self._moved(base))
 
     def without(self, base: Ahead, effect: Effect) -> Ahead:
         """Fit a model with one effect less."""
@@ -169,23 +169,35 @@ class ShootingRange:
 
         What only noise drives, as waves, moves no window, and is left out.
         """
-        found = []
+        found, without = [], self._moved(base)
         for effect in effects:
             if driven_by_noise(effect):
                 continue
             model = base.model.with_effect(effect)
-            made = [one for one in (self._begun(model, base, size) for size in _sizes(effect)) if one is not None]
+            begun = (self._begun(model, base, size, without) for size in _sizes(effect))
+            made = [one for one in begun if one is not None]
             if made:
                 found.append((min(cost for cost, _ in made), effect))
         return sorted(found, key=lambda pair: (pair[0], pair[1].name))
 
-    def _begun(self, model: EffectModel, base: Ahead, size: Float) -> tuple[float, Float] | None:
-        """Return what the sum of squares should fall to from a size of the last effect, and where to begin."""
+    def _begun(
+        self, model: EffectModel, base: Ahead, size: Float, without: Sequence[Moved] | None = None
+    ) -> tuple[float, Float] | None:
+        """Return what the sum of squares should fall to from a size of the last effect, and where to begin.
+
+        ``without`` is what the model predicts without that effect; it serves where there is nothing of it.
+        """
         shared = np.concatenate([base.fit.shared, size])
         shots = [ShotRun(windows, model, self.spec) for windows in self.fitted]
         at = [replace(part.at, shared=shared) for part in base.fit.parts]
-        fall = shooting_fit.foreseen(shots, at, self.scales, self.workers)
-        return None if fall is None else (fall, shared)
+        made = zip(size, model.effects[-1].parameters, strict=True)
+        absent = all(value == p.absent for value, p in made if not p.shapes)
+        here = shooting_fit.linearised(shots, at, self.scales, self.workers, without if absent else None)
+        return None if here is None else (shooting_fit.foreseen(here), shared)
+
+    def _moved(self, base: Ahead) -> list[Moved]:
+        """Return what a model predicts where it was fitted, with the derivatives."""
+        return shooting_fit.moved(base.fit.shots, [part.at for part in base.fit.parts], self.scales, self.workers)
 
 
 def shooting_range(

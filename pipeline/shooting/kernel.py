@@ -1,8 +1,9 @@
 """A ship let run over windows of a manoeuvre, several sets of parameters at once, compiled.
 
 Equation (16) with effects, without noise and without covariance: between instants the mean moves by the classical
-fourth-order Runge-Kutta rule, as in the extended filter (`kempf.pipeline.estimate.filters.ekf`), from the state at
-which each window begins. Sets of parameters stand in lanes (`kempf.pipeline.model.batch`).
+fourth-order Runge-Kutta rule from the state at which each window begins. Steps are whole (decision 0051), where the
+extended filter takes two (`kempf.pipeline.estimate.filters.ekf`). Sets of parameters stand in lanes
+(`kempf.pipeline.model.batch`).
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.compiled import FILLING, njit
-from kempf.pipeline.estimate.filters.ekf import ROWS, SUBSTEPS
+from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.model.batch import each
 from kempf.pipeline.model.chain import PSI, R, V
 from kempf.pipeline.model.dynamics import (
@@ -26,13 +27,15 @@ from kempf.pipeline.model.dynamics import (
 )
 from kempf.pipeline.model.terms.program import DEPTH
 
+#: rows of the inputs over half a step
+HALF = ROWS // 2
+
 
 @njit(**FILLING)
-def _substep(x, rows, rudders, h, ship, table, values, slopes, stack, by, total, room, lanes):  # type: ignore[no-untyped-def]
-    """Move the means over one substep."""
+def _step(x, rows, rudders, h, ship, table, values, slopes, stack, by, total, room, lanes):  # type: ignore[no-untyped-def]
+    """Move the means over one step; ``k1``, their slopes at its beginning, is there already."""
     k1, k2, k3, k4, xs, J = room
     width = k1.shape[0]
-    dynamics(x, rows[0], rudders[0], ship, width, 0, table, values, slopes, stack, by, total, k1, J, lanes)
     for i in range(width):
         for b in range(each(lanes)):
             xs[i, b] = x[i, b] + 0.5 * h * k1[i, b]
@@ -132,12 +135,11 @@ def shoot(  # type: ignore[no-untyped-def]
         x[:] = starts[w]
         for k in range(begins[w], ends[w] + 1):
             if k > begins[w]:
-                for sub in range(SUBSTEPS):
-                    i = ROWS * (k - 1) + 2 * sub
-                    _substep(
-                        *(x, inputs[i : i + 3], rudder[i : i + 3], step_s / SUBSTEPS, ship),
-                        *(table, values, slopes, stack, by, total, room, lanes),
-                    )
+                i, end = ROWS * (k - 1), ROWS * k + 1
+                _step(
+                    *(x, inputs[i:end:HALF], rudder[i:end:HALF], step_s, ship),
+                    *(table, values, slopes, stack, by, total, room, lanes),
+                )
             _measured(
                 *(x, inputs[ROWS * k], rudder[ROWS * k], offset_s[k], current_row[k], ship),
                 *(table, values, slopes, stack, by, total, k1, J, predicted[row], lanes),

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.shooting.shot_run import ShotRun, Unknowns
+from kempf.pipeline.shooting.shot_run import Moved, ShotRun, Unknowns
 from kempf.pipeline.shooting.windows import Rows
 
 
@@ -69,10 +69,16 @@ def whitened(shot: ShotRun, predicted: Float, scales: Scales) -> tuple[Float, Fl
     return np.where(made, error, 0.0), np.where(made, weight, 0.0)
 
 
-def reduce(shot: ShotRun, at: Unknowns, scales: Scales) -> Reduced:
-    """Linearise a manoeuvre and eliminate what is its own."""
+def reduce(shot: ShotRun, at: Unknowns, scales: Scales, without: Moved | None = None) -> Reduced:
+    """Linearise a manoeuvre and eliminate what is its own.
+
+    Parameters
+    ----------
+    without : (ndarray, ndarray), optional
+        See `ShotRun.moved`.
+    """
     windows = shot.windows
-    predicted, slopes = shot.moved(at, scales.error)
+    predicted, slopes = shot.moved(at, scales.error, without)
     if not (np.all(np.isfinite(predicted)) and np.all(np.isfinite(slopes))):
         return _diverged(shot, at)
     error, weight = whitened(shot, predicted, scales)

@@ -18,7 +18,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.shooting.normal_equations import NormalEquations, normal_equations
 from kempf.pipeline.shooting.reduced import Reduced, Scales, reduce
-from kempf.pipeline.shooting.shot_run import N_HULL, ShotRun, Unknowns
+from kempf.pipeline.shooting.shot_run import N_HULL, Moved, ShotRun, Unknowns
 
 _ITERATIONS, _SETTLED = 20, 1e-4
 #: windows over which what is misfitted hangs together
@@ -135,19 +135,31 @@ def fit(
     return ShootingFit(tuple(shots), scales, parts[0].at.shared, tuple(parts), here.cost, converged)
 
 
+def moved(shots: Sequence[ShotRun], at: Sequence[Unknowns], scales: Scales, workers: Executor) -> list[Moved]:
+    """Return what is predicted of every manoeuvre at a point, and its derivatives."""
+    return list(workers.map(lambda pair: pair[0].moved(pair[1], scales.error), zip(shots, at, strict=True)))
+
+
 def linearised(
-    shots: Sequence[ShotRun], at: Sequence[Unknowns], scales: Scales, workers: Executor
+    shots: Sequence[ShotRun],
+    at: Sequence[Unknowns],
+    scales: Scales,
+    workers: Executor,
+    without: Sequence[Moved] | None = None,
 ) -> NormalEquations | None:
-    """Return the normal equations at a point; None where a window diverges there."""
-    found = normal_equations(shots, _reduced(shots, at, scales, workers))
+    """Return the normal equations at a point; None where a window diverges there.
+
+    Parameters
+    ----------
+    without : sequence of (ndarray, ndarray), optional
+        See `ShotRun.moved`; one a manoeuvre.
+    """
+    found = normal_equations(shots, _reduced(shots, at, scales, workers, without))
     return found if np.isfinite(found.cost) else None
 
 
-def foreseen(shots: Sequence[ShotRun], at: Sequence[Unknowns], scales: Scales, workers: Executor) -> float | None:
-    """Return what the sum of squares would fall to by one step of Gauss-Newton; None where a window diverges."""
-    here = linearised(shots, at, scales, workers)
-    if here is None:
-        return None
+def foreseen(here: NormalEquations) -> float:
+    """Return what the sum of squares would fall to by one step of Gauss-Newton."""
     scale = here.scale
     step = np.linalg.lstsq(here.information / np.outer(scale, scale), -here.gradient / scale, rcond=1e-9)[0] / scale
     return here.cost + float(here.gradient @ step)
@@ -177,5 +189,12 @@ def alone(shot: ShotRun, shared: Float, scales: Scales, begin: Unknowns | None =
     return (found if np.isfinite(part.cost) else float("inf")), part.at, part.errors
 
 
-def _reduced(shots: Sequence[ShotRun], at: Sequence[Unknowns], scales: Scales, workers: Executor) -> list[Reduced]:
-    return list(workers.map(lambda pair: reduce(pair[0], pair[1], scales), zip(shots, at, strict=True)))
+def _reduced(
+    shots: Sequence[ShotRun],
+    at: Sequence[Unknowns],
+    scales: Scales,
+    workers: Executor,
+    without: Sequence[Moved] | None = None,
+) -> list[Reduced]:
+    known: Sequence[Moved | None] = without or [None] * len(shots)
+    return list(workers.map(lambda one: reduce(one[0], one[1], scales, one[2]), zip(shots, at, known, strict=True)))

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.model.batch import LANES, MOST
+from kempf.pipeline.model.batch import VECTOR
 from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
@@ -25,6 +25,9 @@ _OWN_STD = np.array([0.05, 0.1, 0.3, 0.3, 0.02])
 #: v, r, psi
 _STATES = 3
 _STEP = 1e-3
+
+#: what is predicted, and its derivatives
+Moved = tuple[Float, Float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +86,7 @@ class ShotRun:
         """
         run = self.windows.run
         k, extra = shared.shape[1], self.model.extra
-        many = -(-k // MOST) * MOST
+        many = -(-k // VECTOR) * VECTOR
         at = np.minimum(np.arange(many), k - 1)
         shared, own, starts = shared[:, at], own[:, at], starts[..., at]
         w = starts.shape[0]
@@ -93,16 +96,12 @@ class ShotRun:
         rudder = self.model.rudders(run.fine_time_s, run.inputs[:, 1], run.rudder_between, shared[N_HULL:])
         constants = run.constants(self.spec.rudder_speed_exponent)
         found = np.empty((self.windows.rows.size, 3, many))
-        for first in range(0, many, MOST):
-            lanes = slice(first, first + MOST)
-            part = np.empty((found.shape[0], 3, MOST))
-            shoot(
-                *(np.ascontiguousarray(shared[:N_HULL, lanes]), np.ascontiguousarray(shared[N_HULL:, lanes])),
-                *(run.step_s, run.inputs, np.ascontiguousarray(rudder[:, lanes]), run.offset_s, run.current_row),
-                *(constants, self.windows.begins, self.windows.ends, np.ascontiguousarray(x0[..., lanes])),
-                *(self.model.table, part, LANES),
-            )
-            found[..., lanes] = part
+        shoot(
+            *(np.ascontiguousarray(shared[:N_HULL]), np.ascontiguousarray(shared[N_HULL:])),
+            *(run.step_s, run.inputs, np.ascontiguousarray(rudder), run.offset_s, run.current_row),
+            *(constants, self.windows.begins, self.windows.ends, x0),
+            *(self.model.table, found, (many, many)),
+        )
         return found[..., :k]
 
     def steps(self, at: Unknowns, scale: Float) -> Float:
@@ -115,19 +114,28 @@ class ShotRun:
         ]
         return np.concatenate([hull, effects, _STEP * self.own_std[self.used], _STEP * scale])
 
-    def moved(self, at: Unknowns, scale: Float) -> tuple[Float, Float]:
+    def moved(self, at: Unknowns, scale: Float, without: Moved | None = None) -> Moved:
         """Return what is predicted, shape (m, 3), and its derivatives, shape (m, 3, 6 + p + d + 3).
 
         Parameters
         ----------
         scale : ndarray, shape (3,)
             Of an error of v, r and psi.
+        without : (ndarray, ndarray), optional
+            The same of the model without its last effects, which are none of them there: only how the prediction moves
+            with these is asked for then.
         """
         by = self.steps(at, scale)
         shared, own, starts = self._stepped(at, by)
+        if without is not None:
+            fresh = np.arange(without[1].shape[2] - self.used.size - _STATES, at.shared.size)
+            lanes = np.concatenate([[0], 1 + fresh])
+            found = self.predicted(shared[:, lanes], own[:, lanes], starts[..., lanes])
+            slopes = (found[..., 1:] - found[..., :1]) / by[fresh]
+            return without[0], np.insert(without[1], np.full(fresh.size, fresh[0]), slopes, axis=2)
         found = self.predicted(shared, own, starts)
         with np.errstate(invalid="ignore"):
-            slopes: Float = (found[..., 1:] - found[..., :1]) / by
+            slopes = (found[..., 1:] - found[..., :1]) / by
         return found[..., 0], slopes
 
     def _stepped(self, at: Unknowns, by: Float) -> tuple[Float, Float, Float]:
