@@ -280,17 +280,15 @@ Columns = list[tuple[Float, Float]]
 def _posterior(logs: Sequence[_Log], forms: Sequence[tuple[int, ...]]) -> SurgeFit:
     """Return the posterior over all forms of the loss and all tau; errors that remember count as fewer."""
     columns = [[log.columns(tau) for log in logs] for tau in _GRID]
+    freed = [_freed(logs, own) for own in columns]
     # where the logs alone are best, their errors are smallest: so large they are
-    every = [_left(logs, own, kinds) for kinds in forms for own in columns]
+    every = [_left(own, kinds) for kinds in forms for own in freed]
     left = min(every, key=lambda parts: sum(float(e @ e) for e in parts))
     count = sum(e.size for e in left)
     error = max(float(np.sqrt(sum(float(e @ e) for e in left) / count)), _LEAST_ERROR)
     variance = error**2 * _memory(left)
-    parts = [
-        (tau, kinds, _solved(logs, own, tau, kinds, variance))
-        for kinds in forms
-        for tau, own in zip(_GRID, columns, strict=True)
-    ]
+    reduced = [[_Reduced.of(log, one, variance) for log, one in zip(logs, own, strict=True)] for own in columns]
+    parts = [(tau, kinds, _solved(own, tau, kinds)) for kinds in forms for tau, own in zip(_GRID, reduced, strict=True)]
     tau = np.array([part[0] for part in parts])
     # the area of the other parameters counts, as in any marginal likelihood
     score = np.array([solved.score for _, _, solved in parts]) + (np.log(tau / TAU_MEDIAN) / TAU_SPREAD) ** 2
@@ -318,24 +316,42 @@ class _Solved:
     settled: tuple[float, ...]
 
 
-def _solved(logs: Sequence[_Log], columns: Columns, tau: float, kinds: Sequence[int], variance: float) -> _Solved:
-    """Return the posterior of the losses at a tau."""
-    losses, kinds = len(kinds), list(kinds)
-    information, right, constant, logdet = np.zeros((losses, losses)), np.zeros(losses), 0.0, 0.0
-    own_parts = []
-    for log, (own, every) in zip(logs, columns, strict=True):
-        lost = every[:, kinds]
+@dataclass(frozen=True, eq=False)
+class _Reduced:
+    """What a log says at one tau of all losses, over the error's variance, V_0 and the first speed taken out."""
+
+    #: information, right: Shape (4, 4) and (4,). Of the losses.
+    information: Float
+    right: Float
+    constant: float
+    logdet: float
+    #: V_0 / V_s without losses, and by how much each lowers it, shape (5,).
+    settled: Float
+
+    @classmethod
+    def of(cls, log: _Log, columns: tuple[Float, Float], variance: float) -> _Reduced:
+        own, lost = columns
         # V_0 has a prior at V_s, the first speed a wide one
         precision = np.array([1.0 / log.settled_std**2, 1.0])
         A = own.T @ own / variance + np.diag(precision)
         b = own.T @ log.speed / variance + precision
         C = own.T @ lost / variance
         solved = np.linalg.solve(A, np.column_stack([b, C]))
-        own_parts.append(solved[0])
-        constant += log.speed @ log.speed / variance + precision.sum() - b @ solved[:, 0]
-        right += lost.T @ log.speed / variance - C.T @ solved[:, 0]
-        information += lost.T @ lost / variance - C.T @ solved[:, 1:]
-        logdet += slogdet(A)[1]
+        return cls(
+            information=lost.T @ lost / variance - C.T @ solved[:, 1:],
+            right=lost.T @ log.speed / variance - C.T @ solved[:, 0],
+            constant=float(log.speed @ log.speed / variance + precision.sum() - b @ solved[:, 0]),
+            logdet=float(slogdet(A)[1]),
+            settled=solved[0],
+        )
+
+
+def _solved(logs: Sequence[_Reduced], tau: float, kinds: Sequence[int]) -> _Solved:
+    """Return the posterior of the losses at a tau."""
+    kinds = list(kinds)
+    information = np.sum([log.information[np.ix_(kinds, kinds)] for log in logs], axis=0)
+    right = np.sum([log.right[kinds] for log in logs], axis=0)
+    constant, logdet = sum(log.constant for log in logs), sum(log.logdet for log in logs)
     unit = np.array([tau, 1.0, 1.0, tau])[kinds]
     mean_before, std_before = LOSS_MEAN[kinds] * unit, LOSS_STD[kinds] * unit
     if BY_DRIFT in kinds and BY_RATE in kinds:
@@ -348,23 +364,28 @@ def _solved(logs: Sequence[_Log], columns: Columns, tau: float, kinds: Sequence[
     cost = constant + mean_before @ prior @ mean_before - target @ mean
     area = logdet + slogdet(whole)[1] - slogdet(prior)[1]
     covariance = np.asarray(inv(whole), dtype=np.float64)
-    settled = tuple(float(part[0] - part[1:] @ mean) for part in own_parts)
+    settled = tuple(float(log.settled[0] - log.settled[1:][kinds] @ mean) for log in logs)
     return _Solved(float(cost + area), mean, covariance, settled)
 
 
-def _left(logs: Sequence[_Log], columns: Columns, kinds: Sequence[int]) -> list[Float]:
-    """Return what the model leaves of every log's speed, without priors.
+def _freed(logs: Sequence[_Log], columns: Columns) -> Columns:
+    """Return speed and losses of every log at one tau without what V_0 and the first speed explain.
 
-    V_0 and the first speed of each log are taken out first (Frisch & Waugh 1933), so that the losses alone are solved.
+    So the losses alone are to be solved for (Frisch & Waugh 1933).
     """
-    speeds, costs = [], []
-    for log, (own, every) in zip(logs, columns, strict=True):
-        lost = every[:, list(kinds)]
+    found = []
+    for log, (own, lost) in zip(logs, columns, strict=True):
         base = np.linalg.qr(own)[0]
-        speeds.append(log.speed - base @ (base.T @ log.speed))
-        costs.append(lost - base @ (base.T @ lost))
-    found = lstsq(np.vstack(costs), np.concatenate(speeds), rcond=1e-10)[0]
-    return [speed - cost @ found for speed, cost in zip(speeds, costs, strict=True)]
+        found.append((log.speed - base @ (base.T @ log.speed), lost - base @ (base.T @ lost)))
+    return found
+
+
+def _left(freed: Columns, kinds: Sequence[int]) -> list[Float]:
+    """Return what the model leaves of every log's speed, without priors; see `_freed`."""
+    chosen = [(speed, lost[:, list(kinds)]) for speed, lost in freed]
+    whole, right = np.vstack([lost for _, lost in chosen]), np.concatenate([speed for speed, _ in chosen])
+    found = lstsq(whole, right, rcond=1e-10)[0]
+    return [speed - lost @ found for speed, lost in chosen]
 
 
 def _memory(left: Sequence[Float]) -> float:
