@@ -120,7 +120,7 @@ class Predicted:
 
     def show(self) -> dict[str, Any]:
         """Return the prediction as the command line's JSON object."""
-        made = self.prediction
+        made, surge = self.prediction, self.basis.surge.at(self.speed_m_s)
         return {
             "vessel": self.vessel,
             "parameter_set_id": self.parameter_set.parameter_set_id,
@@ -144,12 +144,12 @@ class Predicted:
             "imo": [vars(one) for one in made.imo],
             "unstable_on_a_straight_course": made.share_unstable,
             "surge": {
-                "time_constant_lengths": float(self.basis.surge.best[0]),
-                "loss_by_drift_and_turn": float(self.basis.surge.best[1]),
-                "loss_by_yaw_rate": float(self.basis.surge.best[2]),
-                "loss_by_rudder": float(self.basis.surge.best[3]),
-                "loss_by_wind": float(self.basis.surge.best[4]),
-                "std": [float(x) for x in self.basis.surge.std],
+                "time_constant_lengths": float(surge.best[0]),
+                "loss_by_drift_and_turn": float(surge.best[1]),
+                "loss_by_yaw_rate": float(surge.best[2]),
+                "loss_by_rudder": float(surge.best[3]),
+                "loss_by_wind": float(surge.best[4]),
+                "std": [float(x) for x in surge.std],
             },
             "rudder_rate_deg_s": {
                 "value": degrees(made.models[0].model.rudder_rate.rad_s),
