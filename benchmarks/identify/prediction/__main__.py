@@ -17,7 +17,7 @@ from benchmarks.identify.prediction import hidden_ship, plain_ship
 from benchmarks.identify.prediction.compared import Compared, ComparedShip
 from benchmarks.identify.prediction.page import page
 
-_PLAIN, _STAMPED, _HIDDEN, _EVERY = 120, 40, 80, 12
+_PLAIN, _STAMPED, _HIDDEN, _EVERY = 150, 40, 50, 12
 
 
 def ship(task: tuple[str, int], work: Path | None = None) -> ComparedShip:
