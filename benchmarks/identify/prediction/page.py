@@ -75,8 +75,8 @@ def _of_whom(by: Mapping[str, Sequence[ComparedShip]], again: int) -> list[str]:
         f"instrument: how old that is, it does not say, and instruments differ. {len(by['stamped'])} of the ships were "
         "identified once more from the same zigzags in a log that has the instant of every reading (MCAP). "
         f"{again} more were drawn and are no ships: unstable on a straight course, or, as eq. (16) has no damping that "
-        "grows with the motion, sliding through a 35 deg circle with a drift of more than 56 deg or a turn of more than "
-        "three radians a length.",
+        "grows with the motion, sliding through a 35 deg circle with a drift of more than 56 deg or a turn of more "
+        "than three radians a length.",
         "",
         f"**{len(known) + len(diagnosed)} ships have one hidden effect** that acts on the ship: none of an instrument, "
         "no waves, shallow water or roll, which a prediction for calm, deep water takes out. It is small, medium or "
