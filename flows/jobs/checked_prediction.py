@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from kempf.flows.jobs.as_sailed import AsSailed
 from kempf.flows.jobs.compare_predicted import beside, figures_of, own_zigzags
-from kempf.flows.jobs.predict_vessel import Predicted, PredictRequest, limits_of, predict_vessel
+from kempf.flows.jobs.predict_vessel import Predicted, PredictRequest, limits_of, models_of_set, predict_with
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.conditioned import OwnZigzag, conditioned
 from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
-from kempf.pipeline.manoeuvre.own_zigzags import held_against, missed, scatter
+from kempf.pipeline.manoeuvre.own_zigzags import OwnZigzags, held_against, missed, scatter
 from kempf.pipeline.manoeuvre.prediction import predict
 from kempf.warehouse.store import Warehouse
 
@@ -28,26 +28,69 @@ def predict_checked(
 
     Parameters and errors are those of `kempf.flows.jobs.predict_vessel.predict_vessel`.
     """
-    made = predict_vessel(warehouse, vessel, request, progress, count)
+    return CheckedPredictions(warehouse, vessel, request, progress).predict(request, progress, count)
+
+
+class CheckedPredictions:
+    """Predictions of several manoeuvres with one set at one speed, what they share made once.
+
+    Parameters
+    ----------
+    warehouse, vessel, progress
+        As `kempf.flows.jobs.predict_vessel.predict_vessel` takes them.
+    request : PredictRequest
+        Says which set and which speed.
+    """
+
+    def __init__(self, warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent) -> None:
+        self._warehouse = warehouse
+        self._hers = models_of_set(warehouse, vessel, request, progress)
+        self._checks: dict[tuple[str, ...], _Check] = {}
+
+    def predict(self, request: PredictRequest, progress: Progress = silent, count: int = DRAWS) -> Predicted:
+        """Predict one, see `predict_checked`; set and speed are those of the first request."""
+        made = predict_with(self._hers, request, progress, count)
+        # a model whose ships do not sail the manoeuvre is left out, of the check too
+        names = tuple(one.model.name for one in made.prediction.models)
+        if names not in self._checks:
+            self._checks[names] = _check(self._warehouse, made, progress)
+        check = self._checks[names]
+        if not check.models:
+            return replace(made, own_zigzags=check.own)
+        gear = made.prediction.models[0].model.rudder_rate
+        models = [replace(model, rudder_rate=gear) for model in check.models]
+        asked, length_m = made.prediction.manoeuvre, made.basis.profile.length_m
+        prediction = predict(models, asked, made.basis.logs, length_m, count)
+        prediction = replace(prediction, run_away=(*made.prediction.run_away, *prediction.run_away))
+        limits = limits_of(prediction, made.parameter_set)
+        return replace(made, prediction=prediction, limits=limits, own_zigzags=check.own)
+
+
+@dataclass(frozen=True, eq=False)
+class _Check:
+    """What the own zigzags say of some models."""
+
+    own: OwnZigzags
+    #: Those that miss no more than chance; empty where the models as they are do not.
+    models: tuple[Identified, ...] = ()
+
+
+def _check(warehouse: Warehouse, made: Predicted, progress: Progress) -> _Check:
     zigzags = own_zigzags(warehouse, made, progress)
     own = _overshoots(made, zigzags)
     before = held_against(_rows(own), len(zigzags))
     if not missed(_rows(own)):
-        return replace(made, own_zigzags=before)
+        return _Check(before)
     fitted = [one for one in zigzags if one.sample == "fitted"]
     nearer = _with_models(made, lambda model: _brought(model, made, fitted))
     own = _overshoots(nearer, zigzags)
     alone = _overshoots(_with_models(nearer, lambda model: model.scattered_alone()), zigzags)
     both = [name for name in own if name in alone]
     share = scatter(_rows({name: own[name] for name in both}), _rows({name: alone[name] for name in both}))
-    models = [one.model.scattered(share) for one in nearer.prediction.models]
-    asked, length_m = made.prediction.manoeuvre, made.basis.profile.length_m
-    prediction = predict(models, asked, made.basis.logs, length_m, count)
-    prediction = replace(prediction, run_away=(*made.prediction.run_away, *prediction.run_away))
+    models = tuple(one.model.scattered(share) for one in nearer.prediction.models)
     brought = any(one.model.conditioned for one in nearer.prediction.models)
     after = replace(held_against(_rows(own), len(zigzags)), scatter=share, before=before if brought else None)
-    limits = limits_of(prediction, made.parameter_set)
-    return replace(made, prediction=prediction, limits=limits, own_zigzags=after)
+    return _Check(after, models)
 
 
 def _brought(model: Identified, made: Predicted, zigzags: Sequence[AsSailed]) -> Identified:

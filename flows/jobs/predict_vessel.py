@@ -120,7 +120,7 @@ class Predicted:
 
     def show(self) -> dict[str, Any]:
         """Return the prediction as the command line's JSON object."""
-        made = self.prediction
+        made, surge = self.prediction, self.basis.surge.at(self.speed_m_s)
         return {
             "vessel": self.vessel,
             "parameter_set_id": self.parameter_set.parameter_set_id,
@@ -144,12 +144,12 @@ class Predicted:
             "imo": [vars(one) for one in made.imo],
             "unstable_on_a_straight_course": made.share_unstable,
             "surge": {
-                "time_constant_lengths": float(self.basis.surge.best[0]),
-                "loss_by_drift_and_turn": float(self.basis.surge.best[1]),
-                "loss_by_yaw_rate": float(self.basis.surge.best[2]),
-                "loss_by_rudder": float(self.basis.surge.best[3]),
-                "loss_by_wind": float(self.basis.surge.best[4]),
-                "std": [float(x) for x in self.basis.surge.std],
+                "time_constant_lengths": float(surge.best[0]),
+                "loss_by_drift_and_turn": float(surge.best[1]),
+                "loss_by_yaw_rate": float(surge.best[2]),
+                "loss_by_rudder": float(surge.best[3]),
+                "loss_by_wind": float(surge.best[4]),
+                "std": [float(x) for x in surge.std],
             },
             "rudder_rate_deg_s": {
                 "value": degrees(made.models[0].model.rudder_rate.rad_s),
@@ -160,6 +160,20 @@ class Predicted:
             "assumed": list(self.assumed),
             "limits": list(self.limits),
         }
+
+
+@dataclass(frozen=True, eq=False)
+class ModelsOfSet:
+    """What all predictions with one set at one speed share."""
+
+    vessel: str
+    parameter_set: ParameterSet
+    basis: Basis
+    speed_m_s: float
+    #: That of the set, then those that fit as well.
+    models: tuple[Identified, ...]
+    #: Of how the others were found, sentences.
+    remarks: tuple[str, ...]
 
 
 def predict_vessel(
@@ -182,7 +196,41 @@ def predict_vessel(
     DataRejected
         ``set_without_covariance``, ``predicts_no_ship``.
     """
-    manoeuvre = manoeuvre_of(request)
+    return predict_with(models_of_set(warehouse, vessel, request, progress), request, progress, count)
+
+
+def models_of_set(
+    warehouse: Warehouse, vessel: str, request: PredictRequest, progress: Progress = silent
+) -> ModelsOfSet:
+    """Return the models of the set that is asked for, at the speed that is asked for; errors are `predict_vessel`'s."""
+    _require(request)
+    one, _ = chosen_set(warehouse, vessel, request.set_id)
+    basis = basis_of(warehouse, one, progress)
+    speed = request.speed_m_s or basis.approach_m_s
+    rivals = rivals_of(warehouse, one, progress)
+    models = tuple(identified(ship_of_set(warehouse, each, speed), basis) for each in (one, *rivals.sets))
+    return ModelsOfSet(vessel, one, basis, speed, models, rivals.remarks)
+
+
+def predict_with(
+    hers: ModelsOfSet, request: PredictRequest, progress: Progress = silent, count: int = DRAWS
+) -> Predicted:
+    """Predict a manoeuvre with models that are there; set and speed are theirs, errors are `predict_vessel`'s."""
+    _require(request)
+    models, basis = list(hers.models), hers.basis
+    if request.rudder_rate_deg_s is not None:
+        gear = RudderRate(radians(request.rudder_rate_deg_s), 0.0, 0, "")
+        models = [replace(model, rudder_rate=gear) for model in models]
+    progress(0, 1, f"sailing {len(models) * count} ships")
+    made = predict(models, manoeuvre_of(request), basis.logs, basis.profile.length_m, count)
+    progress(1, 1, "sailed")
+    assumed = (*_assumed(request, basis, models, hers.speed_m_s), *hers.remarks)
+    one = hers.parameter_set
+    return Predicted(hers.vessel, one, basis, hers.speed_m_s, made, assumed, limits_of(made, one))
+
+
+def _require(request: PredictRequest) -> None:
+    manoeuvre_of(request)
     if request.speed_m_s is not None and not (isfinite(request.speed_m_s) and request.speed_m_s > 0.0):
         raise UsageError(
             "speed_out_of_range",
@@ -195,19 +243,6 @@ def predict_vessel(
             f"The rudder's rate is {request.rudder_rate_deg_s:g} deg/s, expected more than 0.",
             "Give the rate at which the gear puts the rudder over with --rudder-rate, or leave it out.",
         )
-    one, _ = chosen_set(warehouse, vessel, request.set_id)
-    basis = basis_of(warehouse, one, progress)
-    speed = request.speed_m_s or basis.approach_m_s
-    rivals = rivals_of(warehouse, one, progress)
-    models = [identified(ship_of_set(warehouse, each, speed), basis) for each in (one, *rivals.sets)]
-    if request.rudder_rate_deg_s is not None:
-        gear = RudderRate(radians(request.rudder_rate_deg_s), 0.0, 0, "")
-        models = [replace(model, rudder_rate=gear) for model in models]
-    progress(0, 1, f"sailing {len(models) * count} ships")
-    made = predict(models, manoeuvre, basis.logs, basis.profile.length_m, count)
-    progress(1, 1, "sailed")
-    assumed = (*_assumed(request, basis, models, speed), *rivals.remarks)
-    return Predicted(vessel, one, basis, speed, made, assumed, limits_of(made, one))
 
 
 def manoeuvre_of(request: PredictRequest) -> Manoeuvre:

@@ -105,7 +105,7 @@ def _sailed(zigzags: Sequence[OwnZigzag], theta: Float) -> Float:
     found: list[float] = []
     for one in zigzags:
         own = one.model
-        ship = Ship(own.waters, theta[:6], _within(own, theta)[6:], own.surge.best, own.rudder_rate.rad_s)
+        ship = Ship(own.waters, theta[:6], _within(own, theta)[6:], own.surge_here.best, own.rudder_rate.rad_s)
         made = one.manoeuvre.sailed(ship)
         found += [np.nan if made is None else made.figures[name] for name in one.measured]
     return np.array(found)

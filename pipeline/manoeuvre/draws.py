@@ -60,7 +60,13 @@ class Identified:
     @property
     def ship(self) -> Ship:
         """The ship of the estimates."""
-        return Ship(self.waters, self.hull, self.effects, self.surge.best, self.rudder_rate.rad_s)
+        return Ship(self.waters, self.hull, self.effects, self.surge_here.best, self.rudder_rate.rad_s)
+
+    @property
+    def surge_here(self) -> SurgeFit:
+        """The equation of her speed with the shaft speed of `waters`."""
+        settled = self.waters.settled_m_s
+        return self.surge.at(self.waters.approach_m_s if settled is None else settled)
 
     def scattered(self, share: float) -> Identified:
         """Return the model with parameters that scatter beside their errors, each by a share of its size."""
@@ -96,7 +102,7 @@ class Identified:
         # numbers of their own, so that hull and effects are drawn alike whatever costs her speed
         beside = np.random.Generator(np.random.PCG64([seed, 1])).standard_normal((4, count))
         of_the_day, more = beside[:2], beside[2:].T
-        surge = self.surge.drawn(np.hstack([normal[:, 6 + p : 9 + p], more]))
+        surge = self.surge_here.drawn(np.hstack([normal[:, 6 + p : 9 + p], more]))
         # a rate is positive whatever its error
         share = self.rudder_rate.std_rad_s / self.rudder_rate.rad_s
         rate = self.rudder_rate.rad_s * np.exp(share * normal[:, -1])

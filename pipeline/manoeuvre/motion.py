@@ -61,11 +61,10 @@ def rates(x, s, rudder, sea, numbers, fx, fs):  # type: ignore[no-untyped-def]
     """Fill dx/dt of the lateral states, and d(V, north, east, path)/dt."""
     row, ship, width, table, values, slopes, stack, by, total, J = sea
     row[0], row[_TRUE_HEADING] = s[0], x[PSI, 0]
-    if numbers[WIND] > 0.0:
-        # where the air over the deck comes from, clockwise from the bow
-        away = numbers[WIND_FROM] - x[PSI, 0]
-        ahead, abeam = numbers[WIND] * np.cos(away) + s[0], numbers[WIND] * np.sin(away) + x[V, 0]
-        row[_WIND_SPEED], row[_WIND_ANGLE] = np.hypot(ahead, abeam), np.arctan2(abeam, ahead)
+    # where the air over the deck comes from, clockwise from the bow: in calm air that of her own way
+    away = numbers[WIND_FROM] - x[PSI, 0]
+    ahead, abeam = numbers[WIND] * np.cos(away) + s[0], numbers[WIND] * np.sin(away) + x[V, 0]
+    row[_WIND_SPEED], row[_WIND_ANGLE] = np.hypot(ahead, abeam), np.arctan2(abeam, ahead)
     dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, fx, J, ONE)
     length, settled = numbers[LENGTH], numbers[SETTLED]
     fs[0] = (
@@ -119,7 +118,7 @@ def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignor
     values[SHIP + 8, 0], values[SHIP + 9, 0] = numbers[APPROACH], 1.0
     for i in range(p):
         values[PARAMETER + i, 0] = values_of_effects[i]
-    # no wind but the given one, the shaft turning on, deep water, upright; n0 is 1 and V0 the speed of the approach
+    # the shaft turning on, deep water, upright; n0 is 1 and V0 the speed of the approach
     row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = numbers[SHAFT] / numbers[APPROACH], 1e12, day
     ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
     stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))

@@ -21,6 +21,11 @@ wind costs speed and a following one gives some. k_w / tau is the air's density 
 mass per length: about 0.001 (Isherwood 1972, "Wind resistance of merchant ships", Trans. RINA 115), which for a small
 model in a breeze is a tenth of her speed.
 
+Whether it takes her a way or a time to find her speed shows where the shaft turned at several speeds: by a resistance
+that goes with the speed squared it is tau lengths at any, by an engine or a resistance of another kind it may be the
+same seconds at every. Both are forms, the second as tau lengths at the mean V_s; logs of one shaft speed have the first
+alone.
+
 For a given tau and one of the forms all else enters linearly. So tau is gone through on a grid, and at each value the
 rest is a linear regression with priors: the posterior is exact but for the grid, and needs no start. Which of the terms
 there are beside the one by turning is left to their evidence.
@@ -29,10 +34,11 @@ there are beside the one by turning is left to their evidence.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.linalg import inv, lstsq, slogdet
+from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from kempf.pipeline.channels.series import Float
@@ -56,6 +62,8 @@ _LEAST_ERROR = 0.0005
 #: a posterior wider than this share of the prior comes from the prior
 _FROM_PRIOR = 0.7
 _LAGS = 400
+#: the shaft kept the same speed where no more than this share lies between the largest and the smallest
+_SAME_SPEED = 0.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +82,17 @@ class SurgeFit:
     error_m_s: float
     #: What a user should know of it, sentences.
     remarks: tuple[str, ...]
+    #: Shape (g,), or (0,) where no part is so. Parts whose tau is a time, in the lengths of `reference_m_s`.
+    by_time: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=np.bool_))
+    #: Mean V_s of the manoeuvres, m/s.
+    reference_m_s: float = float("nan")
+
+    def at(self, settled_m_s: float) -> SurgeFit:
+        """Return the fit for a shaft that keeps a speed, m/s: a time is so many more lengths as she is faster."""
+        if not np.any(self.by_time):
+            return self
+        tau = np.where(self.by_time, self.tau * settled_m_s / self.reference_m_s, self.tau)
+        return replace(self, tau=tau, by_time=np.zeros_like(self.by_time), reference_m_s=settled_m_s)
 
     @property
     def best(self) -> Float:
@@ -96,7 +115,11 @@ class SurgeFit:
         k = int(np.argmax(self.probability))
         part = slice(k, k + 1)
         none = np.zeros_like(self.covariance[part])
-        return replace(self, tau=self.tau[part], probability=np.ones(1), loss=self.loss[part], covariance=none)
+        by_time = self.by_time[part]
+        certain = np.ones(1)
+        return replace(
+            self, tau=self.tau[part], probability=certain, loss=self.loss[part], covariance=none, by_time=by_time
+        )
 
     def drawn(self, normal: Float) -> Float:
         """Return tau, k_vr, k_r, k_d and k_w of draws, shape (n, 5), from standard normal numbers, shape (n, 5)."""
@@ -226,9 +249,13 @@ class _Log:
         std = _UNSETTLED_STD if gathers_way else _SETTLED_STD
         return cls(run.step_s * settled / length_m, speed / settled, shaft, costs, settled, std)
 
-    def columns(self, tau: float) -> tuple[Float, Float]:
-        """Return the columns of V_0, of the first speed and of all losses, each through the lag of tau."""
-        kept = np.exp(-self.step / tau)
+    def columns(self, tau: float, reference_m_s: float | None = None) -> tuple[Float, Float]:
+        """Return the columns of V_0, of the first speed and of all losses, each through the lag of tau.
+
+        It is in lengths at the speed of this log, or of ``reference_m_s``.
+        """
+        step = self.step if reference_m_s is None else self.step * reference_m_s / self.settled_m_s
+        kept = np.exp(-step / tau)
 
         def lagged(course: Float) -> Float:
             mean = 0.5 * (course[1:] + course[:-1])
@@ -279,31 +306,40 @@ Columns = list[tuple[Float, Float]]
 
 def _posterior(logs: Sequence[_Log], forms: Sequence[tuple[int, ...]]) -> SurgeFit:
     """Return the posterior over all forms of the loss and all tau; errors that remember count as fewer."""
-    columns = [[log.columns(tau) for log in logs] for tau in _GRID]
+    settled = [log.settled_m_s for log in logs]
+    mean = float(np.mean(settled))
+    references = (None, mean) if max(settled) > (1.0 + _SAME_SPEED) * min(settled) else (None,)
+    grid = [(reference, tau) for reference in references for tau in _GRID]
+    columns = [[log.columns(tau, reference) for log in logs] for reference, tau in grid]
+    freed = [_freed(logs, own) for own in columns]
     # where the logs alone are best, their errors are smallest: so large they are
-    every = [_left(logs, own, kinds) for kinds in forms for own in columns]
+    every = [_left(own, kinds) for kinds in forms for own in freed]
     left = min(every, key=lambda parts: sum(float(e @ e) for e in parts))
     count = sum(e.size for e in left)
     error = max(float(np.sqrt(sum(float(e @ e) for e in left) / count)), _LEAST_ERROR)
     variance = error**2 * _memory(left)
+    reduced = [[_Reduced.of(log, one, variance) for log, one in zip(logs, own, strict=True)] for own in columns]
     parts = [
-        (tau, kinds, _solved(logs, own, tau, kinds, variance))
+        (reference, tau, kinds, _solved(own, tau, kinds))
         for kinds in forms
-        for tau, own in zip(_GRID, columns, strict=True)
+        for (reference, tau), own in zip(grid, reduced, strict=True)
     ]
-    tau = np.array([part[0] for part in parts])
+    tau = np.array([part[1] for part in parts])
     # the area of the other parameters counts, as in any marginal likelihood
-    score = np.array([solved.score for _, _, solved in parts]) + (np.log(tau / TAU_MEDIAN) / TAU_SPREAD) ** 2
+    score = np.array([part[3].score for part in parts]) + (np.log(tau / TAU_MEDIAN) / TAU_SPREAD) ** 2
     p = np.exp(-0.5 * (score - score.min()))
     p /= p.sum()
     loss, covariance = np.zeros((tau.size, 4)), np.zeros((tau.size, 4, 4))
-    for k, (_, kinds, solved) in enumerate(parts):
+    for k, (_, _, kinds, solved) in enumerate(parts):
         loss[k, kinds] = solved.mean
         covariance[k][np.ix_(kinds, kinds)] = solved.covariance
-    kept = np.array(parts[int(np.argmax(p))][2].settled)
-    settled = float(np.mean(kept)), float(np.std(kept))
-    speed = float(np.mean([log.settled_m_s for log in logs]))
-    return SurgeFit(tau, p, loss, covariance, settled, error * speed, ())
+    kept = np.array(parts[int(np.argmax(p))][3].settled)
+    by_time = np.array([part[0] is not None for part in parts])
+    return SurgeFit(
+        *(tau, p, loss, covariance, (float(np.mean(kept)), float(np.std(kept))), error * mean, ()),
+        by_time=by_time,
+        reference_m_s=mean,
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,24 +354,42 @@ class _Solved:
     settled: tuple[float, ...]
 
 
-def _solved(logs: Sequence[_Log], columns: Columns, tau: float, kinds: Sequence[int], variance: float) -> _Solved:
-    """Return the posterior of the losses at a tau."""
-    losses, kinds = len(kinds), list(kinds)
-    information, right, constant, logdet = np.zeros((losses, losses)), np.zeros(losses), 0.0, 0.0
-    own_parts = []
-    for log, (own, every) in zip(logs, columns, strict=True):
-        lost = every[:, kinds]
+@dataclass(frozen=True, eq=False)
+class _Reduced:
+    """What a log says at one tau of all losses, over the error's variance, V_0 and the first speed taken out."""
+
+    #: information, right: Shape (4, 4) and (4,). Of the losses.
+    information: Float
+    right: Float
+    constant: float
+    logdet: float
+    #: V_0 / V_s without losses, and by how much each lowers it, shape (5,).
+    settled: Float
+
+    @classmethod
+    def of(cls, log: _Log, columns: tuple[Float, Float], variance: float) -> _Reduced:
+        own, lost = columns
         # V_0 has a prior at V_s, the first speed a wide one
         precision = np.array([1.0 / log.settled_std**2, 1.0])
         A = own.T @ own / variance + np.diag(precision)
         b = own.T @ log.speed / variance + precision
         C = own.T @ lost / variance
         solved = np.linalg.solve(A, np.column_stack([b, C]))
-        own_parts.append(solved[0])
-        constant += log.speed @ log.speed / variance + precision.sum() - b @ solved[:, 0]
-        right += lost.T @ log.speed / variance - C.T @ solved[:, 0]
-        information += lost.T @ lost / variance - C.T @ solved[:, 1:]
-        logdet += slogdet(A)[1]
+        return cls(
+            information=lost.T @ lost / variance - C.T @ solved[:, 1:],
+            right=lost.T @ log.speed / variance - C.T @ solved[:, 0],
+            constant=float(log.speed @ log.speed / variance + precision.sum() - b @ solved[:, 0]),
+            logdet=float(slogdet(A)[1]),
+            settled=solved[0],
+        )
+
+
+def _solved(logs: Sequence[_Reduced], tau: float, kinds: Sequence[int]) -> _Solved:
+    """Return the posterior of the losses at a tau."""
+    kinds = list(kinds)
+    information = np.sum([log.information[np.ix_(kinds, kinds)] for log in logs], axis=0)
+    right = np.sum([log.right[kinds] for log in logs], axis=0)
+    constant, logdet = sum(log.constant for log in logs), sum(log.logdet for log in logs)
     unit = np.array([tau, 1.0, 1.0, tau])[kinds]
     mean_before, std_before = LOSS_MEAN[kinds] * unit, LOSS_STD[kinds] * unit
     if BY_DRIFT in kinds and BY_RATE in kinds:
@@ -348,23 +402,28 @@ def _solved(logs: Sequence[_Log], columns: Columns, tau: float, kinds: Sequence[
     cost = constant + mean_before @ prior @ mean_before - target @ mean
     area = logdet + slogdet(whole)[1] - slogdet(prior)[1]
     covariance = np.asarray(inv(whole), dtype=np.float64)
-    settled = tuple(float(part[0] - part[1:] @ mean) for part in own_parts)
+    settled = tuple(float(log.settled[0] - log.settled[1:][kinds] @ mean) for log in logs)
     return _Solved(float(cost + area), mean, covariance, settled)
 
 
-def _left(logs: Sequence[_Log], columns: Columns, kinds: Sequence[int]) -> list[Float]:
-    """Return what the model leaves of every log's speed, without priors.
+def _freed(logs: Sequence[_Log], columns: Columns) -> Columns:
+    """Return speed and losses of every log at one tau without what V_0 and the first speed explain.
 
-    V_0 and the first speed of each log are taken out first (Frisch & Waugh 1933), so that the losses alone are solved.
+    So the losses alone are to be solved for (Frisch & Waugh 1933).
     """
-    speeds, costs = [], []
-    for log, (own, every) in zip(logs, columns, strict=True):
-        lost = every[:, list(kinds)]
+    found = []
+    for log, (own, lost) in zip(logs, columns, strict=True):
         base = np.linalg.qr(own)[0]
-        speeds.append(log.speed - base @ (base.T @ log.speed))
-        costs.append(lost - base @ (base.T @ lost))
-    found = lstsq(np.vstack(costs), np.concatenate(speeds), rcond=1e-10)[0]
-    return [speed - cost @ found for speed, cost in zip(speeds, costs, strict=True)]
+        found.append((log.speed - base @ (base.T @ log.speed), lost - base @ (base.T @ lost)))
+    return found
+
+
+def _left(freed: Columns, kinds: Sequence[int]) -> list[Float]:
+    """Return what the model leaves of every log's speed, without priors; see `_freed`."""
+    chosen = [(speed, lost[:, list(kinds)]) for speed, lost in freed]
+    whole, right = np.vstack([lost for _, lost in chosen]), np.concatenate([speed for speed, _ in chosen])
+    found = lstsq(whole, right, rcond=1e-10)[0]
+    return [speed - lost @ found for speed, lost in chosen]
 
 
 def _memory(left: Sequence[Float]) -> float:

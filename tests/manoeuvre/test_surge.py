@@ -111,6 +111,25 @@ def test_what_a_head_wind_costs_is_seen_and_calm_air_costs_nothing() -> None:
     assert surge_of([losing(run, 7.0, losses)], LENGTH).best[4] == 0.0
 
 
+@pytest.mark.parametrize("by_time", [False, True])
+def test_logs_of_two_shaft_speeds_say_whether_she_finds_her_speed_in_a_way_or_a_time(by_time: bool) -> None:
+    run, tau, slow = run_of(record_of(speed_loss=0.3)), 7.0, 6.0
+    runs = [
+        losing(run, tau, 0.8 * turning(run)[1], begin=8.4),
+        losing(run, tau * slow / 8.4 if by_time else tau, 0.8 * turning(run, slow)[1], settled=slow, begin=slow),
+    ]
+    fit = surge_of(runs, LENGTH)
+    assert float(fit.probability @ fit.by_time) == pytest.approx(float(by_time), abs=0.01)
+    for settled in (8.4, slow):
+        own = fit.at(settled)
+        wanted = tau * settled / 8.4 if by_time else tau
+        assert own.best[0] == pytest.approx(wanted, rel=0.1)
+        assert own.sure.best[0] == own.best[0]
+        drawn = own.drawn(np.random.default_rng(0).standard_normal((200, 5)))
+        assert np.median(drawn[:, 0]) == pytest.approx(wanted, rel=0.1)
+    assert not surge_of(runs[:1], LENGTH).by_time.any()
+
+
 def test_without_turns_the_loss_is_a_guess_and_said_to_be() -> None:
     run = run_of(record_of(speed_loss=0.3))
     measured = run.measured.copy()
