@@ -13,6 +13,7 @@ from concurrent.futures import Executor
 import numpy as np
 
 from kempf.pipeline.diagnose.forward_selection import added
+from kempf.pipeline.diagnose.joint_noise import with_joint_noise
 from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effects import catalogue
@@ -26,7 +27,8 @@ def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
     """Return a fit with what its innovations show of lasting noise.
 
     Noise follows no manoeuvre and could imitate a little of everything. It is taken where it says more of the
-    innovations than any effect of the catalogue, and gains clearly.
+    innovations than any effect of the catalogue, and gains clearly. Where it is found, all of it is tried at once,
+    beside a hull that has not bent to any.
 
     Parameters
     ----------
@@ -35,6 +37,11 @@ def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
     workers : Executor
         Share the work; nothing depends on it.
     """
+    found = _one_by_one(fit, workers)
+    return found if found is fit else with_joint_noise(found, _LEAST_GAIN, workers)
+
+
+def _one_by_one(fit: PooledFit, workers: Executor) -> PooledFit:
     effects = catalogue()
     while True:
         there = {effect.name for effect in fit.model.effects}

@@ -31,7 +31,7 @@ SOME = ("rudder_lag", "dead_time", "cross_flow_drag", "sway_quadratic", "yaw_qua
 WORKERS = ThreadPoolExecutor(2)
 _LEGS = 4
 #: step of the grid and time before the first execute, s: a boat does everything in a twentieth of the time
-_TIMES_S = {"mariner": (2.0, 20.0), "usv": (0.1, 5.0)}
+_TIMES_S = {"mariner": (2.0, 20.0), "tanker": (1.0, 20.0), "usv": (0.1, 5.0)}
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,14 +50,20 @@ class Sailed:
 
 @lru_cache(maxsize=8)
 def sailed(
-    effect: str = "none", *, strength: int = 2, seed: int = 3, noise: float = 1.0, name: str = "mariner"
+    effect: str = "none",
+    *,
+    strength: int = 2,
+    seed: int = 3,
+    noise: float = 1.0,
+    name: str = "mariner",
+    sold: bool = False,
 ) -> Sailed:
-    """Sail a day of a ship in a moderate sea."""
+    """Sail a day of a ship in a moderate sea, with fresh noise or instruments as sold."""
     hull = programme.ship(name, seed)
     weather = programme.weather(hull, "moderate", seed, 0)
     hidden: HiddenEffect | None = (CATALOGUE | OUTSIDERS).get(effect)
     c = sail.strength_of(hull, (weather,), hidden, strength, seed) if hidden else 0.0
-    runs, spec = _laid_out(hull, weather, hidden, c, seed, 0, noise, name)
+    runs, spec = _laid_out(hull, weather, hidden, c, seed, 0, noise, name, sold=sold)
     return Sailed(runs, spec, c)
 
 
@@ -92,6 +98,8 @@ def _laid_out(
     day: int,
     noise: float,
     name: str,
+    *,
+    sold: bool = False,
 ) -> tuple[tuple[GridRun, ...], ModelSpec]:
     """Sail a day and lay its zigzags out."""
     step_s, lead_s = _TIMES_S[name]
@@ -100,7 +108,7 @@ def _laid_out(
         hull, (), instruments=readings.instruments(hull), seed=seed + 1000 * day, noise_scale=noise
     )
     sensor = (hidden.name, c) if hidden and hidden.sensor else None
-    trial = readings.read(hull, voyage, weather.wind_from_rad, settings, sensor)
+    trial = readings.read(hull, voyage, weather.wind_from_rad, settings, sensor, sold=sold)
     instruments = instruments_of(trial)
     spec = ModelSpec(rate_bias=False, wind_arm_per_m=hull.wind_arm_per_m)
     ship = ShipConstants(hull.length_m, hull.draught_m, hull.wind_arm_per_m)

@@ -7,8 +7,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks.diagnose.hidden_effects import programme
+from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
 from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
+from kempf.pipeline.diagnose.joint_noise import with_joint_noise
 from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import get, require_free
 from kempf.schemas.errors import UsageError
@@ -49,6 +53,26 @@ def test_a_heading_whose_errors_last_is_found_with_their_size_and_duration():
     assert fit.ship.model.effects == ()
     assert fit.ship.covariance.shape == (6, 6)
     assert np.all(np.abs(fit.hull - fresh.hull) < 4.0 * fit.ship.std)
+
+
+def test_a_hull_that_bent_to_three_noises_is_left_for_the_higher_hill():
+    # noise of heading and yaw rate taken off one by one leaves a12 hundreds of times too large
+    seed, name = 9, "tanker"
+    ship = sailed(name=name, seed=seed, sold=True)
+    _, (fit,) = staged(ship.runs[:2], ship.spec, (), WORKERS)
+    assert {effect.name for effect in fit.model.effects} == set(NAMES)
+    p = programme.ship(name, seed).parameters
+    rudder = 1.0 + RUDDER_OFF
+    truth = np.array([p.a11, p.a12, p.a21, p.a22, p.b1 / rudder, p.b2 / rudder])
+    assert np.all(np.abs(fit.hull - truth) < 3.0 * fit.ship.std)
+
+
+def test_joint_noise_on_the_same_hill_leaves_the_fit_as_it_is():
+    ship = sailed(name="tanker", seed=6, sold=True)
+    plain = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit
+    fit = with_instrument_noise(plain, WORKERS)
+    assert fit.model.effects
+    assert with_joint_noise(fit, 15.0, WORKERS) is fit
 
 
 def test_the_ship_of_a_model_is_what_moves_her():

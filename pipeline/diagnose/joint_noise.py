@@ -1,0 +1,82 @@
+"""Lasting noise of several instruments at once, from a hull that has not bent to it (decision 0050).
+
+A hull that was fitted as if noise were fresh has bent to follow it. Taken one by one each noise is fitted beside such a
+hull, which still follows the others, and the search may end on a lower hill than that of the ship.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import Executor
+from dataclasses import replace
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.estimate.level_bounds import level_bounds
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.model.ship import mariner_like
+from kempf.schemas.effect import Effect
+from kempf.schemas.instrument_noise import lasting_noise
+
+#: intensities of what drives force, moment and current where the search begins, SI: quiet weather
+_CALM = (1e-4, 1e-6, 1e-3)
+
+
+def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor) -> PooledFit:
+    """Return a fit with lasting noise, or the higher one that all lasting noise together has beside another hull.
+
+    The search begins beside a hull of the ship's length (`kempf.pipeline.model.ship.mariner_like`) and quiet weather.
+
+    Parameters
+    ----------
+    fit : PooledFit
+        With the lasting noise that was found one by one.
+    least_gain : float
+        Log-likelihood by which each noise must gain.
+    workers : Executor
+        Share the work; nothing depends on it.
+
+    Returns
+    -------
+    PooledFit
+        The very one given unless the other gains so much for every noise that it has more.
+    """
+    present = {effect.name for effect in fit.model.effects}
+    missing = [noise for name, noise in lasting_noise().items() if name not in present]
+    model = EffectModel((*fit.model.effects, *missing))
+    values = np.concatenate([fit.values, *([p.steps[0] for p in noise.parameters] for noise in missing)])
+    wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
+    hull, levels = mariner_like(fit.runs[0].run.ship.length_m).array(), fit.levels.copy()
+    levels[:, : len(_CALM)] = np.log(_CALM)
+    levels = np.clip(levels, *level_bounds(fit.runs[0].spec))
+    made = _fitted(fit, model, hull, levels, values, workers, wanted)
+    if not (made.converged and made.log_likelihood > wanted):
+        return fit
+    return _without_idle(made, missing, least_gain, workers)
+
+
+def _without_idle(fit: PooledFit, noises: Sequence[Effect], least_gain: float, workers: Executor) -> PooledFit:
+    """Leave out the noises that gain nothing beside the others."""
+    for noise in noises:
+        model = EffectModel(tuple(effect for effect in fit.model.effects if effect.name != noise.name))
+        kept = np.array([effect.name != noise.name for effect, _ in fit.model.parameters])
+        fewer = _fitted(fit, model, fit.hull, fit.levels, fit.values[kept], workers)
+        if fit.log_likelihood <= fewer.log_likelihood + least_gain:
+            fit = fewer
+    return fit
+
+
+def _fitted(
+    fit: PooledFit,
+    model: EffectModel,
+    hull: Float,
+    levels: Float,
+    values: Float,
+    workers: Executor,
+    wanted: float = -np.inf,
+) -> PooledFit:
+    runs = [replace(run, model=model) for run in fit.runs]
+    return pooled_fit.fit(runs, hull, levels, values, workers, wanted=wanted)
