@@ -16,9 +16,12 @@ from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import N_HULL, Point
 from kempf.pipeline.predict.free_run import predictive
+from kempf.schemas.effect import Effect
 
 #: what a candidate must save in the Bayesian information criterion (Kass & Raftery 1995, JASA 90: strong evidence)
 BIC_SAVING = 6.0
+#: ship lengths by which an instrument can stand away from its place in the profile: from midships to an end, and some
+ABOARD = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,7 +58,7 @@ class Confirmation:
     fold_gains: Float
     #: Shape (held,). The same in the held-out runs.
     held_out_gains: Float
-    #: Whether a parameter of the effect ended at a bound.
+    #: Whether a parameter of the effect ended at a bound, or an instrument would stand off the ship.
     at_bound: bool
     #: Whether the refit left nothing of the effect: each of its parameters ended at a lower bound of 0.
     absent: bool
@@ -114,12 +117,19 @@ def confirm(
         bic_change=price - ratio,
         fold_gains=after.folds - before.folds,
         held_out_gains=after.held - before.held,
-        at_bound=bool(np.any((lowest & ~nothing) | highest)),
+        at_bound=bool(np.any((lowest & ~nothing) | highest)) or _overboard(fit, candidate.effect),
         # what the refit gained is then a better hull's: it found another maximum
         absent=bool(np.all(nothing)),
         unseen=after,
         outdone=outdone,
     )
+
+
+def _overboard(fit: PooledFit, effect: Effect) -> bool:
+    """Return whether an instrument would stand off the ship: as far away no place in a profile is wrong."""
+    sizes = zip(effect.parameters, fit.values[-len(effect.parameters) :], strict=True)
+    most = ABOARD * fit.runs[0].run.ship.length_m
+    return effect.group == "sensor" and any(p.unit == "m" and abs(size) > most for p, size in sizes)
 
 
 def _left_out(fit: PooledFit, workers: Executor) -> Float:

@@ -181,6 +181,16 @@ def test_what_the_reference_should_see_and_does_not_is_no_effect(
     assert quiet.before is not None and quiet.before.foreseen(bias) < 0.05 * float(bias @ bias)
 
 
+def test_an_antenna_is_not_claimed_off_the_ship() -> None:
+    """A shear along a bank looks like an antenna three quarters of her length from its place."""
+    found = sailed("bank_shear", strength=1).diagnosis(("antenna_lever", "gyro_bias"))
+    ((candidate, refit),) = found.steps[0].refused
+    assert candidate.effect.name == "antenna_lever" and refit.likelihood_ratio > 50.0
+    assert 0.6 * found.fitted[0].ship.length_m < abs(float(refit.fit.values[0])) < 200.0
+    assert refusal(refit) == "its size is at the limit of what is physical"
+    assert len(found.steps) == 1
+
+
 def test_a_constant_moment_is_seen_by_the_reference_too() -> None:
     """The rudder's neutral angle: what acts all the time alike is made of no drift, turn, order or heading."""
     ship = sailed("neutral_angle", strength=1)
