@@ -23,16 +23,14 @@ from benchmarks import result_page
 from benchmarks.diagnose.hidden_effects import programme
 from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
 from benchmarks.diagnose.hidden_effects.cases import Case
+from benchmarks.diagnose.hidden_effects.taken_in import taken_in
 from benchmarks.diagnose.hidden_effects.write import logs_of
-from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
-from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.pool_vessel import pool_vessel
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
-from kempf.warehouse.store import Warehouse
 
 #: kinds of sets by their name on the page
 KINDS = {"alone": "one zigzag", "pooled": "pooled"}
@@ -71,11 +69,7 @@ def _identified(case: Case, number: int) -> Iterator[Error]:
     files, answer = logs_of(case)
     true = hull_of(case, answer)
     with TemporaryDirectory() as place:
-        for name, content in files.items():
-            (Path(place) / name).write_bytes(content)
-        warehouse = Warehouse(f"{place}/warehouse")
-        logs = sorted(Path(place) / name for name in files if name != "profile.yaml")
-        ingest(warehouse, logs, None, read_profiles([Path(place) / "profile.yaml"]))
+        warehouse = taken_in(files, Path(place))
         outcomes = identify_vessel(warehouse, case.case_id, Request())
         pooled = pool_vessel(warehouse, case.case_id, Request(), outcomes)
         sets = [("alone", o.parameter_set) for o in outcomes if o.parameter_set]

@@ -59,15 +59,21 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
     if is_ship(base.hull) and is_ship(fitted.hull):
         return fitted
     # what the score predicts beside such a hull says little, and the disturbances beside it have eaten the effect
-    levels = base.levels.copy()
-    levels[:, : len(_CALM)] = np.log(_CALM)
-    calm = replace(base, levels=np.clip(levels, *level_bounds(base.runs[0].spec)))
+    calm = replace(base, levels=calm_levels(base))
     for size in _sizes(candidate.effect):
         # a lower hill need not be climbed to its top
         least = max(wanted, fitted.log_likelihood)
         other = _climbed(calm, model, ordinary, size, workers, _TO_THE_END, wanted=least)
         fitted = max(fitted, other, key=lambda fit: fit.log_likelihood)
     return fitted
+
+
+def calm_levels(base: PooledFit) -> Float:
+    """Return the levels of a fit, shape (runs, 6), with disturbances as in quiet weather."""
+    levels = base.levels.copy()
+    levels[:, : len(_CALM)] = np.log(_CALM)
+    result: Float = np.clip(levels, *level_bounds(base.runs[0].spec))
+    return result
 
 
 def _sizes(effect: Effect) -> list[Float]:

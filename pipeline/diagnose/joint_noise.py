@@ -13,16 +13,13 @@ from dataclasses import replace
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.forward_selection import calm_levels
 from kempf.pipeline.estimate import pooled_fit
-from kempf.pipeline.estimate.level_bounds import level_bounds
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect
 from kempf.schemas.instrument_noise import lasting_noise
-
-#: intensities of what drives force, moment and current where the search begins, SI: quiet weather
-_CALM = (1e-4, 1e-6, 1e-3)
 
 
 def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor) -> PooledFit:
@@ -49,10 +46,8 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor) -> Po
     model = EffectModel((*fit.model.effects, *missing))
     values = np.concatenate([fit.values, *([p.steps[0] for p in noise.parameters] for noise in missing)])
     wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
-    hull, levels = mariner_like(fit.runs[0].run.ship.length_m).array(), fit.levels.copy()
-    levels[:, : len(_CALM)] = np.log(_CALM)
-    levels = np.clip(levels, *level_bounds(fit.runs[0].spec))
-    made = _fitted(fit, model, hull, levels, values, workers, wanted)
+    hull = mariner_like(fit.runs[0].run.ship.length_m).array()
+    made = _fitted(fit, model, hull, calm_levels(fit), values, workers, wanted)
     if not (made.converged and made.log_likelihood > wanted):
         return fit
     return _without_idle(made, missing, least_gain, workers)

@@ -127,16 +127,15 @@ class ShotRun:
         """
         by = self.steps(at, scale)
         shared, own, starts = self._stepped(at, by)
-        if without is not None:
-            fresh = np.arange(without[1].shape[2] - self.used.size - _STATES, at.shared.size)
-            lanes = np.concatenate([[0], 1 + fresh])
-            found = self.predicted(shared[:, lanes], own[:, lanes], starts[..., lanes])
-            slopes = (found[..., 1:] - found[..., :1]) / by[fresh]
-            return without[0], np.insert(without[1], np.full(fresh.size, fresh[0]), slopes, axis=2)
-        found = self.predicted(shared, own, starts)
+        first = 0 if without is None else without[1].shape[2] - self.used.size - _STATES
+        fresh = np.arange(first, by.size if without is None else at.shared.size)
+        lanes = np.concatenate([[0], 1 + fresh])
+        found = self.predicted(shared[:, lanes], own[:, lanes], starts[..., lanes])
         with np.errstate(invalid="ignore"):
-            slopes = (found[..., 1:] - found[..., :1]) / by
-        return found[..., 0], slopes
+            slopes: Float = (found[..., 1:] - found[..., :1]) / by[fresh]
+        if without is None:
+            return found[..., 0], slopes
+        return without[0], np.insert(without[1], np.full(fresh.size, first), slopes, axis=2)
 
     def _stepped(self, at: Unknowns, by: Float) -> tuple[Float, Float, Float]:
         many = by.size + 1

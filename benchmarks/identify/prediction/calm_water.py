@@ -10,15 +10,14 @@ from numpy.typing import NDArray
 from benchmarks.diagnose.hidden_effects import plant, sail
 from benchmarks.identify.prediction.compared import (
     ANGLES_DEG,
-    CIRCLE,
     OVERSHOOTS,
     RUDDERS_DEG,
     Truth,
     circle,
+    circle_figures,
     zigzag,
 )
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.segment.turning_figures import turning_figures
 from kempf.pipeline.simulate.hulls import SimulatedHull
 from kempf.schemas.errors import DataRejected
 
@@ -44,18 +43,17 @@ def truth_of(hull: SimulatedHull, strengths: Float) -> Truth:
     DataRejected
         ``no_ship``: she does not come to the end of one.
     """
-    found = {circle(rudder): circle_figures(*sailed(hull, strengths, _TURN_RAD, rudder, 1)) for rudder in RUDDERS_DEG}
+    found = {circle(rudder): circle_of(*sailed(hull, strengths, _TURN_RAD, rudder, 1)) for rudder in RUDDERS_DEG}
     for heading, rudder in ANGLES_DEG:
         _, state, rows = sailed(hull, strengths, radians(heading), rudder, 4)
         found[zigzag(heading, rudder)] = _overshoots(state, rows)
     return found
 
 
-def circle_figures(time_s: Float, state: Float, _: NDArray[np.int64]) -> dict[str, float]:
+def circle_of(time_s: Float, state: Float, _: NDArray[np.int64]) -> dict[str, float]:
     """Return the figures of a circle from its execute on."""
     v, psi, north, east, forward = (state[:, plant.STATE.index(x)] for x in ("v", "psi", "north", "east", "V"))
-    found = turning_figures(time_s, north, east, psi, np.hypot(forward, v), np.arctan2(-v, forward), 0.0)
-    return {name: getattr(found, name) for name in CIRCLE}
+    return circle_figures(time_s, north, east, psi, v, forward)
 
 
 def _overshoots(state: Float, rows: NDArray[np.int64]) -> dict[str, float]:

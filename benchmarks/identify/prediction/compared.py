@@ -5,9 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from kempf.flows.jobs.checked_prediction import CheckedPredictions
 from kempf.flows.jobs.predict_vessel import PredictRequest
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.prediction import Figure
+from kempf.pipeline.segment.turning_figures import turning_figures
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse.store import Warehouse
 
@@ -68,6 +72,15 @@ def circle(rudder_deg: float) -> str:
 def zigzag(heading_deg: float, rudder_deg: float) -> str:
     """Return the name of a zigzag on the page."""
     return f"zigzag {heading_deg:g}/{rudder_deg:g}"
+
+
+def circle_figures(
+    time_s: Float, north_m: Float, east_m: Float, heading_rad: Float, v_m_s: Float, forward_m_s: Float
+) -> dict[str, float]:
+    """Return the figures of a circle that a simulator sailed from its execute on; every array has shape (n,)."""
+    speed, drift = np.hypot(forward_m_s, v_m_s), np.arctan2(-v_m_s, forward_m_s)
+    found = turning_figures(time_s, north_m, east_m, heading_rad, speed, drift, 0.0)
+    return {name: getattr(found, name) for name in CIRCLE}
 
 
 def predicted_beside(

@@ -18,20 +18,18 @@ from benchmarks.diagnose.hidden_effects import plant, programme
 from benchmarks.diagnose.hidden_effects.cases import Case
 from benchmarks.diagnose.hidden_effects.effects import CATALOGUE, SHARES, theta
 from benchmarks.diagnose.hidden_effects.sail import VoyageFailed
+from benchmarks.diagnose.hidden_effects.taken_in import taken_in
 from benchmarks.diagnose.hidden_effects.write import logs_of
 from benchmarks.identify.prediction.calm_water import sailed, truth_of
 from benchmarks.identify.prediction.compared import RUDDERS_DEG, ComparedShip, Truth, predicted_beside
 from benchmarks.identify.prediction.plain_ship import slides
 from kempf.flows.jobs.add_effect import add_effect
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, PLAIN
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.simulate.hulls import HULLS, SimulatedHull
 from kempf.pipeline.simulate.random_streams import stream
 from kempf.schemas.errors import DataRejected, KempfError
-from kempf.warehouse.store import Warehouse
 
 _SEED = 20261125
 _ASIDE = ("waves", "shallow_water", "roll_coupling")
@@ -50,11 +48,7 @@ def compared(number: int, *, diagnosed: bool) -> ComparedShip:
     case, hull, truth, files = next(_ships(number))
     kind = "diagnosed" if diagnosed else "known"
     with TemporaryDirectory() as place:
-        for name, content in files.items():
-            (Path(place) / name).write_bytes(content)
-        warehouse = Warehouse(f"{place}/warehouse")
-        logs = sorted(Path(place) / name for name in files if name != "profile.yaml")
-        ingest(warehouse, logs, None, read_profiles([Path(place) / "profile.yaml"]))
+        warehouse = taken_in(files, Path(place))
         if diagnosed:
             stored, _ = diagnose_vessel(warehouse, case.case_id, PLAIN)
             if case.effect not in stored.effects:

@@ -16,12 +16,12 @@ import numpy as np
 
 from benchmarks.identify.prediction.compared import (
     ANGLES_DEG,
-    CIRCLE,
     OVERSHOOTS,
     RUDDERS_DEG,
     ComparedShip,
     Truth,
     circle,
+    circle_figures,
     predicted_beside,
     zigzag,
 )
@@ -29,7 +29,6 @@ from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.pool_vessel import pool_vessel
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.segment.turning_figures import turning_figures
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS, HullParameters, SimulatedHull
 from kempf.pipeline.simulate.logger_profile import logger_profile
@@ -131,8 +130,7 @@ def _truth(hull: SimulatedHull) -> Truth:
 def _circle(hull: SimulatedHull, rudder_deg: float) -> dict[str, float]:
     time, state = _sailed(hull, TurningCircle(rudder_deg, 540.0))
     v, _, psi, north, east, forward = state.T
-    found = turning_figures(time, north, east, psi, np.hypot(forward, v), np.arctan2(-v, forward), 0.0)
-    return {name: getattr(found, name) for name in CIRCLE}
+    return circle_figures(time, north, east, psi, v, forward)
 
 
 def _overshoots(hull: SimulatedHull, heading_deg: float, rudder_deg: float) -> dict[str, float]:
