@@ -365,7 +365,9 @@ def _widened(
     fitted = [run for run in basis.runs.runs if run.name in levels]
     filters = [RunFilter(left_out(run, gross.get(run.name, {})), model, basis.runs.spec) for run in fitted]
     own = [np.exp(np.array(levels[run.name], dtype=np.float64)) for run in fitted]
-    return widening(filters, own, hull, values, covariance) if filters else 1.0
+    # a covariance that is wider already by what the runs disagree about is counted twice in it
+    already = float(one.convergence.get("widened", 1.0))
+    return max(widening(filters, own, hull, values, covariance) / already**2, 1.0) if filters else 1.0
 
 
 def _scale_m(one: ParameterSet) -> float:

@@ -25,8 +25,9 @@ from kempf.pipeline.diagnose.ladder_step import rung, step_of
 from kempf.pipeline.diagnose.late_velocity import covariance_of_lateness
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.estimate.agreement import LEVEL, agreement_of
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
-from kempf.pipeline.estimate.plain_fit import LEVEL, PlainFit
+from kempf.pipeline.estimate.plain_fit import PlainFit
 from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.estimate.pooled_fit import PooledFit, ShipPart
 from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncertainty_of
@@ -211,7 +212,7 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
     before = fitted.ahead[number - 1] if number else None
     known, plain = _known(fit), fitted.plain
     if not effects:
-        known = replace(known, covariance=known.covariance * plain.widened**2)
+        known = replace(known, covariance=known.covariance * plain.agreement.widened**2)
     made = _as_parameter_set(fit, known, fitted, request)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     # of the manoeuvres that the inputs name, so that a rerun says the same
@@ -237,10 +238,10 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
 
 
 def _known(fit: PooledFit) -> PooledUncertainty:
-    """Return the errors of a fit; of a model with effects those by which its diagnosis judges them."""
+    """Return the errors of a fit; of a model with effects those that its diagnosis states."""
     known = uncertainty_of(fit)
     if fit.ship.model.effects:
-        known = replace(known, covariance=fit.covariance, kind="information")
+        known = replace(known, covariance=fit.covariance * agreement_of(fit).widened ** 2, kind="information")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         return replace(known, covariance=known.covariance + covariance_of_lateness(fit, workers))
 
@@ -250,10 +251,10 @@ def _pooling(plain: PlainFit) -> dict[str, Any]:
     return {
         "segments": len(plain.alone),
         "statistic": plain.statistic,
-        "degrees_of_freedom": plain.degrees_of_freedom,
-        "p_value": plain.p_value,
-        "may_be_pooled": plain.p_value >= LEVEL,
-        "widened": plain.widened,
+        "degrees_of_freedom": plain.agreement.degrees_of_freedom,
+        "p_value": plain.agreement.p_value,
+        "may_be_pooled": plain.agreement.p_value >= LEVEL,
+        "widened": plain.agreement.widened,
         "members": [
             {
                 "segment": one.run.name,
@@ -276,12 +277,12 @@ def _ahead_disagrees(ahead: Ahead | None) -> tuple[str, ...]:
 
 
 def _disagreement(plain: PlainFit) -> tuple[str, ...]:
-    if plain.p_value >= LEVEL:
+    if plain.agreement.p_value >= LEVEL:
         return ()
     return (
-        f"the {len(plain.alone)} manoeuvres do not share one hull (p = {plain.p_value:.1g}): the ship, her load or "
-        "what acts on her changed, or the model lacks something; standard errors are widened "
-        f"{plain.widened:.1f} times",
+        f"the {len(plain.alone)} manoeuvres do not share one hull (p = {plain.agreement.p_value:.1g}): the ship, her "
+        "load or what acts on her changed, or the model lacks something; standard errors are widened "
+        f"{plain.agreement.widened:.1f} times",
     )
 
 
@@ -310,6 +311,7 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
             "step_s": _STEP_S,
             "grid_step_s": fit.runs[0].run.step_s,
             "standard_errors": known.kind,
+            **({"widened": agreement_of(fit).widened} if ship.model.effects else {}),
             "gross_errors": fitted.plain.gross_errors,
             "gross_error_instants_s": _gross_errors(fit, fitted.runs),
             "levels": {one.run.name: list(levels) for one, levels in zip(fit.runs, fit.levels, strict=True)},

@@ -13,6 +13,7 @@ from kempf.pipeline.diagnose.remaining_misfit import as_json as remaining_json
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.verdict import share_explained, verdict
+from kempf.pipeline.estimate.agreement import agreement_of, stated_std
 from kempf.schemas.effect import Effect
 
 #: log-likelihood that an effect must gain in a manoeuvre to be seen in it
@@ -121,14 +122,15 @@ def _values(effect: Effect, values: Float, std: Float) -> dict[str, Any]:
 
 
 def _refit(candidate: Candidate, confirmation: Confirmation) -> dict[str, Any]:
-    size = len(candidate.effect.parameters)
+    size, fit = len(candidate.effect.parameters), confirmation.fit
     return {
         "effect": candidate.effect.name,
-        "parameters": _values(candidate.effect, confirmation.fit.values[-size:], confirmation.fit.std[-size:]),
+        "parameters": _values(candidate.effect, fit.values[-size:], stated_std(fit)[-size:]),
+        "widened": agreement_of(fit).widened,
         "likelihood_ratio": confirmation.likelihood_ratio,
         "bic_change": confirmation.bic_change,
         "gains_left_out": confirmation.fold_gains,
         "gains_held_out": confirmation.held_out_gains,
         "at_bound": confirmation.at_bound,
-        "converged": confirmation.fit.converged,
+        "converged": fit.converged,
     }

@@ -13,6 +13,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.matters import comparisons
 from kempf.pipeline.diagnose.screen import Candidate
+from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import FreeRun, free_run
@@ -120,6 +121,8 @@ def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]
     """
     force, moment, current = step.intensities
     ship = step.fit.ship
+    widened = agreement_of(step.fit).widened if ship.model.effects else 1.0
+    std = widened * ship.std[6:]
     return {
         "step": number,
         "added": None if step.added is None else step.added.name,
@@ -137,10 +140,11 @@ def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]
         "free_run_fitted_to_legs": {run.name: run.relative_error for run in step.by_legs},
         "log_likelihood": step.fit.log_likelihood,
         "converged": step.fit.converged,
+        "widened": widened,
         "hull": dict(zip(_HULL, (float(x) for x in step.fit.hull), strict=True)),
         "effects": {
             f"{effect.name}.{parameter.name}": {"value": float(v), "std": float(s), "unit": parameter.unit}
-            for (effect, parameter), v, s in zip(ship.model.parameters, ship.values, ship.std[6:], strict=True)
+            for (effect, parameter), v, s in zip(ship.model.parameters, ship.values, std, strict=True)
         },
         "instrument_noise": {
             name: {"value": value, "std": std, "unit": unit} for name, value, std, unit in step.fit.noise

@@ -11,10 +11,10 @@ from concurrent.futures import Executor
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import maximum_likelihood
+from kempf.pipeline.estimate.agreement import Agreement
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
@@ -29,8 +29,6 @@ from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 
 _HULL = len(HULL_PARAMETERS)
-#: with a smaller probability under one hull the runs are said not to share one
-LEVEL = 0.01
 #: hulls of single runs that a common climb may begin from where their mean is no ship
 _ENTRIES = 4
 #: a measurement's level, by its logarithm, that is so far from its usual one is on another hill
@@ -74,19 +72,9 @@ class PlainFit:
         return sum(sum(single.gross_errors.values()) for single in self.alone)
 
     @property
-    def degrees_of_freedom(self) -> int:
-        """Of the statistic; 0 for one run."""
-        return _HULL * (len(self.alone) - 1)
-
-    @property
-    def p_value(self) -> float:
-        """Probability of a statistic as large where the runs share one hull."""
-        return float(chi2.sf(self.statistic, self.degrees_of_freedom)) if self.degrees_of_freedom else 1.0
-
-    @property
-    def widened(self) -> float:
-        """Factor by which what the runs disagree about widens standard errors (Birge 1932, Physical Review 40)."""
-        return 1.0 if self.p_value >= LEVEL else float(np.sqrt(self.statistic / self.degrees_of_freedom))
+    def agreement(self) -> Agreement:
+        """Whether the runs share one hull, six degrees of freedom a run beyond the first."""
+        return Agreement(self.statistic, _HULL * (len(self.alone) - 1))
 
     def off_in_std(self, single: Alone) -> Float:
         """Return how far a run's own hull lies from the common one, in its own standard errors, shape (6,)."""

@@ -40,7 +40,8 @@ def calm() -> tuple[Sailed, Diagnosis]:
 
 @pytest.fixture(scope="module")
 def late() -> tuple[Sailed, Diagnosis]:
-    ship = sailed("rudder_lag", strength=1)
+    # of most seeds such a lag bends the plain hull to no ship, which has no error to fall
+    ship = sailed("rudder_lag", strength=1, seed=10)
     return ship, ship.diagnosis(LAG)
 
 

@@ -26,7 +26,7 @@ def test_the_thresholds_are_those_of_the_code() -> None:
     rows = re.findall(r"^\| [^|]+ \| ([\d.]+) \| `(\w+)\.([\w.]+)` \|$", TEXT, flags=re.MULTILINE)
     assert len(rows) == TEXT.partition("## Thresholds")[2].partition("\n## ")[0].count("\n|") - 2
     for value, module, path in rows:
-        rooms = [f"kempf.pipeline.{room}.{module}" for room in ("diagnose", "shooting")]
+        rooms = [f"kempf.pipeline.{room}.{module}" for room in ("diagnose", "estimate", "shooting")]
         (found,) = (import_module(name) for name in rooms if find_spec(name))
         for name in path.split("."):
             found = getattr(found, name)

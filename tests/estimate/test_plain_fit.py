@@ -9,9 +9,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
+from kempf.pipeline.estimate.agreement import LEVEL
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, identify
-from kempf.pipeline.estimate.plain_fit import LEVEL, PlainFit, fit_plain
+from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain
 from kempf.pipeline.estimate.pooled_fit import CommonLikelihood
 from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
 from kempf.pipeline.estimate.record.average import step_of
@@ -50,8 +51,8 @@ def test_one_hull_from_three_zigzags(three: PlainFit) -> None:
     truth = truth_of(sailed("ferry", seed=21, heading_deg=80.0 * 21, duration_s=500.0))
     assert three.fit.converged and not three.left_out
     assert np.max(np.abs(three.fit.hull - truth) / three.fit.std) < 3.0
-    assert three.p_value > LEVEL and three.widened == 1.0
-    assert three.degrees_of_freedom == 12 and 0.0 < three.statistic < 30.0
+    assert three.agreement.p_value > LEVEL and three.agreement.widened == 1.0
+    assert three.agreement.degrees_of_freedom == 12 and 0.0 < three.statistic < 30.0
     assert [one.run.name for one in three.alone] == ["ferry 21", "ferry 22", "ferry 23"]
 
 
@@ -67,7 +68,7 @@ def test_one_run_by_itself_is_the_estimate_of_that_run() -> None:
     trial = sailed("ferry", seed=21, heading_deg=80.0 * 21, duration_s=500.0)
     alone = identify(record_of(trial), SPEC, trial.truth.wind_arm_per_m, STANDARD, 90.0)
     common = fitted(run(21))
-    assert common.statistic == pytest.approx(0.0, abs=1e-3) and common.p_value == 1.0
+    assert common.statistic == pytest.approx(0.0, abs=1e-3) and common.agreement.p_value == 1.0
     assert np.max(np.abs(common.fit.hull - alone.hull.array()) / common.fit.std) < 0.01
 
 
@@ -126,7 +127,7 @@ def test_two_ships_are_no_pool() -> None:
     # a rudder that does a tenth less: b1 and b2 of this ship are smaller
     inputs[:, 1] /= 0.9
     found = fitted(run(21), run(22), replace(other, name="changed", inputs=inputs))
-    assert found.p_value < 1e-6 and found.widened > 1.5
+    assert found.agreement.p_value < 1e-6 and found.agreement.widened > 1.5
     off = {one.run.name: float(np.abs(found.off_in_std(one)).max()) for one in found.alone}
     assert max(off, key=lambda name: off[name]) == "changed"
 

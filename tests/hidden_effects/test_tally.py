@@ -75,6 +75,15 @@ def test_every_target_counts_what_it_says() -> None:
         assert line.startswith(told), asked
 
 
+@pytest.mark.parametrize(("effect", "value"), [("rudder_stall", 1.02**-2), ("backlash", 1.02), ("gyro_bias", 1.0)])
+def test_a_rudder_that_is_off_is_true_of_its_own_log(effect: str, value: float) -> None:
+    told = {"effect": effect, "parameters": {"c": {"value": value, "std": 1e-4, "unit": "1"}}}
+    said = {"diagnosis": {"sets": [{"effects": [effect], "refits": [told]}], "immaterial": []}}
+    truth = {"effect": effect, "parameters": {"c": 1.0}}
+    assert Judged({**truth, "sold": True}, said, {}).covered
+    assert Judged({**truth, "sold": False}, said, {}).covered == (value == 1.0)
+
+
 def test_the_interval_of_a_share_is_wilsons() -> None:
     # its ends are where the distance from what was found is 1.96 standard errors of the true share
     z2 = 1.96**2

@@ -235,12 +235,16 @@ def test_waves_have_the_spread_and_the_frequency_that_are_asked_for(heading: flo
         ]
     )
     q = at(second.noise, values, L=L)
-    stationary = np.diag([at(first.initial_std, values, L=L) ** 2, at(second.initial_std, values, L=L) ** 2])
+    # what is seen is the states by the root of encounter by wave frequency: the noise goes with the waves alone
+    seen = at(effect.terms["heading"], values, m1=1.0, **sea)
+    assert seen == pytest.approx(np.sqrt(abs(w) / w0))
+    stationary = (0.02 / seen) ** 2 * np.eye(2)
     assert A @ stationary + stationary @ A.T + np.diag([0.0, q**2]) == pytest.approx(np.zeros((2, 2)), abs=1e-15)
-    assert stationary[0, 0] == pytest.approx(0.02**2)
+    assert at(first.initial_std, values, L=L) == at(second.initial_std, values, L=L) == 0.02
     assert np.abs(np.linalg.eigvals(A)) == pytest.approx([abs(w), abs(w)])
     # the rate that is measured is that of the yaw
-    assert at(effect.terms["yaw_rate"], values, m2=0.3, **sea) == at(first.derivative, values, m2=0.3, **sea)
+    rate = seen * at(first.derivative, values, m2=0.3, **sea)
+    assert at(effect.terms["yaw_rate"], values, m2=0.3, **sea) == pytest.approx(rate)
 
 
 def test_what_stands_for_eq_16_scales_it() -> None:

@@ -50,6 +50,8 @@ class HiddenEffect:
     most: float = inf
     #: Its name.
     parameter: str = "c"
+    #: Power of the rudder's angle in the unit of the parameter: what a log whose rudder is off shows of it.
+    of_rudder: int = 0
     #: Further parameters that are multiples of it.
     also: tuple[tuple[str, float], ...] = ()
 
@@ -126,7 +128,7 @@ _HULL = (
     HiddenEffect("yaw_v3", "r' += c v^3 / (V L^2)", "1", only(plant.YAW_V3, 1.0, "1/L^2")),
 )
 _RUDDER = (
-    HiddenEffect("rudder_stall", "the hull feels d - c d^3", "1/rad^2", only(plant.STALL), most=1.9),
+    HiddenEffect("rudder_stall", "the hull feels d - c d^3", "1/rad^2", only(plant.STALL), most=1.9, of_rudder=-2),
     HiddenEffect("flow_straightening", "the hull feels d + c d (v/V)^2", "1", only(plant.STRAIGHTEN), 0, most=12.0),
     HiddenEffect(
         "rudder_lag",
@@ -152,6 +154,7 @@ _RUDDER = (
         "rad",
         only(plant.BACKLASH),
         sizes=_deg(1.0, 2.0, 4.0),
+        of_rudder=1,
     ),
     HiddenEffect(
         "rate_limit",
@@ -160,8 +163,17 @@ _RUDDER = (
         only(plant.RATE_LIMIT),
         sizes=(1.0 / 0.6, 1.0 / 0.4, 1.0 / 0.2),
         scale="1/rate",
+        of_rudder=-1,
     ),
-    HiddenEffect("neutral_angle", "the hull feels d + c", "rad", only(plant.NEUTRAL), 0, sizes=_deg(1.0, 2.0, 4.0)),
+    HiddenEffect(
+        "neutral_angle",
+        "the hull feels d + c",
+        "rad",
+        only(plant.NEUTRAL),
+        0,
+        sizes=_deg(1.0, 2.0, 4.0),
+        of_rudder=1,
+    ),
     HiddenEffect("rudder_asymmetry", "the hull feels d + c |d|", "1", only(plant.ASYMMETRY), 0),
     HiddenEffect(
         "propeller_wash",

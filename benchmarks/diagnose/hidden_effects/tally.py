@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from math import inf, sqrt
 from typing import Any
 
+from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
+from benchmarks.diagnose.hidden_effects.effects import CATALOGUE
+
 #: expected score from which an effect must be named, as `DIAGNOSIS` sets it
 DETECTABLE = 50.0
 #: absorption above which an effect cannot be tested
@@ -93,15 +96,19 @@ class Judged:
 
     @property
     def covered(self) -> bool | None:
-        """Whether the 95 % interval of the refit true effect holds the true value; None where it was not named."""
+        """Whether the 95 % interval of the refit true effect holds the true value; None where it was not named.
+
+        A rudder's feedback that is off is in no log: its effects are true of the rudder that the log shows.
+        """
         found, name = self.said.get("diagnosis"), self.truth["effect"]
+        shown = (1.0 + RUDDER_OFF) ** CATALOGUE[name].of_rudder if self.truth["sold"] and name in CATALOGUE else 1.0
         for one in (*found["sets"], *found["immaterial"]) if found else ():
             for refit in one["refits"]:
                 if refit["effect"] == name:
                     told, (key, value) = refit["parameters"], next(iter(self.truth["parameters"].items()))
                     std = told[key]["std"]
                     # an interval that could not be told covers nothing
-                    return bool(std is not None and std > 0 and abs(told[key]["value"] - value) <= 1.96 * std)
+                    return bool(std is not None and std > 0 and abs(told[key]["value"] - shown * value) <= 1.96 * std)
         return None
 
     @property
