@@ -27,6 +27,10 @@ def judged(
     first, then = (
         {"fitted_misfit": 0.1 + one, "left_out_misfit": 0.2 + one, "held_out_misfit": one} for one in (3.0, last)
     )
+    then["beside_the_rung_below"] = {
+        "fitted": {"falls_by": 0.2, "in_std": 5.0},
+        "held_out": {"falls_by": 1.0 - last / 3.0, "in_std": 10.0 * (3.0 - last)},
+    }
     ladder = [{"held_out_error": 0.4, "one_leg_ahead": first}, {"held_out_error": 0.22, "one_leg_ahead": then}]
     aside = (
         [{"effects": [immaterial], "refits": [{"effect": immaterial, "parameters": parameters}]}] if immaterial else []
@@ -60,6 +64,7 @@ def test_every_target_counts_what_it_says() -> None:
         "named with the 3 m boat": "no case",
         "named with instruments": "100 % (1 of 1",
         "every ladder falls": "90 % (9 of 10",
+        "no step of a ladder rises": "90 % (9 of 10",
         "exact name": "50 % (1 of 2",
         "mean size": "1.33",
         "any claim": "33 % (1 of 3",

@@ -14,6 +14,8 @@ from benchmarks.diagnose.hidden_effects.effects import CATALOGUE
 DETECTABLE = 50.0
 #: absorption above which an effect cannot be tested
 ABSORBED = 0.999
+#: standard errors of a paired comparison beyond which a misfit has risen, and part of it that is a rise at all
+WORSE, LEAST_RISE = 2.0, 0.01
 
 
 @dataclass(frozen=True)
@@ -123,6 +125,16 @@ class Judged:
         return all(rungs[-1][key] < rungs[0][key] for key in known)
 
     @property
+    def no_worse(self) -> bool | None:
+        """Whether no step of the ladder makes a misfit one leg ahead larger beyond its error; None without a step."""
+        found = self.said.get("diagnosis")
+        steps = [one["one_leg_ahead"] for one in found["ladder"][1:]] if found else []
+        if not steps or None in steps:
+            return None
+        beside = [one for step in steps for one in step["beside_the_rung_below"].values()]
+        return not any(one["in_std"] < -WORSE and one["falls_by"] < -LEAST_RISE for one in beside)
+
+    @property
     def present_untestable(self) -> list[str]:
         """Effects called present though the model imitates all of them."""
         found = self.said.get("diagnosis")
@@ -202,5 +214,6 @@ def targets(cases: Sequence[Judged]) -> list[tuple[str, str, str]]:
             str(share(seen, lambda c: None if c.against_oracle is None else c.against_oracle <= 1.1)),
         ),
         ("every ladder falls one leg ahead: fitted, left out, held out", "all", str(share(cases, lambda c: c.falls))),
+        ("no step of a ladder rises beyond its error, in any of these", "all", str(share(cases, lambda c: c.no_worse))),
         ("95 % interval of the named effect covers", "93 to 97 %", str(share(known, lambda c: c.covered))),
     ]
