@@ -31,7 +31,8 @@ from kempf.pipeline.manoeuvre.rudder_rate import RudderRate, rudder_rate
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre, Reach
 from kempf.pipeline.manoeuvre.ship import Waters
 from kempf.pipeline.manoeuvre.spiral import Spiral
-from kempf.pipeline.manoeuvre.surge import SurgeFit, surge_of
+from kempf.pipeline.manoeuvre.surge.identify import surge_of
+from kempf.pipeline.manoeuvre.surge.surge_fit import SurgeFit
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
 from kempf.pipeline.manoeuvre.widening import widening
 from kempf.pipeline.manoeuvre.zigzag import Zigzag

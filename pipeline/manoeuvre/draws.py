@@ -18,7 +18,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.own_zigzags import REFERENCE
 from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
 from kempf.pipeline.manoeuvre.ship import Ship, Waters
-from kempf.pipeline.manoeuvre.surge import SurgeFit
+from kempf.pipeline.manoeuvre.surge.surge_fit import SurgeFit
 from kempf.pipeline.model.ship import mariner_like
 
 #: a power of two, as the sequence wants it

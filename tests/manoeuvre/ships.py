@@ -9,7 +9,7 @@ import numpy as np
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
 from kempf.pipeline.manoeuvre.ship import Ship, Waters
-from kempf.pipeline.manoeuvre.surge import SurgeFit
+from kempf.pipeline.manoeuvre.surge.surge_fit import SurgeFit
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.simulate.hulls import HULLS, SimulatedHull
 from kempf.schemas import effects

@@ -13,7 +13,8 @@ from kempf.pipeline.estimate.record.record import Record
 from kempf.pipeline.manoeuvre.covered import beyond, covered
 from kempf.pipeline.manoeuvre.rudder_rate import SOLAS_RAD_S, rudder_rate
 from kempf.pipeline.manoeuvre.sailed import Reach
-from kempf.pipeline.manoeuvre.surge import settled_speed, surge_of
+from kempf.pipeline.manoeuvre.surge.identify import surge_of
+from kempf.pipeline.manoeuvre.surge.logged_speed import settled_speed
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
