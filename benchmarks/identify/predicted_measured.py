@@ -26,7 +26,8 @@ from kempf.flows.jobs.compare_predicted import Beside, MeasuredManoeuvre, beside
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
 from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.predict_vessel import Predicted, PredictRequest
+from kempf.flows.jobs.predict_request import PredictRequest
+from kempf.flows.jobs.predicted import Predicted
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, point
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.pipeline.manoeuvre.zigzag import Zigzag

@@ -12,7 +12,8 @@ import numpy as np
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.lasting_noise import with_lasting_noise
 from kempf.flows.jobs.log_channels import channels_of
-from kempf.flows.jobs.predict_vessel import Basis, Predicted
+from kempf.flows.jobs.predicted import Predicted
+from kempf.flows.jobs.prediction_basis import Basis
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments

@@ -9,7 +9,9 @@ import numpy as np
 
 from kempf.flows.jobs.as_sailed import AsSailed
 from kempf.flows.jobs.compare_predicted import beside, figures_of, own_zigzags
-from kempf.flows.jobs.predict_vessel import Predicted, PredictRequest, limits_of, models_of_set, predict_with
+from kempf.flows.jobs.predict_request import PredictRequest
+from kempf.flows.jobs.predict_vessel import models_of_set, predict_with
+from kempf.flows.jobs.predicted import Predicted, limits_of
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.manoeuvre.conditioned import OwnZigzag, conditioned

@@ -8,7 +8,7 @@ from math import radians
 from typing import Any
 
 from kempf.flows.jobs.as_sailed import AsSailed, as_sailed
-from kempf.flows.jobs.predict_vessel import Predicted
+from kempf.flows.jobs.predicted import Predicted
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.manoeuvre.prediction import Figure, predict
 from kempf.pipeline.manoeuvre.pull_out import PullOut

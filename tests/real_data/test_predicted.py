@@ -10,7 +10,8 @@ from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.compare_predicted import measured_beside
 from kempf.flows.jobs.compare_vessel import compare_vessel
 from kempf.flows.jobs.files import read_model
-from kempf.flows.jobs.predict_vessel import PredictRequest, predict_vessel
+from kempf.flows.jobs.predict_request import PredictRequest
+from kempf.flows.jobs.predict_vessel import predict_vessel
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
 from kempf.flows.jobs.vessel_model import store_model
 from tests.real_data.voyage import Voyage

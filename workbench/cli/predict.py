@@ -17,7 +17,7 @@ from kempf.workbench.terminal import number, print_json, print_paragraph, print_
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_predicted import MeasuredManoeuvre
-    from kempf.flows.jobs.predict_vessel import Predicted
+    from kempf.flows.jobs.predicted import Predicted
     from kempf.pipeline.manoeuvre.prediction import Figure
 
 _KINDS = ("turning-circle", "zigzag", "pull-out", "spiral")
@@ -73,7 +73,7 @@ def command(
     """
     from kempf.flows.jobs.checked_prediction import predict_checked
     from kempf.flows.jobs.compare_predicted import measured_beside
-    from kempf.flows.jobs.predict_vessel import PredictRequest
+    from kempf.flows.jobs.predict_request import PredictRequest
     from kempf.warehouse.store import Warehouse
 
     require_figures(figure, code="cannot_write")

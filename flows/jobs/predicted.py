@@ -1,0 +1,171 @@
+"""A predicted manoeuvre: its figures, what was taken for granted, what limits it; and as JSON content."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from math import degrees, radians
+from typing import Any
+
+from kempf.flows.jobs.predict_request import PredictRequest
+from kempf.flows.jobs.prediction_basis import Basis
+from kempf.pipeline.manoeuvre.draws import Identified
+from kempf.pipeline.manoeuvre.own_zigzags import OwnZigzags
+from kempf.pipeline.manoeuvre.prediction import Prediction
+from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
+from kempf.pipeline.manoeuvre.sailed import Manoeuvre
+from kempf.pipeline.manoeuvre.spiral import Spiral
+from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.warehouse.parameter_set import ParameterSet
+
+#: what is taken of a channel that a manoeuvre in calm water has not
+_TAKEN = {
+    "wind_speed": "calm air",
+    "wind_angle": "calm air",
+    "water_depth": "deep water",
+    "roll": "no heel",
+    "shaft_speed": "the shaft turning as on the approach",
+}
+#: a widening from which it is said
+_SAID = 1.05
+_INSTRUMENTS = {"lateral_speed", "yaw_rate", "heading"}
+
+
+@dataclass(frozen=True, eq=False)
+class Predicted:
+    """What the job did."""
+
+    vessel: str
+    parameter_set: ParameterSet
+    basis: Basis
+    speed_m_s: float
+    prediction: Prediction
+    #: What was taken for granted, and what limits the answer, sentences.
+    assumed: tuple[str, ...]
+    limits: tuple[str, ...]
+    #: What the intervals were held against; None where that was not done.
+    own_zigzags: OwnZigzags | None = None
+
+    def show(self) -> dict[str, Any]:
+        """Return the prediction as the command line's JSON object."""
+        made, surge = self.prediction, self.basis.surge.at(self.speed_m_s)
+        return {
+            "vessel": self.vessel,
+            "parameter_set_id": self.parameter_set.parameter_set_id,
+            "manoeuvre": _manoeuvre_json(made.manoeuvre),
+            "speed_m_s": self.speed_m_s,
+            "figures": _grouped({name: vars(figure) for name, figure in made.figures.items()}),
+            "models": [
+                {
+                    "parameter_set_id": one.model.name,
+                    "effects": [effect.name for effect in one.model.waters.model.effects],
+                    "figures": _grouped({name: vars(figure) for name, figure in one.figures.items()}),
+                    "draws": len(one.drawn) + one.no_ships,
+                    "no_ships": one.no_ships,
+                    "errors_widened": one.model.widened,
+                    "fitted_to_legs": one.model.fitted_to_legs,
+                    "brought_to_own_zigzags": one.model.conditioned,
+                }
+                for one in made.models
+            ],
+            "extrapolated": [{**vars(one), "sentence": one.sentence} for one in made.extrapolated],
+            "imo": [vars(one) for one in made.imo],
+            "unstable_on_a_straight_course": made.share_unstable,
+            "surge": {
+                "time_constant_lengths": float(surge.best[0]),
+                "loss_by_drift_and_turn": float(surge.best[1]),
+                "loss_by_yaw_rate": float(surge.best[2]),
+                "loss_by_rudder": float(surge.best[3]),
+                "loss_by_wind": float(surge.best[4]),
+                "std": [float(x) for x in surge.std],
+            },
+            "rudder_rate_deg_s": {
+                "value": degrees(made.models[0].model.rudder_rate.rad_s),
+                "std": degrees(made.models[0].model.rudder_rate.std_rad_s),
+                "executes": made.models[0].model.rudder_rate.executes,
+            },
+            "own_zigzags": None if self.own_zigzags is None else asdict(self.own_zigzags),
+            "assumed": list(self.assumed),
+            "limits": list(self.limits),
+        }
+
+
+def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identified], speed: float) -> tuple[str, ...]:
+    """Return what a prediction takes for granted, sentences."""
+    said = ["calm, deep water without wind, waves or current; the engine left as on the approach"]
+    if request.speed_m_s is None:
+        said.append(f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres of the set")
+    rate = basis.rudder_rate
+    if request.rudder_rate_deg_s is not None:
+        rate = RudderRate(radians(request.rudder_rate_deg_s), 0.0, 0, "")
+        said.append(f"the rudder goes over at {request.rudder_rate_deg_s:.3g} deg/s, as asked for")
+    if rate.executes:
+        said.append(f"the rudder goes over at {degrees(rate.rad_s):.3g} deg/s, as in {rate.executes} executes")
+    said += [word for word in (rate.remark, *basis.surge.remarks) if word]
+    if not all("speed_through_water" in run.channels for run in basis.runs.runs):
+        said.append("the speed in turns is the one over ground along the bow where no log shows that through the water")
+    if not all("shaft_speed" in run.channels for run in basis.runs.runs):
+        said.append("no shaft speed in the logs: taken as constant in them")
+    for model in models:
+        if model.fitted_to_legs:
+            said.append(
+                f"parameters of {model.name} are those fitted to predict legs: the likelihood's, one step ahead, "
+                "predict them worse"
+            )
+        if model.widened > _SAID and model.fitted_to_legs:
+            said.append(
+                f"errors of {model.name} widened {model.widened:.1f} times: so much worse it predicts a manoeuvre that "
+                "is left out"
+            )
+        elif model.widened > _SAID:
+            said.append(
+                f"errors of {model.name} widened {model.widened:.1f} times: over a leg its prediction errors remember, "
+                "as those of a model that lacks something do"
+            )
+    for effect in {e.name: e for model in models for e in model.waters.model.effects}.values():
+        taken = dict.fromkeys(_TAKEN[c] for c in effect.needs if c in _TAKEN)
+        if taken:
+            said.append(f"{effect.name}: {', '.join(taken)}")
+        elif effect.terms and set(effect.terms) <= _INSTRUMENTS:
+            said.append(f"{effect.name} is in the instruments and does not move the ship")
+    return tuple(said)
+
+
+def limits_of(made: Prediction, one: ParameterSet) -> tuple[str, ...]:
+    """Return what limits a prediction, sentences."""
+    said = []
+    if made.no_ships:
+        count = made.no_ships + len(made.drawn)
+        said.append(f"{made.no_ships} of {count} ships that the errors allow do not sail it and are in no interval")
+    for model in made.run_away:
+        said.append(f"{model.title} fits the logs as well, but its ships run away here: that model is in no interval")
+    if made.share_unstable >= 0.05:
+        said.append(f"unstable on a straight course with a probability of {100.0 * made.share_unstable:.0f} %")
+    if not one.convergence.get("converged"):
+        said.append(f"the set did not converge: {one.convergence.get('reason')}")
+    return tuple(said)
+
+
+def _manoeuvre_json(manoeuvre: Manoeuvre) -> dict[str, Any]:
+    found: dict[str, Any] = {"kind": manoeuvre.name}
+    if isinstance(manoeuvre, Zigzag):
+        found["heading_deg"] = round(degrees(manoeuvre.heading_rad), 9)
+    found["rudder_deg"] = round(degrees(manoeuvre.rudder_rad), 9)  # type: ignore[attr-defined]
+    side = getattr(manoeuvre, "side", None)
+    if side is not None:
+        found["side"] = "starboard" if side > 0 else "port"
+    if isinstance(manoeuvre, Spiral):
+        found["orders_deg"] = [round(degrees(angle), 9) for angle in manoeuvre.orders_rad]
+    return found
+
+
+def _grouped(figures: dict[str, Any]) -> dict[str, Any]:
+    """Return figures by name, those with a number behind it as a list."""
+    found: dict[str, Any] = {}
+    for name, figure in figures.items():
+        base, dot, _ = name.partition(".")
+        if dot:
+            found.setdefault(base, []).append(figure)
+        else:
+            found[base] = figure
+    return found
