@@ -148,7 +148,8 @@ def _widened(
     filters = [RunFilter(left_out(run, gross.get(run.name, {})), model, basis.runs.spec) for run in fitted]
     own = [np.exp(np.array(levels[run.name], dtype=np.float64)) for run in fitted]
     # a covariance that is wider already by what the runs disagree about is counted twice in it
-    already = float(one.convergence.get("widened", 1.0))
+    pooling: dict[str, Any] = dict(one.convergence.get("pooling") or {})
+    already = float(one.convergence.get("widened") or pooling.get("widened") or 1.0)
     return max(widening(filters, own, hull, values, covariance) / already**2, 1.0) if filters else 1.0
 
 

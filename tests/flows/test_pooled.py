@@ -5,14 +5,17 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
+from kempf.flows.jobs.prediction_basis import basis_of, identified
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.ship_model import ship_of_set
 from kempf.flows.jobs.standing_model import POOLED
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.nmea_log import to_nmea
@@ -56,6 +59,16 @@ def test_two_days_make_one_set_which_is_built_again_and_not_twice(days: Warehous
     assert all(pooled.parameters[5].std < 0.95 * one.parameters[5].std for one in single)
     assert aliases.of_vessel(days, "mariner")["current"] == pooled.parameter_set_id
     assert rerun(days, pooled.parameter_set_id).verdict == "bit-identical"
+    # errors that are wider already by what the days disagree about are not widened once more by what legs do
+    basis = basis_of(days, pooled)
+    wide = 9.0 * np.array(pooled.covariance)
+    pooling = {**pooled.convergence["pooling"], "widened": 3.0}
+    other = replace(
+        pooled,
+        covariance=tuple(tuple(float(x) for x in row) for row in wide),
+        convergence={**pooled.convergence, "pooling": pooling},
+    )
+    np.testing.assert_allclose(identified(ship_of_set(days, other), basis).covariance, wide, rtol=1e-12)
     again = pool_vessel(days, "mariner", Request(), outcomes)
     assert again is not None and not again[1] and again[0].parameter_set_id == pooled.parameter_set_id
     assert pool_vessel(days, "mariner", Request(estimator="least-squares"), outcomes) is None
