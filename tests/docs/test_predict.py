@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from kempf.pipeline.manoeuvre import draws, prediction
-from kempf.pipeline.manoeuvre.surge import usual
 from kempf.pipeline.manoeuvre.rudder_rate import SOLAS_RAD_S
+from kempf.pipeline.manoeuvre.surge import usual
 from tests.docs.console import follow
 
 ROOT = Path(__file__).parents[2]
