@@ -7,6 +7,7 @@ from math import isfinite, radians
 from typing import Literal
 
 from kempf.pipeline.manoeuvre.pull_out import PullOut
+from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
@@ -35,6 +36,12 @@ class PredictRequest:
     speed_m_s: float | None = None
     #: Of another steering gear; None takes the rudder's rate that the logs show.
     rudder_rate_deg_s: float | None = None
+
+    @property
+    def rudder_rate(self) -> RudderRate | None:
+        """Of another steering gear, as that of the logs is given; None where there is none."""
+        rate = self.rudder_rate_deg_s
+        return None if rate is None else RudderRate(radians(rate), 0.0, 0, "")
 
 
 def manoeuvre_of(request: PredictRequest) -> Manoeuvre:

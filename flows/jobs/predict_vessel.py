@@ -6,7 +6,6 @@ Nothing is fitted but the speed's equation; what is stored are models that fit a
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import radians
 
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.flows.jobs.predict_request import PredictRequest, manoeuvre_of, required
@@ -17,7 +16,6 @@ from kempf.flows.jobs.ship_model import ship_of_set
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.manoeuvre.draws import DRAWS, Identified
 from kempf.pipeline.manoeuvre.prediction import predict
-from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
@@ -78,9 +76,8 @@ def predict_with(
     """Predict a manoeuvre with models that are there; set and speed are theirs, errors are `predict_vessel`'s."""
     required(request)
     models, basis = list(hers.models), hers.basis
-    if request.rudder_rate_deg_s is not None:
-        gear = RudderRate(radians(request.rudder_rate_deg_s), 0.0, 0, "")
-        models = [replace(model, rudder_rate=gear) for model in models]
+    if request.rudder_rate is not None:
+        models = [replace(model, rudder_rate=request.rudder_rate) for model in models]
     progress(0, 1, f"sailing {len(models) * count} ships")
     made = predict(models, manoeuvre_of(request), basis.logs, basis.profile.length_m, count)
     progress(1, 1, "sailed")

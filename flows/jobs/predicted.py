@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
-from math import degrees, radians
+from math import degrees
 from typing import Any
 
 from kempf.flows.jobs.predict_request import PredictRequest
@@ -12,7 +12,6 @@ from kempf.flows.jobs.prediction_basis import Basis
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.own_zigzags import OwnZigzags
 from kempf.pipeline.manoeuvre.prediction import Prediction
-from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
@@ -95,9 +94,8 @@ def assumed_by(request: PredictRequest, basis: Basis, models: Sequence[Identifie
     said = ["calm, deep water without wind, waves or current; the engine left as on the approach"]
     if request.speed_m_s is None:
         said.append(f"approach at {speed:.3g} m/s, the mean of the {len(basis.runs.runs)} manoeuvres of the set")
-    rate = basis.rudder_rate
-    if request.rudder_rate_deg_s is not None:
-        rate = RudderRate(radians(request.rudder_rate_deg_s), 0.0, 0, "")
+    rate = request.rudder_rate or basis.rudder_rate
+    if request.rudder_rate is not None:
         said.append(f"the rudder goes over at {request.rudder_rate_deg_s:.3g} deg/s, as asked for")
     if rate.executes:
         said.append(f"the rudder goes over at {degrees(rate.rad_s):.3g} deg/s, as in {rate.executes} executes")

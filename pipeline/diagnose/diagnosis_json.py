@@ -13,7 +13,7 @@ from kempf.pipeline.diagnose.remaining_misfit import as_json as remaining_json
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.verdict import share_explained, verdict
-from kempf.pipeline.estimate.agreement import agreement_of, stated_std
+from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.schemas.effect import Effect
 
 #: log-likelihood that an effect must gain in a manoeuvre to be seen in it
@@ -123,10 +123,11 @@ def _values(effect: Effect, values: Float, std: Float) -> dict[str, Any]:
 
 def _refit(candidate: Candidate, confirmation: Confirmation) -> dict[str, Any]:
     size, fit = len(candidate.effect.parameters), confirmation.fit
+    widened = agreement_of(fit).widened
     return {
         "effect": candidate.effect.name,
-        "parameters": _values(candidate.effect, fit.values[-size:], stated_std(fit)[-size:]),
-        "widened": agreement_of(fit).widened,
+        "parameters": _values(candidate.effect, fit.values[-size:], (widened * fit.std)[-size:]),
+        "widened": widened,
         "likelihood_ratio": confirmation.likelihood_ratio,
         "bic_change": confirmation.bic_change,
         "gains_left_out": confirmation.fold_gains,

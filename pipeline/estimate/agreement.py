@@ -11,7 +11,6 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float
@@ -57,11 +56,11 @@ def agreement_of(fit: PooledFit) -> Agreement:
 
     Parameters that ended at a bound are held. How much lasting noise her instruments have a run may see as it likes.
     """
-    of_ship = np.concatenate([np.ones(N_HULL, dtype=np.bool_), fit.model.of_ship])
-    free = np.isfinite(np.diag(fit.covariance)) & of_ship
+    movable = np.isfinite(np.diag(fit.covariance))
+    free = movable & np.concatenate([np.ones(N_HULL, dtype=np.bool_), fit.model.of_ship])
     statistic, count = 0.0, 0
     for line in fit.linearised:
-        score, information = _of_shared(line, free, np.flatnonzero(np.isfinite(np.diag(fit.covariance))))
+        score, information = _of_shared(line, free, movable)
         scale = 1.0 / np.sqrt(np.maximum(np.diag(information), 1e-300))
         size, along = np.linalg.eigh(information * np.outer(scale, scale))
         known = size > _NOTHING
@@ -70,10 +69,10 @@ def agreement_of(fit: PooledFit) -> Agreement:
     return Agreement(statistic, count - int(np.count_nonzero(free)))
 
 
-def _of_shared(line: Linearised, free: Mask, movable: NDArray[np.intp]) -> tuple[Float, Float]:
+def _of_shared(line: Linearised, free: Mask, movable: Mask) -> tuple[Float, Float]:
     """Return score and information of a run on ``free`` parameters, beyond its own levels and what else is movable."""
     common = [k for k, i in enumerate(line.index) if i < free.size and free[i]]
-    own = [k for k, i in enumerate(line.index) if i >= free.size or (not free[i] and i in movable)]
+    own = [k for k, i in enumerate(line.index) if i >= free.size or (movable[i] and not free[i])]
     shared, beside = line.J[:, common], line.J[:, own]
     # what of the shared columns none of a run's own can do
     alone: Float = shared - beside @ (inverse(beside.T @ beside) @ (beside.T @ shared))

@@ -39,14 +39,11 @@ def judged(truth: dict[str, Any], answers: Path, oracles: Path) -> list[Judged]:
 def page(cases: Sequence[Judged], asked: int) -> list[str]:
     """Return the lines of the page."""
     seconds = [one.said["seconds"]["diagnose"] for one in cases]
-    known = kind(cases, "catalogue")
-    fitted = sum(bool(one.oracle) for one in known)
     lines = [
         f"{len(cases)} of {asked} cases were diagnosed: "
         + ", ".join(f"{n} {name}" for name, n in sorted(Counter(c.truth["kind"] for c in cases).items()))
         + f". A diagnosis took {median(seconds):.0f} s (median), {max(seconds):.0f} s at most. The expected score is "
-        "twice the log-likelihood that the true structure gains"
-        + ("." if fitted == len(known) else f"; it was computed of {fitted} of the {len(known)} catalogue cases."),
+        "twice the log-likelihood that the true structure gains.",
         "",
         *result_page.table(("asked", "target", "found"), targets(cases)),
         "",
@@ -106,13 +103,11 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--cases", type=Path, required=True, help="where write put cases/ and sealed.bin")
     parser.add_argument("--answers", type=Path, required=True)
     parser.add_argument("--key", type=Path, required=True)
-    parser.add_argument("--fits-as-they-are", action="store_true", help="make no more fits with the true structure")
     given = parser.parse_args(arguments)
     opened = open_sealed((given.cases / "sealed.bin").read_bytes(), given.key.read_bytes())
     truth = {name: one for name, one in opened["cases"].items() if (given.answers / f"{name}.json").exists()}
     oracles = given.answers.with_name(f"{given.answers.name}.oracle")
-    if not given.fits_as_they_are:
-        all_with_the_truth(given.cases / "cases", truth, oracles)
+    all_with_the_truth(given.cases / "cases", truth, oracles)
     cases = judged(truth, given.answers, oracles)
     draw_confusion(cases, result_page.RESULTS / f"{_NAME}.png")
     result_page.write(
