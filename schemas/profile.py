@@ -190,8 +190,10 @@ class VesselProfile(_Grown):
     surroundings: Literal["tank", "pond", "sea"] | None = None
     antenna: Antenna = Antenna()
     sources: list[Source] = Field(default_factory=list)
+    #: patterns of the files of an inbox that are her logs, by name or by path below the inbox, such as ``AUR_*.csv``
+    inbox: list[str] | None = None
 
-    _later: ClassVar[frozenset[str]] = frozenset({"variation_deg", "surroundings"})
+    _later: ClassVar[frozenset[str]] = frozenset({"variation_deg", "surroundings", "inbox"})
 
     def source_for(self, file_name: str) -> Source | None:
         """Return the first source whose pattern matches the file's name (without its folder), or None."""
@@ -203,8 +205,9 @@ class VesselProfile(_Grown):
 
     @property
     def sha256(self) -> str:
-        """Hash of `canonical_json`."""
-        return hashlib.sha256(self.canonical_json().encode()).hexdigest()
+        """Hash of `canonical_json` but for ``inbox``, which says whose logs are hers and not how they are read."""
+        read = self.model_copy(update={"inbox": None})
+        return hashlib.sha256(read.canonical_json().encode()).hexdigest()
 
 
 def parse(mapping: Any, where: str) -> VesselProfile:

@@ -228,6 +228,22 @@ _ALL = (
         (*_VESSEL, Column("alias", "text", "the name"), _SET),
     ),
     Table(
+        "inbox",
+        "one file of an inbox as it was last looked at, and what became of it",
+        (
+            Column("address", "text", "address of the file: a path, or s3://bucket/key"),
+            Column("size_bytes", "integer", "size when it was looked at", "B"),
+            Column("modified_utc_ns", "integer", "when it was last written, by its storage", "ns"),
+            Column("outcome", "text", "ingested, quarantined, dismissed"),
+            Column("vessel", "text", "vessel it was placed with, null where none"),
+            Column("log_id", "text", "SHA-256 of the log as delivered, null where it is not ingested"),
+            Column("code", "text", "code of the error that quarantined it, null where none"),
+            Column("message", "text", "why it is quarantined or dismissed, for a person"),
+            Column("next_step", "text", "what a person should do, null where nothing"),
+            Column("basis", "text", "hash of vessel, profile and code that it was tried with"),
+        ),
+    ),
+    Table(
         "runs",
         "one run of a flow; its time is the time of the commit",
         (

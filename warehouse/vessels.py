@@ -61,15 +61,15 @@ def register_all(
         with delta.ensured(warehouse, "vessels") as table:
             known = delta.rows(table, "vessels").sort("revision").rows(named=True)
             last = {
-                row["vessel"]: (row["revision"], row["profile_sha256"]) for row in known
+                row["vessel"]: (row["revision"], row["profile_json"]) for row in known
             }  # the highest revision stays
             rows: list[dict[str, Any]] = []
             changed = []
             for vessel, profile in profiles:
-                revision, current_sha256 = last.get(vessel, (0, ""))
-                if current_sha256 == profile.sha256:
+                revision, stored = last.get(vessel, (0, ""))
+                if stored == profile.canonical_json():
                     continue
-                last[vessel] = (revision + 1, profile.sha256)
+                last[vessel] = (revision + 1, profile.canonical_json())
                 changed.append((vessel, profile))
                 rows.append(
                     {
@@ -92,6 +92,14 @@ def names(warehouse: Warehouse) -> list[str]:
     """Return the names of all vessels, sorted."""
     frame = delta.read(warehouse, "vessels", columns=("vessel",))
     return sorted(set(frame["vessel"].to_list()))
+
+
+def profiles(warehouse: Warehouse) -> dict[str, VesselProfile]:
+    """Return the current profile of every vessel, by name, sorted; none where there is no warehouse."""
+    if not warehouse.exists():
+        return {}
+    rows = delta.read(warehouse, "vessels").sort("vessel", "revision").rows(named=True)
+    return {row["vessel"]: _version(row).profile for row in {row["vessel"]: row for row in rows}.values()}
 
 
 def versions(warehouse: Warehouse, vessel: str) -> list[VesselVersion]:

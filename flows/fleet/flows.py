@@ -25,63 +25,94 @@ from prefect.futures import as_completed
 from prefect.runtime import flow_run
 from prefect.states import Failed
 
-from kempf.flows.fleet import plan
+from kempf.flows.fleet import arrivals, plan
 from kempf.flows.fleet import report as fleet_report
 from kempf.flows.fleet.diagnosis_summary import summary
 from kempf.flows.fleet.state import responsible_code
 from kempf.flows.jobs import ingest_logs
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.files import logs_in, read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
+from kempf.flows.jobs.take_inbox import InboxRun, NeedsAPerson, take_inbox
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import vessels as vessel_table
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.source_folder import SourceFolder
 from kempf.warehouse.store import Warehouse
 
 
 @task(name="ingest-batch", retries=1, retry_delay_seconds=5)
 def ingest_batch(warehouse: str, paths: list[str], vessel: str | None, profiles: list[str]) -> list[dict[str, Any]]:
     """Take a batch of logs in."""
-    given = read_profiles([Path(p) for p in profiles]) if profiles else None
-    found = ingest_logs.ingest(Warehouse(warehouse), [Path(p) for p in paths], vessel, given)
+    logs, beside = logs_in([Path(p) for p in paths])
+    files = [Path(p) for p in profiles] or list(beside)
+    given = read_profiles(files) if files else None
+    found = ingest_logs.ingest(Warehouse(warehouse), logs, vessel, given)
     return [outcome.show() for outcome in found]
+
+
+@task(name="take-inbox", retries=1, retry_delay_seconds=5)
+def inbox_task(warehouse: str, folder: str) -> InboxRun:
+    """Ingest what is new in an inbox."""
+    log = get_run_logger()
+    run = take_inbox(
+        Warehouse(warehouse),
+        SourceFolder(folder),
+        lambda done, of, what: log.info("%s, %d of %d", what, done, of),
+    )
+    for one in run.quarantined:
+        log.warning("quarantined: %s: %s %s", one.address, one.message, one.next_step)
+    return run
 
 
 @flow(name="ingest")
 def ingest(
     paths: list[str], warehouse: str = "kempf-data", vessel: str | None = None, profiles: Sequence[str] = ()
-) -> list[dict[str, Any]]:
-    """Take raw logs of one vessel in.
+) -> list[dict[str, Any]] | State[Any]:
+    """Take raw logs in: those of one vessel, or what is new in inboxes. Ends as Failed where a log did not get in.
 
     Parameters
     ----------
     paths : list of str
-        Raw logs.
+        Raw logs and folders of them; where neither a vessel nor a profile is given, inboxes.
     warehouse : str, optional
         Its address.
     vessel : str, optional
         Whose they are; else the profile says so.
     profiles : sequence of str, optional
         Profile files.
+
+    Returns
+    -------
+    list of dict or State
+        One outcome a log; where the run ends as Failed a caller gets the error, `arrivals.LogsFailed` or
+        `kempf.flows.jobs.take_inbox.NeedsAPerson`, which has them too.
     """
+    if vessel is None and not profiles:
+        runs = [inbox_task(warehouse, folder) for folder in paths]
+        outcomes = [outcome.show() for run in runs for outcome in run.ingested]
+        _show_logs(outcomes + [arrivals.in_quarantine(one) for run in runs for one in run.quarantined])
+        waiting = [run for run in runs if run.quarantined]
+        if waiting:
+            errors = [NeedsAPerson(run) for run in waiting]
+            return Failed(message=" ".join(error.message for error in errors), data=errors[0])
+        return outcomes
     outcomes = ingest_batch(warehouse, paths, vessel, list(profiles))
-    rows = [
-        {
-            "log": Path(o["path"]).name,
-            "outcome": o["outcome"],
-            "zigzags": len(o["segments"]),
-            "rejected": (o["records"] or {}).get("rejected"),
-            "error": o.get("error", {}).get("message", ""),
-        }
-        for o in outcomes
-    ]
-    create_table_artifact(key="kempf-ingest", table=rows, description="Logs taken in")
+    _show_logs(outcomes)
+    failed = [outcome for outcome in outcomes if "error" in outcome]
+    if failed:
+        error = arrivals.LogsFailed(outcomes)
+        return Failed(message=error.message, data=error)
     return outcomes
+
+
+def _show_logs(outcomes: Sequence[dict[str, Any]]) -> None:
+    create_table_artifact(key="kempf-ingest", table=arrivals.table(outcomes), description="Logs taken in")
 
 
 @task(name="identify-vessel", retries=1, retry_delay_seconds=5)

@@ -12,6 +12,7 @@ from typing import Any, BinaryIO
 
 from pydantic import ValidationError
 
+from kempf.flows.jobs.inbox_place import PROFILES
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas import profile as profiles
 from kempf.schemas import yaml_text
@@ -36,15 +37,25 @@ def read_bytes(path: Path, what: str) -> bytes:
         ``file_too_large``.
     """
     with _opened(path, what) as stream:
-        file = LogFile(stream)
-        if file.size > LARGEST_BYTES:
-            raise DataRejected(
-                "file_too_large",
-                f"{path} has {file.size} bytes; a {what} of more than {LARGEST_BYTES} is not read.",
-                "Look whether it is the right file; a long profile may be given as several files.",
-                {"path": str(path), "bytes": file.size},
-            )
-        return file.whole()
+        return whole(LogFile(stream), str(path), what)
+
+
+def whole(file: LogFile, where: str, what: str) -> bytes:
+    """Return the bytes of an open file that a person wrote.
+
+    Raises
+    ------
+    DataRejected
+        ``file_too_large``.
+    """
+    if file.size > LARGEST_BYTES:
+        raise DataRejected(
+            "file_too_large",
+            f"{where} has {file.size} bytes; a {what} of more than {LARGEST_BYTES} is not read.",
+            "Look whether it is the right file; a long profile may be given as several files.",
+            {"path": where, "bytes": file.size},
+        )
+    return file.whole()
 
 
 @contextmanager
@@ -112,24 +123,23 @@ def _opened(path: Path, what: str) -> Iterator[BinaryIO]:
         yield stream
 
 
-def _read_yaml(path: Path, what: str) -> Any:
-    """Return what a YAML file says."""
-    data = read_bytes(path, what)
+def _yaml_of(data: bytes, what: str, where: str) -> Any:
+    """Return what the bytes of a YAML file say."""
     try:
         return yaml_text.load(data)
     except yaml_text.TooLarge as error:
         raise UsageError(
             "yaml_too_large",
-            f"The {what} {path} is not read: {error}.",
+            f"The {what} {where} is not read: {error}.",
             "Write it without nested aliases.",
-            {"path": str(path)},
+            {"path": where},
         ) from error
     except yaml_text.NotYaml as error:
         raise UsageError(
             "not_yaml",
-            f"The {what} {path} is not valid YAML: {error}.",
+            f"The {what} {where} is not valid YAML: {error}.",
             "Correct the line it names.",
-            {"path": str(path)},
+            {"path": where},
         ) from error
 
 
@@ -139,26 +149,72 @@ def read_profiles(paths: Sequence[Path]) -> VesselProfile:
     Raises
     ------
     UsageError
-        One is no profile, or two disagree. ``profile_draft``: a ``?`` of a draft is left in one.
+        What `profile_of` raises; two disagree.
     """
-    return profiles.merge([(str(p), profiles.parse(_completed(p), str(p))) for p in paths])
+    return profiles.merge([(str(p), profile_of(read_bytes(p, "vessel profile"), str(p))) for p in paths])
 
 
-def _completed(path: Path) -> Any:
-    """Return what a profile says, in which nothing is left of the ``?`` of a draft."""
-    content = _read_yaml(path, "vessel profile")
+def logs_in(paths: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
+    """Return the files that are meant by some paths: of a folder all in it and below, sorted, but for hidden ones.
+
+    Returns
+    -------
+    logs, profiles : tuple of Path
+        A folder's own ``profile.yaml`` says how its logs are read, and is no log.
+
+    Raises
+    ------
+    NotFound
+        ``empty_folder``.
+    """
+    logs: list[Path] = []
+    beside: list[Path] = []
+    for path in paths:
+        # of "" nothing is left but a dot: a variable that was not set does not mean the folder one is in
+        if str(path) == "." or not path.is_dir():
+            logs.append(path)
+            continue
+        found = sorted(p for p in path.rglob("*") if p.is_file() and not _hidden(p.relative_to(path)))
+        own = [p for p in found if p.name in PROFILES]
+        beside += own
+        logs += [p for p in found if p not in own]
+        if len(found) == len(own):
+            raise NotFound(
+                "empty_folder", f"There is no log in the folder {path}.", "Check the path.", {"path": str(path)}
+            )
+    return tuple(logs), tuple(beside)
+
+
+def _hidden(path: Path) -> bool:
+    return any(part.startswith(".") for part in path.parts)
+
+
+def profile_of(data: bytes, where: str) -> VesselProfile:
+    """Return the vessel profile that the bytes of a file hold.
+
+    Parameters
+    ----------
+    where : str
+        Name of the file, for the message.
+
+    Raises
+    ------
+    UsageError
+        It is no profile. ``profile_draft``: a ``?`` of a draft is left in it.
+    """
+    content = _yaml_of(data, "vessel profile", where)
     if _has_guess(content):
-        text = read_bytes(path, "vessel profile").decode("utf-8", errors="replace")
+        text = data.decode("utf-8", errors="replace")
         lines = [
             str(k) for k, line in enumerate(text.splitlines(), 1) if re.search(r"\?[\"']?\s*([,}#]|$)", _said(line))
         ]
         raise UsageError(
             "profile_draft",
-            f"{path} is still a draft: a ? is left in line{'s' if len(lines) > 1 else ''} {', '.join(lines)}.",
+            f"{where} is still a draft: a ? is left in line{'s' if len(lines) > 1 else ''} {', '.join(lines)}.",
             "Correct what these lines say and delete the ?, or take the lines out.",
-            {"path": str(path), "lines": [int(line) for line in lines]},
+            {"path": where, "lines": [int(line) for line in lines]},
         )
-    return content
+    return profiles.parse(content, where)
 
 
 def _said(line: str) -> str:
@@ -183,7 +239,7 @@ def read_model(path: Path) -> ModelSpec:
         ``model_invalid``: every fault is named with its place. ``model_unknown``: it asks for a base
         that is not there.
     """
-    content = _read_yaml(path, "model specification")
+    content = _yaml_of(read_bytes(path, "model specification"), "model specification", str(path))
     try:
         spec = ModelSpec.model_validate(content)
     except ValidationError as error:

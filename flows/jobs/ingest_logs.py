@@ -10,6 +10,7 @@ from typing import Any
 from kempf.flows.jobs import search_log
 from kempf.flows.jobs.files import opened_log
 from kempf.flows.jobs.find_segments import Ingest
+from kempf.flows.jobs.inbox_place import no_vessel
 from kempf.flows.jobs.out_of_date import unsearched
 from kempf.flows.jobs.search_log import SearchedLog, search
 from kempf.flows.jobs.spool import spooled
@@ -89,16 +90,25 @@ def _channels(examination: StoredExamination | None) -> dict[str, Any] | None:
     return {"verdict": examination.verdict, "findings": examination.content.get("findings", [])}
 
 
-def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile | None) -> tuple[str, VesselProfile]:
+def laid_over(stored: VesselProfile, given: VesselProfile | None, vessel: str) -> VesselProfile:
+    """Return the profile that logs of a vessel are read with: what is given is new, what it leaves out stays."""
+    return overlay(stored, given or VesselProfile()).model_copy(update={"vessel": vessel})
+
+
+def settle_vessel(
+    warehouse: Warehouse, vessel: str | None, given: VesselProfile | None, *, new_vessel: bool = False
+) -> tuple[str, VesselProfile]:
     """Say whose logs they are and with which profile they are read.
 
-    A given profile is laid over the stored one: what it says is new, what it leaves out stays.
+    A name that is new beside other vessels is taken for a slip of the hand, unless a profile comes with it.
 
     Raises
     ------
     UsageError
         ``no_vessel_named``, ``vessel_name``: the name is blank, or ``profiles_disagree``: the option and the profile
         name different vessels.
+    NotFound
+        ``no_vessel``.
     """
     named = given.vessel if given else None
     if vessel is not None and named is not None and vessel != named:
@@ -113,12 +123,17 @@ def settle_vessel(warehouse: Warehouse, vessel: str | None, given: VesselProfile
         raise UsageError(
             "no_vessel_named",
             "Whose logs are these? Neither --vessel nor a profile names the vessel.",
-            "Add --vessel NAME.",
+            "Add --vessel NAME; a folder with one folder a vessel is taken in with `kempf inbox FOLDER`.",
         )
     vessel_key(name)  # refuses a name that is none once, not for every log
-    known = warehouse.exists() and name in vessels.names(warehouse)
-    stored = vessels.current(warehouse, name) if known else VesselProfile()
-    return name, overlay(stored, given or VesselProfile()).model_copy(update={"vessel": name})
+    known = vessels.profiles(warehouse)
+    if known and name not in known and given is None and not new_vessel:
+        raise no_vessel(
+            name,
+            known,
+            "Correct the name; if she is new, say so with --new-vessel, or give her profile with --profile.",
+        )
+    return name, laid_over(known.get(name, VesselProfile()), given, name)
 
 
 def ingest(
@@ -127,6 +142,8 @@ def ingest(
     vessel: str | None = None,
     given: VesselProfile | None = None,
     progress: Progress = silent,
+    *,
+    new_vessel: bool = False,
 ) -> list[IngestOutcome]:
     """Take logs in; one that fails does not stop the others, and leaves nothing behind.
 
@@ -140,6 +157,8 @@ def ingest(
         Whose they are; else the profile says so.
     given : VesselProfile, optional
         Laid over the stored profile of the vessel.
+    new_vessel : bool, optional
+        Whether a vessel of this name that is not known yet is made.
 
     Returns
     -------
@@ -150,8 +169,10 @@ def ingest(
     ------
     UsageError
         Nobody says whose the logs are, or two say different things.
+    NotFound
+        ``no_vessel``.
     """
-    name, profile = settle_vessel(warehouse, vessel, given)
+    name, profile = settle_vessel(warehouse, vessel, given, new_vessel=new_vessel)
     outcomes = []
     for done, path in enumerate(paths):
         progress(done, len(paths), f"reading {path.name}")

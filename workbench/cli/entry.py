@@ -24,6 +24,7 @@ INTERRUPTED = 130
 
 COMMANDS = {
     "ingest": "Take raw logs in: read, check, keep, find the manoeuvres.",
+    "inbox": "Ingest what is new in a folder or bucket, one folder a vessel.",
     "doctor": "Find channels that contradict each other, and the profile line that corrects them.",
     "segments": "List the manoeuvres found.",
     "identify": "Identify a model from every manoeuvre of a vessel.",
@@ -42,7 +43,7 @@ COMMANDS = {
     "compact": "Put the many small files of the tables into few; delete what nothing refers to.",
     "vessels": "List vessels, show and set their profiles.",
     "profile": "Draft the profile of a log that does not describe itself.",
-    "logs": "List the logs, show what was rejected in one and why.",
+    "logs": "List the logs, what was rejected in one and why, and the files in quarantine.",
     "demo": "Simulate a trial, ingest it, identify the ship and compare with the truth.",
     "reproduce-paper": "Repeat the paper's experiment: its figures, its accuracy beside ours.",
     "completion": "Print the shell completion script.",

@@ -10,7 +10,14 @@ from typing import TYPE_CHECKING
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.options import json_option, profile_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import (
+    json_option,
+    new_vessel_option,
+    profile_option,
+    verbose_option,
+    vessel_option,
+    warehouse_option,
+)
 from kempf.workbench.ranked_warnings import of_several, show_warnings
 from kempf.workbench.terminal import counted, one_line, print_json, progress_bar
 
@@ -22,25 +29,33 @@ if TYPE_CHECKING:
 @click.command("ingest", cls=GivenOnce)
 @click.argument("paths", nargs=-1, required=True, type=click.Path(path_type=Path))
 @vessel_option()
+@new_vessel_option("She is new: a name beside those of the warehouse is no slip of the hand.")
 @profile_option
 @verbose_option
 @warehouse_option
 @json_option
 def command(
-    paths: tuple[Path, ...], vessel: str | None, profiles: tuple[Path, ...], verbose: bool, uri: str, as_json: bool
+    paths: tuple[Path, ...],
+    vessel: str | None,
+    new_vessel: bool,
+    profiles: tuple[Path, ...],
+    verbose: bool,
+    uri: str,
+    as_json: bool,
 ) -> None:
-    """Take raw logs in: MCAP, NMEA 0183 or delimited text, also compressed.
+    """Take raw logs in: MCAP, NMEA 0183 or delimited text, also compressed. Of a folder all files are taken.
 
     Each log is read, checked, kept byte for byte and searched for manoeuvres. A log that is in already changes nothing.
     One that cannot be read stops none of the others, and leaves nothing behind.
     """
-    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.files import logs_in, read_profiles
     from kempf.flows.jobs.ingest_logs import ingest
     from kempf.warehouse.store import Warehouse
 
-    given = read_profiles(profiles) if profiles else None
+    paths, beside = logs_in(paths)
+    given = read_profiles(profiles or beside) if profiles or beside else None
     with progress_bar() as progress:
-        outcomes = ingest(Warehouse(uri), paths, vessel, given, progress)
+        outcomes = ingest(Warehouse(uri), paths, vessel, given, progress, new_vessel=new_vessel)
     failed = [outcome.error for outcome in outcomes if outcome.error is not None]
     if len(outcomes) == 1 and failed:
         raise failed[0]

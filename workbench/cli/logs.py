@@ -1,14 +1,22 @@
-"""``kempf logs list|rejected``."""
+"""``kempf logs list|show|rejected|quarantine|release|dismiss``."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
 from kempf.workbench.cli.given_once import GivenOnceGroup
-from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.cli.options import (
+    json_option,
+    new_vessel_option,
+    profile_option,
+    verbose_option,
+    vessel_option,
+    warehouse_option,
+)
 from kempf.workbench.terminal import one_line, print_json, print_note, print_table
 
 if TYPE_CHECKING:
@@ -23,7 +31,7 @@ _ENDS = (14, 15)
 
 @click.group("logs", cls=GivenOnceGroup)
 def command() -> None:
-    """List the logs, show one with what its channels say, and what was rejected in it and why."""
+    """List the logs, show what one's channels say and what was rejected in it; see to the files in quarantine."""
 
 
 @command.command("list")
@@ -180,3 +188,71 @@ def rejected(log_id: str, limit: int, uri: str, as_json: bool) -> None:
     print_table(["record", "reason", "source", "channel", "raw"], rows)
     if refused.height > limit:
         click.echo(f"... {refused.height - limit} more, see --limit")
+
+
+@command.command("quarantine")
+@warehouse_option
+@json_option
+def quarantine(uri: str, as_json: bool) -> None:
+    """List the files of inboxes that could not be placed or read, with the reason and what to do."""
+    from kempf.flows.jobs.take_inbox import quarantine_json
+    from kempf.warehouse import inbox
+    from kempf.warehouse.store import Warehouse
+
+    held = inbox.quarantined(Warehouse(uri))
+    if as_json:
+        print_json([quarantine_json(one) for one in held])
+        return
+    if not held:
+        click.echo("no file is in quarantine")
+    for one in held:
+        click.echo(f"{one_line(one.address)}: [{one.code}] {one_line(one.message or '')}")
+        click.echo(f"  {one_line(one.next_step or '')}")
+
+
+@command.command("release")
+@click.argument("file")
+@vessel_option()
+@new_vessel_option("She is new.")
+@profile_option
+@verbose_option
+@warehouse_option
+@json_option
+def release_file(
+    file: str,
+    vessel: str | None,
+    new_vessel: bool,
+    profiles: tuple[Path, ...],
+    verbose: bool,
+    uri: str,
+    as_json: bool,
+) -> None:
+    """Ingest a file that is in quarantine, by its address or the end of it, as a log of the vessel that is named."""
+    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.release_log import release
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.cli.ingest import tell_outcomes
+
+    given = read_profiles(profiles) if profiles else None
+    outcome = release(Warehouse(uri), file, vessel, given, new_vessel=new_vessel)
+    if as_json:
+        print_json(outcome.show())
+    else:
+        tell_outcomes([outcome], verbose=verbose)
+
+
+@command.command("dismiss")
+@click.argument("file")
+@click.option("--reason", required=True, metavar="TEXT", help="Why it is no log, for those who come after.")
+@warehouse_option
+@json_option
+def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
+    """Leave a file that is in quarantine alone for good. The file itself is not touched."""
+    from kempf.flows.jobs.release_log import dismiss
+    from kempf.warehouse.store import Warehouse
+
+    row = dismiss(Warehouse(uri), file, reason)
+    if as_json:
+        print_json({"file": row.address, "dismissed": True, "reason": row.message})
+    else:
+        click.echo(f"{one_line(row.address)}: dismissed, {one_line(row.message or '')}")

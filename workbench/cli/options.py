@@ -50,6 +50,11 @@ def vessel_option(*, required: bool = False, multiple: bool = False) -> Callable
     )
 
 
+def new_vessel_option(help_text: str) -> Callable[[F], F]:
+    """Add ``--new-vessel``."""
+    return click.option("--new-vessel", is_flag=True, help=help_text)
+
+
 def set_argument(function: F) -> F:
     """Add the argument SET_ID, None where it is not given, and ``--vessel``, whose alias it is."""
     vessel = click.option("--vessel", metavar="NAME", help="Whose alias it is; needed where several vessels have it.")

@@ -1,0 +1,93 @@
+"""Whose the files of an inbox are: by their folder, by its profile, or by the patterns in the vessels' profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from difflib import get_close_matches
+from fnmatch import fnmatch
+
+from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.schemas.profile import VesselProfile
+from kempf.warehouse.source_folder import SourceFile
+
+#: names of a file that says of a folder whose logs are in it and how they are read
+PROFILES = ("profile.yaml", "profile.yml", "profile.json")
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """Whose a file is, and what its folder says beside her stored profile."""
+
+    vessel: str
+    given: VesselProfile | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Register:
+    """What decides whose a file is."""
+
+    #: Stored profiles of the known vessels, by name.
+    known: Mapping[str, VesselProfile]
+    #: What the folders' own profiles say, by folder.
+    of_folder: Mapping[str, VesselProfile]
+    #: Whether the folder of a vessel that is not known makes one.
+    new_vessels: bool = False
+
+    def place(self, file: SourceFile) -> Place:
+        """Return whose a file is.
+
+        Raises
+        ------
+        NotFound
+            ``no_vessel``: its folder has no vessel's name, ``not_placed``: nothing says whose it is.
+        UsageError
+            ``several_vessels``: the patterns of several are those of its name.
+        """
+        given = self.of_folder.get(file.folder)
+        if given is not None and given.vessel is not None:
+            return Place(given.vessel, given)
+        if file.folder and (file.folder in self.known or self.new_vessels):
+            return Place(file.folder, given)
+        fit = sorted(name for name, profile in self.known.items() if _fits(profile, file))
+        if len(fit) > 1:
+            raise UsageError(
+                "several_vessels",
+                f"The patterns of {', '.join(map(repr, fit))} all fit {file.path}.",
+                "Make the patterns under `inbox` in their profiles tell them apart, or release it with "
+                "`kempf logs release FILE --vessel NAME`.",
+                {"path": file.path, "vessels": fit},
+            )
+        if fit:
+            return Place(fit[0], given)
+        raise self._not_placed(file)
+
+    def _not_placed(self, file: SourceFile) -> KempfError:
+        release = "`kempf logs release FILE --vessel NAME`"
+        if not file.folder:
+            return NotFound(
+                "not_placed",
+                f"{file.path} lies in no vessel's folder, and no vessel's profile has a pattern for it under `inbox`.",
+                f"Move it into its vessel's folder, write a pattern into her profile, or release it with {release}.",
+                {"path": file.path},
+            )
+        return no_vessel(
+            file.folder,
+            self.known,
+            f"Rename the folder, put her profile.yaml into it if she is new, or release it with {release}.",
+        )
+
+
+def no_vessel(name: str, known: Iterable[str], next_step: str) -> NotFound:
+    """Return the error of a name that is no vessel's."""
+    names = sorted(known)
+    like = get_close_matches(name, names)
+    said = f"; like it: {', '.join(map(repr, like))}" if like else f"; known: {', '.join(names[:20]) or 'none'}"
+    return NotFound(
+        "no_vessel", f"There is no vessel {name!r}{said}.", next_step, {"vessel": name, "known": names[:20]}
+    )
+
+
+def _fits(profile: VesselProfile, file: SourceFile) -> bool:
+    patterns = profile.inbox or ()
+    return any(fnmatch(file.path, pattern) or fnmatch(file.name, pattern) for pattern in patterns)

@@ -1,0 +1,287 @@
+"""The job that empties an inbox: what is new is ingested, what cannot be placed or read is put into quarantine."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import PurePosixPath
+from typing import Any
+
+from kempf.flows.jobs.files import profile_of, whole
+from kempf.flows.jobs.inbox_place import PROFILES, Register
+from kempf.flows.jobs.ingest_logs import IngestOutcome, ingest_log, laid_over
+from kempf.flows.process.progress import Progress, silent
+from kempf.flows.process.wrap_error import wrapped
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.schemas.errors import DataRejected, KempfError
+from kempf.schemas.profile import VesselProfile, merge
+from kempf.warehouse import code_version, inbox, vessels
+from kempf.warehouse.canonical import canonical_json, sha256
+from kempf.warehouse.inbox import InboxFile
+from kempf.warehouse.source_folder import SourceFile, SourceFolder
+from kempf.warehouse.store import Warehouse
+
+#: a file that was written less than so many seconds ago may still be being written
+SETTLE_S = 60.0
+#: errors that are the warehouse's or the inbox's and no file's: the run ends with them
+_NO_FILES = ("disk_full", "warehouse_not_writable", "warehouse_unreachable", "table_unreadable", "inbox_unreadable")
+#: files whose outcome is stored together
+_TOGETHER = 50
+
+
+@dataclass(frozen=True)
+class InboxRun:
+    """What became of an inbox."""
+
+    address: str
+    #: Of every file that was new, in the order of their paths.
+    ingested: tuple[IngestOutcome, ...]
+    #: All that is in quarantine below this inbox now, whether it was put there by this run or before.
+    quarantined: tuple[InboxFile, ...]
+    #: Of these, addresses of those that this run put there or tried again in vain.
+    tried: frozenset[str]
+    #: Paths of files that were written a moment ago, or whose folder's profile cannot be read.
+    waiting: tuple[str, ...]
+    #: Files that were known and have not changed.
+    known: int
+
+    def show(self) -> dict[str, Any]:
+        """Return the run as JSON content."""
+        return {
+            "inbox": self.address,
+            "ingested": [one.show() for one in self.ingested],
+            "quarantined": [{**quarantine_json(one), "new": one.address in self.tried} for one in self.quarantined],
+            "waiting": list(self.waiting),
+            "known": self.known,
+        }
+
+
+class NeedsAPerson(DataRejected):
+    """Files of an inbox are in quarantine; all others are in.
+
+    Parameters
+    ----------
+    run : InboxRun
+        Kept in ``details``.
+    """
+
+    def __init__(self, run: InboxRun) -> None:
+        names = [PurePosixPath(one.address).name for one in run.quarantined]
+        count = f"{len(names)} file{'s' if len(names) != 1 else ''}"
+        super().__init__(
+            "files_in_quarantine",
+            f"{count} of {run.address} cannot be placed or read: {', '.join(names[:5])}{' ...' if names[5:] else ''}.",
+            "`kempf logs quarantine` says of each why, and what to do.",
+            run.show(),
+        )
+
+
+def quarantine_json(one: InboxFile) -> dict[str, Any]:
+    """Return a file in quarantine as JSON content."""
+    return {
+        "file": one.address,
+        "size_bytes": one.size_bytes,
+        "vessel": one.vessel,
+        "code": one.code,
+        "message": one.message,
+        "next_step": one.next_step,
+    }
+
+
+def take_inbox(
+    warehouse: Warehouse,
+    folder: SourceFolder,
+    progress: Progress = silent,
+    *,
+    new_vessels: bool = False,
+    settle_s: float = SETTLE_S,
+) -> InboxRun:
+    """Ingest what is new in an inbox; what cannot be placed or read goes into quarantine and stops nothing else.
+
+    A file in quarantine is tried again where it, her profile, or the code that reads logs has changed. Nothing in the
+    inbox is moved or deleted.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Made where there is none, with the first log that can be read.
+    folder : SourceFolder
+        One folder a vessel, or files that a pattern in a profile places.
+    new_vessels : bool, optional
+        Whether the folder of a vessel that is not known makes one; else her profile must lie in it.
+    settle_s : float, optional
+        Files written less than so many seconds ago are left for the next run.
+
+    Raises
+    ------
+    KempfError
+        What `SourceFolder.list` raises; ``disk_full``, ``warehouse_not_writable``, ...: no file's fault.
+    """
+    files = folder.list()
+    before = inbox.below(warehouse, folder.address)
+    folders = _read_folders(folder, files)
+    register = Register(vessels.profiles(warehouse), folders.profiles, new_vessels)
+    settled_ns = time.time_ns() - round(settle_s * 1e9)
+    waiting, due = [], []
+    for file in files:
+        if file.address in folders.files:
+            continue
+        if file.folder in folders.unreadable or file.modified_utc_ns > settled_ns:
+            waiting.append(file.path)
+        else:
+            due.append(_placed(register, file))
+    todo = [one for one in due if one.is_new(before.get(one.file.address))]
+    rows, outcomes = folders.rows(before), []
+    for done, one in enumerate(todo):
+        progress(done, len(todo), f"reading {one.file.name}")
+        row, outcome = take(warehouse, folder, one)
+        rows.append(row)
+        if outcome is not None:
+            outcomes.append(outcome)
+        if len(rows) >= _TOGETHER:
+            inbox.record(warehouse, rows)
+            rows = []
+    inbox.record(warehouse, rows)
+    _register(warehouse, folders.profiles)
+    progress(len(todo), len(todo), "done")
+    held = [one for one in inbox.below(warehouse, folder.address).values() if one.outcome == "quarantined"]
+    tried = {one.file.address for one in todo} | {file.address for file, _ in folders.unreadable.values()}
+    return InboxRun(
+        folder.address,
+        tuple(outcomes),
+        tuple(sorted(held, key=lambda one: one.address)),
+        frozenset(tried),
+        tuple(waiting),
+        len(due) - len(todo),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class _Folders:
+    """The profiles that lie in the folders of an inbox, by folder."""
+
+    profiles: Mapping[str, VesselProfile]
+    unreadable: Mapping[str, tuple[SourceFile, KempfError]]
+    #: By address.
+    files: Mapping[str, SourceFile]
+
+    def rows(self, before: Mapping[str, InboxFile]) -> list[InboxFile]:
+        """Return what is to be stored of them: those that cannot be read, and those that could not before."""
+        broken = [_quarantined(file, None, error, None) for file, error in self.unreadable.values()]
+        bad = {one.address for one in broken}
+        mended = [
+            InboxFile(file.address, file.size_bytes, file.modified_utc_ns, "ingested")
+            for file in self.files.values()
+            if file.address in before and file.address not in bad
+        ]
+        return broken + mended
+
+
+def _read_folders(folder: SourceFolder, files: Sequence[SourceFile]) -> _Folders:
+    """Read the profiles that lie in the folders of an inbox."""
+    read: dict[str, VesselProfile] = {}
+    unreadable: dict[str, tuple[SourceFile, KempfError]] = {}
+    there = [file for file in files if file.name in PROFILES and file.path.count("/") == (1 if file.folder else 0)]
+    for file in there:
+        try:
+            with folder.opened(file) as stream:
+                found = profile_of(whole(LogFile(stream), file.address, "vessel profile"), file.address)
+            read[file.folder] = merge([*_beside(read, file), (file.address, found)])
+        except KempfError as error:
+            if error.code in _NO_FILES:
+                raise
+            unreadable.setdefault(file.folder, (file, error))
+    good = {name: profile for name, profile in read.items() if name not in unreadable}
+    return _Folders(good, unreadable, {file.address: file for file in there})
+
+
+def _beside(read: Mapping[str, VesselProfile], file: SourceFile) -> list[tuple[str, VesselProfile]]:
+    return [(f"another profile of the folder {file.folder}", read[file.folder])] if file.folder in read else []
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """A file, with whose it is and how it is to be read; or why it cannot be placed."""
+
+    file: SourceFile
+    vessel: str | None = None
+    profile: VesselProfile | None = None
+    error: KempfError | None = None
+
+    @property
+    def basis(self) -> str:
+        """Hash of what decides what becomes of it, beside its bytes."""
+        return sha256(
+            canonical_json(
+                [
+                    self.vessel,
+                    self.profile.sha256 if self.profile else None,
+                    self.error.message if self.error else None,
+                    code_version.fingerprint("ingest"),
+                ]
+            )
+        )[:16]
+
+    def is_new(self, known: InboxFile | None) -> bool:
+        """Return whether it is to be looked at: it is new, was written since, or may be read now."""
+        if known is None:
+            return True
+        if (known.size_bytes, known.modified_utc_ns) != (self.file.size_bytes, self.file.modified_utc_ns):
+            return True
+        return known.outcome == "quarantined" and known.basis != self.basis
+
+
+def _placed(register: Register, file: SourceFile) -> Placed:
+    try:
+        place = register.place(file)
+    except KempfError as error:
+        return Placed(file, error=error)
+    stored = register.known.get(place.vessel, VesselProfile())
+    return Placed(file, place.vessel, laid_over(stored, place.given, place.vessel))
+
+
+def take(warehouse: Warehouse, folder: SourceFolder, one: Placed) -> tuple[InboxFile, IngestOutcome | None]:
+    """Ingest one file; where it cannot be placed or read, return the row that puts it into quarantine.
+
+    Raises
+    ------
+    KempfError
+        ``disk_full``, ``warehouse_not_writable``, ...: no file's fault.
+    """
+    file = one.file
+    try:
+        if one.error is not None or one.vessel is None or one.profile is None:
+            assert one.error is not None
+            raise one.error
+        with folder.opened(file) as stream:
+            outcome = ingest_log(warehouse, one.vessel, file.name, LogFile(stream), one.profile, file.address)
+    except Exception as error:  # whatever it is, the next log must not pay for it
+        found = wrapped(error)
+        if found.code in _NO_FILES:
+            raise found from error
+        return _quarantined(file, one.vessel, found, one.basis), None
+    row = InboxFile(
+        *(file.address, file.size_bytes, file.modified_utc_ns, "ingested", one.vessel, outcome.log_id),
+        basis=one.basis,
+    )
+    return row, outcome
+
+
+def _quarantined(file: SourceFile, vessel: str | None, error: KempfError, basis: str | None) -> InboxFile:
+    return InboxFile(
+        *(file.address, file.size_bytes, file.modified_utc_ns, "quarantined", vessel),
+        code=error.code,
+        message=error.message,
+        next_step=error.next_step,
+        basis=basis,
+    )
+
+
+def _register(warehouse: Warehouse, of_folder: Mapping[str, VesselProfile]) -> None:
+    """Make what the folders' profiles say of known vessels current, also where no log of theirs is new."""
+    stored = vessels.profiles(warehouse)
+    named = [(given.vessel or folder, given) for folder, given in of_folder.items()]
+    vessels.register_all(
+        warehouse, [(name, laid_over(stored[name], given, name)) for name, given in named if name in stored]
+    )

@@ -1,0 +1,196 @@
+"""An inbox: what is new gets in, what cannot be placed or read waits for a person, and nothing is done twice."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+import yaml
+
+from kempf.flows.fleet.arrivals import LogsFailed
+from kempf.flows.jobs.release_log import dismiss, release
+from kempf.flows.jobs.take_inbox import NeedsAPerson, take_inbox
+from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
+from kempf.warehouse import inbox, logs, vessels
+from kempf.warehouse.source_folder import SourceFolder
+from kempf.warehouse.store import Warehouse
+from tests.conftest import Ship
+from tests.workbench.driving import kempf
+
+
+def taken(place: Path, warehouse: Warehouse):
+    return take_inbox(warehouse, SourceFolder(str(place)), settle_s=0.0)
+
+
+@pytest.fixture
+def place(mariner: Ship, tmp_path: Path) -> Path:
+    """An inbox with the folder of a ship: her profile, her log and something that is no log."""
+    folder = tmp_path / "inbox" / "mariner"
+    folder.mkdir(parents=True)
+    (folder / "profile.yaml").write_text(yaml.safe_dump(mariner.profile))
+    (folder / "day.csv.gz").write_bytes(mariner.csv)
+    (folder / "minutes.pdf").write_bytes(b"%PDF-1.7\n\x00\x01 minutes of the meeting")
+    (folder / ".day.part").write_bytes(b"")
+    return tmp_path / "inbox"
+
+
+@pytest.fixture
+def warehouse(tmp_path: Path) -> Warehouse:
+    return Warehouse(str(tmp_path / "w"))
+
+
+def test_what_is_new_gets_in_once_and_what_is_no_log_waits_for_a_person(place: Path, warehouse: Warehouse) -> None:
+    first = taken(place, warehouse)
+    assert [Path(one.path).name for one in first.ingested] == ["day.csv.gz"] and first.ingested[0].outcome == "new"
+    (pdf,) = first.quarantined
+    assert pdf.address == f"{place}/mariner/minutes.pdf" and pdf.code and pdf.next_step and pdf.address in first.tried
+    assert [row.vessel for row in logs.current(warehouse)] == ["mariner"]
+    again = taken(place, warehouse)
+    assert again.ingested == () and again.quarantined == (pdf,) and not again.tried and again.known == 2
+    dismissed = dismiss(warehouse, "minutes.pdf", "minutes of a meeting")
+    assert dismissed.message == "minutes of a meeting" and taken(place, warehouse).quarantined == ()
+    # what is written anew is looked at again
+    (place / "mariner" / "minutes.pdf").write_bytes(b"%PDF-1.7\n\x00 other minutes")
+    assert [one.address for one in taken(place, warehouse).quarantined] == [pdf.address]
+    with pytest.raises(UsageError, match="blank"):
+        dismiss(warehouse, "minutes.pdf", " ")
+
+
+def test_a_slip_of_the_hand_makes_no_ship_and_is_released_by_one_command(
+    place: Path, mariner: Ship, warehouse: Warehouse
+) -> None:
+    taken(place, warehouse)
+    (place / "marinner").mkdir()
+    (place / "marinner" / "second.nmea.gz").write_bytes(mariner.nmea)
+    (place / "adrift.mcap").write_bytes(mariner.mcap)
+    found = {Path(one.address).name: one for one in taken(place, warehouse).quarantined}
+    assert found["second.nmea.gz"].code == "no_vessel" and "like it: 'mariner'" in str(found["second.nmea.gz"].message)
+    assert found["adrift.mcap"].code == "not_placed"
+    assert vessels.names(warehouse) == ["mariner"]
+    with pytest.raises(NotFound, match="no vessel 'marinner'"):
+        release(warehouse, "second.nmea.gz", "marinner")
+    released = release(warehouse, "second.nmea.gz", "mariner")
+    assert released.outcome == "new" and released.segments
+    assert release(warehouse, f"{place}/adrift.mcap", "mariner").outcome == "new"
+    with pytest.raises(NotFound, match="is in quarantine"):
+        release(warehouse, "adrift.mcap", "mariner")
+    assert len(logs.current(warehouse)) == 3 and vessels.names(warehouse) == ["mariner"]
+    assert {Path(one.address).name for one in inbox.quarantined(warehouse)} == {"minutes.pdf"}
+
+
+def test_patterns_in_the_profile_place_a_file_and_do_not_read_her_logs_anew(
+    place: Path, mariner: Ship, warehouse: Warehouse
+) -> None:
+    before = taken(place, warehouse).ingested[0].ingest_id
+    (place / "MRN-2.nmea.gz").write_bytes(mariner.nmea)
+    assert "not_placed" in [one.code for one in taken(place, warehouse).quarantined]
+    (place / "mariner" / "profile.yaml").write_text(yaml.safe_dump({**mariner.profile, "inbox": ["MRN-*"]}))
+    taken(place, warehouse)  # makes the profile current, so that the next run places the file by it
+    placed = taken(place, warehouse)
+    assert [Path(one.path).name for one in placed.ingested] == ["MRN-2.nmea.gz"]
+    assert vessels.current(warehouse, "mariner").inbox == ["MRN-*"]
+    assert before in [row.ingest_id for row in logs.current(warehouse, "mariner")]
+    other = {**mariner.profile, "vessel": "other", "inbox": ["*.nmea.gz"]}
+    (place / "other").mkdir()
+    (place / "other" / "profile.yaml").write_text(yaml.safe_dump(other))
+    (place / "other" / "hers.csv").write_bytes(b"utc,x\n")
+    taken(place, warehouse)
+    # nothing of hers could be read: she is no vessel, and her patterns place nothing
+    assert vessels.names(warehouse) == ["mariner"]
+
+
+def test_a_profile_that_is_none_holds_its_folder_back(place: Path, mariner: Ship, warehouse: Warehouse) -> None:
+    (place / "mariner" / "profile.yaml").write_text("length_m: -3\n")
+    held = taken(place, warehouse)
+    assert [one.code for one in held.quarantined] == ["profile_invalid"] and held.ingested == ()
+    assert sorted(held.waiting) == ["mariner/day.csv.gz", "mariner/minutes.pdf"]
+    assert not vessels.profiles(warehouse)
+    (place / "mariner" / "profile.yaml").write_text(yaml.safe_dump(mariner.profile))
+    mended = taken(place, warehouse)
+    assert [Path(one.path).name for one in mended.ingested] == ["day.csv.gz"]
+    assert [Path(one.address).name for one in mended.quarantined] == ["minutes.pdf"]
+
+
+def test_a_file_in_quarantine_is_tried_again_where_its_profile_has_changed(
+    place: Path, mariner: Ship, warehouse: Warehouse
+) -> None:
+    wrong = {**mariner.profile, "sources": []}
+    (place / "mariner" / "profile.yaml").write_text(yaml.safe_dump(wrong))
+    assert len(taken(place, warehouse).quarantined) == 2
+    (place / "mariner" / "profile.yaml").write_text(yaml.safe_dump(mariner.profile))
+    assert [Path(one.path).name for one in taken(place, warehouse).ingested] == ["day.csv.gz"]
+
+
+def test_what_was_written_a_moment_ago_is_left_for_the_next_run(place: Path, warehouse: Warehouse) -> None:
+    os.utime(place / "mariner" / "minutes.pdf", (1, 1))
+    run = take_inbox(warehouse, SourceFolder(str(place)), settle_s=3600.0)
+    assert run.waiting == ("mariner/day.csv.gz",) and run.ingested == ()
+
+
+def test_an_inbox_that_is_none(tmp_path: Path, warehouse: Warehouse) -> None:
+    with pytest.raises(NotFound) as gone:
+        taken(tmp_path / "gone", warehouse)
+    assert gone.value.code == "no_inbox"
+    (tmp_path / "file").write_text("x")
+    with pytest.raises(UsageError) as file:
+        taken(tmp_path / "file", warehouse)
+    assert file.value.code == "inbox_path"
+    (tmp_path / "empty").mkdir()
+    assert taken(tmp_path / "empty", warehouse).show()["known"] == 0 and not warehouse.exists()
+
+
+def test_a_full_disk_is_no_files_fault(place: Path, warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    def full(*_: object) -> None:
+        raise KempfError("disk_full", "There is no room left.", "Make room on it.")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("kempf.flows.jobs.take_inbox.ingest_log", full)
+        with pytest.raises(KempfError) as found:
+            taken(place, warehouse)
+    assert found.value.code == "disk_full"
+    assert [Path(one.path).name for one in taken(place, warehouse).ingested] == ["day.csv.gz"]
+
+
+def test_the_flow_fails_where_a_person_is_needed(place: Path, mariner: Ship, tmp_path: Path) -> None:
+    from kempf.flows.fleet.flows import ingest
+
+    for path in (place / "mariner").iterdir():
+        os.utime(path, (1, 1))
+    state = ingest([str(place)], str(tmp_path / "w"), return_state=True)
+    assert state.is_failed() and "minutes.pdf" in str(state.message)
+    error = state.result(raise_on_failure=False)
+    assert isinstance(error, NeedsAPerson) and len(error.details["ingested"]) == 1
+    # of one vessel: where the command exits with 3, the flow fails
+    pdf, log = place / "mariner" / "minutes.pdf", place / "mariner" / "day.csv.gz"
+    state = ingest([str(log), str(pdf)], str(tmp_path / "w"), "mariner", return_state=True)
+    assert state.is_failed()
+    failed = state.result(raise_on_failure=False)
+    assert isinstance(failed, LogsFailed) and isinstance(failed, DataRejected)
+    assert [one["outcome"] for one in failed.details["outcomes"]] == ["unchanged", "failed"]
+    assert ingest([str(log)], str(tmp_path / "w"), "mariner")[0]["outcome"] == "unchanged"
+
+
+def test_the_commands(place: Path, mariner: Ship, tmp_path: Path) -> None:
+    at = ("--warehouse", tmp_path / "w")
+    ran = kempf("inbox", place, "--settle", 0, *at)
+    assert ran.code == 3 and "1 log ingested" in ran.out and "minutes.pdf" in ran.err
+    shown = kempf("inbox", place, "--settle", 0, "--json", *at)
+    assert shown.code == 3 and shown.json["known"] == 2 and not shown.json["quarantined"][0]["new"]
+    (listed,) = kempf("logs", "quarantine", "--json", *at).json
+    assert listed["file"].endswith("minutes.pdf") and listed["next_step"]
+    assert "minutes.pdf" in kempf("logs", "quarantine", *at).out
+    assert kempf("logs", "release", "minutes.pdf", *at).code == 3
+    assert kempf("logs", "dismiss", "minutes.pdf", "--reason", "no log", *at).code == 0
+    assert "no file" in kempf("logs", "quarantine", *at).out
+    assert kempf("inbox", place, "--settle", 0, *at).code == 0
+    # a folder is taken in as its files, with the profile that lies in it
+    refused = kempf("ingest", place / "mariner" / "day.csv.gz", "--vessel", "marinner", "--json", *at)
+    assert refused.code == 4 and refused.json["error"]["code"] == "no_vessel"
+    whole = kempf("ingest", place / "mariner", "--vessel", "mariner", "--json", *at)
+    assert whole.code == 3 and [one["outcome"] for one in whole.json] == ["unchanged", "failed"]
+    assert kempf("ingest", place / "mariner" / "day.csv.gz", "--vessel", "new", "--new-vessel", *at).code == 3
+    (tmp_path / "none").mkdir()
+    assert (
+        kempf("ingest", tmp_path / "none", "--vessel", "mariner", "--json", *at).json["error"]["code"] == "empty_folder"
+    )

@@ -1,0 +1,119 @@
+"""What became of the files of inboxes: ingested, in quarantine, or dismissed. A file has one row, its latest."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+from kempf.schemas.errors import NotFound, UsageError
+from kempf.warehouse import delta
+from kempf.warehouse.keys import one_of
+from kempf.warehouse.retry import with_retry
+from kempf.warehouse.store import Warehouse
+
+Outcome = Literal["ingested", "quarantined", "dismissed"]
+
+
+@dataclass(frozen=True)
+class InboxFile:
+    """One file as it was last looked at."""
+
+    #: A path, or s3://bucket/key.
+    address: str
+    #: size_bytes, modified_utc_ns: By which a file that was written since is known.
+    size_bytes: int
+    modified_utc_ns: int
+    outcome: Outcome
+    #: None where it could not be placed.
+    vessel: str | None = None
+    #: None where it is not ingested.
+    log_id: str | None = None
+    #: Of the error that quarantined it.
+    code: str | None = None
+    #: Why it is quarantined or dismissed, and what to do.
+    message: str | None = None
+    next_step: str | None = None
+    #: Hash of vessel, profile and code that it was tried with.
+    basis: str | None = None
+
+
+def below(warehouse: Warehouse, root: str) -> dict[str, InboxFile]:
+    """Return what is known of the files below an inbox, by address; nothing where there is no warehouse.
+
+    Parameters
+    ----------
+    root : str
+        Address of the inbox, without a slash at its end.
+    """
+    if not warehouse.exists():
+        return {}
+    rows = delta.read(warehouse, "inbox").rows(named=True)
+    return {row["address"]: InboxFile(**row) for row in rows if row["address"].startswith(f"{root}/")}
+
+
+def quarantined(warehouse: Warehouse) -> list[InboxFile]:
+    """Return the files in quarantine, of all inboxes, sorted by address.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    rows = delta.read(warehouse, "inbox", {"outcome": "quarantined"}).sort("address").rows(named=True)
+    return [InboxFile(**row) for row in rows]
+
+
+def by_name(warehouse: Warehouse, name: str) -> InboxFile:
+    """Return a file in quarantine by its address, or by the end of it, such as its file name.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``not_in_quarantine``.
+    UsageError
+        ``ambiguous_file``: several fit.
+    """
+    held = quarantined(warehouse)
+    found = [one for one in held if one.address == name] or [
+        one for one in held if name and one.address.endswith(f"/{name.lstrip('/')}")
+    ]
+    if not found:
+        raise NotFound(
+            "not_in_quarantine",
+            f"No file {name!r} is in quarantine in {warehouse.uri}.",
+            "List those that are with `kempf logs quarantine`.",
+            {"file": name},
+        )
+    if len(found) > 1:
+        raise UsageError(
+            "ambiguous_file",
+            f"{len(found)} files in quarantine fit {name!r}: {', '.join(one.address for one in found[:5])}.",
+            "Give more of the address.",
+            {"file": name, "found": [one.address for one in found]},
+        )
+    return found[0]
+
+
+def record(warehouse: Warehouse, files: Iterable[InboxFile]) -> tuple[str, ...]:
+    """Store what became of files, in place of what was stored of them, in at most one commit.
+
+    Returns
+    -------
+    tuple of str
+        Addresses of those of which something changed, sorted.
+    """
+    rows: Mapping[str, dict[str, Any]] = {one.address: asdict(one) for one in files}
+    if not rows:
+        return ()
+
+    def attempt() -> tuple[str, ...]:
+        with delta.ensured(warehouse, "inbox") as table:
+            stored = delta.rows(table, "inbox", {"address": sorted(rows)}).rows(named=True)
+            held = {row["address"]: row for row in stored}
+            changed = tuple(address for address in sorted(rows) if held.get(address) != rows[address])
+            if changed:
+                delta.replace(table, "inbox", [rows[address] for address in changed], one_of("address", changed))
+            return changed
+
+    return with_retry(attempt)

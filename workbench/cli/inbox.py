@@ -1,0 +1,65 @@
+"""``kempf inbox``."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import click
+
+from kempf.workbench.cli.given_once import GivenOnce
+from kempf.workbench.cli.options import json_option, new_vessel_option, verbose_option, warehouse_option
+from kempf.workbench.terminal import counted, one_line, print_json, progress_bar
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.take_inbox import InboxRun
+
+
+@click.command("inbox", cls=GivenOnce)
+@click.argument("folder", metavar="PATH")
+@new_vessel_option("Make a vessel of every folder whose name is none yet.")
+@click.option(
+    "--settle",
+    "settle_s",
+    type=click.FloatRange(min=0.0),
+    default=60.0,
+    show_default=True,
+    metavar="SECONDS",
+    help="Leave files for the next run that were written less than so long ago.",
+)
+@verbose_option
+@warehouse_option
+@json_option
+def command(folder: str, new_vessel: bool, settle_s: float, verbose: bool, uri: str, as_json: bool) -> None:
+    """Ingest what is new in a folder or under s3://bucket/prefix, one folder a vessel.
+
+    A file whose vessel or format is not clear goes into quarantine and stops no other; `kempf logs quarantine` lists
+    them. Nothing in the inbox is moved or deleted. The exit code is 3 while something is in quarantine.
+    """
+    from kempf.flows.jobs.take_inbox import NeedsAPerson, take_inbox
+    from kempf.warehouse.source_folder import SourceFolder
+    from kempf.warehouse.store import Warehouse
+    from kempf.workbench.cli.ingest import tell_outcomes
+
+    with progress_bar() as progress:
+        run = take_inbox(Warehouse(uri), SourceFolder(folder), progress, new_vessels=new_vessel, settle_s=settle_s)
+    if as_json:
+        print_json(run.show())
+    else:
+        tell_outcomes(run.ingested, verbose=verbose)
+        _print_run(run)
+    if run.quarantined:
+        raise click.exceptions.Exit(NeedsAPerson.exit_code)
+
+
+def _print_run(run: InboxRun) -> None:
+    said = [f"{counted(len(run.ingested), 'log')} ingested", f"{run.known} known"]
+    if run.waiting:
+        said.append(f"{len(run.waiting)} left for the next run, as they are being written or their profile is not read")
+    click.echo(", ".join(said))
+    for one in run.quarantined:
+        mark = "" if one.address in run.tried else " (as before)"
+        click.echo(
+            f"{click.style('quarantined', fg='red')}{mark} [{one.code}] {one_line(one.address)}\n"
+            f"  {one_line(one.message or '')} {one_line(one.next_step or '')}",
+            err=True,
+        )
