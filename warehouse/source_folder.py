@@ -56,6 +56,12 @@ class SourceFolder:
     uri: str
     storage_options: Mapping[str, str] | None = field(default=None, repr=False, hash=False)
 
+    def __post_init__(self) -> None:
+        if not self.uri.strip():
+            raise UsageError(
+                "inbox_path", "The address of the inbox is empty.", "Give a folder, or s3://bucket/prefix.", {}
+            )
+
     @cached_property
     def address(self) -> str:
         """The address without a slash at its end; a local one as a whole path."""

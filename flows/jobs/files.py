@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 import stat
 from collections.abc import Iterator, Sequence
@@ -171,7 +172,7 @@ def logs_in(paths: Sequence[Path]) -> tuple[tuple[Path, ...], tuple[Path, ...]]:
     beside: list[Path] = []
     for path in paths:
         # of "" nothing is left but a dot: a variable that was not set does not mean the folder one is in
-        if str(path) == "." or not path.is_dir():
+        if str(path) == "." or not os.path.isdir(path):  # noqa: PTH112 - False, and no error, for a name too long
             logs.append(path)
             continue
         found = sorted(p for p in path.rglob("*") if p.is_file() and not _hidden(p.relative_to(path)))

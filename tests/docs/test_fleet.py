@@ -30,7 +30,7 @@ def test_every_deployment_is_a_flow_and_its_parameters_are_the_flows() -> None:
         assert f"{name}/{deployment['name']}" in TEXT
         assert deployment["parameters"]["warehouse"] == "{{ $KEMPF_WAREHOUSE }}"
         names.append(name)
-    assert names == ["reprocess", "diagnose"]
+    assert names == ["ingest", "reprocess", "diagnose"]
 
 
 def test_the_page_names_the_pool_the_schedules_and_the_artifacts() -> None:
@@ -39,8 +39,8 @@ def test_the_page_names_the_pool_the_schedules_and_the_artifacts() -> None:
     assert "work-pool create kempf --type process" in TEXT
     assert "worker start --pool kempf" in TEXT
     crons = [[s["cron"] for s in deployment["schedules"]] for deployment in SETTINGS["deployments"]]
-    assert crons == [["0 2 * * *"], ["0 4 * * 0"]]
-    assert "02:00 UTC every night" in TEXT and "04:00 UTC every Sunday" in TEXT
+    assert crons == [["0 1 * * *"], ["0 2 * * *"], ["0 4 * * 0"]]
+    assert "01:00 UTC and" in TEXT and "02:00 UTC every night" in TEXT and "04:00 UTC every Sunday" in TEXT
     source = (ROOT / "flows" / "fleet" / "flows.py").read_text(encoding="utf-8")
     keys = re.findall(r'create_table_artifact\(key="([\w-]+)"', source)
     assert sorted(keys) == ["kempf-diagnose", "kempf-identify", "kempf-ingest", "kempf-reprocess"]

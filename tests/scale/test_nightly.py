@@ -41,7 +41,7 @@ def deployed(place: Warehouse, server: Server, tmp_path_factory: pytest.TempPath
     """The pool and the deployments are made and a worker runs, each by the page's own command."""
     assert documented("prefect server start") == ["prefect", "server", "start", "--host", "127.0.0.1"]
     exported = re.findall(r"^export (\w+)=", TEXT, re.MULTILINE)
-    assert {"PREFECT_API_URL", "KEMPF_WAREHOUSE", "DO_NOT_TRACK"} <= set(exported)
+    assert {"PREFECT_API_URL", "KEMPF_WAREHOUSE", "KEMPF_INBOX", "DO_NOT_TRACK"} <= set(exported)
     env = environment(**server.settings, KEMPF_WAREHOUSE=place.uri)
     for beginning in ("prefect work-pool create", "prefect --no-prompt deploy --"):
         done = ran(documented(beginning), env)
