@@ -65,6 +65,7 @@ _ALL = (
             Column("revision", "integer", "1 for the first profile of the vessel, then 2, 3, ..."),
             _PROFILE,
             Column("profile_json", "text", "the profile as sorted JSON"),
+            Column("removed", "text", "why she counts no longer, from this revision on; null where she counts"),
         ),
     ),
     Table(
@@ -85,6 +86,7 @@ _ALL = (
             *_TALLY,
             Column("rejected_by_reason", "counts", "rejected records and values by reason", "1"),
             Column("notes", "texts", "how the file was read, a sentence each"),
+            Column("removed", "text", "why the log counts no longer, from this revision on; null where it counts"),
         ),
     ),
     Table(

@@ -61,7 +61,7 @@ def held(
     name = log.sha256
     row = logs.find(warehouse, [name]).get(name)
     logs.refuse_other_vessel(row, vessel, file_name)
-    if row is None or row.ingest_id != ingest_id(name, profile_sha256, code_version):
+    if row is None or row.removed is not None or row.ingest_id != ingest_id(name, profile_sha256, code_version):
         return None
     raw.put(warehouse, log)
     return Deposit(name, row.ingest_id, "unchanged")
@@ -97,12 +97,16 @@ def deposit(warehouse: Warehouse, deliveries: Sequence[Delivery]) -> list[Deposi
             logs.refuse_other_vessel(other, row.vessel, row.file_name)
         if before.ingest_id != row.ingest_id:
             raise ValueError(f"{row.file_name}: one log with two profiles or two versions of the code in one deposit")
-        if row.log_id not in known or known[row.log_id].ingest_id != row.ingest_id:
+        last = known.get(row.log_id)
+        if last is None or last.removed is not None or last.ingest_id != row.ingest_id:
             fresh.setdefault(row.log_id, (delivery, row))
     for delivery in deliveries:
         raw.put(warehouse, delivery.log)  # replaces a damaged copy of a log that is there, too
     recorded = {row.log_id: row.revision for row in _store(warehouse, list(fresh.values()))}
-    return [Deposit(row.log_id, row.ingest_id, _outcome(recorded.pop(row.log_id, None))) for row in rows]
+    anew = {name for name, row in known.items() if row.removed is not None}
+    return [
+        Deposit(row.log_id, row.ingest_id, _outcome(recorded.pop(row.log_id, None), row.log_id in anew)) for row in rows
+    ]
 
 
 def _store(warehouse: Warehouse, fresh: Sequence[tuple[Delivery, logs.LogRow]]) -> tuple[logs.LogRow, ...]:
@@ -116,10 +120,10 @@ def _store(warehouse: Warehouse, fresh: Sequence[tuple[Delivery, logs.LogRow]]) 
     return logs.record(warehouse, [row for _, row in fresh])
 
 
-def _outcome(revision: int | None) -> Outcome:
+def _outcome(revision: int | None, was_removed: bool) -> Outcome:
     if revision is None:  # it was there, or another process recorded the same ingest meanwhile
         return "unchanged"
-    return "new" if revision == 1 else "reread"
+    return "new" if revision == 1 or was_removed else "reread"
 
 
 def _row(delivery: Delivery) -> logs.LogRow:

@@ -264,7 +264,7 @@ def _sets_as_of(warehouse: Warehouse, as_of: datetime | None) -> Iterator[DeltaT
 class _Logs:
     """What was known of a vessel's logs at some time."""
 
-    #: Ingests after which their logs had been read anew.
+    #: Ingests after which their logs had been read anew, or removed.
     past: list[str]
     #: Segments found in the others; None where nobody had looked for any, or nobody knows any more.
     segments: list[str] | None
@@ -275,11 +275,12 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
     if as_of is not None and version is None:
         return _Logs([], None)
-    columns = ("log_id", "ingest_id", "revision")
+    columns = ("log_id", "ingest_id", "revision", "removed")
     hers = {"vessel_key": vessel_key(vessel)}
     rows = delta.read(warehouse, "logs", hers, columns, version).sort("log_id", "revision")
-    present = {row["log_id"]: row["ingest_id"] for row in rows.rows(named=True)}
-    past = [row["ingest_id"] for row in rows.rows(named=True) if present[row["log_id"]] != row["ingest_id"]]
+    last = {row["log_id"]: row for row in rows.rows(named=True)}
+    present = {log: row["ingest_id"] for log, row in last.items() if row["removed"] is None}
+    past = [row["ingest_id"] for row in rows.rows(named=True) if present.get(row["log_id"]) != row["ingest_id"]]
     return _Logs(past, _segments_in(warehouse, vessel, sorted(present.values()), as_of))
 
 
@@ -306,8 +307,8 @@ def _exploded(table: DeltaTable | None, vessel: str, known: _Logs) -> pl.DataFra
 def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequence[str]) -> pl.DataFrame:
     """Return sets in the order of their start with a column ``superseded``.
 
-    A set is superseded where one of its logs has been read anew since, where one of its segments is no longer found,
-    and where there are sets of newer code: of the present code, else of the one that was at work last.
+    A set is superseded where one of its logs has been read anew since or removed, where one of its segments is no longer
+    found, and where there are sets of newer code: of the present code, else of the one that was at work last.
     """
     import polars as pl
 

@@ -36,6 +36,8 @@ class LogRow:
     notes: tuple[str, ...] = ()
     #: 1 for the first ingest of the log; the highest is the current one. 0 before it is recorded.
     revision: int = 0
+    #: Why the log counts no longer; None where it does.
+    removed: str | None = None
 
 
 def all_ingests(warehouse: Warehouse, vessel: str | None = None) -> list[LogRow]:
@@ -53,12 +55,29 @@ def current(warehouse: Warehouse, vessel: str | None = None) -> list[LogRow]:
     NotFound
         ``no_warehouse``.
     """
+    return [row for row in _last(warehouse, vessel) if row.removed is None]
+
+
+def removed(warehouse: Warehouse, vessel: str | None = None) -> list[LogRow]:
+    """Return the last row of every log that was removed, of one vessel or of all, sorted by start then log.
+
+    A log that was moved to another vessel is among those removed of the first one.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    return [row for row in _last(warehouse, vessel) if row.removed is not None]
+
+
+def _last(warehouse: Warehouse, vessel: str | None) -> list[LogRow]:
     rows = _latest(all_ingests(warehouse, vessel)).values()
     return sorted(rows, key=lambda row: (row.start_utc_ns, row.log_id))
 
 
 def find(warehouse: Warehouse, log_ids: Sequence[str]) -> dict[str, LogRow]:
-    """Return the current ingest of each of some logs that was ever ingested; none where there is no warehouse."""
+    """Return the last row of each of some logs that was ever ingested, removed or not; none without a warehouse."""
     if not warehouse.exists():
         return {}
     frame = delta.read(warehouse, "logs", {"log_id": sorted(set(log_ids))})
@@ -85,20 +104,21 @@ def of_ingest(warehouse: Warehouse, ingest_id: str) -> LogRow:
 
 
 def refuse_other_vessel(held: LogRow | None, vessel: str, file_name: str) -> None:
-    """Do nothing unless a log is kept for another vessel.
+    """Do nothing unless a log is kept for another vessel; one that was removed is kept for none.
 
     Raises
     ------
     DataRejected
         ``log_of_another_vessel``: the same bytes were ingested for another one.
     """
-    if held is None or held.vessel == vessel:
+    if held is None or held.vessel == vessel or held.removed is not None:
         return
     raise DataRejected(
         "log_of_another_vessel",
         f"{file_name} has the very bytes of {held.file_name}, which was ingested for vessel {held.vessel!r}; "
         f"now it is claimed for {vessel!r}.",
-        f"Use --vessel {held.vessel!r} if it is hers; else look which of the two files was copied wrongly.",
+        f"Use --vessel {held.vessel!r} if it is hers; if she never sailed it, `kempf logs move {held.log_id[:12]} "
+        "--vessel NAME` gives it to the other one; else look which of the two files was copied wrongly.",
         {"log_id": held.log_id, "held_by": held.vessel, "claimed_for": vessel},
     )
 
@@ -135,13 +155,45 @@ def record(warehouse: Warehouse, rows: Iterable[LogRow]) -> tuple[LogRow, ...]:
             for row in given:
                 last = held.get(row.log_id)
                 refuse_other_vessel(last, row.vessel, row.file_name)
-                if last is None or last.ingest_id != row.ingest_id:
+                if last is None or last.ingest_id != row.ingest_id or last.removed is not None:
                     fresh.append(replace(row, revision=1 if last is None else last.revision + 1))
             if fresh:
                 delta.replace(table, "logs", [_as_columns(row) for row in fresh], _new_rows(fresh))
             return tuple(fresh)
 
     return with_retry(attempt)
+
+
+def mark(warehouse: Warehouse, log_ids: Sequence[str], reason: str | None) -> tuple[LogRow, ...]:
+    """Let logs count no longer, or again, in at most one commit; what they were is kept.
+
+    Parameters
+    ----------
+    log_ids : sequence of str
+        Of logs that were ingested.
+    reason : str or None
+        Why they count no longer; None lets them count again.
+
+    Returns
+    -------
+    tuple of LogRow
+        Those that were otherwise before, as they are now, sorted by log.
+    """
+
+    def attempt() -> tuple[LogRow, ...]:
+        with delta.ensured(warehouse, "logs") as table:
+            known = delta.rows(table, "logs", {"log_id": sorted(set(log_ids))})
+            held = _latest([_row(r) for r in known.rows(named=True)])
+            changed = [
+                replace(row, revision=row.revision + 1, removed=reason)
+                for _, row in sorted(held.items())
+                if (row.removed is None) != (reason is None)
+            ]
+            if changed:
+                delta.replace(table, "logs", [_as_columns(row) for row in changed], _new_rows(changed))
+            return tuple(changed)
+
+    return with_retry(attempt) if log_ids else ()
 
 
 def _new_rows(rows: Sequence[LogRow]) -> str:
@@ -168,8 +220,13 @@ def _row(row: dict[str, Any]) -> LogRow:
     return LogRow(**{**row, "tally": Tally(**counts, by_reason=reasons), "notes": tuple(row["notes"])})
 
 
-def by_prefix(warehouse: Warehouse, name: str) -> LogRow:
+def by_prefix(warehouse: Warehouse, name: str, *, removed: bool = False) -> LogRow:
     """Return the current ingest of a log by a beginning of its log id, its ingest id or its file name.
+
+    Parameters
+    ----------
+    removed : bool, optional
+        Whether it is among the logs that were removed.
 
     Raises
     ------
@@ -178,14 +235,15 @@ def by_prefix(warehouse: Warehouse, name: str) -> LogRow:
     UsageError
         ``ambiguous_log``: several fit.
     """
-    rows = current(warehouse)
+    every = _latest(all_ingests(warehouse)).values()
+    rows = [row for row in every if (row.removed is not None) == removed]
     found = [row for row in rows if name and name in (row.log_id, row.ingest_id, row.file_name)]
     found = found or [row for row in rows if name and (row.log_id.startswith(name) or row.ingest_id.startswith(name))]
     if not found:
         raise NotFound(
             "no_log",
-            f"There is no log {name!r} in {warehouse.uri}.",
-            "List them with `kempf logs list`.",
+            f"There is no {'removed ' if removed else ''}log {name!r} in {warehouse.uri}.",
+            f"List them with `kempf logs list{' --removed' if removed else ''}`.",
             {"log": name},
         )
     if len(found) > 1:

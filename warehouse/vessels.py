@@ -12,6 +12,7 @@ from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import delta
 from kempf.warehouse.keys import quoted, vessel_key
 from kempf.warehouse.retry import with_retry
+from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
 
@@ -61,12 +62,13 @@ def register_all(
         with delta.ensured(warehouse, "vessels") as table:
             known = delta.rows(table, "vessels").sort("revision").rows(named=True)
             last = {
-                row["vessel"]: (row["revision"], row["profile_json"]) for row in known
+                row["vessel"]: (row["revision"], row["profile_json"] if row["removed"] is None else None)
+                for row in known
             }  # the highest revision stays
             rows: list[dict[str, Any]] = []
             changed = []
             for vessel, profile in profiles:
-                revision, stored = last.get(vessel, (0, ""))
+                revision, stored = last.get(vessel, (0, None))
                 if stored == profile.canonical_json():
                     continue
                 last[vessel] = (revision + 1, profile.canonical_json())
@@ -78,6 +80,7 @@ def register_all(
                         "revision": revision + 1,
                         "profile_sha256": profile.sha256,
                         "profile_json": profile.canonical_json(),
+                        "removed": None,
                     }
                 )
             if rows:
@@ -88,18 +91,46 @@ def register_all(
     return with_retry(attempt)
 
 
+def remove(warehouse: Warehouse, vessel: str, reason: str) -> bool:
+    """Let a vessel count no longer; her profiles are kept. Her logs are to be removed before.
+
+    Returns
+    -------
+    bool
+        Whether she counted before; else there is no commit.
+    """
+    key = vessel_key(vessel)
+
+    def attempt() -> bool:
+        with delta.ensured(warehouse, "vessels") as table:
+            known = delta.rows(table, "vessels", {"vessel_key": key}).sort("revision").rows(named=True)
+            if not known or known[-1]["removed"] is not None:
+                return False
+            row = {**known[-1], "revision": known[-1]["revision"] + 1, "removed": reason}
+            delta.replace(table, "vessels", [row], f"vessel_key = {quoted(key)} AND revision = {row['revision']}")
+            return True
+
+    return with_retry(attempt)
+
+
+def _last_rows(warehouse: Warehouse, where: Where, columns: Sequence[str] = ()) -> dict[str, dict[str, Any]]:
+    """Return the last row of every vessel that was not removed, by name, sorted."""
+    wanted = (*columns, "vessel", "revision", "removed") if columns else ()
+    rows = delta.read(warehouse, "vessels", where, wanted).sort("vessel", "revision").rows(named=True)
+    last = {row["vessel"]: row for row in rows}
+    return {vessel: row for vessel, row in last.items() if row["removed"] is None}
+
+
 def names(warehouse: Warehouse) -> list[str]:
     """Return the names of all vessels, sorted."""
-    frame = delta.read(warehouse, "vessels", columns=("vessel",))
-    return sorted(set(frame["vessel"].to_list()))
+    return list(_last_rows(warehouse, {}, ("vessel_key",)))
 
 
 def profiles(warehouse: Warehouse) -> dict[str, VesselProfile]:
     """Return the current profile of every vessel, by name, sorted; none where there is no warehouse."""
     if not warehouse.exists():
         return {}
-    rows = delta.read(warehouse, "vessels").sort("vessel", "revision").rows(named=True)
-    return {row["vessel"]: _version(row).profile for row in {row["vessel"]: row for row in rows}.values()}
+    return {vessel: _version(row).profile for vessel, row in _last_rows(warehouse, {}).items()}
 
 
 def versions(warehouse: Warehouse, vessel: str) -> list[VesselVersion]:
@@ -111,7 +142,7 @@ def versions(warehouse: Warehouse, vessel: str) -> list[VesselVersion]:
         ``no_warehouse``, ``no_vessel``.
     """
     rows = delta.read(warehouse, "vessels", {"vessel_key": vessel_key(vessel)}).sort("revision")
-    if rows.height == 0:
+    if rows.height == 0 or rows["removed"][-1] is not None:
         raise _no_vessel(vessel, names(warehouse))
     return [_version(row) for row in rows.rows(named=True)]
 
@@ -136,8 +167,7 @@ def current_hashes(warehouse: Warehouse, vessel: str | None = None) -> dict[str,
         ``no_warehouse``.
     """
     where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
-    rows = delta.read(warehouse, "vessels", where, ("vessel", "profile_sha256", "revision")).sort("revision")
-    return {name: profile_sha256 for name, profile_sha256, _ in rows.rows()}
+    return {name: row["profile_sha256"] for name, row in _last_rows(warehouse, where, ("profile_sha256",)).items()}
 
 
 def require(warehouse: Warehouse, vessel: str) -> None:

@@ -94,16 +94,21 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
             found[row["vessel"]].append(row)
         return found
 
-    profiles = rows("vessels", "revision", "profile_sha256")
-    ingests = rows("logs", "revision", "log_id", "ingest_id")
+    profiles = {
+        name: found
+        for name, found in rows("vessels", "revision", "profile_sha256", "removed").items()
+        if not found[-1]["removed"]
+    }
+    ingests = rows("logs", "revision", "log_id", "ingest_id", "removed")
     sets = rows("parameter_sets", "parameter_set_id")
     pointers = rows("aliases", "alias", "parameter_set_id")
     names = sorted(profiles) if asked is None else asked
-    return {name: _state(name, profiles[name], ingests[name], sets[name], pointers[name]) for name in names}
+    return {name: _state(name, profiles.get(name, ()), ingests[name], sets[name], pointers[name]) for name in names}
 
 
 def _state(vessel: str, profiles: _Rows, ingests: _Rows, sets: _Rows, pointers: _Rows) -> VesselState:
-    current = {row["log_id"]: row["ingest_id"] for row in ingests}  # the highest revision stays
+    last = {row["log_id"]: row for row in ingests}  # the highest revision stays
+    current = {log_id: row["ingest_id"] for log_id, row in last.items() if row["removed"] is None}
     return VesselState(
         vessel,
         profiles[-1]["profile_sha256"] if profiles else "",

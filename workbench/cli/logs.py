@@ -1,4 +1,4 @@
-"""``kempf logs list|show|rejected|quarantine|release|dismiss``."""
+"""``kempf logs list|show|rejected|quarantine|release|dismiss|remove|restore|move``."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from kempf.workbench.cli.confirm import confirm, reason_option, what_goes, yes_option
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import (
     json_option,
@@ -36,9 +37,10 @@ def command() -> None:
 
 @command.command("list")
 @vessel_option()
+@click.option("--removed", is_flag=True, help="Those that were removed or moved, with the reason.")
 @warehouse_option
 @json_option
-def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
+def list_logs(vessel: str | None, removed: bool, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers, records read = kept + rejected, and what the channel doctor says of each."""
     from kempf.flows.jobs.out_of_date import said_of_logs
     from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
@@ -49,6 +51,9 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
     warehouse.require()
     if vessel is not None:
         vessels.require(warehouse, vessel)
+    if removed:
+        _list_removed(logs.removed(warehouse, vessel), as_json)
+        return
     rows_of_logs = logs.current(warehouse, vessel)
     gone = lost.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
     said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
@@ -78,6 +83,14 @@ def list_logs(vessel: str | None, uri: str, as_json: bool) -> None:
         head.append("damage")
         rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, rows_of_logs, strict=True)]
     print_table(head, rows)
+
+
+def _list_removed(rows: Sequence[LogRow], as_json: bool) -> None:
+    if as_json:
+        print_json([{**_facts(row), "removed": row.removed} for row in rows])
+        return
+    head = ["log", "vessel", "file name", "removed"]
+    print_table(head, [[row.log_id[:12], row.vessel, _shortened(row.file_name), row.removed or ""] for row in rows])
 
 
 def _shortened(name: str) -> str:
@@ -243,7 +256,7 @@ def release_file(
 
 @command.command("dismiss")
 @click.argument("file")
-@click.option("--reason", required=True, metavar="TEXT", help="Why it is no log, for those who come after.")
+@reason_option
 @warehouse_option
 @json_option
 def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
@@ -256,3 +269,72 @@ def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
         print_json({"file": row.address, "dismissed": True, "reason": row.message})
     else:
         click.echo(f"{one_line(row.address)}: dismissed, {one_line(row.message or '')}")
+
+
+@command.command("remove")
+@click.argument("log_id")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
+    """Let a log count no longer. Nothing is deleted: `restore` brings it back, `history --as-of` still knows it."""
+    from kempf.flows.jobs.remove_logs import following, remove
+    from kempf.warehouse import logs
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    row = logs.by_prefix(warehouse, log_id)
+    confirm(what_goes(following(warehouse, [row]), f"{row.file_name} is removed"), yes=yes)
+    found = remove(warehouse, [row], reason)
+    if as_json:
+        print_json(found.show())
+    else:
+        click.echo(f"{one_line(row.file_name)}: removed; next: kempf reprocess --vessel {row.vessel}")
+
+
+@command.command("restore")
+@click.argument("log_id")
+@warehouse_option
+@json_option
+def restore_log(log_id: str, uri: str, as_json: bool) -> None:
+    """Let a log that was removed count again."""
+    from kempf.flows.jobs.remove_logs import restore
+    from kempf.warehouse.store import Warehouse
+
+    row = restore(Warehouse(uri), log_id)
+    if as_json:
+        print_json(_facts(row))
+    else:
+        click.echo(f"{one_line(row.file_name)}: counts again; next: kempf reprocess --vessel {row.vessel}")
+
+
+@command.command("move")
+@click.argument("log_id")
+@vessel_option(required=True)
+@new_vessel_option("She is new.")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool, uri: str, as_json: bool) -> None:
+    """Give a log to the vessel that it is of: it is read again from its bytes, with her profile."""
+    from kempf.flows.jobs.remove_logs import following, move
+    from kempf.schemas.errors import NotFound
+    from kempf.warehouse import logs
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    try:
+        row = logs.by_prefix(warehouse, log_id)
+    except NotFound:  # an interrupted move goes on, and takes nothing from anybody
+        pass
+    else:
+        confirm(what_goes(following(warehouse, [row]), f"{row.file_name} is given to {vessel!r}"), yes=yes)
+    found, now = move(warehouse, log_id, vessel, reason, new_vessel=new_vessel)
+    if as_json:
+        print_json({**_facts(now), "following": found.show() if found else None})
+        return
+    of = [vessel] if found is None else [found.vessel, vessel]
+    again = " ".join(f"--vessel {name}" for name in of)
+    click.echo(f"{one_line(now.file_name)}: a log of {vessel} now; next: kempf reprocess {again}")

@@ -1,4 +1,4 @@
-"""``kempf vessels list|show|set``."""
+"""``kempf vessels list|show|set|rename|remove``."""
 
 from __future__ import annotations
 
@@ -6,14 +6,15 @@ from pathlib import Path
 
 import click
 
+from kempf.workbench.cli.confirm import confirm, reason_option, what_goes, yes_option
 from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, profile_option, warehouse_option
-from kempf.workbench.terminal import number, print_json, print_table
+from kempf.workbench.terminal import counted, number, print_json, print_table
 
 
 @click.group("vessels", cls=GivenOnceGroup)
 def command() -> None:
-    """List vessels, show and set their profiles."""
+    """List vessels, show and set their profiles, rename and remove them."""
 
 
 @command.command("list")
@@ -67,3 +68,56 @@ def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) 
         print_json({"vessel": name, "changed": changed})
     else:
         click.echo(f"{name}: " + ("profile set; next: kempf reprocess" if changed else "the profile is the same"))
+
+
+@command.command("remove")
+@click.argument("name")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
+    """Let a vessel and all her logs count no longer. Nothing is deleted; `kempf history --as-of` still knows them."""
+    from kempf.flows.jobs.remove_logs import following, remove_vessel
+    from kempf.warehouse import logs, vessels
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    vessels.require(warehouse, name)
+    held = logs.current(warehouse, name)
+    confirm(what_goes(following(warehouse, held) if held else None, f"The vessel {name!r} is removed"), yes=yes)
+    found = remove_vessel(warehouse, name, reason)
+    if as_json:
+        print_json({"vessel": name, "removed": True, "following": found.show() if found else None})
+    else:
+        click.echo(f"{name}: removed")
+
+
+@command.command("rename")
+@click.argument("name")
+@click.argument("new_name")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
+    """Give a vessel another name: her logs are read for it again, her models are identified again by `reprocess`."""
+    from kempf.flows.jobs.remove_logs import following, rename_vessel
+    from kempf.warehouse import logs, vessels
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    vessels.require(warehouse, name)
+    held = logs.current(warehouse, name)
+    confirm(
+        what_goes(
+            following(warehouse, held) if held else None,
+            f"{name!r} is renamed to {new_name!r} and her logs are read again",
+        ),
+        yes=yes,
+    )
+    rows = rename_vessel(warehouse, name, new_name, reason)
+    if as_json:
+        print_json({"vessel": new_name, "was": name, "logs": [row.log_id for row in rows]})
+    else:
+        click.echo(f"{name}: now {new_name}, {counted(len(rows), 'log')}; next: kempf reprocess --vessel {new_name}")

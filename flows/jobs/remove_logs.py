@@ -1,0 +1,236 @@
+"""The jobs that undo an ingest: a log is removed, restored, or given to another vessel. Nothing is deleted.
+
+What a removed log led to stays readable as of the time before: its segments are found no longer, and every set that
+rests on it is superseded. The vessel's own sets follow with her next reprocessing.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
+from kempf.flows.jobs.spool import spooled
+from kempf.schemas.errors import NotFound, UsageError
+from kempf.warehouse import aliases, history, logs, parameter_sets, raw, segments, vessels
+from kempf.warehouse.logs import LogRow
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class Following:
+    """What follows for a vessel where logs of hers count no longer."""
+
+    vessel: str
+    logs: tuple[LogRow, ...]
+    #: Ids of the segments that are found no longer.
+    segment_ids: tuple[str, ...]
+    #: Ids of the sets that are superseded.
+    set_ids: tuple[str, ...]
+    #: Whether her current set is among them.
+    current: bool
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return {
+            "vessel": self.vessel,
+            "logs": [{"log_id": row.log_id, "file_name": row.file_name} for row in self.logs],
+            "segments": list(self.segment_ids),
+            "superseded": list(self.set_ids),
+            "current_superseded": self.current,
+        }
+
+
+def following(warehouse: Warehouse, rows: Sequence[LogRow]) -> Following:
+    """Return what follows where some logs of one vessel count no longer.
+
+    Parameters
+    ----------
+    rows : sequence of LogRow
+        Current ones of one vessel, at least one.
+    """
+    vessel = rows[0].vessel
+    gone, ingests = {row.log_id for row in rows}, {row.ingest_id for row in rows}
+    held = parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
+    superseded = [one.parameter_set_id for one in held if gone & set(one.log_ids)]
+    current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    return Following(
+        vessel,
+        tuple(rows),
+        tuple(one.segment_id for one in segments.every(warehouse, vessel) if one.ingest_id in ingests),
+        tuple(superseded),
+        current in superseded,
+    )
+
+
+def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Following:
+    """Let logs of one vessel count no longer.
+
+    Parameters
+    ----------
+    rows : sequence of LogRow
+        Current ones of one vessel, at least one.
+    reason : str
+        Why, for those who come after.
+
+    Raises
+    ------
+    UsageError
+        ``no_reason``.
+    """
+    _require_reason(reason)
+    found = following(warehouse, rows)
+    logs.mark(warehouse, [row.log_id for row in rows], reason)
+    if found.current:
+        aliases.withdraw(warehouse, found.vessel)
+    return found
+
+
+def restore(warehouse: Warehouse, name: str) -> LogRow:
+    """Let a log that was removed count again.
+
+    Parameters
+    ----------
+    name : str
+        Beginning of its id, or its file name.
+
+    Raises
+    ------
+    NotFound
+        ``no_log``: none that was removed has this name. ``no_vessel``: its vessel was removed too.
+    UsageError
+        ``ambiguous_log``.
+    """
+    row = logs.by_prefix(warehouse, name, removed=True)
+    vessels.require(warehouse, row.vessel)
+    logs.mark(warehouse, [row.log_id], None)
+    return logs.by_prefix(warehouse, row.log_id)
+
+
+def move(
+    warehouse: Warehouse, name: str, vessel: str, reason: str, *, new_vessel: bool = False
+) -> tuple[Following | None, LogRow]:
+    """Give a log to another vessel: it is removed from the one and read from its bytes for the other.
+
+    Where the move is interrupted the log is the old vessel's, or nobody's; the same command goes on.
+
+    Parameters
+    ----------
+    name : str
+        Beginning of its id, or its file name.
+    vessel : str
+        Whose it is.
+    reason : str
+        Why it was another one's.
+    new_vessel : bool, optional
+        Whether a vessel of this name that is not known yet is made.
+
+    Returns
+    -------
+    following : Following or None
+        What follows for the vessel it was taken from; None where it was removed before.
+    row : LogRow
+        The log as it is now.
+
+    Raises
+    ------
+    NotFound
+        ``no_log``, ``no_vessel``.
+    UsageError
+        ``ambiguous_log``, ``no_reason``, ``log_is_hers``.
+    KempfError
+        It cannot be read with the other vessel's profile; then nothing has changed.
+    """
+    _require_reason(reason)
+    row = _held_or_removed(warehouse, name)
+    whose, profile = settle_vessel(warehouse, vessel, None, new_vessel=new_vessel)
+    if row.vessel == whose and row.removed is None:
+        raise UsageError(
+            "log_is_hers",
+            f"{row.file_name} is a log of {whose!r} already.",
+            "Nothing needs to be done.",
+            {"log_id": row.log_id, "vessel": whose},
+        )
+    with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as readings:
+        read = look_through(whose, row.file_name, log, profile, readings)
+        found = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
+        store(warehouse, [read])
+    return found, logs.by_prefix(warehouse, row.log_id)
+
+
+def _held_or_removed(warehouse: Warehouse, name: str) -> LogRow:
+    try:
+        return logs.by_prefix(warehouse, name)
+    except NotFound as error:
+        try:
+            return logs.by_prefix(warehouse, name, removed=True)
+        except NotFound:
+            raise error from None
+
+
+def remove_vessel(warehouse: Warehouse, vessel: str, reason: str) -> Following | None:
+    """Let a vessel and all her logs count no longer.
+
+    Returns
+    -------
+    Following or None
+        What follows for her logs; None where she has none.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    UsageError
+        ``no_reason``.
+    """
+    _require_reason(reason)
+    vessels.require(warehouse, vessel)
+    held = logs.current(warehouse, vessel)
+    found = remove(warehouse, held, reason) if held else None
+    vessels.remove(warehouse, vessel, reason)
+    return found
+
+
+def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> list[LogRow]:
+    """Give a vessel another name: all her logs are read for it from their bytes, then the old name counts no longer.
+
+    Parameters
+    ----------
+    name : str
+        That no vessel has.
+
+    Returns
+    -------
+    list of LogRow
+        Her logs under the new name.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    UsageError
+        ``vessel_exists``, ``no_reason``, ``vessel_name``.
+    """
+    _require_reason(reason)
+    profile = vessels.current(warehouse, vessel)
+    known = vessels.profiles(warehouse)
+    renamed = profile.model_copy(update={"vessel": name})
+    # an interrupted one goes on: then the profile under the new name is the very same
+    if name == vessel or (name in known and known[name] != renamed):
+        raise UsageError(
+            "vessel_exists",
+            f"There is a vessel {name!r} already.",
+            "Choose another name, or give her logs to that vessel with `kempf logs move`.",
+            {"vessel": name},
+        )
+    vessels.register(warehouse, name, renamed)
+    for row in logs.current(warehouse, vessel):
+        move(warehouse, row.log_id, name, reason)
+    vessels.remove(warehouse, vessel, f"renamed to {name!r}: {reason}")
+    return logs.current(warehouse, name)
+
+
+def _require_reason(reason: str) -> None:
+    if not reason.strip():
+        raise UsageError("no_reason", "The reason is blank.", "Say why with --reason, for those who come after.")

@@ -1,0 +1,144 @@
+"""What a person did by mistake can be undone: a log removed, restored, moved; a vessel renamed, removed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from kempf.flows.fleet.plan import plan
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.remove_logs import following, move, remove, remove_vessel, rename_vessel, restore
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.schemas.errors import DataRejected, NotFound, UsageError
+from kempf.warehouse import aliases, history, logs, parameter_sets, segments, vessels
+from kempf.warehouse.store import Warehouse
+from tests.conftest import Ship
+from tests.flows.content import fresh
+from tests.workbench.driving import kempf
+
+
+@pytest.fixture(scope="module")
+def _filled(mariner: Ship, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = mariner.write(tmp_path_factory.mktemp("undo"))
+    warehouse = fresh(folder / "w")
+    ingest(
+        warehouse, [folder / "mariner.mcap", folder / "mariner.nmea.gz"], given=read_profiles([folder / "profile.yaml"])
+    )
+    identify_vessel(warehouse, "mariner")
+    reprocess_vessel(warehouse, "mariner")
+    return folder
+
+
+@pytest.fixture
+def warehouse(_filled: Path, tmp_path: Path) -> Warehouse:
+    from shutil import copytree
+
+    return Warehouse(str(copytree(_filled / "w", tmp_path / "w")))
+
+
+def test_a_removed_log_is_in_nothing_and_comes_back(warehouse: Warehouse, _filled: Path) -> None:
+    before = history.standing(warehouse, "mariner")
+    first = next(row for row in logs.current(warehouse) if row.format == "mcap")
+    told = following(warehouse, [first])
+    assert len(told.segment_ids) == 1 and told.set_ids and set(told.set_ids) <= set(before)
+    found = remove(warehouse, [first], "a trial of another draught")
+    assert found == told
+    assert first.log_id not in {row.log_id for row in logs.current(warehouse)}
+    assert first.log_id not in {one.log_id for one in segments.every(warehouse, "mariner")}
+    assert not set(found.set_ids) & set(history.standing(warehouse, "mariner"))
+    (gone,) = logs.removed(warehouse)
+    assert gone.removed == "a trial of another draught" and gone.revision == first.revision + 1
+    # nothing was rewritten: her sets are there, and the vessel is due
+    assert {one.parameter_set_id for one in parameter_sets.get_all(warehouse, "mariner")} >= set(before)
+    assert plan(warehouse, None, changed_only=True).due
+    report = reprocess_vessel(warehouse, "mariner")
+    assert not report.failures
+    pointed = aliases.of_vessel(warehouse, "mariner").get("current")
+    assert pointed is None or first.log_id not in parameter_sets.get(warehouse, pointed).log_ids
+    with pytest.raises(NotFound):
+        logs.by_prefix(warehouse, first.log_id)
+    back = restore(warehouse, first.log_id[:10])
+    assert (back.ingest_id, back.removed, back.revision) == (first.ingest_id, None, first.revision + 2)
+    reprocess_vessel(warehouse, "mariner")
+    assert history.standing(warehouse, "mariner") == before
+    with pytest.raises(UsageError, match="blank"):
+        remove(warehouse, [first], " ")
+
+
+def test_a_removed_log_is_ingested_again_as_a_new_one(warehouse: Warehouse, _filled: Path) -> None:
+    first = next(row for row in logs.current(warehouse) if row.format == "mcap")
+    remove(warehouse, [first], "by mistake")
+    (again,) = ingest(warehouse, [_filled / "mariner.mcap"], "mariner")
+    assert again.outcome == "new" and again.ingest_id == first.ingest_id
+    assert len(logs.current(warehouse)) == 2 and len(segments.every(warehouse, "mariner")) == 2
+    (same,) = ingest(warehouse, [_filled / "mariner.mcap"], "mariner")
+    assert same.outcome == "unchanged"
+
+
+def test_a_log_is_given_to_the_vessel_it_is_of(warehouse: Warehouse, _filled: Path) -> None:
+    first = next(row for row in logs.current(warehouse) if row.format == "nmea")
+    with pytest.raises(NotFound, match="no vessel 'marinner'"):
+        move(warehouse, first.log_id, "marinner", "wrong folder")
+    with pytest.raises(UsageError, match="already"):
+        move(warehouse, first.log_id, "mariner", "wrong folder")
+    # the bytes of another vessel's log are refused, and the way out is named
+    (refused,) = ingest(warehouse, [_filled / "mariner.nmea.gz"], "second", new_vessel=True)
+    assert isinstance(refused.error, DataRejected) and "kempf logs move" in refused.error.next_step
+    found, now = move(warehouse, first.log_id, "second", "wrong folder", new_vessel=True)
+    assert found is not None and found.vessel == "mariner"
+    assert (now.vessel, now.log_id, now.removed) == ("second", first.log_id, None)
+    assert [row.format for row in logs.current(warehouse, "mariner")] == ["mcap"]
+    assert len(segments.every(warehouse, "second")) == 1 and len(segments.every(warehouse, "mariner")) == 1
+    (gone,) = logs.removed(warehouse, "mariner")
+    assert gone.removed == "moved to 'second': wrong folder"
+    _, back = move(warehouse, first.log_id, "mariner", "it was hers")
+    assert back.vessel == "mariner" and len(segments.every(warehouse, "mariner")) == 2
+
+
+def test_a_move_that_was_cut_off_goes_on(warehouse: Warehouse) -> None:
+    first = next(row for row in logs.current(warehouse) if row.format == "nmea")
+    remove(warehouse, [first], "moved to 'second': wrong folder")
+    found, now = move(warehouse, first.log_id, "second", "wrong folder", new_vessel=True)
+    assert found is None and now.vessel == "second"
+
+
+def test_a_vessel_is_renamed_and_removed(warehouse: Warehouse) -> None:
+    held = {row.log_id for row in logs.current(warehouse)}
+    rows = rename_vessel(warehouse, "mariner", "sailor", "sold")
+    assert {row.log_id for row in rows} == held and vessels.names(warehouse) == ["sailor"]
+    assert vessels.current(warehouse, "sailor").length_m is not None
+    with pytest.raises(NotFound):
+        segments.every(warehouse, "mariner")
+    assert len(segments.every(warehouse, "sailor")) == 2
+    found = remove_vessel(warehouse, "sailor", "scrapped")
+    assert found is not None and len(found.logs) == 2
+    assert vessels.names(warehouse) == [] and logs.current(warehouse) == []
+    with pytest.raises(NotFound):
+        remove_vessel(warehouse, "sailor", "scrapped")
+    # she may come again
+    assert len(ingest(warehouse, [], "sailor")) == 0
+    vessels.register(warehouse, "sailor", rows and vessels.get(warehouse, rows[0].profile_sha256))
+    assert vessels.names(warehouse) == ["sailor"]
+
+
+def test_the_commands_say_first_what_will_go(warehouse: Warehouse) -> None:
+    at = ("--warehouse", warehouse.uri)
+    log = logs.current(warehouse)[0]
+    asked = kempf("logs", "remove", log.log_id[:12], "--reason", "a test", "--json", *at)
+    assert asked.code == 2 and asked.json["error"]["code"] == "not_confirmed"
+    assert "count no longer" in asked.json["error"]["message"] and "superseded" in asked.json["error"]["message"]
+    assert len(logs.current(warehouse)) == 2
+    done = kempf("logs", "remove", log.log_id[:12], "--reason", "a test", "--yes", "--json", *at)
+    assert done.code == 0 and done.json["logs"][0]["log_id"] == log.log_id
+    (listed,) = kempf("logs", "list", "--removed", "--json", *at).json
+    assert listed["removed"] == "a test"
+    assert kempf("logs", "restore", log.log_id[:12], *at).code == 0
+    moved = kempf("logs", "move", log.log_id[:12], "--vessel", "x", "--new-vessel", "--reason", "y", "--yes", *at)
+    assert moved.code == 0 and "kempf reprocess --vessel mariner --vessel x" in moved.out
+    assert kempf("vessels", "rename", "x", "z", "--reason", "y", "--yes", *at).code == 0
+    assert kempf("vessels", "remove", "z", "--reason", "y", "--yes", *at).code == 0
+    assert [one["vessel"] for one in kempf("vessels", "list", "--json", *at).json] == ["mariner"]
+    assert kempf("vessels", "rename", "mariner", "mariner", "--reason", "y", "--yes", *at).code == 2

@@ -1,0 +1,67 @@
+"""Commands that take something out say first what will go, and ask."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from kempf.schemas.errors import UsageError
+from kempf.workbench.terminal import counted
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.remove_logs import Following
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def reason_option(function: F) -> F:
+    """Add ``--reason``."""
+    return click.option("--reason", required=True, metavar="TEXT", help="Why, for those who come after.")(function)
+
+
+def yes_option(function: F) -> F:
+    """Add ``--yes``."""
+    return click.option("--yes", is_flag=True, help="Do it without asking.")(function)
+
+
+def confirm(what: str, *, yes: bool) -> None:
+    """Say what will be done and ask whether it should be.
+
+    Parameters
+    ----------
+    what : str
+        What will go, a sentence without its full stop.
+    yes : bool
+        Whether the answer was given with the command.
+
+    Raises
+    ------
+    UsageError
+        ``not_confirmed``: nobody is there to ask.
+    """
+    if yes:
+        return
+    if not sys.stdin.isatty():
+        raise UsageError("not_confirmed", f"{what}.", "Nothing was done. Say --yes to do it.")
+    click.confirm(f"{what}. Go on?", abort=True, err=True)
+
+
+def what_goes(found: Following | None, of: str) -> str:
+    """Say what follows where logs count no longer, a sentence without its full stop.
+
+    Parameters
+    ----------
+    of : str
+        What is done, such as "day.csv is removed".
+    """
+    if found is None:
+        return f"{of}; she has no log"
+    sets = f"{counted(len(found.set_ids), 'parameter set')} superseded"
+    current = ", her current one among them" if found.current else ""
+    return (
+        f"{of}: {counted(len(found.logs), 'log')} and {counted(len(found.segment_ids), 'manoeuvre')} of "
+        f"{found.vessel!r} count no longer, {sets}{current}"
+    )
