@@ -9,15 +9,19 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 import pytest
+import yaml
 
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.release_log import release
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.take_inbox import take_inbox
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import aliases, compaction, delta, logs, parameter_sets, raw, runs, segments, vessels
+from kempf.warehouse.source_folder import SourceFolder
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import seen
@@ -147,3 +151,25 @@ def test_compaction_and_vacuum_keep_in_a_bucket_what_they_keep_in_a_folder(bucke
 def sets_by(warehouse: Warehouse, moment: datetime) -> int:
     version = delta.version_as_of(warehouse, "parameter_sets", moment)
     return delta.read(warehouse, "parameter_sets", version=version).height
+
+
+def test_an_inbox_in_a_bucket(bucket: Bucket, ferry: Ship, tmp_path: Path) -> None:
+    place = Warehouse(f"{bucket.uri}/arrivals", bucket.settings)
+    place.write_bytes(yaml.safe_dump(ferry.profile).encode(), "ferry", "profile.yaml")
+    place.write_bytes(ferry.csv, "ferry", "day.csv.gz")
+    place.write_bytes(ferry.nmea, "fery", "next.nmea.gz")
+    warehouse = Warehouse(str(tmp_path / "w"), bucket.settings)
+    folder = SourceFolder(place.uri, bucket.settings)
+    run = take_inbox(warehouse, folder, settle_s=0.0)
+    assert [one.path for one in run.ingested] == [f"{place.uri}/ferry/day.csv.gz"]
+    assert [(one.address, one.code) for one in run.quarantined] == [(f"{place.uri}/fery/next.nmea.gz", "no_vessel")]
+    # now that there is a ship whose name is like it, the reason says so
+    (held,) = take_inbox(warehouse, folder, settle_s=0.0).quarantined
+    assert "like it: 'ferry'" in str(held.message)
+    assert take_inbox(warehouse, folder, settle_s=0.0).known == 2
+    assert release(warehouse, "next.nmea.gz", "ferry").outcome == "new"
+    with pytest.raises(NotFound, match="no folder"):
+        take_inbox(warehouse, SourceFolder(f"{bucket.uri}/nothing", bucket.settings))
+    with pytest.raises(KempfError) as found:
+        take_inbox(warehouse, SourceFolder("s3://no-such-bucket/x", bucket.settings))
+    assert found.value.code in ("no_inbox", "inbox_unreadable")
