@@ -307,8 +307,8 @@ def _exploded(table: DeltaTable | None, vessel: str, known: _Logs) -> pl.DataFra
 def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequence[str]) -> pl.DataFrame:
     """Return sets in the order of their start with a column ``superseded``.
 
-    A set is superseded where one of its logs has been read anew since or removed, where one of its segments is no longer
-    found, and where there are sets of newer code: of the present code, else of the one that was at work last.
+    A set is superseded where one of its logs has been read anew since or removed, where one of its segments is found no
+    longer, and where there are sets of newer code: of the present code, else of the one that was at work last.
     """
     import polars as pl
 
