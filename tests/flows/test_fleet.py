@@ -31,6 +31,7 @@ def _server() -> Iterator[None]:
 @pytest.fixture(scope="module")
 def fleet(mariner: Ship, ferry: Ship, tmp_path_factory: pytest.TempPathFactory) -> Warehouse:
     """Three vessels, a log each, taken in by the flow and identified by reprocessing."""
+    from kempf.flows.fleet.arrivals import LogsFailed
     from kempf.flows.fleet.flows import ingest, reprocess
 
     folder = tmp_path_factory.mktemp("fleet")
@@ -41,8 +42,11 @@ def fleet(mariner: Ship, ferry: Ship, tmp_path_factory: pytest.TempPathFactory) 
     for name in ("mariner", "ferry"):
         outcomes = ingest([str(folder / name / f"{name}.csv.gz")], place, None, [str(folder / name / "profile.yaml")])
         assert [one["outcome"] for one in outcomes] == ["new"]
-    outcomes = ingest([str(folder / "tramp.nmea"), str(folder / "none")], place, "tramp")
-    assert [one["outcome"] for one in outcomes] == ["new", "failed"]
+    tramp = folder / "tramp.yaml"
+    tramp.write_text("vessel: tramp\n", encoding="utf-8")
+    with pytest.raises(LogsFailed, match="1 of 2 logs could not be taken in: none: ") as failed:
+        ingest([str(folder / "tramp.nmea"), str(folder / "none")], place, None, [str(tramp)])
+    assert [one["outcome"] for one in failed.value.details["outcomes"]] == ["new", "failed"]
     reports = reprocess(place)
     assert [(r["vessel"], r["status"], r["new_sets"]) for r in reports] == [(name, "changed", 1) for name in FLEET]
     return Warehouse(place)

@@ -78,7 +78,8 @@ def test_a_given_profile_is_laid_over_the_stored_one(stocked: Warehouse):
     name, profile = settle_vessel(stocked, "mariner", VesselProfile(length_m=200.0))
     assert (name, profile.vessel, profile.length_m) == ("mariner", "mariner", 200.0)
     assert profile.sources == vessels.current(stocked, "mariner").sources
-    assert settle_vessel(stocked, "another", None) == ("another", VesselProfile(vessel="another"))
+    another = settle_vessel(stocked, "another", None, new_vessel=True)
+    assert another == ("another", VesselProfile(vessel="another"))
     with pytest.raises(UsageError, match="Neither"):
         settle_vessel(stocked, None, VesselProfile())
 

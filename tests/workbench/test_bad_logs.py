@@ -162,7 +162,7 @@ def test_the_same_bytes_for_another_vessel(own: Path, logs: Path, tmp_path: Path
     copy = tmp_path / "other name.nmea.gz"
     copy.write_bytes((logs / "mariner.nmea.gz").read_bytes())
     before = tree(own)
-    error = refused(take_in(own, copy, vessel="aurora"), 3, "log_of_another_vessel")
+    error = refused(take_in(own, copy, "--new-vessel", vessel="aurora"), 3, "log_of_another_vessel")
     assert error["details"]["held_by"] == "mariner"
     assert tree(own) == before
 

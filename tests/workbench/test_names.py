@@ -100,7 +100,7 @@ def test_names_that_differ_in_case_alone_are_two_vessels(mariner: Ship, tmp_path
     for k, name in enumerate(("Aurora", "aurora")):
         log = tmp_path / f"{k}.nmea"
         log.write_bytes(b"".join(mariner.lines[: 400 + k]))
-        assert kempf("ingest", log, "--vessel", name, "--warehouse", tmp_path / "w").code == 0
+        assert kempf("ingest", log, "--vessel", name, "--new-vessel", "--warehouse", tmp_path / "w").code == 0
     listed = kempf("vessels", "list", "--warehouse", tmp_path / "w", "--json").json
     assert [(v["vessel"], v["logs"]) for v in listed] == [("Aurora", 1), ("aurora", 1)]
 
