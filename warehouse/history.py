@@ -290,11 +290,12 @@ def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: d
         return None
     where: Where = {"vessel_key": vessel_key(vessel), "ingest_id": ingests}
     try:
-        found = delta.read(warehouse, "segments", where, ("segment_id",), version)["segment_id"].to_list()
+        rows = delta.read(warehouse, "segments", where, ("segment_id", "excluded"), version)
     except KempfError:
         if version is None:
             raise
         return None  # what was found then has been deleted since: earlier versions of kempf did not keep it
+    found = rows.filter(rows["excluded"].is_null())["segment_id"].to_list()
     return found or ([] if examinations.codes(warehouse, ingests) else None)
 
 

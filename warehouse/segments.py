@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from json import loads
 from typing import Any
 
-from kempf.schemas.errors import NotFound
+from kempf.schemas.errors import NotFound, UsageError
 from kempf.warehouse import delta, logs, vessels
 from kempf.warehouse.canonical import canonical_json, plain, sha256
 from kempf.warehouse.instant import iso_utc
@@ -49,6 +49,8 @@ class Segment:
     #: Overshoot angles beyond the nominal heading deviation, deg.
     overshoots_deg: tuple[float, ...]
     code_version: str
+    #: Why a person excluded it; None where it counts.
+    excluded: str | None = None
     #: imo, quality, detail: JSON content; what is not finite becomes null.
     imo: Mapping[str, Any] = field(default_factory=dict)
     quality: Mapping[str, Any] = field(default_factory=dict)
@@ -94,6 +96,7 @@ class Segment:
             "imo": self.imo,
             "quality": self.quality,
             "detail": self.detail,
+            "excluded": self.excluded,
             "log_id": self.log_id,
             "ingest_id": self.ingest_id,
         }
@@ -150,7 +153,7 @@ def replace(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segme
 
 
 def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
-    """Return the zigzags found in the current ingest of each log, sorted by start then id.
+    """Return the zigzags found in the current ingest of each log that nobody excluded, sorted by start then id.
 
     Whatever is fitted, pooled, diagnosed or compared asks here, so that no turning circle is ever fitted by accident.
 
@@ -170,7 +173,9 @@ def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
 
 
 def every(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
-    """Return the manoeuvres of every kind found in the current ingest of each log, sorted by start then id.
+    """Return the manoeuvres of every kind found in the current ingest of each log that nobody excluded.
+
+    They are sorted by start, then id.
 
     Parameters
     ----------
@@ -178,6 +183,19 @@ def every(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
         Where they are.
     vessel : str, optional
         Of this vessel only; of all by default.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    return [segment for segment in found_in(warehouse, vessel) if segment.excluded is None]
+
+
+def found_in(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
+    """Return the manoeuvres of every kind found in the current ingest of each log, also those that were excluded.
+
+    They are sorted by start, then id.
 
     Raises
     ------
@@ -205,22 +223,53 @@ def by_ids(warehouse: Warehouse, vessel: str, names: Collection[str]) -> dict[st
 
 
 def get(warehouse: Warehouse, name: str) -> Segment:
-    """Return a segment of a current ingest by its id, of whatever kind.
+    """Return a segment of a current ingest by its id, of whatever kind, excluded or not.
 
     Raises
     ------
     NotFound
         ``no_warehouse``, ``no_segment``.
     """
-    found = [segment for segment in every(warehouse) if segment.segment_id == name]
+    found = [segment for segment in found_in(warehouse) if segment.segment_id == name]
     if not found:
-        raise NotFound(
-            "no_segment",
-            f"There is no segment {name!r} in {warehouse.uri}.",
-            "List the segments with `kempf segments`.",
-            {"segment_id": name},
+        raise _no_segment(warehouse, name)
+    return found[0]
+
+
+def by_prefix(warehouse: Warehouse, name: str) -> Segment:
+    """Return a segment of a current ingest by a beginning of its id, excluded or not.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_segment``.
+    UsageError
+        ``ambiguous_segment``: several fit.
+    """
+    ids = delta.read(warehouse, "segments", columns=("segment_id", "vessel"))
+    whose = ids.filter(ids["segment_id"].str.starts_with(name))["vessel"].unique().sort().to_list() if name else []
+    known = {one.vessel for one in logs.current(warehouse)} if whose else set()
+    every = [one for vessel in whose if vessel in known for one in found_in(warehouse, vessel)]
+    found = [one for one in every if one.segment_id == name] or [s for s in every if s.segment_id.startswith(name)]
+    if not found:
+        raise _no_segment(warehouse, name)
+    if len(found) > 1:
+        raise UsageError(
+            "ambiguous_segment",
+            f"{len(found)} segments fit {name!r}: {', '.join(one.segment_id for one in found[:5])}.",
+            "Give more of the id.",
+            {"segment_id": name, "found": [one.segment_id for one in found]},
         )
     return found[0]
+
+
+def _no_segment(warehouse: Warehouse, name: str) -> NotFound:
+    return NotFound(
+        "no_segment",
+        f"There is no segment {name!r} in {warehouse.uri}.",
+        "List the segments with `kempf segments`.",
+        {"segment_id": name},
+    )
 
 
 def _sorted(segments: Sequence[Segment]) -> list[Segment]:

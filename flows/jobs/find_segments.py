@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
 from math import nan
 from typing import Any
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.no_log.companions import has_log, shaft_speed
 from kempf.pipeline.ingest.screen import CLOCK_FIRST_NS
+from kempf.pipeline.segment import corrections
+from kempf.pipeline.segment.by_hand import zigzag_between
+from kempf.pipeline.segment.corrections import Marked, Standing
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo import judge
@@ -18,6 +22,7 @@ from kempf.pipeline.segment.pull_out import PullOut
 from kempf.pipeline.segment.spiral import Spiral
 from kempf.pipeline.segment.turning_circle import TurningCircle
 from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version
 from kempf.warehouse.segments import Segment, segment_id
@@ -34,7 +39,7 @@ class Ingest:
 
 
 def find_segments(
-    ingest: Ingest, profile: VesselProfile, instruments: Instruments
+    ingest: Ingest, profile: VesselProfile, instruments: Instruments, said: Sequence[Correction] = ()
 ) -> tuple[list[Segment], tuple[str, ...]]:
     """Find the manoeuvres of one ingest; nothing is stored.
 
@@ -42,13 +47,20 @@ def find_segments(
     ----------
     instruments : Instruments
         Its channels.
+    said : sequence of Correction, optional
+        What a person said of the manoeuvres of this log, in the order in which it was said.
 
     Returns
     -------
     list of Segment
-        The zigzags, and behind them what else was found.
+        The zigzags, and behind them what else was found; those that a person excluded are among them.
     tuple of str
         What a person should know: choices made in normalising, or the channel whose absence forbids the search.
+
+    Raises
+    ------
+    DataRejected
+        ``no_legs``: there is no zigzag between bounds that a person gave.
     """
     heading, rudder = instruments.get("heading"), instruments.get("rudder_angle")
     absent = [name for name, series in (("heading", heading), ("rudder_angle", rudder)) if series is None]
@@ -57,10 +69,32 @@ def find_segments(
         note = f"no {missing} in this log: zigzags cannot be looked for; map it in the profile if the log has it"
         return [], (*instruments.notes, note)
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
-    zigzags = find_manoeuvres(heading, rudder, speed)
-    manoeuvres = [_segment(zigzag, ingest, profile, instruments) for zigzag in zigzags]
-    others = [_kept_aside(one, ingest, profile) for one in find_turning(instruments, zigzags)]
+    standing = corrections.standing(said)
+    marked = corrections.applied(
+        find_manoeuvres(heading, rudder, speed),
+        standing,
+        lambda bounds: zigzag_between(heading, rudder, speed, *bounds),
+    )
+    manoeuvres = [_marked(one, ingest, profile, instruments) for one in marked]
+    turning = find_turning(instruments, [one.zigzag for one in marked])
+    others = [_with(_kept_aside(one, ingest, profile), standing) for one in turning]
     return manoeuvres + others, instruments.notes
+
+
+def _marked(one: Marked, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
+    """Return a zigzag with what a person said of it."""
+    segment = _segment(one.zigzag, ingest, profile, instruments)
+    return segment if one.standing is None else _with(segment, [one.standing])
+
+
+def _with(segment: Segment, said: Sequence[Standing]) -> Segment:
+    """Return a segment with what was said of its manoeuvre."""
+    mine = next((one for one in said if one.concerns(segment.start_utc_ns, segment.end_utc_ns)), None)
+    if mine is None:
+        return segment
+    subject = dict(zip(("start_utc_ns", "end_utc_ns"), mine.subject_utc_ns, strict=True))
+    by_hand = {"action": mine.action, "reason": mine.reason, "subject": subject}
+    return replace(segment, excluded=mine.excluded, detail={**segment.detail, "by_hand": by_hand})
 
 
 def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:

@@ -23,9 +23,10 @@ from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import LogReadings, Tally
+from kempf.schemas.correction import Correction
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.profile import VesselProfile, overlay
-from kempf.warehouse import code_version, examinations, logs, lost, segments, vessels
+from kempf.warehouse import code_version, corrections, examinations, logs, lost, segments, vessels
 from kempf.warehouse.deposit import Delivery, Deposit, deposit, held
 from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.keys import ingest_id, vessel_key
@@ -200,13 +201,15 @@ def ingest_log(
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
         if unsearched(warehouse, [row]):
-            search_log.store(warehouse, [search_log.search_again(warehouse, row)])
+            said = corrections.of_logs(warehouse, [row.log_id])
+            search_log.store(warehouse, [search_log.search_again(warehouse, row, said.get(row.log_id, ()))])
         stored_segments = tuple(s for s in segments.every(warehouse, vessel) if s.ingest_id == there.ingest_id)
         seen = examinations.of_ingests(warehouse, [row.ingest_id])[row.ingest_id]
         return _outcome(warehouse, path, "unchanged", row, stored_segments, seen)
     with spooled(file_name, log, profile) as readings:
         give_back(readings.tally.records_read)
-        read = look_through(vessel, file_name, log, profile, readings)
+        said = corrections.of_logs(warehouse, [log.sha256])
+        read = look_through(vessel, file_name, log, profile, readings, said.get(log.sha256, ()))
         give_back(readings.tally.records_read)
         (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
@@ -243,15 +246,22 @@ class ReadLog:
     found: SearchedLog
 
 
-def look_through(vessel: str, file_name: str, log: LogFile, profile: VesselProfile, readings: LogReadings) -> ReadLog:
-    """Find the manoeuvres of a log that was read, and compare its channels."""
+def look_through(
+    vessel: str,
+    file_name: str,
+    log: LogFile,
+    profile: VesselProfile,
+    readings: LogReadings,
+    said: Sequence[Correction],
+) -> ReadLog:
+    """Find the manoeuvres of a log that was read, as a person corrected them, and compare its channels."""
     code = code_version.fingerprint("ingest")
     this_ingest = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code), file_name)
     instruments = from_readings(readings.lazy())
     give_back(readings.tally.records_read)
     refused = count(readings.rejections())
     records = readings.tally.records_read
-    searched = search(this_ingest, profile, file_name, readings.format, instruments, refused, records)
+    searched = search(this_ingest, profile, file_name, readings.format, instruments, refused, records, said)
     return ReadLog(Delivery(vessel, file_name, log, profile, readings, code), searched)
 
 

@@ -9,7 +9,7 @@ import shlex
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from kempf.warehouse import code_version, examinations, logs, parameter_sets, vessels
+from kempf.warehouse import code_version, corrections, examinations, logs, parameter_sets, vessels
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -30,10 +30,11 @@ def unread(rows: Sequence[LogRow], profiles: Mapping[str, str]) -> list[LogRow]:
 
 
 def unsearched(warehouse: Warehouse, rows: Sequence[LogRow]) -> list[LogRow]:
-    """Return those of some logs whose readings were looked through by other code than the present, or never."""
+    """Return those of some logs that were looked through by other code or with other corrections, or never."""
     code = code_version.fingerprint("segment")
     known = examinations.codes(warehouse, [row.ingest_id for row in rows])
-    return [row for row in rows if known.get(row.ingest_id) != code]
+    said = corrections.of_logs(warehouse, [row.log_id for row in rows])
+    return [row for row in rows if known.get(row.ingest_id) != corrections.basis(code, said.get(row.log_id, ()))]
 
 
 def said_of_logs(warehouse: Warehouse, vessel: str | None = None) -> str | None:

@@ -15,7 +15,7 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import logs, raw, vessels
+from kempf.warehouse import corrections, logs, raw, vessels
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
 
@@ -125,6 +125,7 @@ def _read_anew(
     from kempf.flows.jobs.spool import spooled
 
     failed: dict[str, KempfError] = {}
+    said = corrections.of_logs(warehouse, [row.log_id for row in rows])
     for chunk in _chunks(rows):
         read: dict[str, ReadLog] = {}
         with ExitStack() as until_stored:
@@ -134,7 +135,9 @@ def _read_anew(
                 try:
                     log = until_stored.enter_context(raw.opened(warehouse, row.log_id))
                     readings = until_stored.enter_context(spooled(row.file_name, log, profile))
-                    read[row.ingest_id] = look_through(row.vessel, row.file_name, log, profile, readings)
+                    read[row.ingest_id] = look_through(
+                        row.vessel, row.file_name, log, profile, readings, said.get(row.log_id, ())
+                    )
                 except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                     failed[row.ingest_id] = wrapped(error)
             failed |= together_or_each(read, partial(store, warehouse))
@@ -148,12 +151,13 @@ def _search_anew(warehouse: Warehouse, rows: Sequence[LogRow], begin: Callable[[
     from kempf.flows.jobs.search_log import search_again, store
 
     failed: dict[str, KempfError] = {}
+    said = corrections.of_logs(warehouse, [row.log_id for row in rows])
     for chunk in _chunks(rows):
         searched: dict[str, SearchedLog] = {}
         for row in chunk:
             begin(f"looking for zigzags in {row.file_name}")
             try:
-                searched[row.ingest_id] = search_again(warehouse, row)
+                searched[row.ingest_id] = search_again(warehouse, row, said.get(row.log_id, ()))
             except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                 failed[row.ingest_id] = wrapped(error)
         failed |= together_or_each(searched, partial(store, warehouse))

@@ -7,61 +7,14 @@ rests on it is superseded. The vessel's own sets follow with her next reprocessi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
 
+from kempf.flows.jobs.following import Following, of_logs
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
 from kempf.schemas.errors import NotFound, UsageError
-from kempf.warehouse import aliases, history, logs, parameter_sets, raw, segments, vessels
+from kempf.warehouse import aliases, corrections, logs, raw, vessels
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
-
-
-@dataclass(frozen=True)
-class Following:
-    """What follows for a vessel where logs of hers count no longer."""
-
-    vessel: str
-    logs: tuple[LogRow, ...]
-    #: Ids of the segments that are found no longer.
-    segment_ids: tuple[str, ...]
-    #: Ids of the sets that are superseded.
-    set_ids: tuple[str, ...]
-    #: Whether her current set is among them.
-    current: bool
-
-    def show(self) -> dict[str, Any]:
-        """Return it as JSON content."""
-        return {
-            "vessel": self.vessel,
-            "logs": [{"log_id": row.log_id, "file_name": row.file_name} for row in self.logs],
-            "segments": list(self.segment_ids),
-            "superseded": list(self.set_ids),
-            "current_superseded": self.current,
-        }
-
-
-def following(warehouse: Warehouse, rows: Sequence[LogRow]) -> Following:
-    """Return what follows where some logs of one vessel count no longer.
-
-    Parameters
-    ----------
-    rows : sequence of LogRow
-        Current ones of one vessel, at least one.
-    """
-    vessel = rows[0].vessel
-    gone, ingests = {row.log_id for row in rows}, {row.ingest_id for row in rows}
-    held = parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
-    superseded = [one.parameter_set_id for one in held if gone & set(one.log_ids)]
-    current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
-    return Following(
-        vessel,
-        tuple(rows),
-        tuple(one.segment_id for one in segments.every(warehouse, vessel) if one.ingest_id in ingests),
-        tuple(superseded),
-        current in superseded,
-    )
 
 
 def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Following:
@@ -80,7 +33,7 @@ def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Followi
         ``no_reason``.
     """
     _require_reason(reason)
-    found = following(warehouse, rows)
+    found = of_logs(warehouse, rows)
     logs.mark(warehouse, [row.log_id for row in rows], reason)
     if found.current:
         aliases.withdraw(warehouse, found.vessel)
@@ -153,7 +106,8 @@ def move(
             {"log_id": row.log_id, "vessel": whose},
         )
     with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as readings:
-        read = look_through(whose, row.file_name, log, profile, readings)
+        said = corrections.of_logs(warehouse, [row.log_id]).get(row.log_id, ())
+        read = look_through(whose, row.file_name, log, profile, readings, said)
         found = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
         store(warehouse, [read])
     return found, logs.by_prefix(warehouse, row.log_id)

@@ -12,8 +12,9 @@ from kempf.flows.process.release_memory import give_back
 from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import Instruments
+from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version, examinations, readings, segments, vessels
+from kempf.warehouse import code_version, corrections, examinations, readings, segments, vessels
 from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.segments import Segment
@@ -36,6 +37,7 @@ def search(
     instruments: Instruments,
     refused: Mapping[tuple[str, str | None], int],
     records: int,
+    said: Sequence[Correction] = (),
 ) -> SearchedLog:
     """Find the manoeuvres in the channels of a log, and examine the channels.
 
@@ -50,8 +52,15 @@ def search(
         Values beyond their physical range, `kempf.pipeline.channels.doctor.refused.count`.
     records : int
         Of the log.
+    said : sequence of Correction, optional
+        What a person said of its manoeuvres.
+
+    Raises
+    ------
+    DataRejected
+        ``no_legs``: there is no zigzag between bounds that a person gave.
     """
-    found, notes = find_segments(log, profile, instruments)
+    found, notes = find_segments(log, profile, instruments, said)
     give_back(records)
     try:
         content = examine_instruments(instruments, profile, file_name, log_format, refused).content
@@ -61,7 +70,7 @@ def search(
         log.vessel,
         log.ingest_id,
         log.log_id,
-        code_version.fingerprint("segment"),
+        corrections.basis(code_version.fingerprint("segment"), said),
         content["verdict"],
         tuple(finding["words"] for finding in content["findings"]),
         {**content, "notes": list(notes)},
@@ -69,19 +78,26 @@ def search(
     return SearchedLog(tuple(found), examination)
 
 
-def search_again(warehouse: Warehouse, row: LogRow) -> SearchedLog:
+def search_again(warehouse: Warehouse, row: LogRow, said: Sequence[Correction]) -> SearchedLog:
     """Look through the stored readings of a log; nothing is stored.
+
+    Parameters
+    ----------
+    said : sequence of Correction
+        What a person said of its manoeuvres.
 
     Raises
     ------
     NotFound
         ``no_profile``: the profile that it was read with is lost.
+    DataRejected
+        ``no_legs``: there is no zigzag between bounds that a person gave.
     """
     profile = vessels.get(warehouse, row.profile_sha256)
     log = Ingest(row.vessel, row.log_id, row.ingest_id, row.file_name)
     instruments = channels_of(warehouse, row.ingest_id)
     refused = count([readings.read_rejected(warehouse, row.ingest_id)])
-    return search(log, profile, row.file_name, row.format, instruments, refused, row.tally.records_read)
+    return search(log, profile, row.file_name, row.format, instruments, refused, row.tally.records_read, said)
 
 
 def store(warehouse: Warehouse, searched: Sequence[SearchedLog]) -> None:

@@ -8,9 +8,10 @@ import pytest
 
 from kempf.flows.fleet.plan import plan
 from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.following import of_logs
 from kempf.flows.jobs.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.remove_logs import following, move, remove, remove_vessel, rename_vessel, restore
+from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, rename_vessel, restore
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import aliases, history, logs, parameter_sets, segments, vessels
@@ -42,7 +43,7 @@ def warehouse(_filled: Path, tmp_path: Path) -> Warehouse:
 def test_a_removed_log_is_in_nothing_and_comes_back(warehouse: Warehouse, _filled: Path) -> None:
     before = history.standing(warehouse, "mariner")
     first = next(row for row in logs.current(warehouse) if row.format == "mcap")
-    told = following(warehouse, [first])
+    told = of_logs(warehouse, [first])
     assert len(told.segment_ids) == 1 and told.set_ids and set(told.set_ids) <= set(before)
     found = remove(warehouse, [first], "a trial of another draught")
     assert found == told

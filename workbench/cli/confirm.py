@@ -12,7 +12,7 @@ from kempf.schemas.errors import UsageError
 from kempf.workbench.terminal import counted
 
 if TYPE_CHECKING:
-    from kempf.flows.jobs.remove_logs import Following
+    from kempf.flows.jobs.following import Following
 
 F = TypeVar("F", bound=Callable[..., Any])
 

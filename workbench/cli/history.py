@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,12 +12,16 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
+from kempf.workbench.cli.instants import instant_of
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
 from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.terminal import counted, number, print_json, print_note, print_paragraph, print_table, short_ids
 
 if TYPE_CHECKING:
+    from datetime import datetime
+
     from kempf.warehouse.history import Comparable, History
+    from kempf.warehouse.store import Warehouse
 
 
 #: Smaller p-values are not written out.
@@ -61,7 +64,7 @@ def command(
 
     if figure is not None and not changes:
         raise UsageError("figure_without_changes", "--figure draws what --changes found.", "Add --changes.")
-    warehouse, instant = Warehouse(uri), _instant(as_of)
+    warehouse, instant = Warehouse(uri), instant_of(as_of, "--as-of") if as_of is not None else None
     histories = {
         name: history.of_vessel(warehouse, name, parameter, instant, superseded=superseded)
         for name in dict.fromkeys(vessel)
@@ -73,6 +76,8 @@ def command(
             click.echo(found.note, err=as_json)
     if not changes:
         _show(histories, as_json=as_json)
+        if not as_json:
+            _show_notes(warehouse, list(histories), instant)
         return
     kinds = {name: history.comparable(warehouse, name, instant) for name in histories}
     # each kind of sets has a figure of its own
@@ -119,6 +124,17 @@ def _show(histories: dict[str, History], *, as_json: bool) -> None:
     for vessel, model, estimator in sorted(series, key=lambda kind: (order.index(kind[0]), kind)):
         title = f"{vessel}, model {model}, estimator {estimator}"
         print_table(["start UTC", "parameter", "value", "std", "unit", "set"], series[vessel, model, estimator], title)
+
+
+def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | None) -> None:
+    """Print what people noted of the vessels, by that time."""
+    from kempf.warehouse import notes
+    from kempf.workbench.cli.note import words_of
+
+    for name in names:
+        for one in notes.of_vessel(warehouse, name):
+            if as_of is None or one.written is None or one.written <= as_of:
+                click.echo(f"note: {words_of(one)}")
 
 
 def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: str) -> dict[str, Any]:
@@ -251,17 +267,3 @@ def _print_change(change: dict[str, Any]) -> None:
             f"{by['parameter']} alone would explain it: {number(by['change'], 3)} ± {number(by['std'], 2)} (1 s.e.) "
             f"{by['unit']} ({by['percent']:+.1f} %)"
         )
-
-
-def _instant(text: str | None) -> datetime | None:
-    if text is None:
-        return None
-    try:
-        instant = datetime.fromisoformat(text)
-        return (instant if instant.tzinfo is not None else instant.replace(tzinfo=UTC)).astimezone(UTC)
-    except (ValueError, OverflowError) as error:
-        raise UsageError(
-            "not_a_time",
-            f"--as-of {text!r} is no time; expected ISO 8601.",
-            "Write it as 2025-05-03T12:00:00Z.",
-        ) from error

@@ -279,13 +279,14 @@ def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
 @json_option
 def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a log count no longer. Nothing is deleted: `restore` brings it back, `history --as-of` still knows it."""
-    from kempf.flows.jobs.remove_logs import following, remove
+    from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.remove_logs import remove
     from kempf.warehouse import logs
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
-    confirm(what_goes(following(warehouse, [row]), f"{row.file_name} is removed"), yes=yes)
+    confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is removed"), yes=yes)
     found = remove(warehouse, [row], reason)
     if as_json:
         print_json(found.show())
@@ -319,7 +320,8 @@ def restore_log(log_id: str, uri: str, as_json: bool) -> None:
 @json_option
 def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Give a log to the vessel that it is of: it is read again from its bytes, with her profile."""
-    from kempf.flows.jobs.remove_logs import following, move
+    from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.remove_logs import move
     from kempf.schemas.errors import NotFound
     from kempf.warehouse import logs
     from kempf.warehouse.store import Warehouse
@@ -330,7 +332,7 @@ def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool,
     except NotFound:  # an interrupted move goes on, and takes nothing from anybody
         pass
     else:
-        confirm(what_goes(following(warehouse, [row]), f"{row.file_name} is given to {vessel!r}"), yes=yes)
+        confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is given to {vessel!r}"), yes=yes)
     found, now = move(warehouse, log_id, vessel, reason, new_vessel=new_vessel)
     if as_json:
         print_json({**_facts(now), "following": found.show() if found else None})

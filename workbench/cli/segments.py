@@ -1,4 +1,4 @@
-"""``kempf segments``."""
+"""``kempf segments``, and ``kempf segments correct|exclude|accept|add|corrections``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,11 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import click
+from click.core import ParameterSource
 
-from kempf.workbench.cli.given_once import GivenOnce
+from kempf.schemas.errors import UsageError
+from kempf.workbench.cli import correct_segments
+from kempf.workbench.cli.given_once import GivenOnceGroup
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, one_line, print_json, print_note, print_table, short_ids
 
@@ -15,12 +18,31 @@ if TYPE_CHECKING:
     from kempf.warehouse.segments import Segment
 
 
-@click.command("segments", cls=GivenOnce)
+@click.group("segments", cls=GivenOnceGroup, invoke_without_command=True)
 @vessel_option()
 @warehouse_option
 @json_option
-def command(vessel: str | None, uri: str, as_json: bool) -> None:
-    """List the manoeuvres found: zigzags with overshoots and IMO criteria, and what is kept for validation."""
+@click.pass_context
+def command(context: click.Context, vessel: str | None, uri: str, as_json: bool) -> None:
+    """List the manoeuvres found: zigzags with overshoots and IMO criteria, and what is kept for validation.
+
+    A manoeuvre is corrected by one of the commands below; nothing is lost by it.
+    """
+    if context.invoked_subcommand is None:
+        _list(vessel, uri, as_json)
+    elif context.get_parameter_source("uri") is ParameterSource.COMMANDLINE or vessel or as_json:
+        raise UsageError(
+            "option_before_command",
+            f"Options stand behind `{context.invoked_subcommand}`, not before it.",
+            f"Write kempf segments {context.invoked_subcommand} ... with the options behind.",
+        )
+
+
+for _one in correct_segments.COMMANDS:
+    command.add_command(_one)
+
+
+def _list(vessel: str | None, uri: str, as_json: bool) -> None:
     from kempf.flows.jobs.out_of_date import said_of_logs
     from kempf.warehouse import examinations, logs, segments
     from kempf.warehouse.store import Warehouse
@@ -29,7 +51,7 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
     warehouse.require()
     names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
     # another process may read a log anew between the two questions
-    found = [segment for segment in segments.every(warehouse, vessel) if segment.ingest_id in names]
+    found = [segment for segment in segments.found_in(warehouse, vessel) if segment.ingest_id in names]
     said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
     contradictions = {name: list(one.findings) for name, one in said.items() if one.findings}
     print_note(said_of_logs(warehouse, vessel))
@@ -45,6 +67,9 @@ def command(vessel: str | None, uri: str, as_json: bool) -> None:
         _print_zigzags(zigzags, short)
     else:
         click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
+    for segment in found:
+        if segment.excluded is not None:
+            click.echo(f"{short[segment.segment_id]} is excluded: {one_line(segment.excluded)}")
     for segment in found:
         if not segment.is_zigzag:
             _print_other(segment, short[segment.segment_id])

@@ -78,14 +78,15 @@ def set_profile(name: str, profiles: tuple[Path, ...], uri: str, as_json: bool) 
 @json_option
 def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a vessel and all her logs count no longer. Nothing is deleted; `kempf history --as-of` still knows them."""
-    from kempf.flows.jobs.remove_logs import following, remove_vessel
+    from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.remove_logs import remove_vessel
     from kempf.warehouse import logs, vessels
     from kempf.warehouse.store import Warehouse
 
     warehouse = Warehouse(uri)
     vessels.require(warehouse, name)
     held = logs.current(warehouse, name)
-    confirm(what_goes(following(warehouse, held) if held else None, f"The vessel {name!r} is removed"), yes=yes)
+    confirm(what_goes(of_logs(warehouse, held) if held else None, f"The vessel {name!r} is removed"), yes=yes)
     found = remove_vessel(warehouse, name, reason)
     if as_json:
         print_json({"vessel": name, "removed": True, "following": found.show() if found else None})
@@ -102,7 +103,8 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
 @json_option
 def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Give a vessel another name: her logs are read for it again, her models are identified again by `reprocess`."""
-    from kempf.flows.jobs.remove_logs import following, rename_vessel
+    from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.remove_logs import rename_vessel
     from kempf.warehouse import logs, vessels
     from kempf.warehouse.store import Warehouse
 
@@ -111,7 +113,7 @@ def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: 
     held = logs.current(warehouse, name)
     confirm(
         what_goes(
-            following(warehouse, held) if held else None,
+            of_logs(warehouse, held) if held else None,
             f"{name!r} is renamed to {new_name!r} and her logs are read again",
         ),
         yes=yes,

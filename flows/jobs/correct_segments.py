@@ -1,0 +1,213 @@
+"""The jobs that correct the manoeuvres of a log as a person says: other bounds, excluded, accepted, added.
+
+What was said is kept in the table of corrections and laid over every search of the log from then on. The sets that
+rest on what has changed are superseded; those that follow are made by the next identification of the vessel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+from kempf.flows.jobs import search_log
+from kempf.flows.jobs.following import Following, of_segments
+from kempf.flows.jobs.search_log import SearchedLog, search_again
+from kempf.pipeline.segment.corrections import same
+from kempf.schemas.correction import Action, Bounds, Correction
+from kempf.schemas.errors import UsageError
+from kempf.warehouse import aliases, corrections, logs, segments
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.logs import LogRow
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True, eq=False)
+class Planned:
+    """A correction, and what it would change; nothing is stored before `store`."""
+
+    log: LogRow
+    segment_id: str | None
+    correction: Correction
+    #: The manoeuvre as it was, None where one is added, and as it would be.
+    before: Segment | None
+    after: Segment
+    #: What follows for the vessel.
+    following: Following
+    _searched: SearchedLog
+
+    def store(self, warehouse: Warehouse) -> None:
+        """Store the correction and what follows from it."""
+        # first what was said: where it ends here, the next reprocessing looks through the log again
+        corrections.add(warehouse, self.log.log_id, self.segment_id, self.correction)
+        search_log.store(warehouse, [self._searched])
+        if self.following.current:
+            aliases.withdraw(warehouse, self.log.vessel)
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return {
+            "action": self.correction.action,
+            "reason": self.correction.reason,
+            "before": self.before.show(self.log.file_name) if self.before else None,
+            "after": self.after.show(self.log.file_name),
+            "following": self.following.show(),
+        }
+
+
+def plan_for(
+    warehouse: Warehouse, name: str, action: Action, reason: str, bounds_utc_ns: Bounds | None = None
+) -> Planned:
+    """Return what a correction of a manoeuvre would change.
+
+    Parameters
+    ----------
+    name : str
+        Beginning of the id of the segment.
+    action : {"correct", "exclude", "accept"}
+    reason : str
+        Why, for those who come after.
+    bounds_utc_ns : (int, int), optional
+        For ``correct``: first and last instant, UTC nanoseconds.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_segment``.
+    UsageError
+        ``ambiguous_segment``, ``no_reason``, ``nothing_to_correct``, ``not_a_zigzag``, ``bounds_reversed``,
+        ``bounds_outside_log``, ``bounds_overlap``.
+    DataRejected
+        ``no_legs``: between these bounds is no zigzag.
+    """
+    _require_reason(reason)
+    segment = segments.by_prefix(warehouse, name)
+    log = logs.of_ingest(warehouse, segment.ingest_id)
+    by_hand = segment.detail.get("by_hand")
+    if action == "correct" and not segment.is_zigzag:
+        raise UsageError(
+            "not_a_zigzag",
+            f"{segment.segment_id} is a {segment.kind.replace('_', ' ')}; bounds are given to zigzags only.",
+            "Exclude it with `kempf segments exclude`, or add a zigzag with `kempf segments add`.",
+            {"segment_id": segment.segment_id, "kind": segment.kind},
+        )
+    last = by_hand["action"] if by_hand else None
+    if action == last and (action != "correct" or bounds_utc_ns == (segment.start_utc_ns, segment.end_utc_ns)):
+        raise UsageError(
+            "nothing_to_correct",
+            f"{segment.segment_id} is {_DONE[action]} already: {by_hand['reason'] if by_hand else ''}",
+            "Nothing needs to be done.",
+            {"segment_id": segment.segment_id, "action": action},
+        )
+    subject = segment.start_utc_ns, segment.end_utc_ns
+    if by_hand:
+        subject = by_hand["subject"]["start_utc_ns"], by_hand["subject"]["end_utc_ns"]
+    return _planned(warehouse, log, segment, Correction(action, subject, bounds_utc_ns, reason.strip()))
+
+
+def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason: str) -> Planned:
+    """Return what would change with a zigzag that the search did not find.
+
+    Parameters
+    ----------
+    log_name : str
+        Beginning of the id of the log, or its file name.
+    bounds_utc_ns : (int, int)
+        First and last instant, UTC nanoseconds.
+    reason : str
+        Why, for those who come after.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_log``.
+    UsageError
+        ``ambiguous_log``, ``no_reason``, ``bounds_reversed``, ``bounds_outside_log``, ``bounds_overlap``.
+    DataRejected
+        ``no_legs``: between these bounds is no zigzag.
+    """
+    _require_reason(reason)
+    log = logs.by_prefix(warehouse, log_name)
+    known = [one for one in segments.found_in(warehouse, log.vessel) if one.ingest_id == log.ingest_id]
+    held = next((one for one in known if same((one.start_utc_ns, one.end_utc_ns), bounds_utc_ns)), None)
+    if held is not None:
+        raise UsageError(
+            "bounds_overlap",
+            f"There is a {held.kind.replace('_', ' ')} already: {held.segment_id}, {_span(held)}"
+            f"{', which was excluded' if held.excluded else ''}.",
+            "Give it other bounds with `kempf segments correct`, or let it count with `kempf segments accept`.",
+            {"segment_id": held.segment_id},
+        )
+    return _planned(warehouse, log, None, Correction("add", bounds_utc_ns, bounds_utc_ns, reason.strip()))
+
+
+_DONE = {"correct": "corrected", "exclude": "excluded", "accept": "accepted"}
+
+
+def _planned(warehouse: Warehouse, log: LogRow, segment: Segment | None, correction: Correction) -> Planned:
+    if correction.bounds_utc_ns is not None:
+        _require_within(log, correction.bounds_utc_ns)
+    said = corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ())
+    searched = search_again(warehouse, log, (*said, correction))
+    after = next(
+        one
+        for one in searched.segments
+        if (hand := one.detail.get("by_hand"))
+        and (hand["subject"]["start_utc_ns"], hand["subject"]["end_utc_ns"]) == correction.subject_utc_ns
+    )
+    _refuse_overlap(searched.segments, after)
+    held = [one for one in segments.found_in(warehouse, log.vessel) if one.ingest_id == log.ingest_id]
+    stays = {one.segment_id for one in searched.segments if one.excluded is None}
+    gone = [one.segment_id for one in held if one.excluded is None and one.segment_id not in stays]
+    return Planned(
+        log,
+        segment.segment_id if segment else None,
+        correction,
+        segment,
+        after,
+        of_segments(warehouse, log.vessel, gone),
+        searched,
+    )
+
+
+def _require_within(log: LogRow, bounds: Bounds) -> None:
+    start, end = bounds
+    if start >= end:
+        raise UsageError(
+            "bounds_reversed",
+            f"The end, {iso_utc(end)}, is not after the start, {iso_utc(start)}.",
+            "Give the start first.",
+        )
+    if start < log.start_utc_ns or end > log.end_utc_ns:
+        raise UsageError(
+            "bounds_outside_log",
+            f"{log.file_name} goes from {iso_utc(log.start_utc_ns)} to {iso_utc(log.end_utc_ns)}; the bounds are "
+            f"{iso_utc(start)} to {iso_utc(end)}.",
+            "Give bounds within the log.",
+            {"log_id": log.log_id},
+        )
+
+
+def _refuse_overlap(found: Sequence[Segment], corrected: Segment) -> None:
+    """Refuse bounds under which two zigzags would share readings: they would be fitted twice."""
+    zigzags = sorted((s for s in found if s.is_zigzag and s.excluded is None), key=lambda s: s.start_utc_ns)
+    for one, other in pairwise(zigzags):
+        if one.end_utc_ns > other.start_utc_ns and corrected.segment_id in (one.segment_id, other.segment_id):
+            beside = other if one.segment_id == corrected.segment_id else one
+            raise UsageError(
+                "bounds_overlap",
+                f"These bounds overlap the zigzag {beside.segment_id}, {_span(beside)}.",
+                "Give bounds that do not, or exclude that one first with `kempf segments exclude`.",
+                {"segment_id": beside.segment_id},
+            )
+
+
+def _span(segment: Segment) -> str:
+    return f"{iso_utc(segment.start_utc_ns)} to {iso_utc(segment.end_utc_ns)}"
+
+
+def _require_reason(reason: str) -> None:
+    if not reason.strip():
+        raise UsageError("no_reason", "The reason is blank.", "Say why with --reason, for those who come after.")

@@ -1,0 +1,72 @@
+"""What follows for a vessel where logs or manoeuvres of hers count no longer: which parameter sets go with them."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from kempf.warehouse import aliases, history, parameter_sets, segments
+from kempf.warehouse.logs import LogRow
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class Following:
+    """What follows for a vessel where logs or manoeuvres of hers count no longer."""
+
+    vessel: str
+    #: Logs that go.
+    logs: tuple[LogRow, ...]
+    #: Ids of the segments that are found no longer, or are found otherwise.
+    segment_ids: tuple[str, ...]
+    #: Ids of the sets that are superseded.
+    set_ids: tuple[str, ...]
+    #: Whether her current set is among them.
+    current: bool
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return {
+            "vessel": self.vessel,
+            "logs": [{"log_id": row.log_id, "file_name": row.file_name} for row in self.logs],
+            "segments": list(self.segment_ids),
+            "superseded": list(self.set_ids),
+            "current_superseded": self.current,
+        }
+
+
+def of_logs(warehouse: Warehouse, rows: Sequence[LogRow]) -> Following:
+    """Return what follows where some logs of one vessel count no longer.
+
+    Parameters
+    ----------
+    rows : sequence of LogRow
+        Current ones of one vessel, at least one.
+    """
+    vessel, ingests = rows[0].vessel, {row.ingest_id for row in rows}
+    gone = tuple(one.segment_id for one in segments.found_in(warehouse, vessel) if one.ingest_id in ingests)
+    return _following(warehouse, vessel, tuple(rows), gone, {row.log_id for row in rows}, set())
+
+
+def of_segments(warehouse: Warehouse, vessel: str, segment_ids: Sequence[str]) -> Following:
+    """Return what follows where some manoeuvres of a vessel count no longer, or with other bounds."""
+    return _following(warehouse, vessel, (), tuple(segment_ids), set(), set(segment_ids))
+
+
+def _following(
+    warehouse: Warehouse,
+    vessel: str,
+    rows: tuple[LogRow, ...],
+    gone: tuple[str, ...],
+    log_ids: Collection[str],
+    segment_ids: Collection[str],
+) -> Following:
+    held = parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
+    superseded = [
+        one.parameter_set_id
+        for one in held
+        if not (set(one.log_ids).isdisjoint(log_ids) and set(one.segment_ids).isdisjoint(segment_ids))
+    ]
+    current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    return Following(vessel, rows, gone, tuple(superseded), current in superseded)

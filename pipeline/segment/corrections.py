@@ -1,0 +1,105 @@
+"""What a person said of the manoeuvres of a log, laid over what the search found in it.
+
+A correction names its manoeuvre by its bounds and not by an id, so that it holds when newer code finds the same
+manoeuvre a little earlier or later. Of several corrections of one manoeuvre the last decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+from kempf.pipeline.segment.zigzag import Zigzag
+from kempf.schemas.correction import Action, Bounds, Correction
+
+#: bounds are of the same manoeuvre where they share more than this of the shorter one
+_SAME = 0.5
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How one manoeuvre stands after all that was said of it."""
+
+    subject_utc_ns: Bounds
+    #: None: those that it was found with.
+    bounds_utc_ns: Bounds | None
+    #: Those that it was added with; None where the search found it.
+    added_utc_ns: Bounds | None
+    #: What was said last.
+    action: Action
+    reason: str
+
+    @property
+    def excluded(self) -> str | None:
+        """Why it does not count; None where it does."""
+        return self.reason if self.action == "exclude" else None
+
+    def concerns(self, start_utc_ns: int, end_utc_ns: int) -> bool:
+        """Whether bounds are those of this manoeuvre, as it was found or as it is now."""
+        own = [self.subject_utc_ns] + [self.bounds_utc_ns] * (self.bounds_utc_ns is not None)
+        return any(same(bounds, (start_utc_ns, end_utc_ns)) for bounds in own if bounds is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class Marked:
+    """A zigzag, and what was said of it; None where nobody said anything."""
+
+    zigzag: Zigzag
+    standing: Standing | None = None
+
+
+def same(one: Bounds, other: Bounds) -> bool:
+    """Whether two pairs of bounds are those of one manoeuvre."""
+    shared = min(one[1], other[1]) - max(one[0], other[0])
+    return shared > _SAME * min(one[1] - one[0], other[1] - other[0])
+
+
+def standing(corrections: Sequence[Correction]) -> tuple[Standing, ...]:
+    """Return how the manoeuvres of one log stand, in the order in which they were first spoken of.
+
+    Parameters
+    ----------
+    corrections : sequence of Correction
+        Of one log, in the order in which they were said.
+    """
+    found: list[Standing] = []
+    for one in corrections:
+        at = next((k for k, known in enumerate(found) if known.subject_utc_ns == one.subject_utc_ns), None)
+        if at is None:
+            added = one.bounds_utc_ns if one.action == "add" else None
+            found.append(Standing(one.subject_utc_ns, one.bounds_utc_ns, added, one.action, one.reason))
+            continue
+        known = found[at]
+        bounds = {"correct": one.bounds_utc_ns, "accept": known.added_utc_ns}.get(one.action, known.bounds_utc_ns)
+        found[at] = replace(known, bounds_utc_ns=bounds, action=one.action, reason=one.reason)
+    return tuple(found)
+
+
+def applied(
+    found: Sequence[Zigzag], said: Sequence[Standing], between: Callable[[Bounds], Zigzag]
+) -> tuple[Marked, ...]:
+    """Lay what was said over the zigzags that were found.
+
+    Parameters
+    ----------
+    found : sequence of Zigzag
+        Those of a log, in order of time.
+    said : sequence of Standing
+        `standing` of its corrections.
+    between : callable
+        Describes the zigzag between two bounds, `kempf.pipeline.segment.by_hand.zigzag_between`.
+
+    Returns
+    -------
+    tuple of Marked
+        In order of time: those that do not count are among them. One that was given other bounds takes the place of
+        every one that was found there.
+    """
+    by_hand = [one for one in said if one.bounds_utc_ns is not None]
+    marked = [Marked(between(one.bounds_utc_ns), one) for one in by_hand if one.bounds_utc_ns is not None]
+    for zigzag in found:
+        bounds = zigzag.start_utc_ns, zigzag.end_utc_ns
+        if any(one.concerns(*bounds) for one in by_hand):
+            continue
+        marked.append(Marked(zigzag, next((one for one in said if one.concerns(*bounds)), None)))
+    return tuple(sorted(marked, key=lambda one: (one.zigzag.start_utc_ns, one.zigzag.end_utc_ns)))

@@ -1,0 +1,126 @@
+"""Notes of people on vessels, logs, segments and parameter sets: docked, another draught, a sensor replaced."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from datetime import datetime
+from typing import Any, Literal
+
+from kempf.schemas.errors import UsageError
+from kempf.warehouse import delta, said
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.store import Warehouse
+
+Subject = Literal["vessel", "log", "segment", "set"]
+
+
+@dataclass(frozen=True)
+class Note:
+    """One note as it is kept."""
+
+    #: Its place in the table, from 1.
+    number: int
+    vessel: str
+    subject: Subject
+    #: The vessel's name, or an id.
+    subject_id: str
+    text: str
+    #: When it happened, UTC nanoseconds; None where nobody said.
+    event_utc_ns: int | None = None
+    #: m; None where it states none.
+    draught_m: float | None = None
+    #: When it was written; None before it is.
+    written: datetime | None = None
+
+    def show(self) -> dict[str, Any]:
+        """Return the note as JSON content."""
+        return {
+            "number": self.number,
+            "written": self.written.isoformat().replace("+00:00", "Z") if self.written else None,
+            "vessel": self.vessel,
+            "subject": self.subject,
+            "subject_id": self.subject_id,
+            "at": iso_utc(self.event_utc_ns) if self.event_utc_ns is not None else None,
+            "draught_m": self.draught_m,
+            "text": self.text,
+        }
+
+
+def add(
+    warehouse: Warehouse,
+    vessel: str,
+    subject: Subject,
+    subject_id: str,
+    text: str,
+    *,
+    event_utc_ns: int | None = None,
+    draught_m: float | None = None,
+) -> Note:
+    """Store a note on something that is there.
+
+    Parameters
+    ----------
+    vessel : str
+        Whose the subject is.
+    subject_id : str
+        The vessel's name, or the whole id of the log, segment or set.
+    event_utc_ns : int, optional
+        When what it is about happened, UTC nanoseconds.
+    draught_m : float, optional
+        The draught that it states, m.
+
+    Raises
+    ------
+    UsageError
+        ``empty_note``; ``draught_not_positive``.
+    """
+    if not text.strip():
+        raise UsageError("empty_note", "The note is blank.", "Write what the next person should know.")
+    if draught_m is not None and not 0.0 < draught_m < 50.0:
+        raise UsageError(
+            "draught_not_positive",
+            f"A draught of {draught_m:g} m is none; expected more than 0 and less than 50 m.",
+            "Give it in metres.",
+            {"draught_m": draught_m},
+        )
+    row = {
+        "vessel_key": vessel_key(vessel),
+        "vessel": vessel,
+        "subject": subject,
+        "subject_id": subject_id,
+        "event_utc_ns": event_utc_ns,
+        "draught_m": draught_m,
+        "text": text.strip(),
+    }
+    number = said.add(warehouse, "notes", row)
+    return Note(number, vessel, subject, subject_id, text.strip(), event_utc_ns, draught_m, _written(warehouse, number))
+
+
+def of_vessel(warehouse: Warehouse, vessel: str | None = None) -> list[Note]:
+    """Return the notes on one vessel and what is hers, or all, in the order in which they were written.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    when = said.times(warehouse, "notes")
+    return [
+        Note(
+            row["number"],
+            row["vessel"],
+            row["subject"],
+            row["subject_id"],
+            row["text"],
+            row["event_utc_ns"],
+            row["draught_m"],
+            when.get(row["number"]),
+        )
+        for row in delta.read(warehouse, "notes", where).sort("number").rows(named=True)
+    ]
+
+
+def _written(warehouse: Warehouse, number: int) -> datetime | None:
+    return said.times(warehouse, "notes").get(number)

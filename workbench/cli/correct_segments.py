@@ -1,0 +1,178 @@
+"""``kempf segments correct|exclude|accept|add|corrections``: what a person says of the manoeuvres of a log."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from kempf.schemas.errors import UsageError
+from kempf.workbench.cli.confirm import confirm, reason_option, yes_option
+from kempf.workbench.cli.given_once import GivenOnce
+from kempf.workbench.cli.instants import utc_ns_of
+from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.terminal import counted, one_line, print_json, print_table
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.correct_segments import Planned
+    from kempf.warehouse.segments import Segment
+    from kempf.warehouse.store import Warehouse
+
+
+@click.command("correct", cls=GivenOnce)
+@click.argument("segment_id")
+@click.option("--start", metavar="TIME", help="First instant of the manoeuvre, ISO 8601; its own by default.")
+@click.option("--end", metavar="TIME", help="Last instant of the manoeuvre; its own by default.")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def correct(
+    segment_id: str, start: str | None, end: str | None, reason: str, yes: bool, uri: str, as_json: bool
+) -> None:
+    """Give a zigzag other bounds; executes and overshoots are measured again between them."""
+    from kempf.flows.jobs.correct_segments import plan_for
+    from kempf.warehouse import segments
+    from kempf.warehouse.store import Warehouse
+
+    if start is None and end is None:
+        raise UsageError("no_bounds", "Neither --start nor --end is given.", "Give the one that is to change, or both.")
+    warehouse = Warehouse(uri)
+    own = segments.by_prefix(warehouse, segment_id)
+    bounds = (
+        own.start_utc_ns if start is None else utc_ns_of(start, "--start"),
+        own.end_utc_ns if end is None else utc_ns_of(end, "--end"),
+    )
+    _carry_out(warehouse, plan_for(warehouse, own.segment_id, "correct", reason, bounds), yes=yes, as_json=as_json)
+
+
+@click.command("exclude", cls=GivenOnce)
+@click.argument("segment_id")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def exclude(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
+    """Let a manoeuvre count no longer: nothing is fitted to it, pooled with it or compared with it."""
+    from kempf.flows.jobs.correct_segments import plan_for
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    _carry_out(warehouse, plan_for(warehouse, segment_id, "exclude", reason), yes=yes, as_json=as_json)
+
+
+@click.command("accept", cls=GivenOnce)
+@click.argument("segment_id")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def accept(segment_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
+    """Let a manoeuvre count as the search found it, or as it was added: undoes an exclusion and other bounds."""
+    from kempf.flows.jobs.correct_segments import plan_for
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    _carry_out(warehouse, plan_for(warehouse, segment_id, "accept", reason), yes=yes, as_json=as_json)
+
+
+@click.command("add", cls=GivenOnce)
+@click.argument("log")
+@click.option("--start", required=True, metavar="TIME", help="First instant of the manoeuvre, ISO 8601.")
+@click.option("--end", required=True, metavar="TIME", help="Last instant of the manoeuvre.")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def add(log: str, start: str, end: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
+    """Add a zigzag that the search did not find, by its bounds in a log."""
+    from kempf.flows.jobs.correct_segments import plan_new
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    bounds = utc_ns_of(start, "--start"), utc_ns_of(end, "--end")
+    _carry_out(warehouse, plan_new(warehouse, log, bounds, reason), yes=yes, as_json=as_json)
+
+
+@click.command("corrections", cls=GivenOnce)
+@vessel_option()
+@warehouse_option
+@json_option
+def list_corrections(vessel: str | None, uri: str, as_json: bool) -> None:
+    """List every correction that was made, with its reason and when."""
+    from kempf.warehouse import corrections, logs, said, vessels
+    from kempf.warehouse.instant import iso_utc
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    warehouse.require()
+    if vessel is not None:
+        vessels.require(warehouse, vessel)
+    rows = {row.log_id: row for row in logs.current(warehouse, vessel)}
+    when = said.times(warehouse, "corrections")
+    listed: list[dict[str, Any]] = []
+    for one in corrections.all_of(warehouse, rows if vessel is not None else None):
+        row, bounds = rows.get(one.log_id), one.correction.bounds_utc_ns
+        listed.append(
+            {
+                "number": one.number,
+                "at": when[one.number].isoformat().replace("+00:00", "Z") if one.number in when else None,
+                "vessel": row.vessel if row else None,
+                "log_id": one.log_id,
+                "log": row.file_name if row else None,
+                "segment_id": one.segment_id,
+                "action": one.correction.action,
+                "start": iso_utc(bounds[0]) if bounds else None,
+                "end": iso_utc(bounds[1]) if bounds else None,
+                "reason": one.correction.reason,
+            }
+        )
+    if as_json:
+        print_json(listed)
+        return
+    head = ["no.", "at", "log", "segment", "action", "start", "end", "reason"]
+    print_table(
+        head,
+        [
+            [
+                *(str(one["number"]), str(one["at"] or "-")[:19], str(one["log"] or one["log_id"][:12])),
+                *(str(one["segment_id"] or "-"), str(one["action"])),
+                *(str(one["start"] or "-")[:19], str(one["end"] or "-")[:19], one_line(str(one["reason"]))),
+            ]
+            for one in listed
+        ],
+    )
+
+
+COMMANDS = (correct, exclude, accept, add, list_corrections)
+
+
+def _carry_out(warehouse: Warehouse, planned: Planned, *, yes: bool, as_json: bool) -> None:
+    """Say what a correction changes, ask, and store it."""
+    confirm(_words(planned), yes=yes)
+    planned.store(warehouse)
+    if as_json:
+        print_json(planned.show())
+        return
+    click.echo(f"{_words(planned)}.")
+    click.echo(f"next: kempf reprocess --vessel {planned.log.vessel}")
+
+
+def _words(planned: Planned) -> str:
+    """Say what changes, a sentence without its full stop."""
+    done = {"correct": "gets other bounds", "exclude": "is excluded", "accept": "counts", "add": "is added"}
+    what = f"{_described(planned.before or planned.after)} {done[planned.correction.action]}"
+    if planned.before is not None and planned.after.segment_id != planned.before.segment_id:
+        what += f" and is {_described(planned.after)}"
+    found = planned.following
+    current = ", the current one among them" if found.current else ""
+    return f"{what}: {counted(len(found.set_ids), 'parameter set')} of {found.vessel!r} superseded{current}"
+
+
+def _described(segment: Segment) -> str:
+    from kempf.warehouse.instant import iso_utc
+
+    angles = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} " if segment.is_zigzag else ""
+    kind = segment.kind.replace("_", " ")
+    span = f"{iso_utc(segment.start_utc_ns)[:19]} to {iso_utc(segment.end_utc_ns)[:19]}"
+    return f"{segment.segment_id} ({angles}{kind}, {span})"

@@ -1,0 +1,54 @@
+"""Instants as a person writes them on the command line: ISO 8601, in UTC where no zone is said."""
+
+from __future__ import annotations
+
+import re
+from datetime import UTC, datetime
+
+from kempf.schemas.errors import UsageError
+
+_SECOND_NS = 1_000_000_000
+#: a fraction of a second, which datetime cuts to microseconds
+_FRACTION = re.compile(r"(?<=:\d\d)[.,](\d{1,9})")
+
+
+def instant_of(text: str, option: str) -> datetime:
+    """Return an instant.
+
+    Parameters
+    ----------
+    text : str
+        What was given.
+    option : str
+        With which option, for the message.
+
+    Raises
+    ------
+    UsageError
+        ``not_a_time``.
+    """
+    try:
+        instant = datetime.fromisoformat(text)
+        return (instant if instant.tzinfo is not None else instant.replace(tzinfo=UTC)).astimezone(UTC)
+    except (ValueError, OverflowError) as error:
+        raise UsageError(
+            "not_a_time",
+            f"{option} {text!r} is no time; expected ISO 8601.",
+            "Write it as 2025-05-03T12:00:00Z.",
+        ) from error
+
+
+def utc_ns_of(text: str, option: str) -> int:
+    """Return an instant in UTC nanoseconds, to the nanosecond as `kempf segments --json` prints it; see `instant_of`.
+
+    Examples
+    --------
+    >>> utc_ns_of("2025-05-03T07:47:01.147000012Z", "--start")
+    1746258421147000012
+    """
+    fraction = _FRACTION.search(text)
+    whole = instant_of(text if fraction is None else text[: fraction.start()] + text[fraction.end() :], option)
+    behind = 0 if fraction is None else int(fraction.group(1).ljust(9, "0"))
+    # in whole numbers: a second of today in nanoseconds is more than a float holds
+    since = whole - datetime(1970, 1, 1, tzinfo=UTC)
+    return (since.days * 86_400 + since.seconds) * _SECOND_NS + since.microseconds * 1000 + behind
