@@ -36,7 +36,7 @@ class History:
     """The history of one vessel."""
 
     #: One row a parameter of a set: parameter_set_id, start_utc_ns, model, estimator, parameter, value, std, unit,
-    #: superseded; sorted by start, superseded ones first, then id, then as the set lists them.
+    #: superseded, converged; sorted by start, superseded ones first, then id, then as the set lists them.
     frame: pl.DataFrame
     #: Version of the table that was read; None where there was none.
     version: int | None
@@ -300,8 +300,12 @@ def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: d
 
 
 def _exploded(table: DeltaTable | None, vessel: str, known: _Logs) -> pl.DataFrame:
-    columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters")
-    each = _marked(table, vessel, known, columns).explode("parameters", empty_as_null=False)
+    import polars as pl
+
+    columns = ("parameter_set_id", "start_utc_ns", "model_name", "estimator", "parameters", "convergence_json")
+    converged = pl.col("convergence_json").str.json_path_match("$.converged").eq_missing("true")
+    marked = _marked(table, vessel, known, columns).with_columns(converged=converged).drop("convergence_json")
+    each = marked.explode("parameters", empty_as_null=False)
     return each.unnest("parameters").rename({"model_name": "model", "name": "parameter"})
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from dataclasses import dataclass
 from json import loads
 from typing import TYPE_CHECKING, Any
 
@@ -150,6 +151,33 @@ def models(warehouse: Warehouse, vessel: str) -> list[tuple[dict[str, Any], str,
     columns = ("model_json", "estimator", "settings_json")
     frame = delta.read(warehouse, "parameter_sets", where, columns).unique().sort(*columns)
     return [(loads(text), estimator, loads(settings).get("own") or {}) for text, estimator, settings in frame.rows()]
+
+
+@dataclass(frozen=True)
+class Convergence:
+    """Whether a set converged, and which of its segments it leaves out."""
+
+    parameter_set_id: str
+    estimator: str
+    segment_ids: tuple[str, ...]
+    converged: bool
+    left_out: tuple[str, ...]
+
+
+def convergences(warehouse: Warehouse, vessel: str | None, code: str) -> list[Convergence]:
+    """Return of every set of one vessel or of all that some code made whether it converged, sorted by id."""
+    import polars as pl
+
+    where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    columns = ("parameter_set_id", "estimator", "segment_ids", "convergence_json", "provenance_json")
+    frame = delta.read(warehouse, "parameter_sets", where, columns)
+    own = frame.filter(pl.col("provenance_json").str.json_path_match("$.code_version") == code).sort("parameter_set_id")
+    found = []
+    for name, estimator, segment_ids, text, _ in own.rows():
+        said = loads(text)
+        left = tuple(sorted(said.get("left_out") or ()))
+        found.append(Convergence(name, estimator, tuple(segment_ids), bool(said.get("converged")), left))
+    return found
 
 
 def codes(warehouse: Warehouse, vessel: str) -> set[str]:

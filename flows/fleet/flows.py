@@ -32,13 +32,15 @@ from kempf.flows.fleet.state import responsible_code
 from kempf.flows.jobs import ingest_logs
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.diagnose_vessel import diagnose_vessel
-from kempf.flows.jobs.files import logs_in, read_profiles
+from kempf.flows.jobs.files import logs_in, read_profiles, read_quality
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
 from kempf.flows.jobs.take_inbox import InboxRun, NeedsAPerson, take_inbox
+from kempf.flows.jobs.vessel_report import VesselReport
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.quality import NO_LIMITS
 from kempf.warehouse import vessels as vessel_table
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.parameter_set import ParameterSet
@@ -183,13 +185,21 @@ def reprocess_batch(
 ) -> list[dict[str, Any]]:
     """Bring a batch of vessels up to date; a vessel that fails is reported, the others are done."""
     log = get_run_logger()
+
+    def done(report: VesselReport) -> None:
+        log.info("%s: %s", report.vessel, report.status)
+        for failure in report.failures:
+            log.warning("%s, %s: %s", report.vessel, failure["what"], failure["error"]["message"])
+        for finding in report.findings:
+            log.warning("%s: %s", report.vessel, finding["words"])
+
     return plan.do_batch(
         Warehouse(warehouse),
         vessels,
         changed_only=changed_only,
         flow_run=run,
         code=code,
-        progress=lambda vessel, status: log.info("%s: %s", vessel, status),
+        progress=done,
     )
 
 
@@ -219,13 +229,17 @@ class _Run:
 
 @flow(name="reprocess", task_runner=task_runner(), persist_result=False, result_serializer="json")
 def reprocess(
-    warehouse: str = "kempf-data", vessels: list[str] | None = None, changed_only: bool = True
+    warehouse: str = "kempf-data",
+    vessels: list[str] | None = None,
+    changed_only: bool = True,
+    quality: str | None = None,
 ) -> list[dict[str, Any]] | State[Any]:
     """Bring the fleet up to date with its profiles and the code.
 
     Vessels whose inputs did not change since their last run are not looked at again. The run ends as Failed where a
     vessel failed in a way that is new, or that another attempt may overcome; all others are done all the same. Failures
-    that the run before reported already, of data that are refused, leave it Completed.
+    that the run before reported already, of data that are refused, leave it Completed. It ends as Failed, too, for as
+    long as a vessel has more findings on her logs and models than a file of limits allows.
 
     Parameters
     ----------
@@ -235,6 +249,8 @@ def reprocess(
         Only these; the whole fleet by default.
     changed_only : bool, optional
         False also verifies every kept parameter set from the raw bytes.
+    quality : str, optional
+        File of limits, `kempf.schemas.quality.Quality`; without one any number of findings is allowed.
 
     Returns
     -------
@@ -243,6 +259,7 @@ def reprocess(
         `kempf.flows.fleet.report.VesselsFailed`, which has them too.
     """
     run_id = flow_run.get_id()
+    limits = read_quality(Path(quality)) if quality else NO_LIMITS
     one = _Run(warehouse, changed_only, str(run_id) if run_id else None)
     todo = plan.plan(Warehouse(warehouse), vessels, changed_only=changed_only)
     get_run_logger().info("%d vessels, %d with something to do", todo.vessels, len(todo.due))
@@ -259,17 +276,19 @@ def reprocess(
     for report in one.do([[name] for name in plan.to_try_again(reports.values())], lambda done: None):
         reports[report["vessel"]] = plan.together(reports[report["vessel"]], report)
     ordered = [reports[name] for name in sorted(reports)]
-    sentence = fleet_report.sentence(ordered)
+    sentence = fleet_report.sentence(ordered, limits)
     create_table_artifact(key="kempf-reprocess", table=fleet_report.table(ordered), description=sentence)
-    create_markdown_artifact(key="kempf-fleet", markdown=fleet_report.markdown(ordered), description=sentence)
-    if any(map(fleet_report.alarming, ordered)):
-        return Failed(message=sentence, data=fleet_report.VesselsFailed(ordered))
+    create_markdown_artifact(key="kempf-fleet", markdown=fleet_report.markdown(ordered, limits), description=sentence)
+    if any(fleet_report.needs_a_person(report, limits) for report in ordered):
+        return Failed(message=sentence, data=fleet_report.VesselsFailed(ordered, limits))
     return ordered
 
 
-def reports_of(warehouse: str, vessels: list[str] | None = None, *, changed_only: bool = True) -> list[dict[str, Any]]:
+def reports_of(
+    warehouse: str, vessels: list[str] | None = None, *, changed_only: bool = True, quality: str | None = None
+) -> list[dict[str, Any]]:
     """Run the flow `reprocess` and return its reports, whichever way it ended."""
-    state = reprocess(warehouse, vessels, changed_only, return_state=True)
+    state = reprocess(warehouse, vessels, changed_only, quality, return_state=True)
     found: Any = state.result(raise_on_failure=False)
     if isinstance(found, fleet_report.VesselsFailed):
         found = found.details["reports"]

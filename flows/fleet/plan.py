@@ -122,7 +122,7 @@ def do_batch(
     changed_only: bool,
     flow_run: str | None = None,
     code: Sequence[str] | None = None,
-    progress: Callable[[str, str], None] = lambda vessel, status: None,
+    progress: Callable[[VesselReport], None] = lambda report: None,
 ) -> list[Report]:
     """Bring a batch of vessels up to date, in common commits; one that fails is reported, the others are done.
 
@@ -131,7 +131,7 @@ def do_batch(
     code : sequence of str, optional
         `responsible_code` of the machine that asks; where it is not that of this one, nothing is done.
     progress : callable, optional
-        Called with name and status of every vessel once they are done.
+        Called with the report of every vessel once they are done.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def do_batch(
         for report in reports:
             report.fail(report.vessel, wrapped(error))
     for report in reports:
-        progress(report.vessel, report.status)
+        progress(report)
     return [report.show() for report in reports]
 
 

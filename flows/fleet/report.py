@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from kempf.schemas.errors import DataRejected
+from kempf.schemas.quality import FINDINGS, NO_LIMITS, Quality
 
 #: Rows of a table that a page can still show; of a larger fleet those where nothing happened are left out.
 MOST_ROWS = 1000
@@ -25,10 +26,10 @@ class VesselsFailed(DataRejected):
         One a vessel, those that did not fail among them; kept in ``details``.
     """
 
-    def __init__(self, reports: Reports) -> None:
+    def __init__(self, reports: Reports, quality: Quality) -> None:
         super().__init__(
             "vessels_failed",
-            f"{sentence(reports)}.",
+            f"{sentence(reports, quality)}.",
             "The artifact kempf-fleet of the run says for each what to do; then run it again.",
             {"reports": list(reports)},
         )
@@ -39,12 +40,37 @@ def alarming(report: Mapping[str, Any]) -> bool:
     return any(not (failure["lasting"] and failure["known"]) for failure in report["failures"])
 
 
-def sentence(reports: Reports) -> str:
+def beyond(report: Mapping[str, Any], quality: Quality) -> list[str]:
+    """Return what a vessel has more of than the limits allow, in words, such as ``2 logs without a zigzag``."""
+    return [f"{count} {FINDINGS[kind]}" for kind, count in _over(report, quality).items()]
+
+
+def _over(report: Mapping[str, Any], quality: Quality) -> dict[str, int]:
+    """Return how many findings a vessel has of each kind of which she has more than the limits allow."""
+    limits = {kind: quality.limit(str(report["vessel"]), kind) for kind in FINDINGS}
+    counts = _counts([report])
+    return {kind: counts[kind] for kind, limit in limits.items() if limit is not None and counts[kind] > limit}
+
+
+def _counts(reports: Reports) -> Counter[str]:
+    return Counter(str(one["kind"]) for report in reports for one in report["findings"])
+
+
+def _in_words(counts: Mapping[str, int]) -> str:
+    return ", ".join(f"{counts[kind]} {words}" for kind, words in FINDINGS.items() if counts[kind])
+
+
+def needs_a_person(report: Mapping[str, Any], quality: Quality) -> bool:
+    """Return whether a run is not to end as Completed for the sake of a vessel."""
+    return alarming(report) or bool(beyond(report, quality))
+
+
+def sentence(reports: Reports, quality: Quality = NO_LIMITS) -> str:
     """Return the outcome in one sentence.
 
     Examples
     --------
-    >>> sentence([{"vessel": "a", "status": "changed", "failures": []}])
+    >>> sentence([{"vessel": "a", "status": "changed", "failures": [], "findings": []}])
     '1 vessels: 1 changed'
     """
     counts = Counter(str(report["status"]) for report in reports)
@@ -52,7 +78,10 @@ def sentence(reports: Reports) -> str:
     names = [str(report["vessel"]) for report in reports if alarming(report)]
     woken = f"; look at {', '.join(names[:5])}{' ...' if names[5:] else ''}" if names else ""
     known = sum(1 for report in reports if report["failures"] and not alarming(report))
-    return f"{len(reports)} vessels: {counted or 'none'}" + (f" ({known} as the run before)" if known else "") + woken
+    bad = [str(report["vessel"]) for report in reports if beyond(report, quality)]
+    poor = f"; {len(bad)} beyond the limits of quality: {', '.join(bad[:5])}{' ...' if bad[5:] else ''}" if bad else ""
+    before = f" ({known} as the run before)" if known else ""
+    return f"{len(reports)} vessels: {counted or 'none'}{before}{woken}{poor}"
 
 
 def table(reports: Reports) -> list[dict[str, Any]]:
@@ -60,20 +89,26 @@ def table(reports: Reports) -> list[dict[str, Any]]:
     shown = reports if len(reports) <= MOST_ROWS else [r for r in reports if r["status"] != "unchanged"]
     return [
         {
-            **{k: v for k, v in report.items() if k not in ("failures", "verified")},
+            **{k: v for k, v in report.items() if k not in ("failures", "verified", "findings")},
             "failures": "; ".join(f"{f['what']}: {f['error']['message']}" for f in report["failures"]),
+            "findings": counted(report),
         }
         for report in shown
     ]
 
 
-def markdown(reports: Reports) -> str:
-    """Return the summary of a run as Markdown: what was done, who failed with what, and what to do about it."""
+def counted(report: Mapping[str, Any]) -> str:
+    """Return how many findings of each kind a vessel has, in words."""
+    return _in_words(_counts([report]))
+
+
+def markdown(reports: Reports, quality: Quality = NO_LIMITS) -> str:
+    """Return the summary of a run as Markdown: what was done, who failed with what, what is wrong with the models."""
     keys = ("logs", "reread", "searched", "segments", "new_sets", "kept_sets")
     totals = {key: sum(int(r[key]) for r in reports) for key in keys}
     verified: Counter[str] = sum((Counter(r["verified"]) for r in reports), Counter())
     lines = [
-        f"# {sentence(reports)}",
+        f"# {sentence(reports, quality)}",
         "",
         f"{totals['logs']} logs, {totals['reread']} read anew, {totals['searched']} only searched anew; "
         f"{totals['segments']} zigzags; {totals['new_sets']} new parameter sets, {totals['kept_sets']} kept.",
@@ -91,7 +126,26 @@ def markdown(reports: Reports) -> str:
         lines.append(f"| {' | '.join(map(_cell, (*cells, first['error']['next_step'])))} |")
     if failed[_MOST_TOLD:]:
         lines += ["", f"... and {len(failed) - _MOST_TOLD} more, in the table `kempf-reprocess`."]
-    return "\n".join(lines)
+    return "\n".join(lines + _quality(reports, quality))
+
+
+def _quality(reports: Reports, quality: Quality) -> list[str]:
+    """Return what is wrong with logs and models: how much in the fleet, and each of those who are beyond the limits."""
+    totals = _counts(reports)
+    if not totals:
+        return []
+    lines = ["", "## Quality", "", f"{_in_words(totals)}."]
+    bad = [report for report in reports if beyond(report, quality)]
+    if bad:
+        lines += ["", "| vessel | beyond the limits | for example |", "| --- | --- | --- |"]
+    for report in bad[:_MOST_TOLD]:
+        over = _over(report, quality)
+        example = next(str(one["words"]) for one in report["findings"] if one["kind"] in over)
+        cells = (str(report["vessel"]), ", ".join(beyond(report, quality)), example)
+        lines.append(f"| {' | '.join(map(_cell, cells))} |")
+    if bad[_MOST_TOLD:]:
+        lines += ["", f"... and {len(bad) - _MOST_TOLD} more, in the table `kempf-reprocess`."]
+    return lines
 
 
 def _cell(text: str) -> str:

@@ -16,11 +16,12 @@ from pydantic import ValidationError
 from kempf.flows.jobs.inbox_place import PROFILES
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas import profile as profiles
-from kempf.schemas import yaml_text
+from kempf.schemas import quality, yaml_text
 from kempf.schemas.errors import DataRejected, KempfError, NotFound, UsageError
 from kempf.schemas.faults import faults_of
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
+from kempf.schemas.quality import Quality
 
 #: Largest file that is read whole, bytes: a person writes some thousand, and what takes the parser of YAML a second is
 #: refused. A raw log is opened, and its reader says what is too much.
@@ -229,6 +230,17 @@ def _has_guess(content: Any) -> bool:
     if isinstance(content, list):
         return any(_has_guess(value) for value in content)
     return isinstance(content, str) and content.endswith("?")
+
+
+def read_quality(path: Path) -> Quality:
+    """Read a file that says how many findings on logs and models a vessel may have.
+
+    Raises
+    ------
+    UsageError
+        ``quality_invalid``: every fault is named with its place; ``not_yaml``.
+    """
+    return quality.parse(_yaml_of(read_bytes(path, "file of limits"), "file of limits", str(path)), str(path))
 
 
 def read_model(path: Path) -> ModelSpec:

@@ -20,6 +20,7 @@ from kempf.flows.jobs.refresh_logs import Refreshed, Stale, refresh_all, stale_l
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.standing_model import POOLED, SINGLE, Own, model_of, point, standing
 from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.vessel_quality import quality_of
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
@@ -222,6 +223,7 @@ class _Reprocessing:
         if work.report.segments and self.request is None:
             self._model(work)
         _withdraw(self.warehouse, work.vessel, work.report)
+        work.report.findings = [one.show() for one in quality_of(self.warehouse, work.vessel)]
 
     def _model(self, work: _Work) -> None:
         """Bring her current model with effects up to date; where that fails it stays as it was."""

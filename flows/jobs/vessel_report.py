@@ -36,6 +36,8 @@ class VesselReport:
     #: What failed, each with the error's JSON; the rest was done all the same. ``lasting`` says that the data were
     #: refused, so that the same data are refused again; ``known`` that the run before reported it already.
     failures: list[dict[str, Any]] = field(default_factory=list)
+    #: What is wrong with her logs and models as they are stored now, `kempf.flows.jobs.vessel_quality.Finding.show`.
+    findings: list[dict[str, Any]] = field(default_factory=list)
 
     @property
     def status(self) -> str:
@@ -64,7 +66,7 @@ class VesselReport:
             What was asked for; both are part of the run's id.
         """
         counts = {k: v for k, v in vars(self).items() if isinstance(v, int)}
-        message = {"failures": self.failures, **({"state": state} if state else {})}
+        message = {"failures": self.failures, "findings": self.findings, **({"state": state} if state else {})}
         return FlowRun(
             run_id_of(self.vessel, changed_only=changed_only, estimator=estimator),
             FLOW,
@@ -130,6 +132,7 @@ def from_run(run: FlowRun) -> VesselReport:
         segments=counts["segments"],
         kept_sets=counts["new_sets"] + counts["kept_sets"],
         failures=[{**failure, "known": True} for failure in run.message["failures"]],
+        findings=list(run.message.get("findings", ())),
     )
 
 

@@ -116,7 +116,9 @@ def _show(histories: dict[str, History], *, as_json: bool) -> None:
                 number(r["value"]),
                 number(r["std"], 2),
                 r["unit"],
-                short[r["parameter_set_id"]] + (" superseded" if r["superseded"] else ""),
+                short[r["parameter_set_id"]]
+                + (" superseded" if r["superseded"] else "")
+                + ("" if r["converged"] else " not converged"),
             ]
         )
     # sorted, for sets of one start come in the order of their ids; the vessels stay as they were asked for

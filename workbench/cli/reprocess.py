@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import os
 import sys
+from pathlib import Path
 from typing import Any
 
 import click
 
-from kempf.schemas.errors import DataRejected
+from kempf.schemas.errors import DataRejected, ThresholdExceeded
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import print_json, print_table, progress_bar
@@ -22,18 +23,28 @@ from kempf.workbench.terminal import print_json, print_table, progress_bar
     show_default=True,
     help="Only what changed, or also verify every kept parameter set from the raw bytes.",
 )
+@click.option(
+    "--quality",
+    type=click.Path(path_type=Path),
+    metavar="FILE",
+    help="How many findings on logs and models a vessel may have, quality.yaml; beyond that the exit code is 5.",
+)
 @warehouse_option
 @json_option
-def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool) -> None:
+def command(vessel: tuple[str, ...], changed_only: bool, quality: Path | None, uri: str, as_json: bool) -> None:
     """Bring the whole fleet, or some vessels, up to date with their profiles and the code.
 
     Where PREFECT_API_URL names a server this is a run of the Prefect flow `reprocess` there; else it is done in this
     process, and no server is started. Vessels of which nothing changed since their last run are not looked at again;
     a single one that is named is.
     """
+    from kempf.flows.fleet.report import beyond, counted
+    from kempf.flows.jobs.files import read_quality
+    from kempf.schemas.quality import NO_LIMITS
     from kempf.warehouse import vessels
     from kempf.warehouse.store import Warehouse
 
+    limits = read_quality(quality) if quality else NO_LIMITS
     warehouse = Warehouse(uri)
     warehouse.require()
     names = sorted(set(vessel))
@@ -48,12 +59,13 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
     elif os.environ.get("PREFECT_API_URL"):
         from kempf.flows.fleet.flows import reports_of
 
-        reports = reports_of(uri, names or None, changed_only=changed_only)
+        reports = reports_of(uri, names or None, changed_only=changed_only, quality=str(quality) if quality else None)
     else:
         from kempf.flows.fleet.plan import do_fleet
 
         with progress_bar() as progress:
             reports = do_fleet(warehouse, names or None, changed_only=changed_only, progress=progress)
+    bad = {str(report["vessel"]): over for report in reports if (over := beyond(report, limits))}
     if as_json:
         print_json(reports)
     else:
@@ -63,8 +75,14 @@ def command(vessel: tuple[str, ...], changed_only: bool, uri: str, as_json: bool
         for report in reports:
             for failure in report["failures"]:
                 click.echo(f"{report['vessel']}, {failure['what']}: {failure['error']['message']}", err=True)
+            if report["findings"]:
+                click.echo(f"{report['vessel']}: {counted(report)}", err=True)
     if any(report["failures"] for report in reports):
         sys.exit(DataRejected.exit_code)
+    if bad:
+        for name, over in bad.items():
+            click.echo(f"{name} is beyond the limits of quality: {', '.join(over)}", err=True)
+        sys.exit(ThresholdExceeded.exit_code)
 
 
 def _counts(verdicts: dict[str, int]) -> str:

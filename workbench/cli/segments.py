@@ -44,6 +44,7 @@ for _one in correct_segments.COMMANDS:
 
 def _list(vessel: str | None, uri: str, as_json: bool) -> None:
     from kempf.flows.jobs.out_of_date import said_of_logs
+    from kempf.flows.jobs.vessel_quality import marks
     from kempf.warehouse import examinations, logs, segments
     from kempf.warehouse.store import Warehouse
 
@@ -55,10 +56,14 @@ def _list(vessel: str | None, uri: str, as_json: bool) -> None:
     said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
     contradictions = {name: list(one.findings) for name, one in said.items() if one.findings}
     print_note(said_of_logs(warehouse, vessel))
+    against = marks(warehouse, vessel)
     if as_json:
         shown = [segment.show(names[segment.ingest_id]) for segment in found]
         print_json(
-            [{**one, "channels": contradictions.get(s.ingest_id, [])} for one, s in zip(shown, found, strict=True)]
+            [
+                {**one, "channels": contradictions.get(s.ingest_id, []), "marks": against.get(s.segment_id, [])}
+                for one, s in zip(shown, found, strict=True)
+            ]
         )
         return
     short = short_ids(segment.segment_id for segment in found)
@@ -70,6 +75,8 @@ def _list(vessel: str | None, uri: str, as_json: bool) -> None:
     for segment in found:
         if segment.excluded is not None:
             click.echo(f"{short[segment.segment_id]} is excluded: {one_line(segment.excluded)}")
+        for words in against.get(segment.segment_id, ()):
+            click.echo(f"{short[segment.segment_id]}: {words}")
     for segment in found:
         if not segment.is_zigzag:
             _print_other(segment, short[segment.segment_id])

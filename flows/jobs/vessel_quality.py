@@ -1,0 +1,101 @@
+"""The job that judges what is stored of a vessel: sets that did not converge, logs without a zigzag, and the like.
+
+Nothing of it is a failure: the work was done, and this is what a person should know of what came of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from kempf.schemas.quality import Kind
+from kempf.warehouse import code_version, examinations, history, logs, parameter_sets, segments
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What is wrong with one log or one parameter set of a vessel."""
+
+    kind: Kind
+    #: Id of the log, the segment or the set.
+    subject: str
+    #: One sentence.
+    words: str
+    #: Segments that it is about.
+    segment_ids: tuple[str, ...] = ()
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return {**asdict(self), "segment_ids": list(self.segment_ids)}
+
+
+def quality_of(warehouse: Warehouse, vessel: str) -> list[Finding]:
+    """Return what is wrong with the logs and the standing parameter sets of a vessel.
+
+    Returns
+    -------
+    list of Finding
+        Of logs first, in the order of time.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    found = segments.found_in(warehouse, vessel)
+    sets = parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
+    return [*_of_logs(warehouse, vessel, found), *_of_sets(sets)]
+
+
+def _of_logs(warehouse: Warehouse, vessel: str, found: Iterable[segments.Segment]) -> Iterable[Finding]:
+    with_zigzag = {one.ingest_id for one in found if one.is_zigzag}
+    rows = logs.current(warehouse, vessel)
+    said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows])
+    for row in rows:
+        seen = said.get(row.ingest_id)
+        if seen is not None:
+            yield from (Finding("channels", row.log_id, f"{row.file_name}: {words}") for words in seen.findings[:1])
+        if row.ingest_id in with_zigzag:
+            continue
+        missing = [note for note in (seen.notes if seen else ()) if "zigzags cannot be looked for" in note]
+        if missing:
+            yield Finding("missing_channels", row.log_id, f"{row.file_name}: {missing[0]}.")
+        else:
+            yield Finding("no_zigzag", row.log_id, f"{row.file_name}: no zigzag was found.")
+
+
+def _of_sets(sets: Iterable[ParameterSet]) -> Iterable[Finding]:
+    for one in sets:
+        what = f"{one.parameter_set_id} ({one.model_name}, {one.estimator})"
+        if not one.convergence.get("converged"):
+            yield Finding("not_converged", one.parameter_set_id, f"{what} did not converge.", one.segment_ids)
+        pooling = one.convergence.get("pooling") or {}
+        if pooling.get("may_be_pooled") is False:
+            words = f"{what}: its {pooling['segments']} zigzags do not share one hull (p = {pooling['p_value']:.1g})."
+            yield Finding("no_shared_hull", one.parameter_set_id, words, one.segment_ids)
+        left: Mapping[str, str] = one.convergence.get("left_out") or {}
+        for name, why in sorted(left.items()):
+            yield Finding("left_out", name, f"{what} leaves {name} out: {why}.", (name,))
+
+
+def marks(warehouse: Warehouse, vessel: str | None = None) -> dict[str, list[str]]:
+    """Return what sets of the present code say against segments of one vessel or of all, by segment, in a few words.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    marked: dict[str, list[str]] = {}
+    for row in parameter_sets.convergences(warehouse, vessel, code_version.fingerprint("estimate")):
+        said = dict.fromkeys(row.left_out, "left out of the pooled set")
+        # of a pooled set that did not converge no single zigzag is at fault
+        if not row.converged and len(row.segment_ids) == 1:
+            said |= {row.segment_ids[0]: f"not converged ({row.estimator})"}
+        for name, words in said.items():
+            if words not in marked.setdefault(name, []):
+                marked[name].append(words)
+    return marked

@@ -1,0 +1,76 @@
+"""Which findings on logs and models are too many for a night to count as good: the file ``quality.yaml``."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from kempf.schemas.errors import UsageError
+
+#: What a finding is of, and in words.
+FINDINGS = {
+    "not_converged": "parameter sets that did not converge",
+    "no_shared_hull": "models that the zigzags of a ship do not share",
+    "left_out": "zigzags that the pooled set leaves out",
+    "no_zigzag": "logs without a zigzag",
+    "missing_channels": "logs in which zigzags cannot be looked for",
+    "channels": "logs whose channels contradict each other",
+}
+Kind = Literal["not_converged", "no_shared_hull", "left_out", "no_zigzag", "missing_channels", "channels"]
+
+
+class Limits(BaseModel):
+    """How many findings of a kind one vessel may have; null is any number."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    not_converged: int | None = Field(default=None, ge=0)
+    no_shared_hull: int | None = Field(default=None, ge=0)
+    left_out: int | None = Field(default=None, ge=0)
+    no_zigzag: int | None = Field(default=None, ge=0)
+    missing_channels: int | None = Field(default=None, ge=0)
+    channels: int | None = Field(default=None, ge=0)
+
+
+class Quality(Limits):
+    """The limits of the fleet, and of vessels that differ; what a vessel does not name is as for the fleet."""
+
+    vessels: dict[str, Limits] = Field(default_factory=dict)
+
+    def limit(self, vessel: str, kind: str) -> int | None:
+        """Return how many findings of a kind a vessel may have; None: any number."""
+        own = self.vessels.get(vessel)
+        chosen: Limits = own if own is not None and kind in own.model_fields_set else self
+        found: int | None = getattr(chosen, kind, None)
+        return found
+
+
+#: any number of findings is allowed
+NO_LIMITS = Quality()
+
+
+def parse(content: Any, where: str) -> Quality:
+    """Return the limits that the content of a file states.
+
+    Parameters
+    ----------
+    where : str
+        Name of the file, for the message.
+
+    Raises
+    ------
+    UsageError
+        ``quality_invalid``: every fault is named with its place.
+    """
+    try:
+        return Quality.model_validate({} if content is None else content)
+    except ValidationError as error:
+        faults = [f"{'.'.join(map(str, f['loc'])) or 'file'}: {f['msg']}" for f in error.errors()]
+        raise UsageError(
+            "quality_invalid",
+            f"{where} does not say how many findings a vessel may have: {'; '.join(faults)}.",
+            f"Give a whole number or null for any of {', '.join(n for n in Limits.model_fields)}, and under `vessels` "
+            "the same for one vessel.",
+            {"path": where, "faults": faults},
+        ) from error

@@ -1,0 +1,97 @@
+"""The alarms on a real server: a run that ends badly is posted to a webhook, one that went silent is ended."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from shutil import copytree
+from typing import Any
+
+import pytest
+
+from kempf.schemas.errors import DataRejected
+from kempf.warehouse import logs
+from kempf.warehouse.store import Warehouse
+from tests.scale.conftest import FLEET, touch
+from tests.scale.servers import wait_for
+
+
+@pytest.fixture
+def posted() -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """An address, and what is posted to it."""
+    received: list[dict[str, Any]] = []
+
+    class Receiver(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            received.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            self.send_response(204)
+            self.end_headers()
+
+        def log_message(self, *arguments: Any) -> None:
+            """Say nothing."""
+
+    receiver = ThreadingHTTPServer(("127.0.0.1", 0), Receiver)
+    thread = threading.Thread(target=receiver.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{receiver.server_port}/alarm", received
+    finally:
+        receiver.shutdown()
+        thread.join()
+        receiver.server_close()
+
+
+@pytest.mark.usefixtures("on_server")
+def test_bad_ends_are_posted_and_silent_runs_are_ended(
+    posted: tuple[str, list[dict[str, Any]]], stocked: Path, tmp_path: Path
+) -> None:
+    from prefect.client.orchestration import get_client
+    from prefect.events import emit_event
+    from prefect.states import Running
+
+    from kempf.flows.fleet import alarms
+    from kempf.flows.fleet.flows import reprocess
+
+    url, received = posted
+    alarms.main([url, "--silent", "600"])
+    alarms.main([url, "--silent", "10"])  # in place of those, not beside them
+    with get_client(sync_client=True) as client:
+        assert sorted(one.name for one in client.read_automations() if one.name.startswith("kempf")) == sorted(
+            (alarms.ENDED_BADLY, alarms.GONE_SILENT)
+        )
+    place = Warehouse(str(copytree(stocked, tmp_path / "w")))
+    assert place.folder is not None
+    (row,) = logs.current(place, FLEET[0])
+    touch(place, FLEET[0])
+    (place.folder / "raw" / row.log_id[:2] / row.log_id).write_bytes(b"damaged")
+    with pytest.raises(DataRejected):
+        reprocess(place.uri, [FLEET[0]])
+    wait_for(lambda: received, 120.0, every_s=0.2)
+    (alarm,) = received
+    assert (alarm["flow"], alarm["state"]) == ("reprocess", "Failed")
+    assert alarm["message"] == f"1 vessels: 1 failed; look at {FLEET[0]}"
+    assert alarm["flow_run_id"] in alarm["page"]
+
+    with get_client(sync_client=True) as client:
+        run = client.create_flow_run(reprocess, parameters={"warehouse": place.uri}, state=Running())
+        flow = client.read_flow(run.flow_id)
+        emit_event(  # as the process of a run does while it lives
+            "prefect.flow-run.heartbeat",
+            {"prefect.resource.id": f"prefect.flow-run.{run.id}", "prefect.resource.name": run.name},
+            related=[
+                {
+                    "prefect.resource.id": f"prefect.flow.{flow.id}",
+                    "prefect.resource.role": "flow",
+                    "prefect.resource.name": flow.name,
+                }
+            ],
+        )
+        wait_for(lambda: len(received) == 2, 180.0, every_s=0.5)
+        state = client.read_flow_run(run.id).state
+    assert (
+        state is not None and state.is_crashed() and "Nothing was heard of this run for 10 s" in (state.message or "")
+    )
+    assert (received[1]["flow_run_id"], received[1]["state"]) == (str(run.id), "Crashed")
