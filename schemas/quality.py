@@ -8,14 +8,14 @@ from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from kempf.schemas.errors import UsageError
 
-#: What a finding is of, and in words.
+#: What a finding is of, one and several.
 FINDINGS = {
-    "not_converged": "parameter sets that did not converge",
-    "no_shared_hull": "models that the zigzags of a ship do not share",
-    "left_out": "zigzags that the pooled set leaves out",
-    "no_zigzag": "logs without a zigzag",
-    "missing_channels": "logs in which zigzags cannot be looked for",
-    "channels": "logs whose channels contradict each other",
+    "not_converged": ("parameter set that did not converge", "parameter sets that did not converge"),
+    "no_shared_hull": ("model that her zigzags do not share", "models that her zigzags do not share"),
+    "left_out": ("zigzag that the pooled set leaves out", "zigzags that the pooled set leaves out"),
+    "no_zigzag": ("log without a zigzag", "logs without a zigzag"),
+    "missing_channels": ("log in which zigzags cannot be looked for", "logs in which zigzags cannot be looked for"),
+    "channels": ("log whose channels contradict each other", "logs whose channels contradict each other"),
 }
 Kind = Literal["not_converged", "no_shared_hull", "left_out", "no_zigzag", "missing_channels", "channels"]
 
@@ -44,6 +44,12 @@ class Quality(Limits):
         chosen: Limits = own if own is not None and kind in own.model_fields_set else self
         found: int | None = getattr(chosen, kind, None)
         return found
+
+
+def in_words(kind: str, count: int) -> str:
+    """Return how many findings there are of a kind, such as ``2 logs without a zigzag``."""
+    one, several = FINDINGS[kind]
+    return f"{count} {one if count == 1 else several}"
 
 
 #: any number of findings is allowed

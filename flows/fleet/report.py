@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from kempf.schemas.errors import DataRejected
-from kempf.schemas.quality import FINDINGS, NO_LIMITS, Quality
+from kempf.schemas.quality import FINDINGS, NO_LIMITS, Quality, in_words
 
 #: Rows of a table that a page can still show; of a larger fleet those where nothing happened are left out.
 MOST_ROWS = 1000
@@ -42,7 +42,7 @@ def alarming(report: Mapping[str, Any]) -> bool:
 
 def beyond(report: Mapping[str, Any], quality: Quality) -> list[str]:
     """Return what a vessel has more of than the limits allow, in words, such as ``2 logs without a zigzag``."""
-    return [f"{count} {FINDINGS[kind]}" for kind, count in _over(report, quality).items()]
+    return [in_words(kind, count) for kind, count in _over(report, quality).items()]
 
 
 def _over(report: Mapping[str, Any], quality: Quality) -> dict[str, int]:
@@ -57,7 +57,7 @@ def _counts(reports: Reports) -> Counter[str]:
 
 
 def _in_words(counts: Mapping[str, int]) -> str:
-    return ", ".join(f"{counts[kind]} {words}" for kind, words in FINDINGS.items() if counts[kind])
+    return ", ".join(in_words(kind, counts[kind]) for kind in FINDINGS if counts[kind])
 
 
 def needs_a_person(report: Mapping[str, Any], quality: Quality) -> bool:
