@@ -16,7 +16,7 @@ from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta
+from kempf.warehouse import delta, seals
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
@@ -97,6 +97,8 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
             removed = table.optimize.compact(writer_properties=written)["numFilesRemoved"]
         if warehouse.size_of(name, "_delta_log", f"{table.version():020d}.checkpoint.parquet") is None:
             table.create_checkpoint()
+        seals.seal(table)
+        seals.seal_checkpoint(table)
     return int(removed) > 0
 
 
@@ -179,6 +181,7 @@ def _vacuumed(
         there = [size for size in sizes if size is not None]
         if there and not dry_run:
             ask(dry_run=False)
+            seals.seal(table)
     return Cleared(name, len(there), sum(there), len(keep))
 
 

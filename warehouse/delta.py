@@ -18,7 +18,7 @@ from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.tables import TABLES, arrow_schema
-from kempf.warehouse import table_cache
+from kempf.warehouse import seals, table_cache
 from kempf.warehouse.scan import Where, scanned
 from kempf.warehouse.store import Warehouse, not_writable
 
@@ -75,7 +75,7 @@ def open_table(warehouse: Warehouse, name: str, version: int | None = None) -> D
     if warehouse.folder is not None and not (warehouse.folder / name / "_delta_log").is_dir():
         return None
     try:
-        return _Table(address, version=version, storage_options=warehouse.options)
+        table = _Table(address, version=version, storage_options=warehouse.options)
     except TableNotFoundError:
         # no version asked for: where another writer makes it at this moment, the caller comes again
         newest = None if version is None else _newest(warehouse, name)
@@ -87,12 +87,26 @@ def open_table(warehouse: Warehouse, name: str, version: int | None = None) -> D
         newest = None if version is None else _newest(warehouse, name)
         if version is not None and newest is not None and not 0 <= version <= newest:
             raise _no_version(name, version, newest) from error
+        _name_damage(warehouse, name)
         raise KempfError(
             "table_unreadable",
             f"The table {name} of {warehouse.uri} cannot be opened: {error}",
-            "Restore the folder from a copy; the raw logs in it stay readable.",
+            "See with `kempf verify` what is damaged; `kempf repair` makes again what can be made.",
             {"table": name, "version": version},
         ) from error
+    seals.compare_log(table, name)
+    return table
+
+
+def _name_damage(warehouse: Warehouse, name: str) -> None:
+    """Raise the error of the first commit of a table that is not what was written, where its seals know of one."""
+    if warehouse.folder is None:
+        return
+    folder = warehouse.folder / name
+    newest = max(seals.sealed_versions(folder), default=-1)
+    for damage in seals.damages_of_log(folder, name, newest):
+        if damage.what != "seal":
+            raise damage.error()
 
 
 def _newest(warehouse: Warehouse, name: str) -> int | None:
@@ -139,6 +153,7 @@ def ensure_table(warehouse: Warehouse, name: str) -> DeltaTable:
                 raise
     made = open_table(warehouse, name)
     assert made is not None
+    seals.seal(made)
     return made
 
 
@@ -151,6 +166,7 @@ def ensured(warehouse: Warehouse, name: str) -> Iterator[DeltaTable]:
     """
     with table_cache.borrowed(warehouse, name, ensure_table) as table:
         assert table is not None
+        seals.compare_log(table, name)
         # here, and not where it is opened: a handle that was lent for reading before may lack columns too
         yield _with_every_column(warehouse, table, name)
 
@@ -168,6 +184,7 @@ def _with_every_column(warehouse: Warehouse, table: DeltaTable, name: str) -> De
         table.alter.add_columns(missing)
     altered = open_table(warehouse, name)
     assert altered is not None
+    seals.seal(altered)
     return altered
 
 
@@ -218,6 +235,8 @@ def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iter
     """
     with table_cache.borrowed(warehouse, name, open_table) as table:
         if version is None or (table is not None and table.version() == version):
+            if table is not None:
+                seals.compare_log(table, name)
             yield table
             return
     yield open_table(warehouse, name, version)
@@ -306,6 +325,7 @@ def replace(
             predicate=predicate,
             writer_properties=WriterProperties(compression="ZSTD"),
         )
+        seals.seal(table)
 
 
 def _as_described(table: DeltaTable, schema: pa.Schema) -> pa.Schema:

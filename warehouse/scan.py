@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING
 
 from kempf.schemas.tables import TABLES, arrow_schema
+from kempf.warehouse import seals
 
 if TYPE_CHECKING:
     import polars as pl
@@ -46,8 +47,11 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
         lazy = empty.lazy()
     # the table format takes a blank value for a null one
     elif _local(table) and single and all(single.values()) and single.keys() >= set(table.metadata().partition_columns):
-        lazy = _of_few_files(table, empty, single)
+        lazy = _of_few_files(table, name, empty, single)
     else:
+        folder = seals.folder_of(table)
+        if folder is not None:
+            seals.compare_files(folder, name, _candidates(table, asked))
         held = {field.name for field in table.schema().fields}
         absent = {column: kind for column, kind in empty.schema.items() if column not in held}
         lazy = pl.scan_delta(table).with_columns(pl.lit(None, dtype=kind).alias(c) for c, kind in absent.items())
@@ -61,19 +65,29 @@ def _local(table: DeltaTable) -> bool:
     return table.table_uri.startswith(("file://", "/"))
 
 
-def _of_few_files(table: DeltaTable, empty: pl.DataFrame, single: Mapping[str, str]) -> pl.LazyFrame:
+def _of_few_files(table: DeltaTable, name: str, empty: pl.DataFrame, single: Mapping[str, str]) -> pl.LazyFrame:
     """Return the rows of the files that may hold these values, by their folder or their statistics."""
     import polars as pl
 
     files = _files(table, single)
     if not files:
         return empty.lazy()
+    folder = seals.folder_of(table)
+    if folder is not None:
+        seals.compare_files(folder, name, files)
     folders = table.metadata().partition_columns  # what a folder is named by does not stand in its files
     inside = {column: kind for column, kind in empty.schema.items() if column not in folders}
     lazy = pl.scan_parquet(
         files, schema=inside, missing_columns="insert", extra_columns="ignore", glob=False, hive_partitioning=False
     )
     return lazy.with_columns(pl.lit(single[column]).alias(column) for column in folders).select(empty.columns)
+
+
+def _candidates(table: DeltaTable, asked: Mapping[str, str | list[str]]) -> list[str]:
+    """Return the files of the folders that a question concerns."""
+    folders = set(table.metadata().partition_columns)
+    filters = [(c, "in", [v] if isinstance(v, str) else list(v)) for c, v in asked.items() if c in folders and v]
+    return table.file_uris(partition_filters=filters) if filters else table.file_uris()
 
 
 def _files(table: DeltaTable, single: Mapping[str, str]) -> list[str]:
