@@ -5,9 +5,10 @@ A crash between the steps leaves nothing that is seen, and the same deposit agai
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import LogReadings
@@ -117,7 +118,19 @@ def _store(warehouse: Warehouse, fresh: Sequence[tuple[Delivery, logs.LogRow]]) 
     readings.write(warehouse, batch)
     readings.write_rejected(warehouse, batch)
     lost.write(warehouse, batch)
+    for delivery, row in fresh:
+        raw.describe(warehouse, row.log_id, description(row, delivery.profile))
     return logs.record(warehouse, [row for _, row in fresh])
+
+
+def description(row: logs.LogRow, profile: VesselProfile) -> dict[str, Any]:
+    """Return what is kept beside a raw log: whose it is, how it is called and read, and why it counts no longer."""
+    return {
+        "vessel": row.vessel,
+        "file_name": row.file_name,
+        "profile": json.loads(profile.canonical_json()),
+        "removed": row.removed,
+    }
 
 
 def _outcome(revision: int | None, was_removed: bool) -> Outcome:

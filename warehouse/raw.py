@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+import json
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from typing import Any
 
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import DataRejected, KempfError, NotFound
+from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.store import Warehouse
 
 #: A log that is shorter is fetched once, and held; a longer one is read again where it lies. Bytes.
@@ -38,9 +41,7 @@ def put(warehouse: Warehouse, log: LogFile) -> str:
     """
     name = log.sha256
     warehouse.create()
-    with warehouse.opened(*_place(name)) as kept:
-        is_whole = kept is not None and LogFile(kept).sha256 == name
-    if is_whole:
+    if is_whole(warehouse, name):
         for _ in _unchanged(log):
             pass
     else:  # a damaged copy is replaced by a whole one
@@ -75,15 +76,15 @@ def opened(warehouse: Warehouse, name: str) -> Iterator[LogFile]:
         ``raw_bytes_damaged``: what is kept no longer has the hash it is kept under.
     """
     warehouse.require()
-    with warehouse.opened(*_place(name)) as kept:
-        if kept is None:
+    with warehouse.opened(*_place(name)) as stream:
+        if stream is None:
             raise NotFound(
                 "no_raw_log",
                 f"The warehouse {warehouse.uri} keeps no raw log {name!r}.",
                 "Ingest the file again with `kempf ingest`; `kempf segments` lists the logs that are kept.",
                 {"log_id": name},
             )
-        log = LogFile(kept)
+        log = LogFile(stream)
         if log.size < _SHORT:
             log = LogFile(log.whole())
         if log.sha256 != name:
@@ -94,6 +95,45 @@ def opened(warehouse: Warehouse, name: str) -> Iterator[LogFile]:
                 {"log_id": name, "found": log.sha256, "size_bytes": log.size},
             )
         yield log
+
+
+def describe(warehouse: Warehouse, name: str, facts: Mapping[str, Any]) -> None:
+    """Keep beside a log whose it is and how it is read, so that the tables can be made again from the raw logs alone.
+
+    Parameters
+    ----------
+    facts : mapping
+        JSON content: ``vessel``, ``file_name``, ``profile``, ``removed``.
+    """
+    data = canonical_json(dict(facts)).encode()
+    if warehouse.read_bytes(*_beside(name)) != data:
+        warehouse.write_bytes(data, *_beside(name))
+
+
+def described(warehouse: Warehouse, name: str) -> dict[str, Any] | None:
+    """Return what is kept beside a log; None where it is nothing, or damaged."""
+    data = warehouse.read_bytes(*_beside(name))
+    try:
+        facts = None if data is None else json.loads(data)
+    except ValueError:
+        return None
+    return facts if isinstance(facts, dict) and {"vessel", "file_name", "profile"} <= facts.keys() else None
+
+
+def kept(warehouse: Warehouse) -> list[str]:
+    """Return the ids of all logs that are kept as delivered, sorted."""
+    return [name for name in warehouse.files_below("raw") if len(name) == 64]
+
+
+def is_whole(warehouse: Warehouse, name: str) -> bool:
+    """Return whether a log is kept with the bytes that it is known by; False too where it is not kept at all."""
+    with warehouse.opened(*_place(name)) as stream:
+        return stream is not None and LogFile(stream).sha256 == name
+
+
+def _beside(name: str) -> tuple[str, ...]:
+    *folder, last = _place(name)
+    return (*folder, f"{last}.json")
 
 
 def _place(name: str) -> tuple[str, ...]:

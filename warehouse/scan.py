@@ -87,7 +87,7 @@ def _candidates(table: DeltaTable, asked: Mapping[str, str | list[str]]) -> list
     """Return the files of the folders that a question concerns."""
     folders = set(table.metadata().partition_columns)
     filters = [(c, "in", [v] if isinstance(v, str) else list(v)) for c, v in asked.items() if c in folders and v]
-    return table.file_uris(partition_filters=filters) if filters else table.file_uris()
+    return table.file_uris(file_pruning_predicate=filters) if filters else table.file_uris()
 
 
 def _files(table: DeltaTable, single: Mapping[str, str]) -> list[str]:

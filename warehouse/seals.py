@@ -172,6 +172,31 @@ def _damage_of_commit(folder: Path, name: str, version: int) -> Iterator[Damage]
         yield Damage(name, "commit", path, "its bytes are others than were written")
 
 
+def torn_commits(folder: Path, name: str) -> Iterator[Damage]:
+    """Yield the commits of a table that were never sealed and are not whole: their writer was cut off."""
+    sealed = set(sealed_versions(folder))
+    for path in sorted((folder / "_delta_log").glob("*.json")):
+        if path.stem.isdigit() and int(path.stem) not in sealed and not _is_whole(path.read_bytes()):
+            yield Damage(name, "commit", f"{name}/_delta_log/{path.name}", "it was cut off while it was written")
+
+
+def _is_whole(commit: bytes) -> bool:
+    """Return whether a commit has all its lines, as far as it says itself how many files it adds."""
+    try:
+        actions = [json.loads(line) for line in commit.splitlines() if line.strip()]
+    except ValueError:
+        return False
+    # what the writer says of itself stands first, so that a commit that was cut off still has it
+    said = next((action["commitInfo"] for action in actions if "commitInfo" in action), None)
+    if said is None or commit.endswith(b"\n"):
+        return False
+    if said.get("operation") == "CREATE TABLE":
+        return any("metaData" in action for action in actions)
+    metrics = said.get("operationMetrics") or {}
+    expected = {"add": metrics.get("num_added_files"), "remove": metrics.get("num_removed_files")}
+    return all(count is None or sum(what in a for a in actions) == int(count) for what, count in expected.items())
+
+
 def copy_of_commit(folder: Path, version: int) -> bytes | None:
     """Return the sealed copy of a commit; None where there is none, or its own hash does not fit."""
     try:
@@ -276,7 +301,7 @@ def _log_seal(folder: Path, version: int) -> Path:
 
 
 def _file_seal(folder: Path, path: str) -> Path:
-    return folder / FOLDER / "data" / path.rpartition("/")[2]
+    return folder / FOLDER / "data" / f"{path.rpartition('/')[2]}.sha256"
 
 
 def _write(path: Path, data: bytes) -> None:
@@ -289,3 +314,55 @@ def _write(path: Path, data: bytes) -> None:
     except BaseException:
         passing.unlink(missing_ok=True)
         raise
+
+
+def mend_log(folder: Path, name: str) -> list[str]:
+    """Put the commits of a table back from their sealed copies, and take away what was cut off before it counted.
+
+    Returns
+    -------
+    list of str
+        What was done, a sentence each.
+    """
+    done = []
+    newest = max(sealed_versions(folder), default=-1)
+    for path in sorted((folder / "_delta_log").glob("*.checkpoint.parquet")):
+        damage = damage_of_file(folder, name, path)
+        if damage is not None and damage.what != "seal":
+            # the commits are all kept: the table opens without it
+            path.unlink(missing_ok=True)
+            (folder / "_delta_log" / "_last_checkpoint").unlink(missing_ok=True)
+            _file_seal(folder, path.name).unlink(missing_ok=True)
+            done.append(f"The checkpoint {name}/_delta_log/{path.name} was taken away; the commits say the same.")
+    for version in range(newest + 1):
+        for damage in list(_damage_of_commit(folder, name, version)):
+            copy = copy_of_commit(folder, version)
+            if damage.what == "seal":
+                _log_seal(folder, version).unlink()
+                done.append(f"The seal {damage.path} was taken away; it is made anew.")
+            elif copy is not None:
+                _commit(folder, version).parent.mkdir(parents=True, exist_ok=True)
+                _write(_commit(folder, version), copy)
+                done.append(f"The commit {damage.path} was put back from its sealed copy.")
+    for damage in list(torn_commits(folder, name)):
+        path = folder / "_delta_log" / Path(damage.path).name
+        path.unlink()
+        done.append(f"The commit {damage.path} was taken away: {damage.why}, and never counted.")
+    return done
+
+
+def mend_seals(folder: Path, name: str, paths: Iterable[Path]) -> list[str]:
+    """Seal anew the files of a table whose seals are no whole ones."""
+    done = []
+    for path in paths:
+        damage = damage_of_file(folder, name, path)
+        if damage is not None and damage.what == "seal":
+            _file_seal(folder, path.name).unlink()
+            _seal_file(folder, path)
+            done.append(f"The seal {damage.path} was made anew.")
+    return done
+
+
+def forget(folder: Path, path: Path) -> None:
+    """Take the seal of a file away that is no longer one of its table."""
+    _file_seal(folder, path.name).unlink(missing_ok=True)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import errno
+import hashlib
 import json
 import os
 import re
@@ -145,6 +146,14 @@ class Warehouse:
             "Look at the permissions of the folder, or at the address and the credentials of the object store.",
         )
 
+    def files_below(self, *parts: str) -> list[str]:
+        """Return the names of all files in a folder inside and in those below it, without their folders, sorted."""
+        from pyarrow import fs
+
+        files, root = self._files
+        where = fs.FileSelector("/".join((root, *parts)), recursive=True, allow_not_found=True)
+        return sorted(one.base_name for one in files.get_file_info(where) if one.is_file)
+
     def size_of(self, *parts: str) -> int | None:
         """Return the size of a file inside, bytes; None where there is none."""
         files, root = self._files
@@ -203,17 +212,20 @@ class Warehouse:
         Raises
         ------
         KempfError
-            ``warehouse_layout``: it is there, but was made by a newer version, or its marker is damaged.
+            ``warehouse_layout``: it is there, but was made by a newer version; ``warehouse_marker_damaged``.
         """
         if self.folder is None and vars(self).get("_stood"):
             return True  # a bucket is asked once; a folder may be moved away while we look
         marker = self.read_bytes(MARKER)
         if marker is None:
             return False
-        try:
-            layout = json.loads(marker)["layout"]
-        except (ValueError, KeyError, TypeError):
-            layout = None
+        layout = _layout(marker)
+        if layout is None:
+            raise KempfError(
+                "warehouse_marker_damaged",
+                f"The file {MARKER} of the warehouse {self.uri} is damaged.",
+                "`kempf repair` writes it anew.",
+            )
         if layout != LAYOUT:
             raise KempfError(
                 "warehouse_layout",
@@ -284,7 +296,41 @@ class Warehouse:
                     "Give another folder with --warehouse.",
                     {"uri": self.uri},
                 )
-        self.write_bytes(json.dumps({"layout": LAYOUT}).encode() + b"\n", MARKER)
+        self.write_bytes(_marker(LAYOUT), MARKER)
+
+    def mend_marker(self) -> bool:
+        """Write the marker anew where it is damaged, or where there are tables and no marker; return whether it was.
+
+        A warehouse of another layout stays as it is.
+        """
+        marker = self.read_bytes(MARKER)
+        damaged = _layout(marker) is None if marker is not None else self._has_tables()
+        if damaged:
+            self.write_bytes(_marker(LAYOUT), MARKER)
+            return True
+        return False
+
+    def _has_tables(self) -> bool:
+        return self.folder is not None and (self.folder / "logs" / "_delta_log").is_dir()
+
+
+def _marker(layout: int) -> bytes:
+    return json.dumps({"layout": layout, "check": _check(layout)}).encode() + b"\n"
+
+
+def _check(layout: int) -> str:
+    """Return what shows that the number of a layout is the one that was written."""
+    return hashlib.sha256(f"kempf layout {layout}".encode()).hexdigest()[:12]
+
+
+def _layout(marker: bytes) -> int | None:
+    """Return the layout that a marker states; None where it is damaged. Earlier versions wrote no check."""
+    try:
+        content = json.loads(marker)
+        layout = int(content["layout"])
+        return layout if content.keys() == {"layout"} or content["check"] == _check(layout) else None
+    except (ValueError, KeyError, TypeError, AttributeError):
+        return None
 
 
 def _write_through(path: str) -> None:

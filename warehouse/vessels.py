@@ -147,6 +147,17 @@ def versions(warehouse: Warehouse, vessel: str) -> list[VesselVersion]:
     return [_version(row) for row in rows.rows(named=True)]
 
 
+def all_versions(warehouse: Warehouse) -> list[VesselVersion]:
+    """Return every version of every vessel's profile, those of removed ones too, sorted by vessel and revision.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    """
+    return [_version(row) for row in delta.read(warehouse, "vessels").sort("vessel", "revision").rows(named=True)]
+
+
 def current(warehouse: Warehouse, vessel: str) -> VesselProfile:
     """Return the current profile of a vessel.
 

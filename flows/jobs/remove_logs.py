@@ -7,12 +7,14 @@ rests on it is superseded. The vessel's own sets follow with her next reprocessi
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from kempf.flows.jobs.following import Following, of_logs
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.warehouse import aliases, corrections, logs, raw, vessels
+from kempf.warehouse.deposit import description
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
 
@@ -34,10 +36,18 @@ def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Followi
     """
     _require_reason(reason)
     found = of_logs(warehouse, rows)
-    logs.mark(warehouse, [row.log_id for row in rows], reason)
+    _mark(warehouse, rows, reason)
     if found.current:
         aliases.withdraw(warehouse, found.vessel)
     return found
+
+
+def _mark(warehouse: Warehouse, rows: Sequence[LogRow], reason: str | None) -> None:
+    """Let logs count no longer, or again: in their register, and beside the raw logs."""
+    logs.mark(warehouse, [row.log_id for row in rows], reason)
+    for row in rows:
+        profile = vessels.get(warehouse, row.profile_sha256)
+        raw.describe(warehouse, row.log_id, description(replace(row, removed=reason), profile))
 
 
 def restore(warehouse: Warehouse, name: str) -> LogRow:
@@ -57,7 +67,7 @@ def restore(warehouse: Warehouse, name: str) -> LogRow:
     """
     row = logs.by_prefix(warehouse, name, removed=True)
     vessels.require(warehouse, row.vessel)
-    logs.mark(warehouse, [row.log_id], None)
+    _mark(warehouse, [row], None)
     return logs.by_prefix(warehouse, row.log_id)
 
 

@@ -25,7 +25,14 @@ from kempf.warehouse.store import Warehouse
 #: a file that was written less than so many seconds ago may still be being written
 SETTLE_S = 60.0
 #: errors that are the warehouse's or the inbox's and no file's: the run ends with them
-_NO_FILES = ("disk_full", "warehouse_not_writable", "warehouse_unreachable", "table_unreadable", "inbox_unreadable")
+_NO_FILES = (
+    "disk_full",
+    "warehouse_not_writable",
+    "warehouse_unreachable",
+    "table_unreadable",
+    "table_damaged",
+    "inbox_unreadable",
+)
 #: files whose outcome is stored together
 _TOGETHER = 50
 

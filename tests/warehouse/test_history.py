@@ -43,6 +43,7 @@ def test_rows_are_in_order_of_start_then_id(warehouse: Warehouse) -> None:
         "std",
         "unit",
         "superseded",
+        "converged",
     ]
     assert found.frame.columns == columns
     assert found.note is None

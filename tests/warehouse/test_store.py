@@ -155,7 +155,7 @@ def test_a_damaged_table_log_is_one_clear_error(warehouse: Warehouse) -> None:
         commit.write_bytes(b"{garbage")
     with pytest.raises(KempfError) as caught:
         runs.all_runs(warehouse)
-    assert caught.value.code == "table_unreadable"
+    assert caught.value.code == "table_damaged"
     assert caught.value.details["table"] == "runs"
 
 
@@ -173,7 +173,7 @@ def test_a_missing_table_file_is_one_clear_error(warehouse: Warehouse) -> None:
         path.unlink()
     with pytest.raises(KempfError) as caught:
         runs.all_runs(warehouse)
-    assert caught.value.code == "table_unreadable"
+    assert caught.value.code == "table_damaged"
 
 
 def test_readings_that_are_lent_and_missing_are_one_clear_error(warehouse: Warehouse) -> None:
@@ -182,7 +182,7 @@ def test_readings_that_are_lent_and_missing_are_one_clear_error(warehouse: Wareh
         path.unlink()
     with pytest.raises(KempfError) as caught, readings.lent(warehouse, stored.ingest_id) as rows:
         rows.collect()
-    assert caught.value.code == "table_unreadable"
+    assert caught.value.code == "table_damaged"
 
 
 def test_a_full_disk_is_reported(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:

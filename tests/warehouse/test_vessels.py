@@ -77,5 +77,5 @@ def test_no_name_becomes_a_path(warehouse: Warehouse) -> None:
         assert readings.read(warehouse, one.ingest_id).height == 5
     assert warehouse.folder is not None
     folders = {p.name for p in (warehouse.folder / "readings").iterdir()}
-    assert folders == {"_delta_log"} | {f"vessel_key={vessel_key(name)}" for name in ODD_NAMES}
+    assert folders == {"_delta_log", "_seals"} | {f"vessel_key={vessel_key(name)}" for name in ODD_NAMES}
     assert {p.name for p in warehouse.folder.parent.iterdir()} == {warehouse.folder.name}

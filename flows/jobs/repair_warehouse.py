@@ -1,0 +1,260 @@
+"""The job that makes again what is damaged in a warehouse, from sealed copies and from the raw logs.
+
+Commits are put back from their copies. Data files that are not what was written are taken out of their table and kept
+aside; what they held of logs is read again from the raw bytes, registers of logs and vessels are made again from what
+is kept beside these. What people said (corrections, notes, aliases) and parameter sets of earlier code cannot be made
+again, and are counted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from kempf.flows.jobs import search_log
+from kempf.flows.jobs.ingest_logs import ingest_log, look_through
+from kempf.flows.jobs.spool import spooled
+from kempf.flows.process.progress import Progress, silent
+from kempf.flows.process.wrap_error import wrapped
+from kempf.schemas.errors import KempfError
+from kempf.schemas.profile import parse
+from kempf.schemas.tables import TABLES
+from kempf.warehouse import code_version, corrections, delta, logs, lost, raw, readings, seals, vessels
+from kempf.warehouse.deposit import description
+from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.logs import LogRow
+from kempf.warehouse.store import Warehouse
+from kempf.warehouse.verify import Problem, verify
+
+#: where damaged files are kept aside, below the warehouse
+ASIDE = "damaged"
+#: tables whose rows come of the bytes of a log and of nothing else
+_OF_LOGS = ("readings", "rejected", "lost", "examinations", "segments")
+
+
+@dataclass
+class Repaired:
+    """What became of a damaged warehouse."""
+
+    #: done, gone: What was made again, and what is lost for good, a sentence each.
+    done: list[str] = field(default_factory=list)
+    gone: list[str] = field(default_factory=list)
+    #: What is still wrong.
+    left: list[Problem] = field(default_factory=list)
+    #: Of what logs gave that had to be taken out: ingests, and keys of vessels; None stands for all of them.
+    ingests: set[str] = field(default_factory=set)
+    vessel_keys: set[str | None] = field(default_factory=set)
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return {"done": self.done, "lost": self.gone, "left": [one.show() for one in self.left]}
+
+
+def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
+    """Make again what is damaged, as far as it can be; a warehouse in which all is well is not touched.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    UsageError
+        ``not_a_folder``: a bucket keeps its own checksums and copies.
+    """
+    found = Repaired()
+    if warehouse.mend_marker():
+        found.done.append("The file that marks the warehouse was written anew.")
+    warehouse.require()
+    if warehouse.folder is not None:
+        for name in TABLES:
+            progress(0, 1, f"table {name}")
+            try:
+                _table(warehouse, warehouse.folder / name, name, found)
+            except KempfError as error:  # the other tables are mended all the same
+                found.gone.append(f"the table {name}: {error.message}")
+    _profiles(warehouse, found)
+    _each(warehouse, found, progress, _missing_logs(warehouse), _taken_in)
+    _each(warehouse, found, progress, _unread_logs(warehouse, found), _read_again)
+    _describe(warehouse)
+    found.left = verify(warehouse, lambda what: progress(0, 1, what))
+    found.gone += [f"{one.words} Ingest the original file again." for one in found.left if one.kind == "raw log"]
+    return found
+
+
+def _table(warehouse: Warehouse, folder: Path, name: str, found: Repaired) -> None:
+    """Put the log of a table back, and take its damaged files out."""
+    if not folder.is_dir():
+        return
+    found.done += seals.mend_log(folder, name)
+    if not (folder / "_delta_log").is_dir():
+        return
+    table = delta.open_table(warehouse, name)
+    if table is None:
+        return
+    live = {Path(path) for path in table.file_uris()}
+    every = live | {path for path in folder.rglob("*.parquet") if folder / "_delta_log" not in path.parents}
+    found.done += seals.mend_seals(folder, name, sorted(every))
+    bad = [path for path in sorted(every) if _is_bad(folder, name, path, live)]
+    rows = _rows_by_file(table)
+    for path in bad:
+        _put_aside(warehouse, folder, path)
+        if path in live:
+            count = rows.get(path.name)
+            said = f"{count} rows" if count is not None else "rows"
+            found.done.append(f"{name}/{path.relative_to(folder).as_posix()} was taken out of its table.")
+            _remember(folder, path, name, found)
+            if name not in _OF_LOGS and name != "logs":
+                found.gone.append(f"{said} of the table {name}{_AFTER.get(name, '')}")
+        else:
+            found.gone.append(f"what the table {name} held earlier in {path.name}; the newest version does not need it")
+    if any(path in live for path in bad):
+        table.repair()
+    seals.seal(table)
+
+
+def _remember(folder: Path, path: Path, name: str, found: Repaired) -> None:
+    """Note of whom a data file was, where the bytes of logs give it again."""
+    if name not in _OF_LOGS:
+        return
+    parts = dict(part.partition("=")[::2] for part in path.relative_to(folder).parts[:-1])
+    if "ingest_id" in parts:
+        found.ingests.add(parts["ingest_id"])
+    else:
+        found.vessel_keys.add(parts.get("vessel_key"))
+
+
+_AFTER = {
+    "vessels": ": profiles are made again from what is kept beside the raw logs",
+    "parameter_sets": ": those of the present code are made again by `kempf reprocess`",
+    "aliases": ": which set is current is chosen anew by `kempf reprocess`",
+    "diagnoses": ": `kempf diagnose` makes them again",
+    "diagnosis_evidence": ": `kempf diagnose` makes them again",
+    "runs": ": vessels are looked at once more",
+    "inbox": ": files are looked at once more",
+    "corrections": ": what people said of manoeuvres has to be said again",
+    "notes": ": they have to be written again",
+}
+
+
+def _is_bad(folder: Path, name: str, path: Path, live: set[Path]) -> bool:
+    damage = seals.damage_of_file(folder, name, path)
+    if damage is None and path in live:
+        # not sealed, or the seal is that of a file that was cut off before it was sealed
+        return not path.exists() or not _can_be_read(path)
+    return damage is not None and damage.what != "seal" and (path in live or path.exists())
+
+
+def _can_be_read(path: Path) -> bool:
+    import polars as pl
+
+    try:
+        pl.read_parquet(path, glob=False, hive_partitioning=False)
+    except Exception:  # noqa: BLE001 - whatever the reader says, it cannot
+        return False
+    return True
+
+
+def _rows_by_file(table: Any) -> dict[str, int]:
+    import polars as pl
+
+    actions = pl.DataFrame(table.get_add_actions(flatten=True))
+    return {str(path).rpartition("/")[2]: int(count) for path, count in actions.select("path", "num_records").rows()}
+
+
+def _put_aside(warehouse: Warehouse, folder: Path, path: Path) -> None:
+    seals.forget(folder, path)
+    if path.exists():
+        assert warehouse.folder is not None
+        aside = warehouse.folder / ASIDE / folder.name
+        aside.mkdir(parents=True, exist_ok=True)
+        path.replace(aside / path.name)
+
+
+def _each(
+    warehouse: Warehouse,
+    found: Repaired,
+    progress: Progress,
+    names: Sequence[str],
+    mend: Callable[[Warehouse, str], str],
+) -> None:
+    """Mend logs one by one; one that cannot be stops no other."""
+    for done, name in enumerate(names):
+        progress(done, len(names), f"log {name[:12]}")
+        try:
+            found.done.append(mend(warehouse, name))
+        except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
+            found.gone.append(f"the log {name}: {wrapped(error).message}")
+
+
+def _missing_logs(warehouse: Warehouse) -> list[str]:
+    """Return the raw logs that no register knows, and that were not removed."""
+    known = {row.log_id for row in logs.all_ingests(warehouse)}
+    described = {name: raw.described(warehouse, name) for name in raw.kept(warehouse) if name not in known}
+    return [name for name, facts in described.items() if facts is not None and not facts.get("removed")]
+
+
+def _taken_in(warehouse: Warehouse, name: str) -> str:
+    """Take a log in again from its raw bytes and what is kept beside them."""
+    facts = raw.described(warehouse, name)
+    assert facts is not None
+    profile = parse(facts["profile"], f"raw/{name}.json")
+    with raw.opened(warehouse, name) as log:
+        outcome = ingest_log(warehouse, facts["vessel"], facts["file_name"], log, profile, facts["file_name"])
+    return f"{facts['file_name']} of {facts['vessel']} was taken in again from its raw bytes ({outcome.outcome})."
+
+
+def _profiles(warehouse: Warehouse, found: Repaired) -> None:
+    """Register the profiles again that logs were read with and that are lost, those of later logs last."""
+    known = {version.profile_sha256 for version in vessels.all_versions(warehouse)}
+    rows = [row for row in logs.current(warehouse) if row.profile_sha256 not in known]
+    for row in rows:
+        facts = raw.described(warehouse, row.log_id)
+        if facts is not None:
+            vessels.register(warehouse, row.vessel, parse(facts["profile"], f"raw/{row.log_id}.json"))
+    if rows:
+        found.done.append(f"The profiles of {len({row.vessel for row in rows})} vessels were registered again.")
+
+
+def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
+    """Return the logs of which something that their bytes gave is missing, and that the present code has read."""
+    code = code_version.fingerprint("ingest")
+    rows = [row for row in logs.current(warehouse) if row.code_version == code]
+    held = _partitions(warehouse, "readings")
+    examined = set(delta.read(warehouse, "examinations", columns=("ingest_id",))["ingest_id"].to_list())
+
+    def whole(row: LogRow) -> bool:
+        touched = row.ingest_id in found.ingests or not found.vessel_keys.isdisjoint({None, vessel_key(row.vessel)})
+        return not touched and row.ingest_id in held and row.ingest_id in examined
+
+    return [row.log_id for row in rows if not whole(row)]
+
+
+def _partitions(warehouse: Warehouse, name: str) -> set[str]:
+    with delta.reading(warehouse, name) as table:
+        return set() if table is None else {str(part["ingest_id"]) for part in table.partitions()}
+
+
+def _read_again(warehouse: Warehouse, name: str) -> str:
+    """Read a log again and put all that its bytes give in place of what is stored of it."""
+    row = logs.by_prefix(warehouse, name)
+    profile = vessels.get(warehouse, row.profile_sha256)
+    said = corrections.of_logs(warehouse, [name]).get(name, ())
+    with raw.opened(warehouse, name) as log, spooled(row.file_name, log, profile) as read:
+        found = look_through(row.vessel, row.file_name, log, profile, read, said)
+        if found.found.examination.ingest_id != row.ingest_id:
+            raise KempfError(
+                "other_ingest", f"{row.file_name} is read with other code now.", "Run `kempf reprocess`.", {"log": name}
+            )
+        search_log.store(warehouse, [found.found])
+        batch = [(row.vessel, row.ingest_id, read)]
+        readings.write(warehouse, batch)
+        readings.write_rejected(warehouse, batch)
+        lost.write(warehouse, batch)
+    return f"{row.file_name} of {row.vessel} was read again from its raw bytes."
+
+
+def _describe(warehouse: Warehouse) -> None:
+    """Keep beside every raw log what its register says."""
+    for name, row in logs.find(warehouse, raw.kept(warehouse)).items():
+        raw.describe(warehouse, name, description(row, vessels.get(warehouse, row.profile_sha256)))

@@ -1,0 +1,48 @@
+"""``kempf repair``: what is damaged in a warehouse is made again from sealed copies and from the raw logs."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from kempf.schemas.errors import DataRejected
+from kempf.workbench.cli.confirm import confirm, yes_option
+from kempf.workbench.cli.given_once import GivenOnce
+from kempf.workbench.cli.options import json_option, warehouse_option
+from kempf.workbench.terminal import counted, one_line, print_json, progress_bar
+
+
+@click.command("repair", cls=GivenOnce)
+@yes_option
+@warehouse_option
+@json_option
+def command(yes: bool, uri: str, as_json: bool) -> None:
+    """Make again what is damaged, as far as it can be, and say what is lost.
+
+    Damaged files are kept aside in the folder `damaged` of the warehouse. Leaves with exit code 3 where something is
+    still wrong.
+    """
+    from kempf.flows.jobs.repair_warehouse import repair
+    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.verify import verify
+
+    warehouse = Warehouse(uri)
+    with progress_bar() as progress:
+        found = verify(warehouse, lambda what: progress(0, 1, what))
+    if found:
+        confirm(f"{counted(len(found), 'problem')}, the first: {found[0].words.rstrip('.')}", yes=yes)
+    with progress_bar() as progress:
+        done = repair(warehouse, progress)
+    if as_json:
+        print_json(done.show())
+    else:
+        for words in done.done:
+            click.echo(one_line(words))
+        for words in done.gone:
+            click.echo(f"lost: {one_line(words)}")
+        for one in done.left:
+            click.echo(f"still wrong: {one_line(one.words)}")
+        click.echo("next: kempf reprocess" if done.done or done.gone else "nothing had to be done")
+    if done.left:
+        sys.exit(DataRejected.exit_code)

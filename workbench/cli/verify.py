@@ -1,0 +1,35 @@
+"""``kempf verify``: whether everything in a warehouse is there and as it was written."""
+
+from __future__ import annotations
+
+import sys
+
+import click
+
+from kempf.schemas.errors import DataRejected
+from kempf.workbench.cli.given_once import GivenOnce
+from kempf.workbench.cli.options import json_option, warehouse_option
+from kempf.workbench.terminal import counted, one_line, print_json, progress_bar
+
+
+@click.command("verify", cls=GivenOnce)
+@warehouse_option
+@json_option
+def command(uri: str, as_json: bool) -> None:
+    """Check raw logs, the files of every table and what refers to what; say what is damaged or lost.
+
+    Leaves with exit code 3 where something is. Nothing is changed.
+    """
+    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.verify import verify
+
+    with progress_bar() as progress:
+        found = verify(Warehouse(uri), lambda what: progress(0, 1, what))
+    if as_json:
+        print_json([one.show() for one in found])
+    else:
+        for one in found:
+            click.echo(one_line(one.words))
+        click.echo(f"{counted(len(found), 'problem')}; next: kempf repair" if found else "all is well")
+    if found:
+        sys.exit(DataRejected.exit_code)
