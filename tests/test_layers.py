@@ -40,7 +40,7 @@ ROOMS = {
 STORED = tuple(f"kempf.pipeline.ingest.{name}." for name in ("decoded", "readings", "log_file"))
 #: Libraries with one door, and the files that are it.
 DOORS = {
-    "prefect": ("flows/fleet/engine.py", "flows/fleet/flows.py"),
+    "prefect": ("flows/fleet/alarms.py", "flows/fleet/engine.py", "flows/fleet/flows.py"),
     "deltalake": ("warehouse/",),
     "click": ("workbench/",),
     "rich": ("workbench/",),
@@ -153,7 +153,7 @@ def test_what_reads_its_own_package_opens_nothing_else(path):
 
 def test_only_the_fleet_knows_prefect():
     knows = [p for p in sources() if any(within(m, "prefect") for _, m in imported(p, ast.parse(read(p))))]
-    assert knows == ["flows/fleet/engine.py", "flows/fleet/flows.py"]
+    assert knows == ["flows/fleet/alarms.py", "flows/fleet/engine.py", "flows/fleet/flows.py"]
 
 
 @pytest.mark.parametrize(

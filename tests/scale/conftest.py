@@ -3,6 +3,7 @@ from __future__ import annotations
 import gzip
 import sys
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from importlib import import_module
 from pathlib import Path
@@ -84,9 +85,10 @@ class Server:
     settings: dict[str, str]
 
 
-@pytest.fixture(scope="session")
-def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
-    home, port = tmp_path_factory.mktemp("prefect"), free_port()
+@contextmanager
+def prefect_server(home: Path) -> Iterator[Server]:
+    """Start a Prefect server that keeps what it knows in a folder."""
+    port = free_port()
     settings = {
         "PREFECT_HOME": str(home),
         "PREFECT_API_URL": f"http://127.0.0.1:{port}/api",
@@ -103,9 +105,21 @@ def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
         yield Server(settings["PREFECT_API_URL"], settings)
 
 
+@pytest.fixture(scope="session")
+def server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    with prefect_server(tmp_path_factory.mktemp("prefect")) as started:
+        yield started
+
+
 @pytest.fixture
 def on_server(server: Server) -> Iterator[None]:
     """The flows of this process report to the server."""
+    with reporting_to(server):
+        yield
+
+
+@contextmanager
+def reporting_to(server: Server) -> Iterator[None]:
     import_module("kempf.flows.fleet.engine")  # first: it sets what Prefect reads when it is imported
     from prefect.settings import PREFECT_API_URL, PREFECT_HOME, temporary_settings
 

@@ -15,7 +15,7 @@ import pytest
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse import logs
 from kempf.warehouse.store import Warehouse
-from tests.scale.conftest import FLEET, touch
+from tests.scale.conftest import FLEET, prefect_server, reporting_to, touch
 from tests.scale.servers import wait_for
 
 
@@ -44,7 +44,16 @@ def posted() -> Iterator[tuple[str, list[dict[str, Any]]]]:
         receiver.server_close()
 
 
-@pytest.mark.usefixtures("on_server")
+@pytest.fixture
+def _server_of_its_own(tmp_path: Path) -> Iterator[None]:
+    """Its alarms concern no other test."""
+    home = tmp_path / "prefect"
+    home.mkdir()
+    with prefect_server(home) as server, reporting_to(server):
+        yield
+
+
+@pytest.mark.usefixtures("_server_of_its_own")
 def test_bad_ends_are_posted_and_silent_runs_are_ended(
     posted: tuple[str, list[dict[str, Any]]], stocked: Path, tmp_path: Path
 ) -> None:

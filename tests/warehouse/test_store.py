@@ -96,14 +96,31 @@ def test_creating_twice_changes_nothing(warehouse: Warehouse) -> None:
     assert [p.name for p in warehouse.folder.iterdir() if p.name.startswith(".")] == []
 
 
-@pytest.mark.parametrize("content", [json.dumps({"layout": 99}), "{", "[]", "null"])
-def test_a_marker_of_another_layout_is_refused(warehouse: Warehouse, content: str) -> None:
+@pytest.mark.parametrize("content", ["{", "[]", "null", json.dumps({"layout": 3, "check": "of another number"})])
+def test_a_marker_that_is_damaged_is_refused_and_written_anew(warehouse: Warehouse, content: str) -> None:
     warehouse.create()
     assert warehouse.folder is not None
-    (warehouse.folder / MARKER).write_text(content)
+    marker = warehouse.folder / MARKER
+    whole = marker.read_bytes()
+    marker.write_text(content)
+    with pytest.raises(KempfError) as caught:
+        logs.current(warehouse)
+    assert caught.value.code == "warehouse_marker_damaged"
+    assert warehouse.mend_marker() and marker.read_bytes() == whole
+    assert not warehouse.mend_marker()
+
+
+def test_a_marker_of_another_layout_is_refused_and_left(warehouse: Warehouse) -> None:
+    warehouse.create()
+    assert warehouse.folder is not None
+    marker = warehouse.folder / MARKER
+    marker.write_text(json.dumps({"layout": 99}))
     with pytest.raises(KempfError) as caught:
         logs.current(warehouse)
     assert caught.value.code == "warehouse_layout"
+    assert not warehouse.mend_marker()
+    marker.write_text(json.dumps({"layout": 2}))  # as earlier versions wrote it
+    assert logs.current(warehouse) == []
 
 
 @pytest.mark.parametrize("address", ["", "  ", "/data/50%20/x", "/data/a[1]/x", "/data/a=b/x", "s3://bucket/50%"])

@@ -118,7 +118,9 @@ def test_what_is_no_warehouse_is_not_made_one(logs: Path, tmp_path: Path, kind: 
     assert tree(tmp_path) == before
 
 
-@pytest.mark.parametrize(("marker", "code"), [(b"{", "warehouse_marker_damaged"), (b'{"layout": 99}', "warehouse_layout")])
+@pytest.mark.parametrize(
+    ("marker", "code"), [(b"{", "warehouse_marker_damaged"), (b'{"layout": 99}', "warehouse_layout")]
+)
 def test_a_warehouse_of_another_time(tmp_path: Path, marker: bytes, code: str):
     (tmp_path / "kempf-warehouse.json").write_bytes(marker)
     refused(kempf("segments", "--warehouse", tmp_path, "--json"), 1, code)

@@ -183,6 +183,8 @@ CHECKS: dict[tuple[str, ...], Callable[[Late, dict[str, Any]], None]] = {
 }
 #: these begin from a set's model and screen what it lacks: tests/flows/test_diagnose.py goes through them
 SCREENING = {("diagnose",), ("report",)}
+#: what takes the id of a set and reads nothing of what is in it
+NOTED = {("note",)}
 _SET = {"set_id", "first", "second", "--set"}
 
 
@@ -196,7 +198,7 @@ def _taking_a_set(command: click.Command, path: tuple[str, ...] = ()) -> set[tup
 
 
 def test_no_command_that_takes_a_set_is_forgotten() -> None:
-    assert _taking_a_set(cli) == set(CHECKS) | SCREENING
+    assert _taking_a_set(cli) == set(CHECKS) | SCREENING | NOTED
 
 
 @pytest.mark.parametrize("path", [path for path in CHECKS if path != ("params", "alias")], ids=" ".join)

@@ -1,0 +1,154 @@
+"""What is damaged in a warehouse is found, and made again as far as the raw logs and the sealed copies reach."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from shutil import copytree, rmtree
+from typing import Any
+
+import pytest
+
+from kempf.flows.jobs.correct_segments import plan_for
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.remove_logs import remove, restore
+from kempf.flows.jobs.repair_warehouse import repair
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.warehouse import aliases, corrections, logs, raw, segments, table_cache, vessels
+from kempf.warehouse.store import Warehouse
+from kempf.warehouse.verify import verify
+from tests.conftest import Ship
+from tests.flows.content import fresh, seen
+from tests.workbench.driving import kempf
+
+
+@pytest.fixture(scope="module")
+def _filled(mariner: Ship, ferry: Ship, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two vessels with a log each, a correction, parameter sets."""
+    folder = tmp_path_factory.mktemp("repair")
+    warehouse = fresh(folder / "w")
+    for ship, name, ending in ((mariner, "mariner", "nmea.gz"), (ferry, "ferry", "csv.gz")):
+        path = ship.write(folder / name)
+        ingest(warehouse, [path / f"{name}.{ending}"], given=read_profiles([path / "profile.yaml"]))
+    assert logs.current(warehouse, "mariner")[0].tally.records_rejected > 0
+    zigzag = segments.current(warehouse, "mariner")[0]
+    plan_for(warehouse, zigzag.segment_id, "accept", "looked at").store(warehouse)
+    for name in ("mariner", "ferry"):
+        reprocess_vessel(warehouse, name)
+    assert verify(warehouse) == []
+    return folder
+
+
+@pytest.fixture
+def warehouse(_filled: Path, tmp_path: Path) -> Warehouse:
+    return Warehouse(str(copytree(_filled / "w", tmp_path / "w")))
+
+
+def content(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
+    """What a warehouse says, but for in which run and from which versions of tables sets were made."""
+    found = seen(warehouse)
+    for row in found["parameter_sets"]:
+        known = json.loads(row["provenance_json"])
+        row["provenance_json"] = json.dumps({k: v for k, v in known.items() if k != "flow_run"}, sort_keys=True)
+    return found
+
+
+def flipped(path: Path) -> None:
+    data = bytearray(path.read_bytes())
+    data[len(data) // 2] ^= 16
+    path.write_bytes(bytes(data))
+
+
+def files(warehouse: Warehouse, table: str) -> list[Path]:
+    assert warehouse.folder is not None
+    return sorted(p for p in (warehouse.folder / table).rglob("*.parquet") if "_delta_log" not in p.parts)
+
+
+@pytest.mark.parametrize("table", ["readings", "rejected", "examinations", "segments", "logs", "vessels"])
+def test_what_logs_gave_is_made_again_from_their_bytes(warehouse: Warehouse, table: str) -> None:
+    wanted = content(warehouse)
+    for path in files(warehouse, table):
+        flipped(path)
+    named = verify(warehouse)
+    assert any(one.table == table and not one.past for one in named)
+    refused = kempf("verify", "--warehouse", warehouse.uri, "--json")
+    assert refused.code == 3 and len(refused.json) == len(named)
+    done = repair(warehouse)
+    assert done.done and done.left == []
+    for name in ("mariner", "ferry"):
+        reprocess_vessel(warehouse, name)
+    found = content(warehouse)
+    revisions = ("logs", "vessels")  # registers that were made again count their rows from one
+    assert {k: v for k, v in found.items() if k not in revisions} == {
+        k: v for k, v in wanted.items() if k not in revisions
+    }
+    for name in revisions:
+        last = [[{**row, "revision": 0} for row in one[name]][-2:] for one in (found, wanted)]
+        assert last[0] == last[1]
+    assert verify(warehouse) == []
+    assert warehouse.folder is not None and list((warehouse.folder / "damaged" / table).iterdir())
+
+
+def test_sets_and_aliases_come_with_the_next_run_and_what_people_said_is_named_as_lost(warehouse: Warehouse) -> None:
+    wanted = content(warehouse)
+    pointed = aliases.of_vessel(warehouse, "ferry")
+    for table in ("parameter_sets", "aliases", "corrections"):
+        for path in files(warehouse, table):
+            flipped(path)
+    output = kempf("repair", "--warehouse", warehouse.uri, "--json")
+    assert output.code == 2 and output.json["error"]["code"] == "not_confirmed"
+    output = kempf("repair", "--yes", "--warehouse", warehouse.uri, "--json")
+    assert output.code == 0 and output.json["left"] == []
+    said = " ".join(output.json["lost"])
+    assert "of the table corrections: what people said of manoeuvres has to be said again" in said
+    assert "of the table parameter_sets: those of the present code are made again" in said
+    assert corrections.all_of(warehouse) == []
+    for name in ("mariner", "ferry"):
+        reprocess_vessel(warehouse, name)
+    ids = [row["parameter_set_id"] for row in wanted["parameter_sets"]]
+    assert [row["parameter_set_id"] for row in content(warehouse)["parameter_sets"]] == ids
+    assert aliases.of_vessel(warehouse, "ferry") == pointed
+
+
+def test_a_warehouse_is_built_again_from_its_raw_logs_alone(warehouse: Warehouse, tmp_path: Path) -> None:
+    wanted = content(warehouse)
+    (row,) = logs.current(warehouse, "ferry")
+    remove(warehouse, [row], "not hers")
+    assert (raw.described(warehouse, row.log_id) or {})["removed"] == "not hers"
+    restore(warehouse, row.log_id)
+    place = Warehouse(str(tmp_path / "again"))
+    place.create()
+    assert warehouse.folder is not None and place.folder is not None
+    copytree(warehouse.folder / "raw", place.folder / "raw")
+    assert {one.table for one in verify(place)} == {"logs"}
+    done = repair(place)
+    assert done.left == [] and len(done.done) == 2
+    for name in ("mariner", "ferry"):
+        assert vessels.current(place, name) == vessels.current(warehouse, name)
+        reprocess_vessel(place, name)
+    found = content(place)
+    for name in ("readings", "rejected", "raw"):
+        assert found[name] == wanted[name]
+    ids = [row["parameter_set_id"] for row in wanted["parameter_sets"]]
+    assert [row["parameter_set_id"] for row in found["parameter_sets"]] == ids
+
+
+def test_a_table_that_is_gone_and_a_raw_log_that_is_damaged(warehouse: Warehouse) -> None:
+    assert warehouse.folder is not None
+    (row,) = logs.current(warehouse, "ferry")
+    kept = warehouse.folder / "raw" / row.log_id[:2] / row.log_id
+    flipped(kept)
+    rmtree(warehouse.folder / "segments" / "_delta_log")
+    table_cache.forget()
+    assert {one.table for one in verify(warehouse)} >= {"raw", "segments"}
+    done = repair(warehouse)
+    assert [one.table for one in done.left] == ["raw"]
+    assert any("Ingest the original file again" in words for words in done.gone)
+    assert len(segments.current(warehouse)) == 2
+
+
+def test_a_warehouse_in_which_all_is_well_is_left_alone(warehouse: Warehouse) -> None:
+    assert kempf("verify", "--warehouse", warehouse.uri).out.strip() == "all is well"
+    output = kempf("repair", "--warehouse", warehouse.uri)
+    assert output.code == 0 and output.out.strip() == "nothing had to be done"
