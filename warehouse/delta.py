@@ -90,12 +90,17 @@ def open_table(warehouse: Warehouse, name: str, version: int | None = None) -> D
         _name_damage(warehouse, name)
         raise KempfError(
             "table_unreadable",
-            f"The table {name} of {warehouse.uri} cannot be opened: {error}",
+            f"The table {name} of {warehouse.uri} cannot be opened: {_first_line(error)}",
             "See with `kempf verify` what is damaged; `kempf repair` makes again what can be made.",
             {"table": name, "version": version},
         ) from error
     seals.compare_log(table, name)
     return table
+
+
+def _first_line(error: BaseException) -> str:
+    """Return what a library says of an error, without where in the library it was."""
+    return (str(error).strip().splitlines() or [type(error).__name__])[0].rstrip(".") + "."
 
 
 def _name_damage(warehouse: Warehouse, name: str) -> None:
@@ -280,8 +285,8 @@ def _unreadable_as_error(name: str) -> Iterator[None]:
     except (OSError, pl.exceptions.ComputeError, pl.exceptions.PanicException) as error:
         raise KempfError(
             "table_unreadable",
-            f"A file of the table {name} cannot be read: {error}",
-            "Restore the folder from a copy; the raw logs in it stay readable.",
+            f"A file of the table {name} cannot be read: {_first_line(error)}",
+            "See with `kempf verify` what is damaged; `kempf repair` makes again what can be made.",
             {"table": name},
         ) from error
 

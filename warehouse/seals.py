@@ -328,7 +328,9 @@ def mend_log(folder: Path, name: str) -> list[str]:
     newest = max(sealed_versions(folder), default=-1)
     for path in sorted((folder / "_delta_log").glob("*.checkpoint.parquet")):
         damage = damage_of_file(folder, name, path)
-        if damage is not None and damage.what != "seal":
+        if damage is not None and damage.what == "seal":
+            done += mend_seals(folder, name, [path])
+        elif damage is not None:
             # the commits are all kept: the table opens without it
             path.unlink(missing_ok=True)
             (folder / "_delta_log" / "_last_checkpoint").unlink(missing_ok=True)

@@ -40,11 +40,19 @@ class Planned:
 
     def store(self, warehouse: Warehouse) -> None:
         """Store the correction and what follows from it."""
-        # first what was said: where it ends here, the next reprocessing looks through the log again
-        corrections.add(warehouse, self.log.log_id, self.segment_id, self.correction)
+        # first what was said: where it ends here, the next reprocessing looks through the log again, and the same
+        # command goes on
+        if self._last_said(warehouse) != self.correction:
+            corrections.add(warehouse, self.log.log_id, self.segment_id, self.correction)
         search_log.store(warehouse, [self._searched])
         if self.following.current:
             aliases.withdraw(warehouse, self.log.vessel)
+
+    def _last_said(self, warehouse: Warehouse) -> Correction | None:
+        """Return what was said of this manoeuvre last."""
+        said = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
+        mine = [one for one in said if one.subject_utc_ns == self.correction.subject_utc_ns]
+        return mine[-1] if mine else None
 
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
