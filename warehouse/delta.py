@@ -349,6 +349,10 @@ def _batches(frames: Iterator[pl.DataFrame], schema: pa.Schema) -> Iterator[pa.R
             yield from some.to_arrow(compat_level=pl.CompatLevel.oldest()).cast(schema).to_batches()
 
 
+#: what a system says of a disk that takes nothing
+_REFUSED = ("read-only file system", "permission denied", "input/output error")
+
+
 @contextmanager
 def refusals_as_errors(address: str) -> Iterator[None]:
     """Raise what the storage refuses while something is written to an address as one clear error.
@@ -368,8 +372,8 @@ def refusals_as_errors(address: str) -> Iterator[None]:
         raise not_writable(address, error) from error
     except DeltaError as error:
         refusal = not_writable(address, error)
-        # a commit that the disk has no room for is no lost race: trying it again would not help
-        if refusal.code == "disk_full":
+        # a commit that the disk has no room for, or that it refuses, is no lost race: trying it again would not help
+        if refusal.code == "disk_full" or any(words in str(error).lower() for words in _REFUSED):
             raise refusal from error
         # on a disk the rest is no matter of the connection
         if isinstance(error, CommitFailedError) or "://" not in address.removeprefix("file://"):

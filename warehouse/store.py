@@ -359,7 +359,8 @@ def not_writable(where: str, error: Exception) -> KempfError:
     """
     if where.startswith("file://"):
         where = unquote(where.removeprefix("file://")).rstrip("/")
-    message = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", str(error)).split())
+    # without the places in a library that it lists below
+    message = " ".join(re.sub(r"\x1b\[[0-9;]*m", "", re.split(r"\n\s*0: ", str(error))[0]).split())
     if getattr(error, "errno", None) in _FULL or any(words in message.lower() for words in _FULL_WORDS):
         free = _free_bytes(where)
         return KempfError(

@@ -20,6 +20,7 @@ from kempf.warehouse import (
     readings,
     runs,
     segments,
+    table_cache,
     vessels,
 )
 from kempf.warehouse.deposit import deposit
@@ -232,3 +233,50 @@ def test_a_table_from_before_a_column_was_known_gets_it(tmp_path: Path, monkeypa
         assert held is not None and held.version() == 1, "they are added once"
     assert len(after) == len(before) + 2
     assert after[-1].metadata["unit"] == "m/s"
+
+
+@pytest.mark.parametrize("words", ["Read-only file system (os error 30)", "Input/output error (os error 5)"])
+def test_a_disk_that_takes_nothing_is_one_clear_error(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch, words: str
+) -> None:
+    from deltalake.exceptions import DeltaError
+
+    def refusing(*arguments, **options):
+        raise DeltaError(f"Generic LocalFileSystem error: Unable to open file: {words}\n   0: <unknown>\n   1: clone3")
+
+    monkeypatch.setattr("deltalake.write_deltalake", refusing)
+    with pytest.raises(KempfError) as caught:
+        runs.record_all(warehouse, [runs.FlowRun("run-1", "ingest", None, "completed")])
+    assert caught.value.code == "warehouse_not_writable"
+    assert words in caught.value.message and "clone3" not in caught.value.message
+
+
+def test_a_table_log_that_is_no_log_is_named_without_what_the_library_adds(warehouse: Warehouse) -> None:
+    from shutil import rmtree
+
+    runs.record_all(warehouse, [runs.FlowRun("run-1", "ingest", None, "completed")])
+    assert warehouse.folder is not None
+    rmtree(warehouse.folder / "runs" / "_seals")
+    (warehouse.folder / "runs" / "_delta_log" / f"{1:020d}.json").write_text('{"commitInfo": {')
+    table_cache.forget()
+    with pytest.raises(KempfError) as caught:
+        runs.all_runs(warehouse)
+    assert caught.value.code == "table_unreadable"
+    assert "\n" not in caught.value.message and "unknown" not in caught.value.message
+
+
+def test_a_full_disk_in_compaction_is_reported(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    from deltalake import DeltaTable
+    from deltalake.exceptions import DeltaError
+
+    for k in range(3):
+        runs.record_all(warehouse, [runs.FlowRun(f"run-{k}", "ingest", None, "completed")])
+
+    def full(*arguments, **options):
+        raise DeltaError("Generic LocalFileSystem error: No space left on device (os error 28)")
+
+    monkeypatch.setattr(DeltaTable, "create_checkpoint", full)
+    with pytest.raises(KempfError) as caught:
+        compaction.compact(warehouse, more_files_than=1)
+    assert caught.value.code == "disk_full"
+    assert len(runs.all_runs(warehouse)) == 3

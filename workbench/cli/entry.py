@@ -6,6 +6,7 @@ import _thread
 import contextlib
 import json
 import os
+import signal
 import sys
 import threading
 import traceback
@@ -19,8 +20,8 @@ from kempf.schemas.errors import KempfError, UsageError
 from kempf.workbench.cli.lazy import LazyGroup
 from kempf.workbench.terminal import one_line
 
-#: Exit code of a command that a person interrupted, as shells have it.
-INTERRUPTED = 130
+#: Exit codes of a command that a person interrupted, and of one that was asked to end, as shells have them.
+INTERRUPTED, TERMINATED = 130, 143
 
 COMMANDS = {
     "ingest": "Take raw logs in: read, check, keep, find the manoeuvres.",
@@ -82,13 +83,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     for stream in (stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):  # a file name may hold bytes that are no letters
             stream.reconfigure(errors="backslashreplace")
+    asked_to_end: list[int] = []
+    _end_when_asked(asked_to_end)
     try:
         code = cli.main(args=given, prog_name="kempf", standalone_mode=False, color=_color())
     except click.ClickException as error:
         code = _print_usage_error(error, as_json)
     except (click.Abort, KeyboardInterrupt):
         click.echo("Interrupted. What was finished is kept, nothing is half in; the same command goes on.", err=True)
-        code = INTERRUPTED
+        code = TERMINATED if asked_to_end else INTERRUPTED
     except SystemExit:
         if sys.stdout is stdout:
             raise
@@ -97,6 +100,17 @@ def main(arguments: Sequence[str] | None = None) -> None:
     except Exception as error:  # noqa: BLE001 - the last place where it can be reported
         code = _print_error(wrapped(error), as_json)
     sys.exit(code if isinstance(code, int) else 0)
+
+
+def _end_when_asked(received: list[int]) -> None:
+    """Let SIGTERM, which a shutdown or a scheduler sends, end a command as Ctrl-C does; note that it came."""
+
+    def end(number: int, frame: object) -> None:
+        received.append(number)
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGTERM, end)
 
 
 def _unraisable(unraisable: sys.UnraisableHookArgs) -> None:
