@@ -60,6 +60,8 @@ def automations(webhook: UUID, silent_s: float = SILENT_S) -> list[AutomationCor
                 for_each={"prefect.resource.id"},
                 posture=Posture.Reactive,
                 threshold=1,
+                # the end of a run may be said twice: the second time is within this of the first, and is not posted
+                within=timedelta(minutes=5),
             ),
             actions=[CallWebhook(block_document_id=webhook, payload=_PAYLOAD)],
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -28,6 +29,19 @@ class LogsFailed(DataRejected):
             "The artifact kempf-ingest of the run says for each why; then run it again.",
             {"outcomes": list(outcomes)},
         )
+
+
+def sentence(outcomes: Sequence[dict[str, Any]]) -> str:
+    """Return what became of logs in one sentence.
+
+    Examples
+    --------
+    >>> sentence([{"outcome": "new"}, {"outcome": "new"}, {"outcome": "unchanged"}])
+    '3 logs: 2 new, 1 unchanged'
+    """
+    counts = Counter(str(one["outcome"]) for one in outcomes)
+    said = ", ".join(f"{count} {what}" for what, count in sorted(counts.items()))
+    return f"{len(outcomes)} log{'' if len(outcomes) == 1 else 's'}: {said}" if outcomes else "no log is new"
 
 
 def in_quarantine(one: InboxFile) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from prefect.artifacts import (
 from prefect.client.schemas.objects import State
 from prefect.futures import as_completed
 from prefect.runtime import flow_run
-from prefect.states import Failed
+from prefect.states import Completed, Failed
 
 from kempf.flows.fleet import arrivals, plan
 from kempf.flows.fleet import report as fleet_report
@@ -103,14 +103,14 @@ def ingest(
         if waiting:
             errors = [NeedsAPerson(run) for run in waiting]
             return Failed(message=" ".join(error.message for error in errors), data=errors[0])
-        return outcomes
+        return Completed(message=arrivals.sentence(outcomes), data=outcomes)
     outcomes = ingest_batch(warehouse, paths, vessel, list(profiles))
     _show_logs(outcomes)
     failed = [outcome for outcome in outcomes if "error" in outcome]
     if failed:
         error = arrivals.LogsFailed(outcomes)
         return Failed(message=error.message, data=error)
-    return outcomes
+    return Completed(message=arrivals.sentence(outcomes), data=outcomes)
 
 
 def _show_logs(outcomes: Sequence[dict[str, Any]]) -> None:
@@ -281,7 +281,7 @@ def reprocess(
     create_markdown_artifact(key="kempf-fleet", markdown=fleet_report.markdown(ordered, limits), description=sentence)
     if any(fleet_report.needs_a_person(report, limits) for report in ordered):
         return Failed(message=sentence, data=fleet_report.VesselsFailed(ordered, limits))
-    return ordered
+    return Completed(message=sentence, data=ordered)
 
 
 def reports_of(

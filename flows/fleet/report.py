@@ -71,7 +71,7 @@ def sentence(reports: Reports, quality: Quality = NO_LIMITS) -> str:
     Examples
     --------
     >>> sentence([{"vessel": "a", "status": "changed", "failures": [], "findings": []}])
-    '1 vessels: 1 changed'
+    '1 vessel: 1 changed'
     """
     counts = Counter(str(report["status"]) for report in reports)
     counted = ", ".join(f"{count} {status}" for status, count in sorted(counts.items()))
@@ -81,7 +81,8 @@ def sentence(reports: Reports, quality: Quality = NO_LIMITS) -> str:
     bad = [str(report["vessel"]) for report in reports if beyond(report, quality)]
     poor = f"; {len(bad)} beyond the limits of quality: {', '.join(bad[:5])}{' ...' if bad[5:] else ''}" if bad else ""
     before = f" ({known} as the run before)" if known else ""
-    return f"{len(reports)} vessels: {counted or 'none'}{before}{woken}{poor}"
+    vessels = f"{len(reports)} vessel{'' if len(reports) == 1 else 's'}"
+    return f"{vessels}: {counted or 'none'}{before}{woken}{poor}"
 
 
 def table(reports: Reports) -> list[dict[str, Any]]:

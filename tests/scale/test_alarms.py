@@ -81,7 +81,7 @@ def test_bad_ends_are_posted_and_silent_runs_are_ended(
     wait_for(lambda: received, 120.0, every_s=0.2)
     (alarm,) = received
     assert (alarm["flow"], alarm["state"]) == ("reprocess", "Failed")
-    assert alarm["message"] == f"1 vessels: 1 failed; look at {FLEET[0]}"
+    assert alarm["message"] == f"1 vessel: 1 failed; look at {FLEET[0]}"
     assert alarm["flow_run_id"] in alarm["page"]
 
     with get_client(sync_client=True) as client:
