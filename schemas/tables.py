@@ -275,6 +275,23 @@ _ALL = (
         ),
     ),
     Table(
+        "run_history",
+        "one vessel that a run worked on; only ever added, its time is that of the commit",
+        (
+            Column("number", "integer", "place of the commit among those of the table, from 1"),
+            Column("flow", "text", "name of the flow"),
+            Column("flow_run", "text", "id of the run on the server, null where there was none"),
+            Column("vessel", "text", "name of the vessel"),
+            Column("status", "text", "changed, unchanged, failed"),
+            Column("new_sets", "integer", "parameter sets made", "1"),
+            Column("kept_sets", "integer", "parameter sets kept", "1"),
+            Column("reread", "integer", "logs read anew", "1"),
+            Column("failures", "integer", "what failed", "1"),
+            Column("findings", "integer", "what is wrong with her logs and models", "1"),
+            Column("first_failure", "text", "what failed first, null where nothing did"),
+        ),
+    ),
+    Table(
         "runs",
         "one run of a flow; its time is the time of the commit",
         (

@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 #: Tables that grow by single rows; readings come in whole files and are left alone.
 _SMALL = (
     *("vessels", "logs", "lost", "segments", "examinations", "parameter_sets"),
-    *("diagnoses", "diagnosis_evidence", "aliases", "inbox", "runs"),
+    *("diagnoses", "diagnosis_evidence", "aliases", "inbox", "runs", "run_history", "corrections", "notes"),
 )
 #: Rows that are read or skipped together.
 _ROW_GROUP = 8192

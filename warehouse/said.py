@@ -1,6 +1,6 @@
-"""Tables of what people said: rows are only ever added, one a commit, and the commit says when.
+"""Tables to which rows are only ever added; the commit says when.
 
-The number of a row is its place in the table, so that of two people who speak at once one comes second.
+The number of a row is the place of its commit, so that of two who add at once one comes second.
 """
 
 from __future__ import annotations
@@ -14,20 +14,20 @@ from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
 
-def add(warehouse: Warehouse, name: str, row: Mapping[str, Any]) -> int:
-    """Add a row to a table of the warehouse, with the next ``number``.
+def add(warehouse: Warehouse, name: str, *rows: Mapping[str, Any]) -> int:
+    """Add rows to a table of the warehouse by one commit, with the next ``number``.
 
     Parameters
     ----------
     name : str
         Of the table, which has a column ``number``.
-    row : mapping
-        Every other column.
+    *rows : mapping
+        Every other column; at least one row.
 
     Returns
     -------
     int
-        Its number, from 1.
+        Their number, from 1: the place of the commit.
     """
 
     def attempt() -> int:
@@ -35,14 +35,14 @@ def add(warehouse: Warehouse, name: str, row: Mapping[str, Any]) -> int:
             last = delta.rows(table, name, columns=("number",))["number"].max()
             number = (int(last) if isinstance(last, int) else 0) + 1
             # the predicate names what another writer would add at the same moment: the second one comes again
-            delta.replace(table, name, [{**row, "number": number}], f"number = {number}")
+            delta.replace(table, name, [{**row, "number": number} for row in rows], f"number = {number}")
             return number
 
     return with_retry(attempt)
 
 
 def times(warehouse: Warehouse, name: str) -> dict[int, datetime]:
-    """Return when each row of a table was added, by its number."""
+    """Return when the rows of a table were added, by their number."""
     with delta.reading(warehouse, name) as table:
         if table is None:
             return {}

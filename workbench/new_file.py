@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -95,3 +96,23 @@ def _cannot_write(path: Path, why: str, option: str) -> UsageError:
         f"Writing {path} failed: {why}.",
         f"Give another file with {option}; nothing is overwritten.",
     )
+
+
+@contextmanager
+def replaced(path: Path) -> Iterator[Path]:
+    """Lend a file to write to, which takes the place of another once it is whole; the folder is made.
+
+    Raises
+    ------
+    UsageError
+        ``cannot_write``.
+    """
+    passing = path.with_name(f".{path.name}.{os.getpid()}")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        yield passing
+        passing.replace(path)
+    except OSError as error:
+        raise _cannot_write(path, error.strerror or str(error), "FOLDER") from error
+    finally:
+        passing.unlink(missing_ok=True)

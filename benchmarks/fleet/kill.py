@@ -163,7 +163,7 @@ def kill_once(job: str, begin: Path, folder: Path, logs: Path, wanted: Any, wait
 
 def stored_rows(warehouse: Warehouse) -> dict[str, int]:
     """Count every row of the tables, reachable or not: what is there twice would show. Runs come on top."""
-    return {name: delta.read(warehouse, name).height for name in delta.versions(warehouse) if name != "runs"}
+    return {name: delta.read(warehouse, name).height for name in delta.versions(warehouse) if name not in contents.RUNS}
 
 
 def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:

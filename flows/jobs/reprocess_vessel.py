@@ -21,7 +21,7 @@ from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.standing_model import POOLED, SINGLE, Own, model_of, point, standing
 from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.jobs.vessel_quality import quality_of
-from kempf.flows.jobs.vessel_report import VesselReport, remember_all
+from kempf.flows.jobs.vessel_report import VesselReport, remember_all, remember_history
 from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
@@ -107,6 +107,7 @@ def reprocess_vessels(
     estimator = request.estimator if request else None
     runs = [(w.report, w.report.as_run(w.left, changed_only=changed_only, estimator=estimator)) for w in all_of_them]
     _together(all_of_them, lambda: remember_all(warehouse, runs))
+    _together(all_of_them, lambda: remember_history(warehouse, [w.report for w in all_of_them], flow_run))
     return [work.report for work in all_of_them]
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any
 
 from kempf.schemas.errors import DataRejected, KempfError
-from kempf.warehouse import runs
+from kempf.warehouse import runs, said
 from kempf.warehouse.runs import FlowRun
 from kempf.warehouse.store import Warehouse
 
@@ -102,6 +102,28 @@ def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, FlowR
         entries.append(replace(run, message={**run.message, "failures": report.failures}))
         entries += _forgotten(run, stored)
     runs.record_all(warehouse, entries)
+
+
+def remember_history(warehouse: Warehouse, reports: Sequence[VesselReport], flow_run: str | None) -> None:
+    """Add what was done for vessels to the history of runs, in one commit."""
+    if not reports:
+        return
+    rows = [
+        {
+            "flow": FLOW,
+            "flow_run": flow_run,
+            "vessel": report.vessel,
+            "status": report.status,
+            "new_sets": report.new_sets,
+            "kept_sets": report.kept_sets,
+            "reread": report.reread,
+            "failures": len(report.failures),
+            "findings": len(report.findings),
+            "first_failure": report.failures[0]["error"]["message"] if report.failures else None,
+        }
+        for report in reports
+    ]
+    said.add(warehouse, "run_history", *rows)
 
 
 def _forgotten(run: FlowRun, stored: Mapping[str, FlowRun]) -> list[FlowRun]:

@@ -13,7 +13,8 @@ from kempf.warehouse import delta
 from kempf.warehouse.store import Warehouse
 
 #: Runs tell how the work went, which an interruption changes.
-TOLD = tuple(name for name in TABLES if name != "runs")
+RUNS = ("runs", "run_history")
+TOLD = tuple(name for name in TABLES if name not in RUNS)
 
 
 def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
@@ -37,7 +38,7 @@ def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
 
 def versions(warehouse: Warehouse) -> dict[str, int]:
     """The newest version of every table but the runs."""
-    return {name: version for name, version in delta.versions(warehouse).items() if name != "runs"}
+    return {name: version for name, version in delta.versions(warehouse).items() if name not in RUNS}
 
 
 def fresh(path: Path) -> Warehouse:

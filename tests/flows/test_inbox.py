@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -152,11 +153,19 @@ def test_a_full_disk_is_no_files_fault(place: Path, warehouse: Warehouse, monkey
     assert [Path(one.path).name for one in taken(place, warehouse).ingested] == ["day.csv.gz"]
 
 
-def test_the_flow_fails_where_a_person_is_needed(place: Path, mariner: Ship, tmp_path: Path) -> None:
-    from kempf.flows.fleet.flows import ingest
+def test_the_flow_fails_where_a_person_is_needed(place: Path, tmp_path: Path) -> None:
+    from importlib import import_module
+
+    flows = import_module("kempf.flows.fleet.flows")  # first: it sets what Prefect reads when it is imported
+    from prefect.testing.utilities import prefect_test_harness
 
     for path in (place / "mariner").iterdir():
         os.utime(path, (1, 1))
+    with prefect_test_harness(server_startup_timeout=180):
+        _ends_as_failed(flows.ingest, place, tmp_path)
+
+
+def _ends_as_failed(ingest: Any, place: Path, tmp_path: Path) -> None:
     state = ingest([str(place)], str(tmp_path / "w"), return_state=True)
     assert state.is_failed() and "minutes.pdf" in str(state.message)
     error = state.result(raise_on_failure=False)

@@ -50,14 +50,15 @@ def outside(folder: Path) -> set[str]:
 def check_names(place: Path) -> None:
     """Every folder of a warehouse is named by the house alone."""
     parts = {part for name in tree(place) for part in Path(name).parts}
-    allowed = {"kempf-warehouse.json", "raw", "_delta_log"}
+    allowed = {"kempf-warehouse.json", "raw", "_delta_log", "_seals", "log", "data"}
     tables = {"vessels", "logs", "readings", "rejected", "segments", "examinations"} | {
         "parameter_sets",
         "aliases",
         "runs",
+        "run_history",
     }
     for part in parts - allowed - tables:
-        hexadecimal = set(part.split("=")[-1]) <= set("0123456789abcdef")
+        hexadecimal = set(part.split("=")[-1].removesuffix(".json")) <= set("0123456789abcdef")
         assert hexadecimal or part.startswith("part-") or part[:20].isdigit(), part
 
 

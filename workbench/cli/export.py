@@ -57,6 +57,42 @@ def csv_file(**given: Any) -> None:
     _text("csv", **given)
 
 
+@command.command("tables")
+@click.argument("folder", type=click.Path(path_type=Path, file_okay=False))
+@click.option(
+    "--format",
+    "file_format",
+    type=click.Choice(["parquet", "csv"]),
+    default="parquet",
+    show_default=True,
+    help="Of the files.",
+)
+@warehouse_option
+@json_option
+def tables(folder: Path, file_format: str, uri: str, as_json: bool) -> None:
+    """Parameters over time, manoeuvres, logs and runs of the fleet, a file each for SQL or a spreadsheet.
+
+    Files of an earlier call in FOLDER are replaced, each all at once.
+    """
+    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.views import VIEWS
+    from kempf.workbench.new_file import replaced
+
+    warehouse = Warehouse(uri)
+    warehouse.require()
+    rows = {}
+    for name, view in VIEWS.items():
+        frame = view(warehouse)
+        with replaced(folder / f"{name}.{file_format}") as passing:
+            frame.write_parquet(passing) if file_format == "parquet" else frame.write_csv(passing)
+        rows[name] = frame.height
+    if as_json:
+        print_json({"folder": str(folder), "rows": rows})
+    else:
+        for name, count in rows.items():
+            click.echo(f"{folder / name}.{file_format}: {counted(count, 'row')}")
+
+
 @command.command("control")
 @_linear_options
 def control_file(output: Path | None, as_json: bool, **asked: Any) -> None:

@@ -12,9 +12,9 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.instants import instant_of
-from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
-from kempf.workbench.new_file import require_figures, writing
+from kempf.workbench.cli.instants import end_of
+from kempf.workbench.cli.options import figure_option, json_option, output_option, vessel_option, warehouse_option
+from kempf.workbench.new_file import require_figures, require_new, writing
 from kempf.workbench.terminal import counted, number, print_json, print_note, print_paragraph, print_table, short_ids
 
 if TYPE_CHECKING:
@@ -29,11 +29,18 @@ _LEAST_P = 1e-16
 
 
 @click.command("history", cls=GivenOnce)
-@vessel_option(required=True, multiple=True)
+@vessel_option(multiple=True)
 @click.option("--parameter", metavar="NAME", help="Only this parameter, such as b2.")
-@click.option("--as-of", metavar="TIME", help="What was known at this time, ISO 8601; without a zone it is UTC.")
+@click.option("--as-of", metavar="TIME", help="What was known then, ISO 8601; a date is the whole day.")
 @click.option("--all", "superseded", is_flag=True, help="Also sets that a newer profile or code superseded.")
 @click.option("--changes", is_flag=True, help="Say whether the ship changed, when, by how much and in what.")
+@click.option(
+    "--format",
+    "file_format",
+    type=click.Choice(["csv", "parquet", "json"]),
+    help="Write the history to --output in this form, a row a parameter of a set.",
+)
+@output_option("With --format: the file.")
 @figure_option("With --changes: draw it")
 @click.option(
     "--occasion",
@@ -52,23 +59,30 @@ def command(
     as_of: str | None,
     superseded: bool,
     changes: bool,
+    file_format: str | None,
+    output: Path | None,
     figure: Path | None,
     occasion_h: float,
     uri: str,
     as_json: bool,
 ) -> None:
-    """Show vessels' parameters over time, as known now or at an earlier time, and whether they changed."""
+    """Show vessels' parameters over time, as known now or at an earlier time, and whether they changed.
+
+    Without --vessel, of the whole fleet.
+    """
     from kempf.flows.jobs.out_of_date import said_of_vessel
-    from kempf.warehouse import history
+    from kempf.warehouse import history, vessels
     from kempf.warehouse.store import Warehouse
 
-    if figure is not None and not changes:
-        raise UsageError("figure_without_changes", "--figure draws what --changes found.", "Add --changes.")
-    warehouse, instant = Warehouse(uri), instant_of(as_of, "--as-of") if as_of is not None else None
+    _require_sense(file_format, output, figure, changes=changes)
+    warehouse, instant = Warehouse(uri), end_of(as_of, "--as-of") if as_of is not None else None
     histories = {
         name: history.of_vessel(warehouse, name, parameter, instant, superseded=superseded)
-        for name in dict.fromkeys(vessel)
+        for name in (dict.fromkeys(vessel) or vessels.names(warehouse))
     }
+    if file_format is not None:
+        _write(histories, file_format, output)
+        return
     for name, found in histories.items():
         if instant is None:
             print_note(said_of_vessel(warehouse, name))
@@ -87,12 +101,45 @@ def command(
         examined = [_examine(kind, occasion_h, next(figures, None), name) for kind in kinds[name]]
         documents.append({"vessel": name, "history": _rows(name, found), "changes": examined})
     if as_json:
-        print_json(documents if len(documents) > 1 else documents[0])
+        print_json(documents[0] if len(documents) == 1 else documents)
         return
     for document in documents:
         if len(documents) > 1:
             click.echo(click.style(document["vessel"], bold=True))
         _print_all(document["changes"])
+
+
+def _require_sense(file_format: str | None, output: Path | None, figure: Path | None, *, changes: bool) -> None:
+    """Refuse options that say nothing without each other."""
+    if (file_format is None) != (output is None):
+        raise UsageError("format_without_output", "--format and --output belong together.", "Give both, or neither.")
+    if figure is not None and not changes:
+        raise UsageError("figure_without_changes", "--figure draws what --changes found.", "Add --changes.")
+    if output is not None:
+        require_new(output, "--output")
+
+
+def _write(histories: dict[str, History], file_format: str, output: Path | None) -> None:
+    """Write histories to a file, a row a parameter of a set."""
+    import polars as pl
+
+    assert output is not None
+    schema = {
+        **{"vessel": pl.String, "start": pl.String, "parameter": pl.String, "value": pl.Float64, "std": pl.Float64},
+        **{"low": pl.Float64, "high": pl.Float64, "unit": pl.String, "model": pl.String, "estimator": pl.String},
+        **{"converged": pl.Boolean, "superseded": pl.Boolean, "parameter_set_id": pl.String},
+    }
+    rows = [row for name, history in histories.items() for row in _rows(name, history)]
+    frame = pl.DataFrame([{key: row[key] for key in schema} for row in rows], schema=schema, orient="row")
+    time = pl.col("start").str.to_datetime("%+", time_unit="us", time_zone="UTC")
+    with writing(output, "--output"):
+        if file_format == "parquet":
+            frame.with_columns(time).write_parquet(output)
+        elif file_format == "csv":
+            frame.write_csv(output)
+        else:
+            frame.write_json(output)
+    click.echo(f"{output}: {counted(frame.height, 'row')} of {counted(len(histories), 'vessel')}")
 
 
 def _rows(vessel: str, history: History) -> list[dict[str, Any]]:

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from datetime import UTC, datetime
+from datetime import UTC, datetime, timedelta
 
 from kempf.schemas.errors import UsageError
 
 _SECOND_NS = 1_000_000_000
 #: a fraction of a second, which datetime cuts to microseconds
 _FRACTION = re.compile(r"(?<=:\d\d)[.,](\d{1,9})")
+_DATE = re.compile(r"\d{4}-?\d{2}-?\d{2}")
 
 
 def instant_of(text: str, option: str) -> datetime:
@@ -36,6 +37,18 @@ def instant_of(text: str, option: str) -> datetime:
             f"{option} {text!r} is no time; expected ISO 8601.",
             "Write it as 2025-05-03T12:00:00Z.",
         ) from error
+
+
+def end_of(text: str, option: str) -> datetime:
+    """Return an instant; where only a date is given, the last one of that day. See `instant_of`.
+
+    Examples
+    --------
+    >>> end_of("2025-05-03", "--as-of").isoformat()
+    '2025-05-03T23:59:59.999999+00:00'
+    """
+    instant = instant_of(text, option)
+    return instant + timedelta(days=1) - timedelta(microseconds=1) if _DATE.fullmatch(text.strip()) else instant
 
 
 def utc_ns_of(text: str, option: str) -> int:

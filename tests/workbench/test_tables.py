@@ -1,0 +1,126 @@
+"""The tables for analysts: written by one command, read by SQL, by polars and by a spreadsheet."""
+
+from __future__ import annotations
+
+import csv
+import json
+import re
+from datetime import UTC, datetime, timedelta
+from pathlib import Path
+
+import polars as pl
+import pytest
+
+from kempf.flows.jobs.correct_segments import plan_for
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.warehouse import history, segments
+from kempf.warehouse.store import Warehouse
+from tests.conftest import Ship
+from tests.workbench.driving import kempf
+
+duckdb = pytest.importorskip("duckdb", reason="duckdb is not installed: no SQL to try")
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def place(mariner: Ship, ferry: Ship, tmp_path_factory: pytest.TempPathFactory) -> Warehouse:
+    folder = tmp_path_factory.mktemp("tables")
+    warehouse = Warehouse(str(folder / "w"))
+    for ship, name in ((mariner, "mariner"), (ferry, "ferry")):
+        path = ship.write(folder / name)
+        ingest(warehouse, [path / f"{name}.nmea.gz"], given=read_profiles([path / "profile.yaml"]))
+        reprocess_vessel(warehouse, name)
+    (zigzag,) = segments.current(warehouse, "ferry")
+    plan_for(warehouse, zigzag.segment_id, "exclude", "engine slowed").store(warehouse)
+    return warehouse
+
+
+@pytest.fixture(scope="module")
+def written(place: Warehouse, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("out") / "tables"
+    for _ in range(2):  # a second call replaces the files
+        output = kempf("export", "tables", folder, "--warehouse", place.uri, "--json")
+        assert output.code == 0
+    assert sorted(path.name for path in folder.iterdir()) == [
+        f"{name}.parquet" for name in ("log_quality", "manoeuvres", "parameter_history", "run_history")
+    ]
+    assert output.json["rows"]["manoeuvres"] == 2
+    return folder
+
+
+def sql(folder: Path, query: str) -> list[tuple[object, ...]]:
+    found: list[tuple[object, ...]] = duckdb.connect().execute(query.replace("TABLES", str(folder))).fetchall()
+    return found
+
+
+def test_parameters_are_a_row_each(place: Warehouse, written: Path) -> None:
+    rows = sql(
+        written,
+        "select vessel, parameter, value, std, unit, converged, superseded, current, stored_at, epoch_us(start_at) "
+        "from 'TABLES/parameter_history.parquet' where parameter = 'b2' order by vessel",
+    )
+    assert [(row[0], row[4], row[5], row[6], row[7]) for row in rows] == [
+        ("ferry", "1/m^2", True, True, False),
+        ("mariner", "1/m^2", True, False, True),
+    ]
+    (own,) = history.of_vessel(place, "mariner", "b2").rows()
+    assert (rows[1][2], rows[1][3]) == (own["value"], own["std"]) and rows[1][9] == own["start_utc_ns"] // 1000
+    stored = rows[1][8]
+    assert isinstance(stored, datetime) and timedelta(0) < datetime.now(UTC) - stored.astimezone(UTC) < timedelta(1)
+
+
+def test_manoeuvres_logs_and_runs(written: Path) -> None:
+    ferry, mariner = sql(written, "select vessel, kind, excluded, overshoot_1_deg from 'TABLES/manoeuvres.parquet'")
+    assert (ferry[2], mariner[2]) == ("engine slowed", None) and isinstance(mariner[3], float)
+    logs = sql(
+        written, "select records_read = records_kept + records_rejected, zigzags from 'TABLES/log_quality.parquet'"
+    )
+    assert logs == [(True, 1), (True, 1)]
+    runs = sql(written, "select vessel, status, new_sets, failures from 'TABLES/run_history.parquet' order by run_at")
+    assert runs == [("mariner", "changed", 1, 0), ("ferry", "changed", 1, 0)]
+    frame = pl.scan_parquet(written / "parameter_history.parquet").filter(pl.col("vessel") == "mariner").collect()
+    assert frame.schema["start_at"] == pl.Datetime("us", "UTC") and frame.height == 6
+
+
+def test_the_dashboard_asks_what_the_tables_answer(written: Path) -> None:
+    dashboard = json.loads((ROOT / "docs" / "grafana" / "kempf.json").read_text(encoding="utf-8"))
+    queries = [target["rawSql"] for panel in dashboard["panels"] for target in panel["targets"]]
+    assert len(queries) >= 4
+    for query in queries:
+        filled = re.sub(r"\$\{?vessel\}?", "mariner", query).replace("${tables}", str(written))
+        assert "$" not in filled, query
+        assert sql(written, filled), query
+
+
+def test_tables_as_text(place: Warehouse, tmp_path: Path) -> None:
+    assert kempf("export", "tables", tmp_path / "t", "--format", "csv", "--warehouse", place.uri).code == 0
+    with (tmp_path / "t" / "manoeuvres.csv").open(newline="", encoding="utf-8") as stream:
+        assert [row["vessel"] for row in csv.DictReader(stream)] == ["ferry", "mariner"]
+    (tmp_path / "file").touch()
+    refused = kempf("export", "tables", tmp_path / "file", "--warehouse", place.uri)
+    assert refused.code == 2
+
+
+def test_history_of_the_fleet_in_three_forms(place: Warehouse, tmp_path: Path) -> None:
+    at = ("--warehouse", place.uri)
+    fleet = kempf("history", "--all", *at, "--json").json
+    assert {row["vessel"] for row in fleet} == {"mariner", "ferry"}
+    for ending, read in (("csv", pl.read_csv), ("parquet", pl.read_parquet), ("json", pl.read_json)):
+        path = tmp_path / f"history.{ending}"
+        assert kempf("history", "--all", "--format", ending, "--output", path, *at).code == 0
+        frame = read(path)  # type: ignore[operator]
+        assert frame["value"].to_list() == [row["value"] for row in fleet]
+    again = kempf("history", "--format", "csv", "--output", tmp_path / "history.csv", *at)
+    assert again.code == 2 and "it is there already" in again.err
+    alone = kempf("history", "--format", "csv", *at, "--json")
+    assert alone.json["error"]["code"] == "format_without_output"
+
+
+def test_a_date_means_the_whole_day(place: Warehouse) -> None:
+    at = ("history", "--vessel", "mariner", "--warehouse", place.uri, "--json")
+    today = datetime.now(UTC).date()
+    assert len(kempf(*at, "--as-of", today.isoformat()).json) == 6
+    assert kempf(*at, "--as-of", (today - timedelta(days=1)).isoformat()).json == []
+    assert kempf(*at, "--as-of", f"{today.isoformat()}T00:00").json == []

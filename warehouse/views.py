@@ -1,0 +1,209 @@
+"""The tables that analysts ask for, made of those in which things are kept.
+
+Times are timestamps in UTC, to the microsecond. Nothing here is stored.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from json import loads
+from typing import Any
+
+import polars as pl
+
+from kempf.warehouse import aliases, delta, examinations, history, logs, said, segments, vessels
+from kempf.warehouse.store import Warehouse
+
+_TIME = pl.Datetime("us", "UTC")
+
+
+def parameter_history(warehouse: Warehouse) -> pl.DataFrame:
+    """Return a row a parameter of every set, superseded ones too, sorted by vessel, start, set and parameter.
+
+    Columns: vessel, start_at, parameter, value, std, low, high (of the 95 % interval), unit, model, effects, estimator,
+    converged, superseded, current, parameter_set_id, stored_at, code.
+    """
+    names = vessels.names(warehouse)
+    schema: dict[str, Any] = {"vessel": pl.String, **_PARAMETER}
+    frames = [_of_vessel(warehouse, name) for name in names]
+    found = pl.concat([pl.DataFrame(schema=schema), *frames]) if frames else pl.DataFrame(schema=schema)
+    return found.sort("vessel", "start_at", "parameter_set_id", "parameter")
+
+
+_PARAMETER: dict[str, Any] = {
+    "start_at": _TIME,
+    "parameter": pl.String,
+    "value": pl.Float64,
+    "std": pl.Float64,
+    "low": pl.Float64,
+    "high": pl.Float64,
+    "unit": pl.String,
+    "model": pl.String,
+    "effects": pl.String,
+    "estimator": pl.String,
+    "converged": pl.Boolean,
+    "superseded": pl.Boolean,
+    "current": pl.Boolean,
+    "parameter_set_id": pl.String,
+    "stored_at": _TIME,
+    "code": pl.String,
+}
+
+
+def _of_vessel(warehouse: Warehouse, vessel: str) -> pl.DataFrame:
+    found = history.of_vessel(warehouse, vessel, superseded=True)
+    current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    facts = _sets(warehouse, vessel)
+    rows = [
+        {
+            **{key: row[key] for key in ("parameter", "value", "std", "low", "high", "unit", "model", "estimator")},
+            **{key: row[key] for key in ("converged", "superseded", "parameter_set_id")},
+            **facts[row["parameter_set_id"]],
+            "vessel": vessel,
+            "start_at": row["start_utc_ns"] // 1000,
+            "current": row["parameter_set_id"] == current,
+        }
+        for row in found.rows()
+    ]
+    schema = {"vessel": pl.String, **_PARAMETER}
+    return pl.DataFrame(
+        rows, schema={**schema, "start_at": pl.Int64, "stored_at": pl.Int64}, orient="row"
+    ).with_columns(pl.col("start_at", "stored_at").cast(_TIME))
+
+
+def _sets(warehouse: Warehouse, vessel: str) -> dict[str, dict[str, Any]]:
+    """Return effects, code and the time at which it was stored of every set of a vessel, by id."""
+    from kempf.warehouse.keys import vessel_key
+
+    columns = ("parameter_set_id", "model_json", "provenance_json")
+    frame = delta.read(warehouse, "parameter_sets", {"vessel_key": vessel_key(vessel)}, columns)
+    with delta.reading(warehouse, "parameter_sets") as table:
+        times = delta.commit_times(table) if table is not None else []
+    return {name: _facts(loads(model), loads(provenance), times) for name, model, provenance in frame.rows()}
+
+
+def _facts(model: Mapping[str, Any], provenance: Mapping[str, Any], times: list[int]) -> dict[str, Any]:
+    # it was stored by the first commit behind the version that it was made beside
+    before = int((provenance.get("table_versions") or {}).get("parameter_sets", -1))
+    stored = times[before + 1] * 1000 if before + 1 < len(times) else None
+    code = provenance.get("code_version")
+    return {"effects": " + ".join(model.get("effects") or ()), "stored_at": stored, "code": code}
+
+
+def manoeuvres(warehouse: Warehouse) -> pl.DataFrame:
+    """Return a row a manoeuvre of every kind, excluded ones too, sorted by vessel and start.
+
+    Columns: vessel, start_at, end_at, kind, psi0_deg, delta0_deg, first_side, base_heading_deg, executes,
+    overshoot_1_deg to overshoot_3_deg, imo_passed (null where nothing was judged), excluded (why), remarks, file_name,
+    segment_id, log_id.
+    """
+    names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
+    rows = []
+    for one in segments.found_in(warehouse):
+        judged = [c["passed"] for c in one.imo.values() if c.get("passed") is not None]
+        angles = (*one.overshoots_deg, None, None, None)
+        rows.append(
+            {
+                "vessel": one.vessel,
+                "start_at": one.start_utc_ns // 1000,
+                "end_at": one.end_utc_ns // 1000,
+                "kind": one.kind,
+                "psi0_deg": None if one.psi0_deg != one.psi0_deg else one.psi0_deg,
+                "delta0_deg": one.delta0_deg,
+                "first_side": one.first_side,
+                "base_heading_deg": one.base_heading_deg,
+                "executes": len(one.executes_utc_ns),
+                **{f"overshoot_{k + 1}_deg": angles[k] for k in range(3)},
+                "imo_passed": all(judged) if judged else None,
+                "excluded": one.excluded,
+                "remarks": " ".join(one.quality.get("reasons") or ()),
+                "file_name": names.get(one.ingest_id),
+                "segment_id": one.segment_id,
+                "log_id": one.log_id,
+            }
+        )
+    text, real = pl.String, pl.Float64
+    schema: dict[str, Any] = {
+        **{
+            "vessel": text,
+            "start_at": pl.Int64,
+            "end_at": pl.Int64,
+            "kind": text,
+            "psi0_deg": real,
+            "delta0_deg": real,
+        },
+        **{"first_side": text, "base_heading_deg": real, "executes": pl.Int64},
+        **{f"overshoot_{k}_deg": real for k in (1, 2, 3)},
+        **{"imo_passed": pl.Boolean, "excluded": text, "remarks": text, "file_name": text},
+        **{"segment_id": text, "log_id": text},
+    }
+    found = pl.DataFrame(rows, schema=schema, orient="row").with_columns(pl.col("start_at", "end_at").cast(_TIME))
+    return found.sort("vessel", "start_at", "segment_id")
+
+
+def log_quality(warehouse: Warehouse) -> pl.DataFrame:
+    """Return a row a log, removed ones too, sorted by vessel and start.
+
+    Columns: vessel, start_at, end_at, file_name, format, records and values read, kept and rejected, zigzags, channels
+    (the doctor's verdict), findings, first_finding, removed (why), log_id.
+    """
+    rows = [*logs.current(warehouse), *logs.removed(warehouse)]
+    seen = examinations.of_ingests(warehouse, [row.ingest_id for row in rows])
+    zigzags: dict[str, int] = {}
+    for one in segments.found_in(warehouse):
+        zigzags[one.ingest_id] = zigzags.get(one.ingest_id, 0) + one.is_zigzag
+    counts = [f"{what}_{done}" for what in ("records", "values") for done in ("read", "kept", "rejected")]
+    content = [
+        {
+            "vessel": row.vessel,
+            "start_at": row.start_utc_ns // 1000,
+            "end_at": row.end_utc_ns // 1000,
+            "file_name": row.file_name,
+            "format": row.format,
+            **{name: getattr(row.tally, name) for name in counts},
+            "zigzags": zigzags.get(row.ingest_id, 0),
+            "channels": seen[row.ingest_id].verdict if row.ingest_id in seen else None,
+            "findings": len(seen[row.ingest_id].findings) if row.ingest_id in seen else None,
+            "first_finding": next(iter(seen[row.ingest_id].findings), None) if row.ingest_id in seen else None,
+            "removed": row.removed,
+            "log_id": row.log_id,
+        }
+        for row in rows
+    ]
+    text, whole = pl.String, pl.Int64
+    schema: dict[str, Any] = {
+        **{"vessel": text, "start_at": whole, "end_at": whole, "file_name": text, "format": text},
+        **dict.fromkeys(counts, whole),
+        **{"zigzags": whole, "channels": text, "findings": whole, "first_finding": text, "removed": text},
+        "log_id": text,
+    }
+    found = pl.DataFrame(content, schema=schema, orient="row").with_columns(pl.col("start_at", "end_at").cast(_TIME))
+    return found.sort("vessel", "start_at", "log_id")
+
+
+def run_history(warehouse: Warehouse) -> pl.DataFrame:
+    """Return a row a vessel that a run worked on, in the order of time; vessels that had nothing to do have none.
+
+    Columns: run_at, flow, flow_run, vessel, status, new_sets, kept_sets, reread, failures, findings, first_failure.
+    """
+    times = said.times(warehouse, "run_history")
+    rows = delta.read(warehouse, "run_history").sort("number", "vessel").rows(named=True)
+    content = [
+        {**{key: row[key] for key in row if key != "number"}, "run_at": times.get(row["number"])} for row in rows
+    ]
+    text, whole = pl.String, pl.Int64
+    schema: dict[str, Any] = {
+        **{"run_at": _TIME, "flow": text, "flow_run": text, "vessel": text, "status": text},
+        **{"new_sets": whole, "kept_sets": whole, "reread": whole, "failures": whole, "findings": whole},
+        "first_failure": text,
+    }
+    return pl.DataFrame(content, schema=schema, orient="row")
+
+
+#: Every view by name.
+VIEWS: dict[str, Callable[[Warehouse], pl.DataFrame]] = {
+    "parameter_history": parameter_history,
+    "manoeuvres": manoeuvres,
+    "log_quality": log_quality,
+    "run_history": run_history,
+}
