@@ -12,7 +12,7 @@ import subprocess
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
-from importlib.metadata import PackageNotFoundError, version
+from importlib.metadata import PackageNotFoundError, distributions, version
 from pathlib import Path
 from types import ModuleType
 from typing import Literal
@@ -138,6 +138,35 @@ def packages() -> dict[str, str]:
         except PackageNotFoundError:
             found[name] = "absent"
     return found
+
+
+@cache
+def machine() -> dict[str, str]:
+    """Return what else than code and `PACKAGES` bits may rest on: system, kind of processor, its name, all packages.
+
+    Returns
+    -------
+    dict
+        ``system``, ``machine``, ``processor``, and ``environment``: SHA-256 of the names and versions of everything
+        that is installed, 64 hex digits, which one lock file makes the same everywhere.
+    """
+    installed = sorted({f"{one.name.lower()}=={one.version}" for one in distributions() if one.name})
+    return {
+        "system": platform.system(),
+        "machine": platform.machine(),
+        "processor": _processor(),
+        "environment": sha256("\n".join(installed).encode()).hexdigest(),
+    }
+
+
+def _processor() -> str:
+    """Return the name of the processor, as Linux has it; elsewhere what Python knows of it."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError:
+        return platform.processor()
+    named = (line.partition(":")[2].strip() for line in lines if line.startswith("model name"))
+    return next(named, platform.processor())
 
 
 @cache

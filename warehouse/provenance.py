@@ -36,8 +36,9 @@ def collect(
     -------
     dict
         JSON content with the keys ``inputs``, ``ingest_ids``, ``profile_sha256``, ``code_version``, ``git_commit``,
-        ``packages``, ``python``, ``table_versions``, ``flow_run``, ``channels``: what the channel doctor said of the
-        logs when the set was made, by log id, those with nothing to say left out.
+        ``packages``, ``python``, ``machine`` (system, processor, hash of all that is installed), ``table_versions``,
+        ``flow_run``, ``channels``: what the channel doctor said of the logs when the set was made, by log id, those
+        with nothing to say left out.
     """
     seen = examinations.of_ingests(warehouse, ingest_ids).values() if warehouse is not None and ingest_ids else ()
     if table_versions is None:
@@ -51,6 +52,7 @@ def collect(
         "git_commit": code_version.git_commit(),
         "packages": {name: found for name, found in installed.items() if name != "python"},
         "python": installed["python"],
+        "machine": code_version.machine(),
         "table_versions": dict(sorted(table_versions.items())),
         "flow_run": flow_run,
         "channels": {one.log_id: list(one.findings) for one in seen if one.findings},

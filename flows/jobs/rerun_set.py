@@ -32,8 +32,8 @@ class Rerun:
     verdict: str
     #: Fields that differ.
     differences: list[Difference]
-    #: code_changed, packages_changed: Dict. Whether the code or an effect, and which packages, are others than when the
-    #: set was made.
+    #: code_changed, packages_changed: Dict. Whether the code or an effect, and which packages, or what of the machine,
+    #: are others than when the set was made.
     code_changed: bool
     packages_changed: dict[str, list[str | None]]
 
@@ -141,7 +141,9 @@ def _no_estimator(stored: ParameterSet) -> NotFound:
 def judged(stored: ParameterSet, again: ParameterSet, tolerance: float = 1e-9) -> Rerun:
     """Return the verdict on a parameter set that was computed again."""
     verdict, differences = agreement.verdict(stored, again, tolerance)
-    now, then = code_version.packages(), dict(stored.provenance.get("packages") or {})
+    now = {**code_version.packages(), **code_version.machine()}
+    # sets of earlier versions do not say on which machine they were made
+    then = {**(stored.provenance.get("packages") or {}), **(stored.provenance.get("machine") or {})}
     changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}
     return Rerun(stored.parameter_set_id, verdict, differences, code_changed(inputs_of(stored)), changed)
 

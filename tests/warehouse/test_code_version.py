@@ -99,3 +99,10 @@ def test_importing_the_store_loads_no_heavy_library() -> None:
     )
     done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
+
+
+def test_the_machine_is_named() -> None:
+    found = code_version.machine()
+    assert set(found) == {"system", "machine", "processor", "environment"}
+    assert found["system"] and found["machine"]
+    assert re.fullmatch(r"[0-9a-f]{64}", found["environment"])
