@@ -105,9 +105,7 @@ def remember_all(warehouse: Warehouse, found: Sequence[tuple[VesselReport, FlowR
 
 
 def remember_history(warehouse: Warehouse, reports: Sequence[VesselReport], flow_run: str | None) -> None:
-    """Add what was done for vessels to the history of runs, in one commit."""
-    if not reports:
-        return
+    """Add what was done for vessels to the history of runs, in one commit; those who had nothing to do are left out."""
     rows = [
         {
             "flow": FLOW,
@@ -122,8 +120,10 @@ def remember_history(warehouse: Warehouse, reports: Sequence[VesselReport], flow
             "first_failure": report.failures[0]["error"]["message"] if report.failures else None,
         }
         for report in reports
+        if report.status != "unchanged"
     ]
-    said.add(warehouse, "run_history", *rows)
+    if rows:
+        said.add(warehouse, "run_history", *rows)
 
 
 def _forgotten(run: FlowRun, stored: Mapping[str, FlowRun]) -> list[FlowRun]:

@@ -19,7 +19,7 @@ from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.warehouse import delta, history, logs, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
-from tests.flows.content import fresh
+from tests.flows.content import RUNS, fresh
 from tests.workbench.driving import ROOT, START
 
 ROOMS = ("schemas", "pipeline", "warehouse", "flows", "workbench")
@@ -80,7 +80,7 @@ def source(harbour: Path, tmp_path_factory: pytest.TempPathFactory) -> Source:
 
 
 def versions(place: Path) -> dict[str, int]:
-    return {name: n for name, n in delta.versions(Warehouse(str(place))).items() if name not in ("runs", "aliases")}
+    return {name: n for name, n in delta.versions(Warehouse(str(place))).items() if name not in (*RUNS, "aliases")}
 
 
 def test_remarks_docstrings_and_rooms_of_no_stage_move_nothing(source: Source, tmp_path: Path) -> None:

@@ -20,7 +20,7 @@ from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import aliases, delta, parameter_sets, runs, segments, vessels
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
-from tests.flows.content import fresh, seen
+from tests.flows.content import RUNS, fresh, seen
 
 FLEET = ["cutter", "ferry", "sloop"]
 QUICK = Request(estimator="least-squares")
@@ -56,7 +56,7 @@ def test_one_commit_a_table_and_what_each_alone_would_make(own: Warehouse, tmp_p
     together = reprocess_vessels(own, FLEET)
     after = delta.versions(own)
     assert [(r.vessel, r.status, r.reread, r.new_sets) for r in together] == [(v, "changed", 1, 1) for v in FLEET]
-    written = ("logs", "readings", "rejected", "segments", "examinations", "parameter_sets", "aliases", "runs")
+    written = ("logs", "readings", "rejected", "segments", "examinations", "parameter_sets", "aliases", *RUNS)
     # a table that was not there is made by a commit of its own
     made = {name: after[name] - before.get(name, 0) for name in after if name != "vessels"}
     assert made == dict.fromkeys(written, 1)

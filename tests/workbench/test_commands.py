@@ -195,7 +195,7 @@ def test_the_version_is_that_of_the_package():
         ("ingest",),
         ("identify",),
         ("identify", "--vessel", "x", "--estimator", "guess"),
-        ("history",),
+        ("history", "--occasion", "long"),
         ("rerun", "x", "--tolerance", "much"),
         ("params", "nonsense"),
         ("params", "export", "x", "--format", "xls"),
