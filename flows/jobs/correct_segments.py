@@ -16,7 +16,7 @@ from kempf.flows.jobs.following import Following, of_segments
 from kempf.flows.jobs.search_log import SearchedLog, search_again
 from kempf.pipeline.segment.corrections import same
 from kempf.schemas.correction import Action, Bounds, Correction
-from kempf.schemas.errors import UsageError
+from kempf.schemas.errors import NotFound, UsageError
 from kempf.warehouse import aliases, corrections, logs, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.logs import LogRow
@@ -83,7 +83,7 @@ def plan_for(
     Raises
     ------
     NotFound
-        ``no_warehouse``, ``no_segment``.
+        ``no_warehouse``, ``no_segment``; ``manoeuvre_gone``: the present code finds nothing there.
     UsageError
         ``ambiguous_segment``, ``no_reason``, ``nothing_to_correct``, ``not_a_zigzag``, ``bounds_reversed``,
         ``bounds_outside_log``, ``bounds_overlap``.
@@ -109,9 +109,7 @@ def plan_for(
             "Nothing needs to be done.",
             {"segment_id": segment.segment_id, "action": action},
         )
-    subject = segment.start_utc_ns, segment.end_utc_ns
-    if by_hand:
-        subject = by_hand["subject"]["start_utc_ns"], by_hand["subject"]["end_utc_ns"]
+    subject = _subject(segment) or (segment.start_utc_ns, segment.end_utc_ns)
     return _planned(warehouse, log, segment, Correction(action, subject, bounds_utc_ns, reason.strip()))
 
 
@@ -159,12 +157,14 @@ def _planned(warehouse: Warehouse, log: LogRow, segment: Segment | None, correct
         _require_within(log, correction.bounds_utc_ns)
     said = corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ())
     searched = search_again(warehouse, log, (*said, correction))
-    after = next(
-        one
-        for one in searched.segments
-        if (hand := one.detail.get("by_hand"))
-        and (hand["subject"]["start_utc_ns"], hand["subject"]["end_utc_ns"]) == correction.subject_utc_ns
-    )
+    after = next((one for one in searched.segments if _subject(one) == correction.subject_utc_ns), None)
+    if after is None:
+        raise NotFound(
+            "manoeuvre_gone",
+            f"The search finds nothing any more where this manoeuvre was, {_time(correction.subject_utc_ns)}.",
+            "Give its bounds with `kempf segments correct`, or bring the log up to date with `kempf reprocess`.",
+            {"log_id": log.log_id},
+        )
     _refuse_overlap(searched.segments, after)
     held = [one for one in segments.found_in(warehouse, log.vessel) if one.ingest_id == log.ingest_id]
     stays = {one.segment_id for one in searched.segments if one.excluded is None}
@@ -212,8 +212,18 @@ def _refuse_overlap(found: Sequence[Segment], corrected: Segment) -> None:
             )
 
 
+def _subject(segment: Segment) -> Bounds | None:
+    """Return the bounds of the manoeuvre that a correction was said of; None where nobody said anything."""
+    by_hand = segment.detail.get("by_hand")
+    return (by_hand["subject"]["start_utc_ns"], by_hand["subject"]["end_utc_ns"]) if by_hand else None
+
+
+def _time(bounds: Bounds) -> str:
+    return f"{iso_utc(bounds[0])} to {iso_utc(bounds[1])}"
+
+
 def _span(segment: Segment) -> str:
-    return f"{iso_utc(segment.start_utc_ns)} to {iso_utc(segment.end_utc_ns)}"
+    return _time((segment.start_utc_ns, segment.end_utc_ns))
 
 
 def _require_reason(reason: str) -> None:

@@ -255,6 +255,8 @@ def _read_again(warehouse: Warehouse, name: str) -> str:
 
 
 def _describe(warehouse: Warehouse) -> None:
-    """Keep beside every raw log what its register says."""
+    """Keep beside every raw log what its register says; one whose profile is lost is left as it is."""
+    profiles = {one.profile_sha256: one.profile for one in vessels.all_versions(warehouse)}
     for name, row in logs.find(warehouse, raw.kept(warehouse)).items():
-        raw.describe(warehouse, name, description(row, vessels.get(warehouse, row.profile_sha256)))
+        if row.profile_sha256 in profiles:
+            raw.describe(warehouse, name, description(row, profiles[row.profile_sha256]))

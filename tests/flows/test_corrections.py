@@ -16,7 +16,7 @@ from kempf.flows.jobs.out_of_date import unsearched
 from kempf.flows.jobs.remove_logs import rename_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
-from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import aliases, corrections, history, logs, notes, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
@@ -146,6 +146,18 @@ def test_bounds_that_are_none(warehouse: Warehouse) -> None:
     with pytest.raises(DataRejected, match="no zigzag to describe"):
         plan_for(warehouse, zigzag.segment_id, "correct", "x", (start, start + SECOND_NS))
     assert corrections.all_of(warehouse) == []
+
+
+def test_a_manoeuvre_that_newer_code_does_not_find(warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
+    (zigzag,) = segments.current(warehouse, "mariner")
+    monkeypatch.setattr("kempf.flows.jobs.find_segments.find_manoeuvres", lambda *arguments: [])
+    with pytest.raises(NotFound, match="finds nothing any more") as gone:
+        plan_for(warehouse, zigzag.segment_id, "exclude", "engine slowed")
+    assert gone.value.code == "manoeuvre_gone" and corrections.all_of(warehouse) == []
+    bounds = zigzag.start_utc_ns, zigzag.end_utc_ns
+    plan_for(warehouse, zigzag.segment_id, "correct", "it was one", bounds).store(warehouse)
+    (kept,) = segments.current(warehouse, "mariner")
+    assert (kept.start_utc_ns, kept.end_utc_ns) == bounds
 
 
 def test_the_command_line(warehouse: Warehouse) -> None:
