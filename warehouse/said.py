@@ -7,11 +7,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from datetime import UTC, datetime
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from kempf.warehouse import delta
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    from deltalake import DeltaTable
 
 
 def add(warehouse: Warehouse, name: str, *rows: Mapping[str, Any]) -> int:
@@ -32,8 +35,8 @@ def add(warehouse: Warehouse, name: str, *rows: Mapping[str, Any]) -> int:
 
     def attempt() -> int:
         with delta.ensured(warehouse, name) as table:
-            last = delta.rows(table, name, columns=("number",))["number"].max()
-            number = (int(last) if isinstance(last, int) else 0) + 1
+            # also where rows were lost: a number is never given again
+            number = len(_writes(table)) + 1
             # the predicate names what another writer would add at the same moment: the second one comes again
             delta.replace(table, name, [{**row, "number": number} for row in rows], f"number = {number}")
             return number
@@ -46,6 +49,10 @@ def times(warehouse: Warehouse, name: str) -> dict[int, datetime]:
     with delta.reading(warehouse, name) as table:
         if table is None:
             return {}
-        writes = [entry for entry in table.history() if entry.get("operation") == "WRITE"][::-1]
-        instants = [datetime.fromtimestamp(int(entry["timestamp"]) / 1000.0, UTC) for entry in writes]
+        instants = [datetime.fromtimestamp(int(entry["timestamp"]) / 1000.0, UTC) for entry in _writes(table)]
         return dict(enumerate(instants, start=1))
+
+
+def _writes(table: DeltaTable) -> list[dict[str, Any]]:
+    """Return the commits of a table that added rows, in order."""
+    return [entry for entry in table.history() if entry.get("operation") == "WRITE"][::-1]

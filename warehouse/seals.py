@@ -341,7 +341,9 @@ def mend_log(folder: Path, name: str) -> list[str]:
             copy = copy_of_commit(folder, version)
             if damage.what == "seal":
                 _log_seal(folder, version).unlink()
-                done.append(f"The seal {damage.path} was taken away; it is made anew.")
+                with suppress(FileNotFoundError):
+                    _seal_version(folder, version)
+                done.append(f"The seal {damage.path} was made anew.")
             elif copy is not None:
                 _commit(folder, version).parent.mkdir(parents=True, exist_ok=True)
                 _write(_commit(folder, version), copy)

@@ -206,6 +206,12 @@ class Warehouse:
         except OSError as error:
             raise not_writable(self.uri, error) from error
 
+    def delete(self, *parts: str) -> None:
+        """Delete a file inside, where it is there."""
+        files, root = self._files
+        with contextlib.suppress(FileNotFoundError):
+            files.delete_file("/".join((root, *parts)))
+
     def exists(self) -> bool:
         """Return whether a warehouse is there.
 

@@ -62,7 +62,12 @@ def verify(warehouse: Warehouse, look: Look = lambda what: None) -> list[Problem
         look(f"table {name}")
         found += damages(warehouse, name)
     look("references")
-    return found + list(_references(warehouse))
+    return [*found, *_unfinished(warehouse), *_references(warehouse)]
+
+
+def _unfinished(warehouse: Warehouse) -> Iterator[Problem]:
+    if warehouse.read_bytes("damaged", "unfinished.json") is not None:
+        yield Problem("reference", "readings", "damaged/unfinished.json", "A repair was not finished.")
 
 
 def _raw(warehouse: Warehouse, look: Look) -> Iterator[Problem]:

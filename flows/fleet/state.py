@@ -37,11 +37,11 @@ class VesselState:
     set_ids: tuple[str, ...] = ()
     #: What her aliases point to, sorted.
     aliases: tuple[tuple[str, str], ...] = ()
-    #: Numbers of the corrections of manoeuvres in her logs.
-    corrections: tuple[int, ...] = ()
+    #: What was said of manoeuvres in her logs, in order.
+    corrections: tuple[str, ...] = ()
 
     @property
-    def inputs(self) -> tuple[str, tuple[str, ...], tuple[int, ...]]:
+    def inputs(self) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
         """What reprocessing starts from and does not change itself."""
         return self.profile_sha256, self.log_ids, self.corrections
 
@@ -104,9 +104,9 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
     ingests = rows("logs", "revision", "log_id", "ingest_id", "removed")
     sets = rows("parameter_sets", "parameter_set_id")
     pointers = rows("aliases", "alias", "parameter_set_id")
-    said: dict[str, list[int]] = defaultdict(list)
-    for row in delta.read(warehouse, "corrections", columns=("log_id", "number")).sort("number").rows(named=True):
-        said[row["log_id"]].append(row["number"])
+    said: dict[str, list[str]] = defaultdict(list)
+    for row in delta.read(warehouse, "corrections").sort("number").rows(named=True):
+        said[row["log_id"]].append(canonical_json(row))
     names = sorted(profiles) if asked is None else asked
     return {
         name: _state(name, profiles.get(name, ()), ingests[name], sets[name], pointers[name], said) for name in names
@@ -114,7 +114,7 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
 
 
 def _state(
-    vessel: str, profiles: _Rows, ingests: _Rows, sets: _Rows, pointers: _Rows, said: Mapping[str, Sequence[int]]
+    vessel: str, profiles: _Rows, ingests: _Rows, sets: _Rows, pointers: _Rows, said: Mapping[str, Sequence[str]]
 ) -> VesselState:
     last = {row["log_id"]: row for row in ingests}  # the highest revision stays
     current = {log_id: row["ingest_id"] for log_id, row in last.items() if row["removed"] is None}
@@ -125,5 +125,5 @@ def _state(
         tuple(sorted(current.values())),
         tuple(row["parameter_set_id"] for row in sets),
         tuple((row["alias"], row["parameter_set_id"]) for row in pointers),
-        tuple(number for log_id in sorted(current) for number in said.get(log_id, ())),
+        tuple(one for log_id in sorted(current) for one in said.get(log_id, ())),
     )

@@ -16,7 +16,7 @@ from kempf.flows.jobs.following import Following, of_segments
 from kempf.flows.jobs.search_log import SearchedLog, search_again
 from kempf.pipeline.segment.corrections import same
 from kempf.schemas.correction import Action, Bounds, Correction
-from kempf.schemas.errors import NotFound, UsageError
+from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import aliases, corrections, logs, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.logs import LogRow
@@ -37,22 +37,21 @@ class Planned:
     #: What follows for the vessel.
     following: Following
     _searched: SearchedLog
+    _said: tuple[Correction, ...]
 
     def store(self, warehouse: Warehouse) -> None:
         """Store the correction and what follows from it."""
         # first what was said: where it ends here, the next reprocessing looks through the log again, and the same
         # command goes on
-        if self._last_said(warehouse) != self.correction:
+        before = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
+        if _with(before, self.correction) != before:
             corrections.add(warehouse, self.log.log_id, self.segment_id, self.correction)
-        search_log.store(warehouse, [self._searched])
+        # another person may have corrected the same log meanwhile
+        now = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
+        searched = self._searched if now == self._said else search_again(warehouse, self.log, now)
+        search_log.store(warehouse, [searched])
         if self.following.current:
             aliases.withdraw(warehouse, self.log.vessel)
-
-    def _last_said(self, warehouse: Warehouse) -> Correction | None:
-        """Return what was said of this manoeuvre last."""
-        said = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
-        mine = [one for one in said if one.subject_utc_ns == self.correction.subject_utc_ns]
-        return mine[-1] if mine else None
 
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
@@ -136,7 +135,7 @@ def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason:
     """
     _require_reason(reason)
     log = logs.by_prefix(warehouse, log_name)
-    known = [one for one in segments.found_in(warehouse, log.vessel) if one.ingest_id == log.ingest_id]
+    known = [s for s in segments.found_in(warehouse, log.vessel) if s.ingest_id == log.ingest_id and s.is_zigzag]
     held = next((one for one in known if same((one.start_utc_ns, one.end_utc_ns), bounds_utc_ns)), None)
     if held is not None:
         raise UsageError(
@@ -155,9 +154,18 @@ _DONE = {"correct": "corrected", "exclude": "excluded", "accept": "accepted"}
 def _planned(warehouse: Warehouse, log: LogRow, segment: Segment | None, correction: Correction) -> Planned:
     if correction.bounds_utc_ns is not None:
         _require_within(log, correction.bounds_utc_ns)
-    said = corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ())
-    searched = search_again(warehouse, log, (*said, correction))
+    said = _with(corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ()), correction)
+    searched = search_again(warehouse, log, said)
     after = next((one for one in searched.segments if _subject(one) == correction.subject_utc_ns), None)
+    own = (after.start_utc_ns, after.end_utc_ns) if after else None
+    if correction.bounds_utc_ns not in (None, own):
+        raise DataRejected(
+            "no_legs",
+            f"From {_time(correction.bounds_utc_ns)} the rudder is not held to one side and then to the other with the "
+            "heading following: there is no zigzag to describe.",
+            "Give bounds that hold two legs at least.",
+            {"log_id": log.log_id},
+        )
     if after is None:
         raise NotFound(
             "manoeuvre_gone",
@@ -168,7 +176,11 @@ def _planned(warehouse: Warehouse, log: LogRow, segment: Segment | None, correct
     _refuse_overlap(searched.segments, after)
     held = [one for one in segments.found_in(warehouse, log.vessel) if one.ingest_id == log.ingest_id]
     stays = {one.segment_id for one in searched.segments if one.excluded is None}
-    gone = [one.segment_id for one in held if one.excluded is None and one.segment_id not in stays]
+    lost = [one for one in held if one.excluded is None and one.segment_id not in stays]
+    for one in lost:
+        if one.is_zigzag and segment is not None and one.segment_id != segment.segment_id:
+            raise _overlap(one)
+    gone = [one.segment_id for one in lost]
     return Planned(
         log,
         segment.segment_id if segment else None,
@@ -177,6 +189,7 @@ def _planned(warehouse: Warehouse, log: LogRow, segment: Segment | None, correct
         after,
         of_segments(warehouse, log.vessel, gone),
         searched,
+        said,
     )
 
 
@@ -204,12 +217,22 @@ def _refuse_overlap(found: Sequence[Segment], corrected: Segment) -> None:
     for one, other in pairwise(zigzags):
         if one.end_utc_ns > other.start_utc_ns and corrected.segment_id in (one.segment_id, other.segment_id):
             beside = other if one.segment_id == corrected.segment_id else one
-            raise UsageError(
-                "bounds_overlap",
-                f"These bounds overlap the zigzag {beside.segment_id}, {_span(beside)}.",
-                "Give bounds that do not, or exclude that one first with `kempf segments exclude`.",
-                {"segment_id": beside.segment_id},
-            )
+            raise _overlap(beside)
+
+
+def _overlap(beside: Segment) -> UsageError:
+    return UsageError(
+        "bounds_overlap",
+        f"These bounds overlap the zigzag {beside.segment_id}, {_span(beside)}.",
+        "Give bounds that do not, or exclude that one first with `kempf segments exclude`.",
+        {"segment_id": beside.segment_id},
+    )
+
+
+def _with(said: Sequence[Correction], correction: Correction) -> tuple[Correction, ...]:
+    """Return what was said of a log with one more; a command that was killed and is repeated says nothing more."""
+    mine = [one for one in said if one.subject_utc_ns == correction.subject_utc_ns]
+    return tuple(said) if mine and mine[-1] == correction else (*said, correction)
 
 
 def _subject(segment: Segment) -> Bounds | None:

@@ -56,11 +56,6 @@ def find_segments(
         The zigzags, and behind them what else was found; those that a person excluded are among them.
     tuple of str
         What a person should know: choices made in normalising, or the channel whose absence forbids the search.
-
-    Raises
-    ------
-    DataRejected
-        ``no_legs``: there is no zigzag between bounds that a person gave.
     """
     heading, rudder = instruments.get("heading"), instruments.get("rudder_angle")
     absent = [name for name, series in (("heading", heading), ("rudder_angle", rudder)) if series is None]
@@ -70,7 +65,7 @@ def find_segments(
         return [], (*instruments.notes, note)
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
     standing = corrections.standing(said)
-    marked = corrections.applied(
+    marked, notes = corrections.applied(
         find_manoeuvres(heading, rudder, speed),
         standing,
         lambda bounds: zigzag_between(heading, rudder, speed, *bounds),
@@ -78,7 +73,7 @@ def find_segments(
     manoeuvres = [_marked(one, ingest, profile, instruments) for one in marked]
     turning = find_turning(instruments, [one.zigzag for one in marked])
     others = [_with(_kept_aside(one, ingest, profile), standing) for one in turning]
-    return manoeuvres + others, instruments.notes
+    return manoeuvres + others, (*instruments.notes, *notes)
 
 
 def _marked(one: Marked, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:

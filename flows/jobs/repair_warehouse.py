@@ -8,6 +8,7 @@ again, and are counted.
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -30,6 +31,8 @@ from kempf.warehouse.verify import Problem, verify
 
 #: where damaged files are kept aside, below the warehouse
 ASIDE = "damaged"
+#: what a repair that was cut off has still to do
+UNFINISHED = (ASIDE, "unfinished.json")
 #: tables whose rows come of the bytes of a log and of nothing else
 _OF_LOGS = ("readings", "rejected", "lost", "examinations", "segments")
 
@@ -46,6 +49,8 @@ class Repaired:
     #: Of what logs gave that had to be taken out: ingests, and keys of vessels; None stands for all of them.
     ingests: set[str] = field(default_factory=set)
     vessel_keys: set[str | None] = field(default_factory=set)
+    #: Whether rows of the register of logs had to be taken out: then what is kept beside the raw logs counts.
+    registers: bool = False
 
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
@@ -66,6 +71,7 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
     if warehouse.mend_marker():
         found.done.append("The file that marks the warehouse was written anew.")
     warehouse.require()
+    _recall(warehouse, found)
     if warehouse.folder is not None:
         for name in TABLES:
             progress(0, 1, f"table {name}")
@@ -74,9 +80,12 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
             except KempfError as error:  # the other tables are mended all the same
                 found.gone.append(f"the table {name}: {error.message}")
     _profiles(warehouse, found)
-    _each(warehouse, found, progress, _missing_logs(warehouse), _taken_in)
+    _removed_again(warehouse, found)
+    _each(warehouse, found, progress, _missing_logs(warehouse, found), _taken_in)
     _each(warehouse, found, progress, _unread_logs(warehouse, found), _read_again)
     _describe(warehouse)
+    if not _unread_left(found):
+        warehouse.delete(*UNFINISHED)
     found.left = verify(warehouse, lambda what: progress(0, 1, what))
     found.gone += [f"{one.words} Ingest the original file again." for one in found.left if one.kind == "raw log"]
     return found
@@ -98,12 +107,14 @@ def _table(warehouse: Warehouse, folder: Path, name: str, found: Repaired) -> No
     bad = [path for path in sorted(every) if _is_bad(folder, name, path, live)]
     rows = _rows_by_file(table)
     for path in bad:
+        if path in live:
+            # first: where it ends here, the next repair goes on
+            _remember(warehouse, folder, path, name, found)
         _put_aside(warehouse, folder, path)
         if path in live:
             count = rows.get(path.name)
             said = f"{count} rows" if count is not None else "rows"
             found.done.append(f"{name}/{path.relative_to(folder).as_posix()} was taken out of its table.")
-            _remember(folder, path, name, found)
             if name not in _OF_LOGS and name != "logs":
                 found.gone.append(f"{said} of the table {name}{_AFTER.get(name, '')}")
         else:
@@ -113,15 +124,33 @@ def _table(warehouse: Warehouse, folder: Path, name: str, found: Repaired) -> No
     seals.seal(table)
 
 
-def _remember(folder: Path, path: Path, name: str, found: Repaired) -> None:
-    """Note of whom a data file was, where the bytes of logs give it again."""
-    if name not in _OF_LOGS:
-        return
+def _remember(warehouse: Warehouse, folder: Path, path: Path, name: str, found: Repaired) -> None:
+    """Note of whom a data file was, where the raw logs give it again, and keep that until it is done."""
     parts = dict(part.partition("=")[::2] for part in path.relative_to(folder).parts[:-1])
-    if "ingest_id" in parts:
+    if name == "logs":
+        found.registers = True
+    elif name not in _OF_LOGS:
+        return
+    elif "ingest_id" in parts:
         found.ingests.add(parts["ingest_id"])
     else:
         found.vessel_keys.add(parts.get("vessel_key"))
+    content = {
+        "ingests": sorted(found.ingests),
+        "vessel_keys": sorted(found.vessel_keys, key=str),
+        "registers": found.registers,
+    }
+    warehouse.write_bytes(json.dumps(content).encode(), *UNFINISHED)
+
+
+def _recall(warehouse: Warehouse, found: Repaired) -> None:
+    """Go on with what an earlier repair did not finish."""
+    data = warehouse.read_bytes(*UNFINISHED)
+    if data is not None:
+        content = json.loads(data)
+        found.ingests |= set(content["ingests"])
+        found.vessel_keys |= set(content["vessel_keys"])
+        found.registers = bool(content["registers"])
 
 
 _AFTER = {
@@ -187,9 +216,22 @@ def _each(
             found.gone.append(f"the log {name}: {wrapped(error).message}")
 
 
-def _missing_logs(warehouse: Warehouse) -> list[str]:
-    """Return the raw logs that no register knows, and that were not removed."""
-    known = {row.log_id for row in logs.all_ingests(warehouse)}
+def _removed_again(warehouse: Warehouse, found: Repaired) -> None:
+    """Let logs count no longer of which it is kept beside them that they were removed, or that they are another's."""
+    if not found.registers:
+        return
+    for row in logs.current(warehouse):
+        facts = raw.described(warehouse, row.log_id)
+        if facts is not None and (facts.get("removed") or facts["vessel"] != row.vessel):
+            reason = facts.get("removed") or f"moved to {facts['vessel']!r}"
+            logs.mark(warehouse, [row.log_id], reason)
+            found.done.append(f"{row.file_name} of {row.vessel} counts no longer, as before: {reason}.")
+
+
+def _missing_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
+    """Return the raw logs that should count, by what is kept beside them, and that no register lets count."""
+    current = {row.log_id for row in logs.current(warehouse)}
+    known = current if found.registers else {row.log_id for row in logs.all_ingests(warehouse)}
     described = {name: raw.described(warehouse, name) for name in raw.kept(warehouse) if name not in known}
     return [name for name, facts in described.items() if facts is not None and not facts.get("removed")]
 
@@ -207,13 +249,20 @@ def _taken_in(warehouse: Warehouse, name: str) -> str:
 def _profiles(warehouse: Warehouse, found: Repaired) -> None:
     """Register the profiles again that logs were read with and that are lost, those of later logs last."""
     known = {version.profile_sha256 for version in vessels.all_versions(warehouse)}
-    rows = [row for row in logs.current(warehouse) if row.profile_sha256 not in known]
-    for row in rows:
+    rows = [*logs.removed(warehouse), *logs.current(warehouse)]
+    lost = [row for row in rows if row.profile_sha256 not in known]
+    now = vessels.profiles(warehouse)
+    for row in lost:
         facts = raw.described(warehouse, row.log_id)
         if facts is not None:
             vessels.register(warehouse, row.vessel, parse(facts["profile"], f"raw/{row.log_id}.json"))
-    if rows:
-        found.done.append(f"The profiles of {len({row.vessel for row in rows})} vessels were registered again.")
+    for vessel in sorted({row.vessel for row in lost} & now.keys()):
+        vessels.register(warehouse, vessel, now[vessel])  # what was current and not lost stays current
+    removed = {row.vessel for row in lost} - {row.vessel for row in logs.current(warehouse)} - now.keys()
+    for vessel in sorted(removed):
+        vessels.remove(warehouse, vessel, "her logs were removed")
+    if lost:
+        found.done.append(f"Profiles were registered again: {', '.join(sorted({row.vessel for row in lost}))}.")
 
 
 def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
@@ -228,6 +277,11 @@ def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
         return not touched and row.ingest_id in held and row.ingest_id in examined
 
     return [row.log_id for row in rows if not whole(row)]
+
+
+def _unread_left(found: Repaired) -> bool:
+    """Return whether a log that was to be read again could not be."""
+    return any(words.startswith("the log ") for words in found.gone)
 
 
 def _partitions(warehouse: Warehouse, name: str) -> set[str]:

@@ -54,11 +54,6 @@ def search(
         Of the log.
     said : sequence of Correction, optional
         What a person said of its manoeuvres.
-
-    Raises
-    ------
-    DataRejected
-        ``no_legs``: there is no zigzag between bounds that a person gave.
     """
     found, notes = find_segments(log, profile, instruments, said)
     give_back(records)
@@ -90,8 +85,6 @@ def search_again(warehouse: Warehouse, row: LogRow, said: Sequence[Correction]) 
     ------
     NotFound
         ``no_profile``: the profile that it was read with is lost.
-    DataRejected
-        ``no_legs``: there is no zigzag between bounds that a person gave.
     """
     profile = vessels.get(warehouse, row.profile_sha256)
     log = Ingest(row.vessel, row.log_id, row.ingest_id, row.file_name)

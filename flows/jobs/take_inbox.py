@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import PurePosixPath
 from typing import Any
 
@@ -26,13 +26,11 @@ from kempf.warehouse.store import Warehouse
 SETTLE_S = 60.0
 #: errors that are the warehouse's or the inbox's and no file's: the run ends with them
 _NO_FILES = (
-    "disk_full",
-    "warehouse_not_writable",
-    "warehouse_unreachable",
-    "table_unreadable",
-    "table_damaged",
-    "inbox_unreadable",
+    *("disk_full", "warehouse_not_writable", "warehouse_unreachable", "table_unreadable", "table_damaged"),
+    *("warehouse_busy", "warehouse_layout", "warehouse_marker_damaged", "inbox_unreadable"),
 )
+#: errors that may be gone at the next attempt though the file is the same
+_PASSING = ("file_unreadable", "no_such_file", "log_unreadable", "internal")
 #: files whose outcome is stored together
 _TOGETHER = 50
 
@@ -139,7 +137,7 @@ def take_inbox(
         else:
             due.append(_placed(register, file))
     todo = [one for one in due if one.is_new(before.get(one.file.address))]
-    rows, outcomes = folders.rows(before), []
+    rows, outcomes = [*folders.rows(before), *_gone(files, before)], []
     for done, one in enumerate(todo):
         progress(done, len(todo), f"reading {one.file.name}")
         row, outcome = take(warehouse, folder, one)
@@ -162,6 +160,13 @@ def take_inbox(
         tuple(waiting),
         len(due) - len(todo),
     )
+
+
+def _gone(files: Sequence[SourceFile], before: Mapping[str, InboxFile]) -> list[InboxFile]:
+    """Return the rows that end the quarantine of files that were moved, renamed or deleted."""
+    there = {file.address for file in files}
+    left = [one for one in before.values() if one.outcome == "quarantined" and one.address not in there]
+    return [replace(one, outcome="dismissed", message="It is no longer in the inbox.", next_step=None) for one in left]
 
 
 @dataclass(frozen=True, eq=False)
@@ -236,7 +241,7 @@ class Placed:
             return True
         if (known.size_bytes, known.modified_utc_ns) != (self.file.size_bytes, self.file.modified_utc_ns):
             return True
-        return known.outcome == "quarantined" and known.basis != self.basis
+        return known.outcome == "quarantined" and (known.basis != self.basis or known.code in _PASSING)
 
 
 def _placed(register: Register, file: SourceFile) -> Placed:

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 from kempf.pipeline.segment.zigzag import Zigzag
 from kempf.schemas.correction import Action, Bounds, Correction
+from kempf.schemas.errors import DataRejected
 
 #: bounds are of the same manoeuvre where they share more than this of the shorter one
 _SAME = 0.5
@@ -77,7 +78,7 @@ def standing(corrections: Sequence[Correction]) -> tuple[Standing, ...]:
 
 def applied(
     found: Sequence[Zigzag], said: Sequence[Standing], between: Callable[[Bounds], Zigzag]
-) -> tuple[Marked, ...]:
+) -> tuple[tuple[Marked, ...], tuple[str, ...]]:
     """Lay what was said over the zigzags that were found.
 
     Parameters
@@ -94,12 +95,25 @@ def applied(
     tuple of Marked
         In order of time: those that do not count are among them. One that was given other bounds takes the place of
         every one that was found there.
+    tuple of str
+        Of bounds given by a person that hold no zigzag, one sentence each: they stop nothing else.
     """
-    by_hand = [one for one in said if one.bounds_utc_ns is not None]
-    marked = [Marked(between(one.bounds_utc_ns), one) for one in by_hand if one.bounds_utc_ns is not None]
+    by_hand, marked, notes = [], [], []
+    for one in said:
+        if one.bounds_utc_ns is None:
+            continue
+        try:
+            marked.append(Marked(between(one.bounds_utc_ns), one))
+            by_hand.append(one)
+        except DataRejected:
+            if one.excluded is None:
+                notes.append(
+                    f"a zigzag {'added' if one.action == 'add' else 'corrected'} by hand ({one.reason}) is not there: "
+                    "between its bounds the rudder is not held to one side and then to the other"
+                )
     for zigzag in found:
         bounds = zigzag.start_utc_ns, zigzag.end_utc_ns
         if any(one.concerns(*bounds) for one in by_hand):
             continue
         marked.append(Marked(zigzag, next((one for one in said if one.concerns(*bounds)), None)))
-    return tuple(sorted(marked, key=lambda one: (one.zigzag.start_utc_ns, one.zigzag.end_utc_ns)))
+    return tuple(sorted(marked, key=lambda one: (one.zigzag.start_utc_ns, one.zigzag.end_utc_ns))), tuple(notes)

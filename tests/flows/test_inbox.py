@@ -141,6 +141,29 @@ def test_an_inbox_that_is_none(tmp_path: Path, warehouse: Warehouse) -> None:
     assert taken(tmp_path / "empty", warehouse).show()["known"] == 0 and not warehouse.exists()
 
 
+def test_a_folder_that_was_renamed_waits_for_nobody_any_more(place: Path, mariner: Ship, warehouse: Warehouse) -> None:
+    taken(place, warehouse)
+    (place / "marinner").mkdir()
+    (place / "marinner" / "second.nmea.gz").write_bytes(mariner.nmea)
+    (place / "mariner" / "minutes.pdf").unlink()
+    assert [Path(one.address).name for one in taken(place, warehouse).quarantined] == ["second.nmea.gz"]
+    (place / "marinner" / "second.nmea.gz").rename(place / "mariner" / "second.nmea.gz")
+    done = taken(place, warehouse)
+    assert [Path(one.path).name for one in done.ingested] == ["second.nmea.gz"] and done.quarantined == ()
+
+
+def test_a_file_that_could_not_be_read_for_a_moment_is_tried_again(
+    place: Path, warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def failing(*_: object) -> None:
+        raise KempfError("file_unreadable", "The share did not answer.", "Look at it.")
+
+    with monkeypatch.context() as patched:
+        patched.setattr("kempf.flows.jobs.take_inbox.ingest_log", failing)
+        assert len(taken(place, warehouse).quarantined) == 2
+    assert [Path(one.path).name for one in taken(place, warehouse).ingested] == ["day.csv.gz"]
+
+
 def test_a_full_disk_is_no_files_fault(place: Path, warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch) -> None:
     def full(*_: object) -> None:
         raise KempfError("disk_full", "There is no room left.", "Make room on it.")

@@ -12,7 +12,7 @@ import pytest
 from kempf.flows.jobs.correct_segments import plan_for
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
-from kempf.flows.jobs.remove_logs import remove, restore
+from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, restore
 from kempf.flows.jobs.repair_warehouse import repair
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.warehouse import aliases, corrections, logs, raw, segments, table_cache, vessels
@@ -152,3 +152,64 @@ def test_a_warehouse_in_which_all_is_well_is_left_alone(warehouse: Warehouse) ->
     assert kempf("verify", "--warehouse", warehouse.uri).out.strip() == "all is well"
     output = kempf("repair", "--warehouse", warehouse.uri)
     assert output.code == 0 and output.out.strip() == "nothing had to be done"
+
+
+def newest(warehouse: Warehouse, table: str) -> Path:
+    return max(files(warehouse, table), key=lambda path: path.stat().st_mtime_ns)
+
+
+def test_a_removed_log_stays_removed_and_a_moved_one_where_it_was_moved(warehouse: Warehouse) -> None:
+    (ferry,) = logs.current(warehouse, "ferry")
+    remove(warehouse, [ferry], "not hers")
+    flipped(newest(warehouse, "logs"))
+    table_cache.forget()
+    assert repair(warehouse).left == []
+    assert [row.removed for row in logs.removed(warehouse, "ferry")] == ["not hers"]
+    assert logs.current(warehouse, "ferry") == []
+    restore(warehouse, ferry.log_id)
+    move(warehouse, ferry.log_id, "mariner", "copied into the wrong folder")
+    flipped(newest(warehouse, "logs"))
+    table_cache.forget()
+    assert repair(warehouse).left == []
+    assert ferry.log_id in {row.log_id for row in logs.current(warehouse, "mariner")}
+    assert (raw.described(warehouse, ferry.log_id) or {})["vessel"] == "mariner"
+
+
+def cut_off(*_: object) -> None:
+    raise KeyboardInterrupt
+
+
+def test_a_repair_that_was_cut_off_is_finished_by_the_next(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    wanted = content(warehouse)["segments"]
+    for path in files(warehouse, "segments"):
+        flipped(path)
+    with monkeypatch.context() as patched:
+        patched.setattr("kempf.flows.jobs.repair_warehouse._profiles", cut_off)
+        with pytest.raises(KeyboardInterrupt):
+            repair(warehouse)
+    assert [one.where for one in verify(warehouse)] == ["damaged/unfinished.json"]
+    assert repair(warehouse).left == [] and content(warehouse)["segments"] == wanted
+
+
+def test_profiles_come_again_and_what_was_current_stays(warehouse: Warehouse) -> None:
+    before = files(warehouse, "vessels")
+    newer = vessels.current(warehouse, "mariner").model_copy(update={"length_m": 99.0})
+    vessels.register(warehouse, "mariner", newer)
+    remove_vessel(warehouse, "ferry", "a rehearsal")
+    for path in before:
+        flipped(path)
+    table_cache.forget()
+    assert repair(warehouse).left == []
+    assert vessels.names(warehouse) == ["mariner"] and vessels.current(warehouse, "mariner").length_m == 99.0
+
+
+def test_the_marker_is_mended_by_the_command(warehouse: Warehouse) -> None:
+    assert warehouse.folder is not None
+    marker = warehouse.folder / "kempf-warehouse.json"
+    for harm in (Path.unlink, lambda path: path.write_text("{")):
+        harm(marker)
+        output = kempf("repair", "--warehouse", warehouse.uri, "--json")
+        assert output.code == 0 and output.json["done"] == ["The file that marks the warehouse was written anew."]
+        assert len(logs.current(warehouse)) == 2

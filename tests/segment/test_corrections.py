@@ -62,7 +62,7 @@ def test_a_corrected_zigzag_takes_the_place_of_the_one_found(log: tuple[Series, 
     found = zigzag.start_utc_ns, zigzag.end_utc_ns
     # to where the second leg from the end begins
     bounds = zigzag.start_utc_ns + 2 * SECOND_NS, zigzag.executes[-2].time_utc_ns
-    (one,) = applied(
+    ((one,), _) = applied(
         [zigzag], standing([said("correct", found, bounds)]), lambda b: zigzag_between(heading, rudder, None, *b)
     )
     corrected = one.zigzag
@@ -77,7 +77,7 @@ def test_a_corrected_zigzag_takes_the_place_of_the_one_found(log: tuple[Series, 
     assert all(before[1] == after[0] for before, after in pairwise(edges))
     # newer code finds it a little later: the correction is of the same manoeuvre
     late = (zigzag.start_utc_ns - 3 * SECOND_NS, zigzag.end_utc_ns)
-    (again,) = applied(
+    ((again,), _) = applied(
         [zigzag], standing([said("correct", late, bounds)]), lambda b: zigzag_between(heading, rudder, None, *b)
     )
     assert again.zigzag == corrected
@@ -85,7 +85,9 @@ def test_a_corrected_zigzag_takes_the_place_of_the_one_found(log: tuple[Series, 
 
 def test_an_excluded_one_stays_and_is_marked(log: tuple[Series, Series, Zigzag]) -> None:
     _, _, zigzag = log
-    (one,) = applied([zigzag], standing([said("exclude", (zigzag.start_utc_ns, zigzag.end_utc_ns))]), lambda _: zigzag)
+    ((one,), _) = applied(
+        [zigzag], standing([said("exclude", (zigzag.start_utc_ns, zigzag.end_utc_ns))]), lambda _: zigzag
+    )
     assert one.zigzag == zigzag and one.standing is not None and one.standing.excluded == "because of exclude"
 
 
@@ -104,3 +106,15 @@ def test_what_the_search_refuses_is_described_where_a_person_says_so() -> None:
     zigzag = zigzag_between(heading, rudder, None, int(rudder.time_utc_ns[0]), int(rudder.time_utc_ns[-1]))
     assert len(zigzag.executes) >= 4 and zigzag.delta0_deg == 20.0
     assert np.isfinite(zigzag.psi0_deg)
+
+
+def test_bounds_that_hold_no_zigzag_any_more_stop_nothing(log: tuple[Series, Series, Zigzag]) -> None:
+    heading, rudder, zigzag = log
+    before = zigzag.executes[0].time_utc_ns
+    nothing = before - 30 * SECOND_NS, before - SECOND_NS
+    spoken = [said("add", nothing, nothing)]
+    found, notes = applied([zigzag], standing(spoken), lambda b: zigzag_between(heading, rudder, None, *b))
+    assert [one.zigzag for one in found] == [zigzag]
+    assert len(notes) == 1 and "added by hand (because of add) is not there" in notes[0]
+    spoken.append(said("exclude", nothing))
+    assert applied([zigzag], standing(spoken), lambda b: zigzag_between(heading, rudder, None, *b))[1] == ()

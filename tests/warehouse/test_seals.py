@@ -107,7 +107,7 @@ def test_a_damaged_seal_stops_nobody_and_is_found(warehouse: Warehouse) -> None:
     assert len(damages(warehouse, "runs")) == 2
     place = folder(warehouse)
     done = seals.mend_log(place, "runs") + seals.mend_seals(place, "runs", sorted(place.glob("*.parquet")))
-    assert len(done) == 2
+    assert len(done) == 2 and seals.copy_of_commit(place, 2) == commit(warehouse, 2).read_bytes()
     with delta.reading(warehouse, "runs") as table:
         assert table is not None
         vars(table).pop("kempf_sealed", None)

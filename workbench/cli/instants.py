@@ -48,7 +48,9 @@ def end_of(text: str, option: str) -> datetime:
     '2025-05-03T23:59:59.999999+00:00'
     """
     instant = instant_of(text, option)
-    return instant + timedelta(days=1) - timedelta(microseconds=1) if _DATE.fullmatch(text.strip()) else instant
+    # without passing through the day behind: the last day there is has none
+    day = timedelta(hours=23, minutes=59, seconds=59, microseconds=999_999)
+    return instant + day if _DATE.fullmatch(text.strip()) else instant
 
 
 def utc_ns_of(text: str, option: str) -> int:

@@ -28,12 +28,15 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     from kempf.warehouse.verify import verify
 
     warehouse = Warehouse(uri)
+    mended = warehouse.mend_marker()
     with progress_bar() as progress:
         found = verify(warehouse, lambda what: progress(0, 1, what))
     if found:
         confirm(f"{counted(len(found), 'problem')}, the first: {found[0].words.rstrip('.')}", yes=yes)
     with progress_bar() as progress:
         done = repair(warehouse, progress)
+    if mended:
+        done.done.insert(0, "The file that marks the warehouse was written anew.")
     if as_json:
         print_json(done.show())
     else:
@@ -43,6 +46,7 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
             click.echo(f"lost: {one_line(words)}")
         for one in done.left:
             click.echo(f"still wrong: {one_line(one.words)}")
-        click.echo("next: kempf reprocess" if done.done or done.gone else "nothing had to be done")
+        nothing = "nothing could be made again" if done.left else "nothing had to be done"
+        click.echo("next: kempf reprocess" if done.done or done.gone else nothing)
     if done.left:
         sys.exit(DataRejected.exit_code)
