@@ -7,6 +7,7 @@ from typing import Any, Literal
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from kempf.schemas.errors import UsageError
+from kempf.schemas.faults import faults_of
 
 #: What a finding is of, one and several.
 FINDINGS = {
@@ -72,7 +73,7 @@ def parse(content: Any, where: str) -> Quality:
     try:
         return Quality.model_validate({} if content is None else content)
     except ValidationError as error:
-        faults = [f"{'.'.join(map(str, f['loc'])) or 'file'}: {f['msg']}" for f in error.errors()]
+        faults = faults_of(error, "file", content)
         raise UsageError(
             "quality_invalid",
             f"{where} does not say how many findings a vessel may have: {'; '.join(faults)}.",

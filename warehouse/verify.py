@@ -13,6 +13,10 @@ from kempf.warehouse import delta, logs, raw, seals, vessels
 from kempf.warehouse.deposit import description
 from kempf.warehouse.store import Warehouse
 
+#: where a repair keeps damaged files aside, below the warehouse, and what it has still to do where it was cut off
+ASIDE = "damaged"
+UNFINISHED = (ASIDE, "unfinished.json")
+
 Kind = Literal["raw log", "table", "reference"]
 
 
@@ -66,8 +70,8 @@ def verify(warehouse: Warehouse, look: Look = lambda what: None) -> list[Problem
 
 
 def _unfinished(warehouse: Warehouse) -> Iterator[Problem]:
-    if warehouse.read_bytes("damaged", "unfinished.json") is not None:
-        yield Problem("reference", "readings", "damaged/unfinished.json", "A repair was not finished.")
+    if warehouse.read_bytes(*UNFINISHED) is not None:
+        yield Problem("reference", "readings", "/".join(UNFINISHED), "A repair was not finished.")
 
 
 def _raw(warehouse: Warehouse, look: Look) -> Iterator[Problem]:

@@ -14,12 +14,10 @@ import shutil
 import signal
 import subprocess
 import sys
-import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass, field, replace
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -28,7 +26,7 @@ import yaml
 
 from benchmarks.result_page import table, write
 from tests.scale.conftest import Server, prefect_server
-from tests.scale.servers import ROOT, environment, wait_for
+from tests.scale.servers import ROOT, environment, receiver, running, wait_for
 
 ROOMS = ("schemas", "pipeline", "warehouse", "flows", "workbench", "kempf")
 FILES = ("prefect.yaml", "quality.yaml", "pyproject.toml")
@@ -80,40 +78,9 @@ class Harbour:
     @contextmanager
     def worker(self) -> Iterator[subprocess.Popen[bytes]]:
         """Let a worker run, in a process group of its own."""
-        with (self.folder / "worker.log").open("ab") as log:
-            process = subprocess.Popen(
-                ["prefect", "worker", "start", "--pool", "kempf"],
-                **{"env": self.env, "cwd": self.source, "stdout": log, "stderr": log, "start_new_session": True},
-            )
-            try:
-                yield process
-            finally:
-                with suppress(ProcessLookupError):
-                    os.killpg(process.pid, signal.SIGKILL)
-                process.wait()
-
-
-@contextmanager
-def receiver() -> Iterator[tuple[str, list[dict[str, Any]]]]:
-    """Lend an address, and what is posted to it."""
-    received: list[dict[str, Any]] = []
-
-    class Receiver(BaseHTTPRequestHandler):
-        def do_POST(self) -> None:
-            received.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
-            self.send_response(204)
-            self.end_headers()
-
-        def log_message(self, *arguments: Any) -> None:
-            """Say nothing."""
-
-    server = ThreadingHTTPServer(("127.0.0.1", 0), Receiver)
-    threading.Thread(target=server.serve_forever, daemon=True).start()
-    try:
-        yield f"http://127.0.0.1:{server.server_port}/alarm", received
-    finally:
-        server.shutdown()
-        server.server_close()
+        command = ["prefect", "worker", "start", "--pool", "kempf"]
+        with running(command, self.env, self.folder / "worker.log", cwd=self.source) as process:
+            yield process
 
 
 @contextmanager

@@ -13,6 +13,7 @@ from typing import Any
 
 from kempf.flows.jobs import search_log
 from kempf.flows.jobs.following import Following, of_segments
+from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.search_log import SearchedLog, search_again
 from kempf.pipeline.segment.corrections import same
 from kempf.schemas.correction import Action, Bounds, Correction
@@ -89,7 +90,7 @@ def plan_for(
     DataRejected
         ``no_legs``: between these bounds is no zigzag.
     """
-    _require_reason(reason)
+    require_reason(reason)
     segment = segments.by_prefix(warehouse, name)
     log = logs.of_ingest(warehouse, segment.ingest_id)
     by_hand = segment.detail.get("by_hand")
@@ -133,7 +134,7 @@ def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason:
     DataRejected
         ``no_legs``: between these bounds is no zigzag.
     """
-    _require_reason(reason)
+    require_reason(reason)
     log = logs.by_prefix(warehouse, log_name)
     known = [s for s in segments.found_in(warehouse, log.vessel) if s.ingest_id == log.ingest_id and s.is_zigzag]
     held = next((one for one in known if same((one.start_utc_ns, one.end_utc_ns), bounds_utc_ns)), None)
@@ -247,8 +248,3 @@ def _time(bounds: Bounds) -> str:
 
 def _span(segment: Segment) -> str:
     return _time((segment.start_utc_ns, segment.end_utc_ns))
-
-
-def _require_reason(reason: str) -> None:
-    if not reason.strip():
-        raise UsageError("no_reason", "The reason is blank.", "Say why with --reason, for those who come after.")

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from kempf.flows.jobs.following import Following, of_logs
+from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
 from kempf.schemas.errors import NotFound, UsageError
@@ -34,7 +35,7 @@ def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Followi
     UsageError
         ``no_reason``.
     """
-    _require_reason(reason)
+    require_reason(reason)
     found = of_logs(warehouse, rows)
     _mark(warehouse, rows, reason)
     if found.current:
@@ -105,7 +106,7 @@ def move(
     KempfError
         It cannot be read with the other vessel's profile; then nothing has changed.
     """
-    _require_reason(reason)
+    require_reason(reason)
     row = _held_or_removed(warehouse, name)
     whose, profile = settle_vessel(warehouse, vessel, None, new_vessel=new_vessel)
     if row.vessel == whose and row.removed is None:
@@ -148,7 +149,7 @@ def remove_vessel(warehouse: Warehouse, vessel: str, reason: str) -> Following |
     UsageError
         ``no_reason``.
     """
-    _require_reason(reason)
+    require_reason(reason)
     vessels.require(warehouse, vessel)
     held = logs.current(warehouse, vessel)
     found = remove(warehouse, held, reason) if held else None
@@ -176,7 +177,7 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
     UsageError
         ``vessel_exists``, ``no_reason``, ``vessel_name``.
     """
-    _require_reason(reason)
+    require_reason(reason)
     profile = vessels.current(warehouse, vessel)
     known = vessels.profiles(warehouse)
     renamed = profile.model_copy(update={"vessel": name})
@@ -193,8 +194,3 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
         move(warehouse, row.log_id, name, reason)
     vessels.remove(warehouse, vessel, f"renamed to {name!r}: {reason}")
     return logs.current(warehouse, name)
-
-
-def _require_reason(reason: str) -> None:
-    if not reason.strip():
-        raise UsageError("no_reason", "The reason is blank.", "Say why with --reason, for those who come after.")

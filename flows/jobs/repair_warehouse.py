@@ -27,12 +27,8 @@ from kempf.warehouse.deposit import description
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import Problem, verify
+from kempf.warehouse.verify import ASIDE, UNFINISHED, Problem, verify
 
-#: where damaged files are kept aside, below the warehouse
-ASIDE = "damaged"
-#: what a repair that was cut off has still to do
-UNFINISHED = (ASIDE, "unfinished.json")
 #: tables whose rows come of the bytes of a log and of nothing else
 _OF_LOGS = ("readings", "rejected", "lost", "examinations", "segments")
 
@@ -64,8 +60,6 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
     ------
     NotFound
         ``no_warehouse``.
-    UsageError
-        ``not_a_folder``: a bucket keeps its own checksums and copies.
     """
     found = Repaired()
     if warehouse.mend_marker():

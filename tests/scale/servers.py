@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
+from typing import Any
 
 ROOT = Path(__file__).parents[2]
 
@@ -31,12 +35,18 @@ def environment(**more: str) -> dict[str, str]:
 
 @contextmanager
 def running(
-    command: list[str], env: Mapping[str, str], log: Path, *, port: int | None = None, within_s: float = 300.0
+    command: list[str],
+    env: Mapping[str, str],
+    log: Path,
+    *,
+    port: int | None = None,
+    within_s: float = 300.0,
+    cwd: Path = ROOT,
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Start a process, wait until it listens, and end it with its whole group."""
     with log.open("wb") as out:
         process = subprocess.Popen(
-            command, env=dict(env), cwd=ROOT, stdout=out, stderr=subprocess.STDOUT, start_new_session=True
+            command, env=dict(env), cwd=cwd, stdout=out, stderr=subprocess.STDOUT, start_new_session=True
         )
         try:
             if port is not None:
@@ -68,3 +78,28 @@ def wait_for(reached, within_s: float = 60.0, every_s: float = 0.1) -> None:
     while not reached():
         assert time.monotonic() < until, f"not reached within {within_s} s"
         time.sleep(every_s)
+
+
+@contextmanager
+def receiver() -> Iterator[tuple[str, list[dict[str, Any]]]]:
+    """Lend an address, and what is posted to it as JSON."""
+    received: list[dict[str, Any]] = []
+
+    class Receiver(BaseHTTPRequestHandler):
+        def do_POST(self) -> None:
+            received.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            self.send_response(204)
+            self.end_headers()
+
+        def log_message(self, *arguments: Any) -> None:
+            """Say nothing."""
+
+    server = ThreadingHTTPServer(("127.0.0.1", 0), Receiver)
+    thread = threading.Thread(target=server.serve_forever, daemon=True)
+    thread.start()
+    try:
+        yield f"http://127.0.0.1:{server.server_port}/alarm", received
+    finally:
+        server.shutdown()
+        thread.join()
+        server.server_close()

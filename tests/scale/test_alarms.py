@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import threading
 from collections.abc import Iterator
-from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 from shutil import copytree
 from typing import Any
@@ -16,32 +13,13 @@ from kempf.schemas.errors import DataRejected
 from kempf.warehouse import logs
 from kempf.warehouse.store import Warehouse
 from tests.scale.conftest import FLEET, prefect_server, reporting_to, touch
-from tests.scale.servers import wait_for
+from tests.scale.servers import receiver, wait_for
 
 
 @pytest.fixture
 def posted() -> Iterator[tuple[str, list[dict[str, Any]]]]:
-    """An address, and what is posted to it."""
-    received: list[dict[str, Any]] = []
-
-    class Receiver(BaseHTTPRequestHandler):
-        def do_POST(self) -> None:
-            received.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
-            self.send_response(204)
-            self.end_headers()
-
-        def log_message(self, *arguments: Any) -> None:
-            """Say nothing."""
-
-    receiver = ThreadingHTTPServer(("127.0.0.1", 0), Receiver)
-    thread = threading.Thread(target=receiver.serve_forever, daemon=True)
-    thread.start()
-    try:
-        yield f"http://127.0.0.1:{receiver.server_port}/alarm", received
-    finally:
-        receiver.shutdown()
-        thread.join()
-        receiver.server_close()
+    with receiver() as lent:
+        yield lent
 
 
 @pytest.fixture
