@@ -9,6 +9,7 @@ import hashlib
 import json
 import math
 import re
+from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, StringConstraints, ValidationInfo, field_validator, model_validator
@@ -152,9 +153,7 @@ class Effect(Frozen):
         strange = [channel for channel in named if channel not in CHANNEL_SYMBOLS.values()]
         if strange:
             raise ValueError(f"take {', '.join(CHANNEL_SYMBOLS.values())}; found {strange[0][:40]!r}")
-        states = others.data.get("states", ())
-        formulas = (*others.data.get("terms", {}).values(), *(f for s in states for f in (s.derivative, s.noise)))
-        words = {word for formula in formulas for word in _WORD.findall(formula)}
+        words = _words_in(others.data.get("terms", {}), others.data.get("states", ()))
         return tuple(dict.fromkeys([*(c for symbol, c in CHANNEL_SYMBOLS.items() if symbol in words), *named]))
 
     @field_validator("measured_by")
@@ -173,6 +172,10 @@ class Effect(Frozen):
         if not self.terms and self.rudder_course is None:
             raise ValueError("it has no term: give it terms or a rudder_course")
         return self
+
+    def uses(self, symbol: str) -> bool:
+        """Return whether its formulas speak of a symbol, see `kempf.schemas.symbols.SYMBOLS`."""
+        return symbol in _words_in(self.terms, self.states)
 
     @property
     def sha256(self) -> str:
@@ -205,3 +208,8 @@ class Effect(Frozen):
             "told_by": list(self.measured_by),
             "sha256": self.sha256,
         }
+
+
+def _words_in(terms: Mapping[str, str], states: Sequence[ExtraState]) -> set[str]:
+    formulas = (*terms.values(), *(formula for state in states for formula in (state.derivative, state.noise)))
+    return {word for formula in formulas for word in _WORD.findall(formula)}

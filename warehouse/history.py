@@ -17,6 +17,7 @@ from kempf.warehouse import code_version, delta, examinations, vessels
 from kempf.warehouse.canonical import plain
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.parameter_set import UPDATES
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
@@ -230,7 +231,7 @@ def _known(row: dict[str, Any]) -> dict[str, str]:
 
 
 def _not_comparable(row: dict[str, Any], names: dict[str, str], seen: set[str]) -> str:
-    if len(row["segment_ids"]) != 1:
+    if len(row["segment_ids"]) != 1 or json.loads(row["settings_json"]).get(UPDATES):
         return "made of several segments"
     if row["segment_ids"][0] in seen:
         return "of a segment that is there already"
@@ -313,11 +314,13 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
     """Return sets in the order of their start with a column ``superseded``.
 
     A set is superseded where one of its logs has been read anew since or removed, where one of its segments is found no
-    longer, and where there are sets of newer code: of the present code, else of the one that was at work last.
+    longer, and where there are sets of newer code: of the present code, else of the one that was at work last; where
+    this is so of a set that it brings forward; and where a pooled set of the same model rests on more manoeuvres.
     """
     import polars as pl
 
-    extra = [name for name in ("segment_ids", "provenance_json") if name not in columns]
+    needed = ("segment_ids", "provenance_json", "settings_json", "model_sha256", "estimator", "convergence_json")
+    extra = [name for name in needed if name not in columns]
     sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, (*columns, *extra))
     provenance = pl.col("provenance_json").str
     at = provenance.json_path_match("$.table_versions.parameter_sets").cast(pl.Int64).fill_null(-1)
@@ -331,8 +334,45 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
         old |= provenance.json_path_match("$.ingest_ids").str.contains_any(known.past).fill_null(value=False)
     if known.segments is not None:
         old |= ~pl.col("segment_ids").list.eval(pl.element().is_in(known.segments)).list.all()
-    marked = sets.with_columns(superseded=old).drop("_code", "_at", *extra)
+    sets = sets.with_columns(superseded=old).drop("_code", "_at")
+    marked = sets.with_columns(superseded=_with_chains(sets)).drop(extra)
     return marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
+
+
+def _with_chains(sets: pl.DataFrame) -> pl.Series:
+    """Return which sets are superseded, those that rest on others and pooled ones of fewer manoeuvres with them."""
+    import polars as pl
+
+    settings, converged = pl.col("settings_json").str, pl.col("convergence_json").str
+    frame = sets.select(
+        "parameter_set_id",
+        "superseded",
+        "estimator",
+        "model_sha256",
+        updates=settings.json_path_match("$.updates.set"),
+        many=settings.json_path_match("$.updates.manoeuvres").cast(pl.Int64).fill_null(0)
+        + pl.col("segment_ids").list.len().cast(pl.Int64),
+        converged=converged.json_path_match("$.converged").eq_missing("true"),
+    )
+    rows = {row["parameter_set_id"]: row for row in frame.rows(named=True)}
+    # a set rests on fewer manoeuvres than one that brings it forward
+    for row in sorted(rows.values(), key=lambda one: one["many"]):
+        if row["updates"] is not None:
+            before = rows.get(row["updates"])
+            row["superseded"] = row["superseded"] or before is None or before["invalid"]
+        row["invalid"] = row["superseded"]
+    most: dict[tuple[str, str], int] = {}
+    for row in rows.values():
+        if row["many"] > 1 and row["converged"] and not row["invalid"]:
+            kind = row["estimator"], row["model_sha256"]
+            most[kind] = max(most.get(kind, 0), row["many"])
+    return pl.Series(
+        [
+            row["invalid"] or 1 < row["many"] < most.get((row["estimator"], row["model_sha256"]), 0)
+            for row in (rows[name] for name in frame["parameter_set_id"].to_list())
+        ],
+        dtype=pl.Boolean,
+    )
 
 
 def _only(frame: pl.DataFrame, parameter: str) -> pl.DataFrame:

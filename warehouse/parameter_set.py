@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import hypot, nan
 from typing import Any
 
@@ -83,6 +83,26 @@ def parameter_set_id(inputs: Inputs) -> str:
     return "ps-" + sha256(canonical_json(inputs.as_json()))[:16]
 
 
+#: key of the settings of a set that brings another one forward
+UPDATES = "updates"
+
+
+@dataclass(frozen=True)
+class Update:
+    """What a set brings forward that rests on another one; it is stored with what it adds to that."""
+
+    #: Id of the other set.
+    set: str
+    #: Manoeuvres of that set and of all that it rests on in turn.
+    manoeuvres: int
+    #: Manoeuvres of the first of these, which were fitted all at once.
+    fitted_at_once: int
+
+    def show(self) -> dict[str, Any]:
+        """Return it as it stands in the settings."""
+        return dict(vars(self))
+
+
 @dataclass(frozen=True)
 class ParameterSet:
     """One identified model.
@@ -140,6 +160,12 @@ class ParameterSet:
             if len(set(names)) != len(names):
                 raise ValueError(f"{group} share a name: {names}")
 
+    @property
+    def updates(self) -> Update | None:
+        """The set that this one brings forward; None where it stands by itself."""
+        said = self.settings.get(UPDATES)
+        return None if said is None else Update(**said)
+
     def show(self) -> dict[str, Any]:
         """Return the parameter set as the command line's JSON object."""
         shown: dict[str, Any] = plain(
@@ -168,6 +194,63 @@ class ParameterSet:
 
 def _by_name(estimates: Sequence[StoredValue]) -> dict[str, dict[str, Any]]:
     return {e.name: {"value": e.value, "std": e.std, "unit": e.unit} for e in estimates}
+
+
+#: what a set says of each manoeuvre, by which a set that brings it forward adds that of its own
+_OF_EACH = ("levels", "gross_error_instants_s", "left_out")
+_OF_EACH_ON_RUNG = ("held_out", "in_sample", "foreseen", "free_run_fitted_to_legs")
+
+
+def brought_forward(before: ParameterSet, added: ParameterSet) -> ParameterSet:
+    """Return a set that rests on another one with what that says of its manoeuvres.
+
+    Parameters
+    ----------
+    before : ParameterSet
+        The other one, which stands by itself, or was put together likewise.
+    added : ParameterSet
+        As it is stored: `ParameterSet.updates` is the other one.
+    """
+    then, now = before.convergence, added.convergence
+    convergence = {**now, **{name: {**(then.get(name) or {}), **(now.get(name) or {})} for name in _OF_EACH}}
+    convergence["held_out"] = [*(then.get("held_out") or ()), *(now.get("held_out") or ())]
+    if "pooling" in now and "pooling" in then:
+        members = [*then["pooling"]["members"], *now["pooling"]["members"]]
+        convergence["pooling"] = {**now["pooling"], "members": members}
+    first, last = before.fit["rung"], added.fit["rung"]
+    rung = {**last, **{name: {**first.get(name, {}), **last.get(name, {})} for name in _OF_EACH_ON_RUNG}}
+    # legs are fitted where all manoeuvres are
+    rung["one_leg_ahead"] = first["one_leg_ahead"]
+    return replace(
+        added,
+        settings={**added.settings, "segments": _both(before.settings, added.settings, "segments")},
+        provenance=_both_origins(before.provenance, added.provenance),
+        segment_ids=(*before.segment_ids, *added.segment_ids),
+        log_ids=tuple(sorted({*before.log_ids, *added.log_ids})),
+        convergence=convergence,
+        fit={**added.fit, "rung": rung},
+        warnings=tuple(dict.fromkeys((*before.warnings, *added.warnings))),
+    )
+
+
+def _both(before: Mapping[str, Any], added: Mapping[str, Any], key: str) -> list[Any]:
+    return [*(before.get(key) or ()), *(added.get(key) or ())]
+
+
+def _both_origins(before: Mapping[str, Any], added: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the provenance of a set that rests on another one: logs, segments and channels of both."""
+    first, last = before.get("inputs") or {}, added.get("inputs") or {}
+    inputs = {
+        **last,
+        "log_ids": sorted({*_both(first, last, "log_ids")}),
+        "segments": _both(first, last, "segments"),
+    }
+    return {
+        **added,
+        "inputs": inputs,
+        "ingest_ids": sorted({*_both(before, added, "ingest_ids")}),
+        "channels": {**(before.get("channels") or {}), **(added.get("channels") or {})},
+    }
 
 
 def compare(first: ParameterSet, second: ParameterSet) -> dict[str, dict[str, Any]]:

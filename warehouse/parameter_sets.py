@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from json import loads
 from typing import TYPE_CHECKING, Any
@@ -12,8 +12,9 @@ from kempf.warehouse import delta
 from kempf.warehouse.agreement import content_digest, differences
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.keys import one_of, vessel_key
-from kempf.warehouse.parameter_set import ParameterSet, StoredValue
+from kempf.warehouse.parameter_set import UPDATES, ParameterSet, StoredValue, brought_forward
 from kempf.warehouse.retry import with_retry
+from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
@@ -68,7 +69,104 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
 
 
 def get(warehouse: Warehouse, name: str) -> ParameterSet:
-    """Return a parameter set by its id, or by a beginning of it that only one has.
+    """Return a parameter set by its id, or by a beginning of it that only one has; see `as_stored` and `whole`."""
+    return whole(warehouse, [as_stored(warehouse, name)])[0]
+
+
+def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
+    """Return the parameter sets of a vessel, all or some by their whole ids; see `all_as_stored` and `whole`."""
+    return whole(warehouse, all_as_stored(warehouse, vessel, names))
+
+
+def whole(warehouse: Warehouse, sets: Sequence[ParameterSet], bases: Sequence[ParameterSet] = ()) -> list[ParameterSet]:
+    """Return sets of one vessel, those that bring others forward with what these say of their manoeuvres.
+
+    Parameters
+    ----------
+    bases : sequence of ParameterSet, optional
+        Whole ones that they may bring forward.
+
+    Raises
+    ------
+    KempfError
+        ``set_lost``: one of these is not stored any more.
+    """
+    if not any(one.updates for one in sets):
+        return list(sets)
+    known = {one.parameter_set_id: one for one in sets}
+    ready = {one.parameter_set_id: one for one in bases}
+    if all(one.updates is None or one.updates.set in ready for one in sets):
+        return [brought_forward(ready[one.updates.set], one) if one.updates else one for one in sets]
+    updating = [one for one in sets if one.updates]
+    models, estimators = (sorted({getattr(one, name) for one in updating}) for name in ("model_sha256", "estimator"))
+    where: Where = {"vessel_key": vessel_key(sets[0].vessel), "model_sha256": models, "estimator": estimators}
+    for row in delta.read(warehouse, "parameter_sets", where).rows(named=True):
+        known.setdefault(row["parameter_set_id"], _set(row))
+    return [_on_its_base(one, known) for one in sets]
+
+
+def _on_its_base(one: ParameterSet, known: Mapping[str, ParameterSet]) -> ParameterSet:
+    chain = [one]
+    while (update := chain[-1].updates) is not None:
+        if update.set not in known:
+            raise KempfError(
+                "set_lost",
+                f"{one.parameter_set_id} brings {update.set} forward, which is not in the warehouse any more.",
+                "See with `kempf verify` what is damaged; `kempf reprocess` fits all manoeuvres anew.",
+                {"parameter_set_id": one.parameter_set_id, "updates": update.set},
+            )
+        chain.append(known[update.set])
+    made = chain.pop()
+    while chain:
+        made = brought_forward(made, chain.pop())
+    return made
+
+
+@dataclass(frozen=True)
+class Pooled:
+    """What is known of a pooled set without reading all of it."""
+
+    parameter_set_id: str
+    #: Those that it adds, where it brings another one forward.
+    segment_ids: tuple[str, ...]
+    settings: dict[str, Any]
+    code_version: str
+    profile_sha256: str
+
+    @property
+    def updates(self) -> str | None:
+        """Id of the set that it brings forward."""
+        said = self.settings.get(UPDATES)
+        return None if said is None else str(said["set"])
+
+    @property
+    def manoeuvres(self) -> int:
+        """How many it rests on, with all that it brings forward."""
+        said = self.settings.get(UPDATES) or {"manoeuvres": 0}
+        return int(said["manoeuvres"]) + len(self.segment_ids)
+
+    @property
+    def fitted_at_once(self) -> int:
+        """How many the first of these was fitted to."""
+        said = self.settings.get(UPDATES)
+        return int(said["fitted_at_once"]) if said else len(self.segment_ids)
+
+
+def pooled(warehouse: Warehouse, vessel: str, model_sha256: str, estimator: str) -> list[Pooled]:
+    """Return what is known of a vessel's sets of one model and estimator, sorted by id."""
+    where: Where = {"vessel_key": vessel_key(vessel), "model_sha256": model_sha256, "estimator": estimator}
+    columns = ("parameter_set_id", "segment_ids", "settings_json", "provenance_json")
+    frame = delta.read(warehouse, "parameter_sets", where, columns).sort("parameter_set_id")
+    said = frame["provenance_json"].str
+    codes, profiles = (said.json_path_match(f"$.{key}").to_list() for key in ("code_version", "profile_sha256"))
+    return [
+        Pooled(name, tuple(ids), loads(settings), code, profile)
+        for (name, ids, settings, _), code, profile in zip(frame.rows(), codes, profiles, strict=True)
+    ]
+
+
+def as_stored(warehouse: Warehouse, name: str) -> ParameterSet:
+    """Return a parameter set as it is stored, by its id or by a beginning of it that only one has.
 
     Raises
     ------
@@ -96,11 +194,11 @@ def get(warehouse: Warehouse, name: str) -> ParameterSet:
             "Give more of the id.",
             {"beginning": name, "found": found},
         )
-    return get(warehouse, found[0])
+    return as_stored(warehouse, found[0])
 
 
-def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
-    """Return the parameter sets of a vessel, all or some of them by their whole ids, in one reading of the table.
+def all_as_stored(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
+    """Return the parameter sets of a vessel as they are stored, all or some by their whole ids, in one reading.
 
     Parameters
     ----------

@@ -41,6 +41,8 @@ class SetRequest:
     #: Provenance.
     origin: dict[str, Any]
     parent: str | None = None
+    #: The set that it brings forward, whole; see `warehouse.parameter_set.ParameterSet.updates`.
+    before: ParameterSet | None = None
 
     @property
     def spec(self) -> ModelSpec:

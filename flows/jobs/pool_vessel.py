@@ -8,7 +8,7 @@ from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose, without_log
 from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request
 from kempf.flows.jobs.pending import Waiting, waiting
 from kempf.flows.jobs.standing_model import SINGLE
-from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.update_model import store_up_to_date
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import logs
@@ -92,7 +92,7 @@ def pool_segments(
     chosen = poolable(warehouse, vessel, request, outcomes)
     if isinstance(chosen, str):
         return None
-    made, is_new = store_model(
+    made, is_new = store_up_to_date(
         *(warehouse, chosen, request.spec, request.own, progress, flow_run),
         search=dict(request.settings),
         keep=new.keep,

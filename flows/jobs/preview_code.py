@@ -110,7 +110,7 @@ def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
         failures = _seed(warehouse, scratch, vessel)
         report = reprocess_vessel(scratch, vessel)
         now = [stored for stored in standing_sets(scratch, vessel) if stored.provenance["code_version"] == code]
-    there = {stored.parameter_set_id for stored in parameter_sets.get_all(warehouse, vessel)}
+    there = set(parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list())
     pairs = paired(old, now)
     return VesselPreview(
         vessel,
@@ -153,7 +153,7 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[st
             failures.append(_failure(row.file_name, error))
     logs.record(scratch, kept)
     # those that no longer stand, too: their models are brought up to date with the others
-    parameter_sets.insert(scratch, parameter_sets.get_all(warehouse, vessel))
+    parameter_sets.insert(scratch, parameter_sets.all_as_stored(warehouse, vessel))
     for alias, name in aliases.of_vessel(warehouse, vessel).items():
         aliases.point(scratch, vessel, name, alias)
     return failures

@@ -17,9 +17,9 @@ from kempf.flows.jobs.identify_vessel import IdentifyOutcome, Request, identify_
 from kempf.flows.jobs.pending import Waiting, store
 from kempf.flows.jobs.pool_vessel import pool_segments
 from kempf.flows.jobs.refresh_logs import Refreshed, Stale, refresh_all, stale_logs
-from kempf.flows.jobs.rerun_set import rerun
+from kempf.flows.jobs.rerun_set import rerun_alone
 from kempf.flows.jobs.standing_model import POOLED, SINGLE, Own, model_of, point, standing
-from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.update_model import store_up_to_date
 from kempf.flows.jobs.vessel_quality import quality_of
 from kempf.flows.jobs.vessel_report import VesselReport, remember_all, remember_history
 from kempf.flows.process.commit_batch import together_or_each
@@ -237,7 +237,7 @@ class _Reprocessing:
             return
         try:
             chosen = choose(self.warehouse, work.vessel, out_of_date(work.refreshed) if work.refreshed else {})
-            made, new = store_model(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
+            made, new = store_up_to_date(self.warehouse, chosen, spec, own, self.progress, self.flow_run)
         except KempfError as error:
             work.report.fail(aliases.CURRENT, error)
             return
@@ -289,12 +289,12 @@ def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
 
 def _verify(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
     code = code_version.fingerprint("estimate")
-    for name in parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list():
-        if parameter_sets.get(warehouse, name).provenance["code_version"] != code:
+    for stored in parameter_sets.all_as_stored(warehouse, vessel):
+        if stored.provenance["code_version"] != code:
             continue
         try:
-            verdict = rerun(warehouse, name).verdict
+            verdict = rerun_alone(warehouse, stored).verdict
         except KempfError as error:
-            report.fail(name, error)
+            report.fail(stored.parameter_set_id, error)
             continue
         report.verified[verdict] = report.verified.get(verdict, 0) + 1

@@ -16,6 +16,7 @@ from typing import Any
 
 from kempf.flows.fleet.state import code_of_sets
 from kempf.flows.jobs.rerun_set import Rerun, code_changed, inputs_of, judged, raw_inputs, rebuilt
+from kempf.flows.jobs.standing_model import POOLED
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
@@ -127,7 +128,7 @@ def verify_all(
     done = len(found)
     for vessel, of_hers in groupby(asked, key=lambda pair: pair[0]):
         names = [name for _, name in of_hers if name not in found]
-        for group in _groups(parameter_sets.get_all(warehouse, vessel, names)):
+        for group in _groups(parameter_sets.all_as_stored(warehouse, vessel, names)):
             progress(done, len(asked), f"{vessel}: building {len(group)} parameter sets again")
             verdicts = _verify(warehouse, group, tolerance)
             # what is finished is kept even if the next moment is the last
@@ -160,11 +161,11 @@ def _verify(warehouse: Warehouse, group: Sequence[ParameterSet], tolerance: floa
 
     def verdict_on(stored: ParameterSet) -> RerunVerdict:
         try:
-            return _verdict(stored, judged(stored, rebuilt(stored, instruments, profile), tolerance))
+            return _verdict(stored, judged(stored, rebuilt(warehouse, stored, instruments, profile), tolerance))
         except Exception as error:  # noqa: BLE001 - whatever it is, the other sets must not pay for it
             return _failed(stored, wrapped(error))
 
-    if len(inputs_of(group[0]).bounds) > 1:  # such a set takes all cores for itself
+    if group[0].estimator == POOLED:  # such a set takes all cores for itself
         return [verdict_on(stored) for stored in group]
     workers = ThreadPoolExecutor(max_workers=cpu_count())
     try:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from kempf.flows.jobs.chosen_set import named_set
@@ -11,12 +11,14 @@ from kempf.flows.jobs.identify_vessel import build
 from kempf.flows.jobs.parameter_set_of import SetRequest
 from kempf.flows.jobs.spool import spooled
 from kempf.flows.jobs.standing_model import POOLED, WITH_EFFECTS, Own, known_effects
+from kempf.flows.jobs.update_model import build_updated
 from kempf.flows.jobs.vessel_model import build_model
+from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments, from_readings
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import NotFound
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import agreement, code_version, logs, raw, vessels
+from kempf.warehouse import agreement, code_version, logs, parameter_sets, raw, vessels
 from kempf.warehouse.agreement import Difference
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet
@@ -36,6 +38,8 @@ class Rerun:
     #: are others than when the set was made.
     code_changed: bool
     packages_changed: dict[str, list[str | None]]
+    #: Verdicts on the sets that it brings forward, by id, the one that was fitted at once first.
+    rests_on: dict[str, str] = field(default_factory=dict)
 
     def show(self) -> dict[str, Any]:
         """Return the verdict as JSON content."""
@@ -45,11 +49,12 @@ class Rerun:
             "differences": [difference.as_json() for difference in self.differences],
             "code_changed": self.code_changed,
             "packages_changed": self.packages_changed,
+            "rests_on": self.rests_on,
         }
 
 
-def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
-    """Build a parameter set again from the raw bytes; nothing is stored.
+def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9, progress: Progress = silent) -> Rerun:
+    """Build a parameter set again from the raw bytes, and every one that it brings forward; nothing is stored.
 
     Parameters
     ----------
@@ -57,6 +62,13 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
         Its id, a beginning of it, or an alias.
     tolerance : float, optional
         Largest relative difference that still counts as equal.
+    progress : Progress, optional
+        Called before every set.
+
+    Returns
+    -------
+    Rerun
+        On the set, from those before it as they are stored; theirs stand beside it.
 
     Raises
     ------
@@ -65,8 +77,23 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9) -> Rerun:
     KempfError
         ``raw_bytes_damaged``.
     """
-    stored = named_set(warehouse, name)
-    return judged(stored, rebuilt(stored, *raw_inputs(warehouse, stored)), tolerance)
+    chain = [parameter_sets.as_stored(warehouse, named_set(warehouse, name).parameter_set_id)]
+    while (update := chain[0].updates) is not None:
+        chain.insert(0, parameter_sets.as_stored(warehouse, update.set))
+    verdicts = []
+    for done, stored in enumerate(chain):
+        progress(done, len(chain), f"building {stored.parameter_set_id} again")
+        verdicts.append(rerun_alone(warehouse, stored, tolerance))
+    progress(len(chain), len(chain), "done")
+    return replace(verdicts[-1], rests_on={one.parameter_set_id: one.verdict for one in verdicts[:-1]})
+
+
+def rerun_alone(warehouse: Warehouse, stored: ParameterSet, tolerance: float = 1e-9) -> Rerun:
+    """Build a parameter set again from the raw bytes and, where it brings another one forward, from that as stored.
+
+    Errors are those of `rerun`.
+    """
+    return judged(stored, rebuilt(warehouse, stored, *raw_inputs(warehouse, stored)), tolerance)
 
 
 def raw_inputs(warehouse: Warehouse, stored: ParameterSet) -> tuple[dict[str, Instruments], VesselProfile]:
@@ -99,11 +126,17 @@ def _read_again(warehouse: Warehouse, row: LogRow, profile: VesselProfile) -> In
         return from_readings(readings.lazy())
 
 
-def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profile: VesselProfile) -> ParameterSet:
+def rebuilt(
+    warehouse: Warehouse, stored: ParameterSet, instruments: Mapping[str, Instruments], profile: VesselProfile
+) -> ParameterSet:
     """Compute a stored parameter set again with the present code.
 
     Parameters
     ----------
+    warehouse : Warehouse
+        Of the set that it brings forward.
+    stored : ParameterSet
+        As it is stored.
     instruments : mapping of str to Instruments
         Series by log, see `raw_inputs`.
     profile : VesselProfile
@@ -120,7 +153,10 @@ def rebuilt(stored: ParameterSet, instruments: Mapping[str, Instruments], profil
     if inputs.estimator not in (*NAMES, POOLED, WITH_EFFECTS):
         raise _no_estimator(stored)
     ids, origin = stored.segment_ids, dict(stored.provenance)
-    request = SetRequest(inputs, profile, stored.vessel, ids, origin, stored.parent)
+    before = parameter_sets.get(warehouse, stored.updates.set) if stored.updates else None
+    request = SetRequest(inputs, profile, stored.vessel, ids, origin, stored.parent, before)
+    if before is not None:
+        return build_updated(instruments, request)
     if inputs.estimator in (POOLED, WITH_EFFECTS):
         return build_model(instruments, request)
     return build(instruments, request)

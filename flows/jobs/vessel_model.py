@@ -21,16 +21,19 @@ from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
 from kempf.pipeline.diagnose.late_velocity import covariance_of_lateness
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
-from kempf.pipeline.estimate.agreement import LEVEL, agreement_of
+from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
-from kempf.pipeline.estimate.plain_fit import PlainFit
+from kempf.pipeline.estimate.plain_fit import Alone, PlainFit, off_in_std
 from kempf.pipeline.estimate.plausibility import plausibility_warnings
 from kempf.pipeline.estimate.pooled_fit import PooledFit, ShipPart
 from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncertainty_of
+from kempf.pipeline.estimate.posterior import posterior_of
+from kempf.pipeline.estimate.record.grid_run import common_slip
 from kempf.pipeline.estimate.record.left_out import instants_left_out
 from kempf.pipeline.estimate.result import discrete_values
 from kempf.pipeline.shooting.ahead import Ahead, ahead_of
@@ -42,6 +45,8 @@ from kempf.warehouse.parameter_set import StoredValue as Stored
 from kempf.warehouse.store import Warehouse
 
 _STEP_S = 1.0
+#: key of a pooled set's convergence that holds what its fit leaves for further runs
+POSTERIOR = "posterior"
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,8 +181,9 @@ def build_with_errors_that_last(instruments: Mapping[str, Instruments], request:
 
 def _single(fitted: Fitted, request: SetRequest) -> ParameterSet:
     fit, (record,) = fitted.fits[-1], fitted.runs.records
-    known = _known(fit)
-    made = _as_parameter_set(fit, known, fitted, request)
+    errors = errors_of(fit, uncertainty_of(fit))
+    known = errors.widened(agreement_of(fit)) if fit.ship.model.effects else errors.together
+    made = as_set(fit, known, fitted.runs, fitted.plain.gross_errors, request)
     return replace(
         made,
         noise=(
@@ -210,10 +216,14 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
     number = next(k for k, one in enumerate(fitted.fits) if one is fit)
     step = step_of(fit, [runs.runs[i] for i in left], fitted.ahead[number])
     before = fitted.ahead[number - 1] if number else None
-    known, plain = _known(fit), fitted.plain
-    if not effects:
-        known = replace(known, covariance=known.covariance * plain.agreement.widened**2)
-    made = _as_parameter_set(fit, known, fitted, request)
+    plain, errors = fitted.plain, errors_of(fit, uncertainty_of(fit))
+    agreement = agreement_of(fit) if effects else plain.agreement
+    together = errors.together
+    known = replace(together, covariance=together.covariance * agreement.widened**2)
+    if effects:
+        known = errors.widened(agreement)
+    made = as_set(fit, known, runs, plain.gross_errors, request)
+    left_behind = posterior_of(fit, together, agreement, fit.log_likelihood)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     # of the manoeuvres that the inputs name, so that a rerun says the same
     skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in request.segment_ids}
@@ -224,7 +234,10 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
             **made.convergence,
             "held_out": [run.name for run in step.held],
             "left_out": skipped,
-            **({} if effects or len(plain.alone) < 2 else {"pooling": _pooling(plain)}),
+            POSTERIOR: {**left_behind.show(), "slip_m": common_slip([one.run for one in fit.runs])},
+            **(
+                {} if effects or len(plain.alone) < 2 else {"pooling": pooling(plain.agreement, plain.alone, plain.fit)}
+            ),
         },
         warnings=(
             *(f"left out: {name} ({why})" for name, why in sorted(skipped.items())),
@@ -237,31 +250,56 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
     )
 
 
-def _known(fit: PooledFit) -> PooledUncertainty:
-    """Return the errors of a fit; of a model with effects those that its diagnosis states."""
-    known = uncertainty_of(fit)
+@dataclass(frozen=True, eq=False)
+class Errors:
+    """What is known of the errors of a fit, before what the runs disagree about widens them."""
+
+    known: PooledUncertainty
+    #: Shape (6 + p, 6 + p). What is not known of a receiver's lateness adds.
+    late: Float
+
+    @property
+    def together(self) -> PooledUncertainty:
+        """Both."""
+        return replace(self.known, covariance=self.known.covariance + self.late)
+
+    def widened(self, agreement: Agreement) -> PooledUncertainty:
+        """Return both, the first wider by what the runs disagree about."""
+        return replace(self.known, covariance=self.known.covariance * agreement.widened**2 + self.late)
+
+
+def errors_of(fit: PooledFit, known: PooledUncertainty) -> Errors:
+    """Return the errors of a fit with those of lateness; of a model with effects those that its diagnosis states."""
     if fit.ship.model.effects:
-        known = replace(known, covariance=fit.covariance * agreement_of(fit).widened ** 2, kind="information")
+        known = replace(known, covariance=fit.covariance, kind="information")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        return replace(known, covariance=known.covariance + covariance_of_lateness(fit, workers))
+        return Errors(known, covariance_of_lateness(fit, workers))
 
 
-def _pooling(plain: PlainFit) -> dict[str, Any]:
-    """Return what separate hulls say of a common one, JSON content."""
+def pooling(agreement: Agreement, alone: Sequence[Alone], fit: PooledFit, before: int = 0) -> dict[str, Any]:
+    """Return what separate hulls say of a common one, JSON content.
+
+    Parameters
+    ----------
+    alone : sequence of Alone
+        Runs, each by itself.
+    before : int, optional
+        How many more runs the fit rests on.
+    """
     return {
-        "segments": len(plain.alone),
-        "statistic": plain.statistic,
-        "degrees_of_freedom": plain.agreement.degrees_of_freedom,
-        "p_value": plain.agreement.p_value,
-        "may_be_pooled": plain.agreement.p_value >= LEVEL,
-        "widened": plain.agreement.widened,
+        "segments": before + len(alone),
+        "statistic": agreement.statistic,
+        "degrees_of_freedom": agreement.degrees_of_freedom,
+        "p_value": agreement.p_value,
+        "may_be_pooled": agreement.p_value >= LEVEL,
+        "widened": agreement.widened,
         "members": [
             {
                 "segment": one.run.name,
                 "gross_errors": one.gross_errors,
-                "off_in_std": dict(zip(HULL_PARAMETERS, plain.off_in_std(one).tolist(), strict=True)),
+                "off_in_std": dict(zip(HULL_PARAMETERS, off_in_std(one, fit).tolist(), strict=True)),
             }
-            for one in plain.alone
+            for one in alone
         ],
     }
 
@@ -286,8 +324,18 @@ def _disagreement(plain: PlainFit) -> tuple[str, ...]:
     )
 
 
-def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, request: SetRequest) -> ParameterSet:
-    """Return what every set of a fit with effects holds."""
+def as_set(
+    fit: PooledFit, known: PooledUncertainty, runs: VesselRuns, gross_errors: int, request: SetRequest
+) -> ParameterSet:
+    """Return what every set of a common fit holds.
+
+    Parameters
+    ----------
+    known : PooledUncertainty
+        The errors that are stated.
+    gross_errors : int
+        Measurements that were taken out.
+    """
     spec, ship = request.spec, fit.ship_part(known.covariance)
     covariance = ship.covariance
     speed = float(np.mean([np.mean(one.run.speed_m_s) for one in fit.runs]))
@@ -312,8 +360,8 @@ def _as_parameter_set(fit: PooledFit, known: PooledUncertainty, fitted: Fitted, 
             "grid_step_s": fit.runs[0].run.step_s,
             "standard_errors": known.kind,
             **({"widened": agreement_of(fit).widened} if ship.model.effects else {}),
-            "gross_errors": fitted.plain.gross_errors,
-            "gross_error_instants_s": _gross_errors(fit, fitted.runs),
+            "gross_errors": gross_errors,
+            "gross_error_instants_s": _gross_errors(fit, runs),
             "levels": {one.run.name: list(levels) for one, levels in zip(fit.runs, fit.levels, strict=True)},
         },
         warnings=(

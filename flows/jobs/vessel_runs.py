@@ -39,8 +39,20 @@ class VesselRuns:
     skipped: dict[str, str]
 
 
-def assembled(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent) -> VesselRuns:
-    """Read the chosen segments from the warehouse and make runs of them."""
+@dataclass(frozen=True)
+class Like:
+    """What further runs of a vessel are to share with those that a model was fitted to."""
+
+    #: See `pipeline.estimate.record.average.step_of`.
+    grid_step_s: float
+    #: See `pipeline.estimate.record.grid_run.common_slip`.
+    slip_m: float | None
+
+
+def assembled(
+    warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: Progress = silent, like: Like | None = None
+) -> VesselRuns:
+    """Read the chosen segments from the warehouse and make runs of them; see `assemble`."""
     instruments = {}
     for done, (log_id, ingest_id) in enumerate(chosen.ingests.items()):
         progress(done, len(chosen.ingests), f"reading {chosen.file_names[log_id]}")
@@ -48,7 +60,7 @@ def assembled(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, progress: P
     progress(len(chosen.ingests), len(chosen.ingests), "laying the manoeuvres out")
     profile = vessels.get(warehouse, chosen.profile_sha256)
     bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
-    made = assemble(instruments, profile, bounds, spec)
+    made = assemble(instruments, profile, bounds, spec, like)
     return VesselRuns(made.spec, made.runs, made.records, chosen.skipped | made.skipped)
 
 
@@ -57,6 +69,7 @@ def assemble(
     profile: VesselProfile,
     bounds: Sequence[tuple[str, Bounds]],
     spec: ModelSpec,
+    like: Like | None = None,
 ) -> VesselRuns:
     """Make runs of segments; a function of its arguments alone, so that a rerun makes the same.
 
@@ -66,6 +79,8 @@ def assemble(
         Series by log.
     bounds : sequence of (str, Bounds)
         Segments with their names.
+    like : Like, optional
+        What they are to share with other runs of the vessel.
 
     Raises
     ------
@@ -89,12 +104,13 @@ def assemble(
     arm = arm_of(spec, profile)
     ready = spec.with_arm(arm)
     ship = ShipConstants(profile.length_m or LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
-    step = step_of([record for _, _, record in records], profile.length_m)
+    step = like.grid_step_s if like else step_of([record for _, _, record in records], profile.length_m)
     days = {log_id: k for k, log_id in enumerate(dict.fromkeys(one.log_id for _, one, _ in records))}
     runs = with_common_slip(
         [
             make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id])
             for name, one, record in records
-        ]
+        ],
+        like.slip_m if like else None,
     )
     return VesselRuns(ready, runs, tuple(record for _, _, record in records), skipped)

@@ -13,7 +13,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.matters import comparisons
 from kempf.pipeline.diagnose.screen import Candidate
-from kempf.pipeline.estimate.agreement import agreement_of
+from kempf.pipeline.estimate.agreement import Agreement, agreement_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import FreeRun, free_run
@@ -111,17 +111,19 @@ def make_step(
     return Step(fit, added, chosen_from, refused, tuple(screened), free[:many], free[many:], ahead, legs)
 
 
-def rung(number: int, step: Step, before: Ahead | None = None) -> dict[str, Any]:
+def rung(number: int, step: Step, before: Ahead | None = None, agreement: Agreement | None = None) -> dict[str, Any]:
     """Return one rung of the ladder as JSON content.
 
     Parameters
     ----------
     before : Ahead, optional
         The rung below one leg ahead, to compare with.
+    agreement : Agreement, optional
+        Of all runs that the fit rests on, where it is not fitted to all of them.
     """
     force, moment, current = step.intensities
     ship = step.fit.ship
-    widened = agreement_of(step.fit).widened if ship.model.effects else 1.0
+    widened = (agreement or agreement_of(step.fit)).widened if ship.model.effects else 1.0
     std = widened * ship.std[6:]
     return {
         "step": number,

@@ -14,7 +14,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import maximum_likelihood
-from kempf.pipeline.estimate.agreement import Agreement
+from kempf.pipeline.estimate.agreement import LEVEL, Agreement
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
@@ -25,6 +25,7 @@ from kempf.pipeline.estimate.search.climb import Search
 from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.uncertainty import from_information
 from kempf.pipeline.model.effect_model import EffectModel
+from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 
@@ -35,6 +36,8 @@ _ENTRIES = 4
 _UNLIKE, _DISTURBANCES = np.log(3.0), 3
 #: a disturbance's level so far below its usual one has sunk to nothing
 _SUNK = np.log(10.0)
+#: log-likelihood by which another hill must be higher: less is what two climbs of one hill differ by
+_HIGHER = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,25 +67,21 @@ class PlainFit:
     #: Runs that cannot be identified by themselves, with the reason.
     left_out: dict[str, str]
     #: Likelihood ratio of separate hulls to one.
-    statistic: float
+    agreement: Agreement
 
     @property
     def gross_errors(self) -> int:
         """How many measurements were taken out."""
         return sum(sum(single.gross_errors.values()) for single in self.alone)
 
-    @property
-    def agreement(self) -> Agreement:
-        """Whether the runs share one hull, six degrees of freedom a run beyond the first."""
-        return Agreement(self.statistic, _HULL * (len(self.alone) - 1))
 
-    def off_in_std(self, single: Alone) -> Float:
-        """Return how far a run's own hull lies from the common one, in its own standard errors, shape (6,)."""
-        information = single.search.information
-        index = np.flatnonzero(np.diag(information) > 0.0)
-        std = np.sqrt(np.diag(from_information(information, index).covariance)[:_HULL])
-        off: Float = (single.hull - self.fit.hull) / std
-        return off
+def off_in_std(single: Alone, fit: PooledFit) -> Float:
+    """Return how far a run's own hull lies from a common one, in its own standard errors, shape (6,)."""
+    information = single.search.information
+    index = np.flatnonzero(np.diag(information) > 0.0)
+    std = np.sqrt(np.diag(from_information(information, index).covariance)[:_HULL])
+    off: Float = (single.hull - fit.hull) / std
+    return off
 
 
 def fit_plain(
@@ -105,7 +104,7 @@ def fit_plain(
     DataRejected
         ``no_ship_explains_it``: none of the runs can be identified by itself, or they have no ship in common.
     """
-    made = list(workers.map(lambda run: _alone(run, spec, settings), runs))
+    made = list(workers.map(lambda run: fitted_alone(run, spec, settings), runs))
     alone = tuple(single for single in made if isinstance(single, Alone))
     left_out = {run.name: why for run, why in zip(runs, made, strict=True) if isinstance(why, str)}
     if not alone:
@@ -126,10 +125,20 @@ def fit_plain(
         best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
         climbed = _climbed(layout, best, levels)
     separate = sum(single.search.log_likelihood for single in alone)
-    return PlainFit(ended(layout, climbed), alone, left_out, max(2.0 * (separate - climbed.log_likelihood), 0.0))
+    if not (climbed.converged and _agreement(alone, separate, climbed).p_value >= LEVEL):
+        # runs that seem to be of two ships may have been climbed on a lower hill
+        other = _climbed(layout, mariner_like(runs[0].ship.length_m).array(), levels)
+        if other.converged and other.log_likelihood > climbed.log_likelihood + _HIGHER:
+            climbed = other
+    return PlainFit(ended(layout, climbed), alone, left_out, _agreement(alone, separate, climbed))
 
 
-def _alone(run: GridRun, spec: ModelSpec, settings: MaximumLikelihoodSettings) -> Alone | str:
+def _agreement(alone: Sequence[Alone], separate: float, climbed: Search[Arrow]) -> Agreement:
+    """Return whether the runs share one hull, six degrees of freedom a run beyond the first."""
+    return Agreement(max(2.0 * (separate - climbed.log_likelihood), 0.0), _HULL * (len(alone) - 1))
+
+
+def fitted_alone(run: GridRun, spec: ModelSpec, settings: MaximumLikelihoodSettings) -> Alone | str:
     """Fit a run by itself, or say why that cannot be."""
     record = RunFilter(run, EffectModel(), spec).linear().record
     try:

@@ -67,6 +67,30 @@ class ShipPart:
 
 
 @dataclass(frozen=True, eq=False)
+class Parabola:
+    """A log-likelihood of what runs share, about its top."""
+
+    #: Shape (6 + p,). Hull and effects where it is highest.
+    top: Float
+    #: Shape (6 + p, 6 + p).
+    information: Float
+
+    def scaled(self, unit: Float) -> Parabola:
+        """Return it over parameters that are counted in units, shape (6 + p,)."""
+        return Parabola(self.top / unit, self.information * np.outer(unit, unit))
+
+    def loss(self, shared: Float) -> float:
+        """Return by how much it is lower than at its top."""
+        off = shared - self.top
+        return float(0.5 * off @ self.information @ off)
+
+    def score(self, shared: Float) -> Float:
+        """Return its slope, shape (6 + p,)."""
+        slope: Float = -self.information @ (shared - self.top)
+        return slope
+
+
+@dataclass(frozen=True, eq=False)
 class PooledFit:
     """A model fitted to several runs."""
 
@@ -191,9 +215,18 @@ class CommonLikelihood:
 
     Without effects the model is linear, and its filter has derivatives in closed form: less than half of what the
     extended one's differences cost, and the same to within a hundredth of a standard error (a test).
+
+    Parameters
+    ----------
+    filtered : sequence of RunFilter
+        Runs, all with one model.
+    workers : Executor
+        Runs share it; sums are in the order of the runs.
+    before : Parabola, optional
+        Of the log-likelihood of other runs of the ship, which is added.
     """
 
-    def __init__(self, filtered: Sequence[RunFilter], workers: Executor) -> None:
+    def __init__(self, filtered: Sequence[RunFilter], workers: Executor, before: Parabola | None = None) -> None:
         self.filtered, self.workers, self.model = filtered, workers, filtered[0].model
         self.linear = () if self.model.effects else tuple(one.linear() for one in filtered)
         self.shared = N_HULL + len(self.model.names)
@@ -207,6 +240,7 @@ class CommonLikelihood:
         used: Mask = np.concatenate([np.ones(self.shared, dtype=np.bool_), *(f.levels_used() for f in filtered)])
         self.active = used.astype(np.bool_)
         self.logarithms: Mask = np.arange(used.size) >= self.shared
+        self.before = None if before is None else before.scaled(self.scale)
         self.highest, self.top = -np.inf, np.zeros(0)
         self.lines: tuple[Linearised, ...] = ()
 
@@ -229,6 +263,10 @@ class CommonLikelihood:
         scores, information = np.zeros((runs, s + N_LEVELS)), np.zeros((runs, s + N_LEVELS, s + N_LEVELS))
         for run, (own_score, own_information) in enumerate(parts):
             scores[run], information[run] = own_score, own_information
+        if self.before is not None and parts:
+            # other runs have no levels here: theirs goes with the first of these
+            scores[0, :s] += self.before.score(theta[:s])
+            information[0, :s, :s] += self.before.information
         score = np.concatenate([np.sum(scores[:, :s], axis=0), scores[:, s:].ravel()])
         arrow = Arrow(information[:, :s, :s], information[:, :s, s:], information[:, s:, s:], scores)
         if not (np.all(np.isfinite(score)) and np.all(np.isfinite(information))):
@@ -245,7 +283,9 @@ class CommonLikelihood:
             return linear.full(np.clip(own, linear.low, linear.high))
 
         made = list(self.workers.map(one, range(len(self.linear))))
-        return sum(value for value, _, _ in made), [(score, information) for _, score, information in made]
+        return sum(value for value, _, _ in made) - self._loss(theta), [
+            (score, information) for _, score, information in made
+        ]
 
     def _extended(self, theta: Float) -> tuple[float, list[tuple[Float, Float]]]:
         """Ask the extended filter of every run.
@@ -254,7 +294,7 @@ class CommonLikelihood:
         no higher than the highest: they are left at 0, a dozen passes each spared.
         """
         bases = self._passed(theta)
-        value = sum(base.log_likelihood for base in bases)
+        value = sum(base.log_likelihood for base in bases) - self._loss(theta)
         if not np.isfinite(value) or value <= self.highest:
             return value if np.isfinite(value) else -np.inf, []
         lines = self._linearised(theta, bases)
@@ -268,6 +308,9 @@ class CommonLikelihood:
         if all(np.all(np.isfinite(information)) for _, information in parts):
             self.highest, self.top, self.lines = value, theta.copy(), lines
         return value, parts
+
+    def _loss(self, theta: Float) -> float:
+        return 0.0 if self.before is None else self.before.loss(theta[: self.shared])
 
     def _passed(self, theta: Float) -> list[Passed]:
         numbers = range(len(self.filtered))

@@ -14,7 +14,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.one_step_fit import one_step_fit
 from kempf.pipeline.estimate.plausibility import not_white
-from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
+from kempf.pipeline.estimate.pooled_fit import Linearised, Parabola, PooledFit
 from kempf.pipeline.estimate.search.block_arrow import inverse
 from kempf.pipeline.estimate.uncertainty import sandwich
 
@@ -36,25 +36,55 @@ class PooledUncertainty:
 
 def uncertainty_of(fit: PooledFit) -> PooledUncertainty:
     """Return the standard errors of a common fit, the larger ones where prediction errors are not white."""
-    passes = [line.passed for line in fit.linearised]
-    steps = tuple(
-        one_step_fit(filtered.run.measured, passed.innovation, passed.variance)
-        for filtered, passed in zip(fit.runs, passes, strict=True)
-    )
+    steps = _one_step(fit)
     if any(not_white(one) for one in steps):
-        shared = fit.covariance.shape[0]
-        scores, time, end = [], [], 0.0
-        for filtered, line in zip(fit.runs, fit.linearised, strict=True):
-            rows, _ = np.nonzero(np.isfinite(line.passed.innovation))
-            scores.append(_scores(line, shared))
-            time.append(filtered.run.time_s[rows] + end)
-            end += float(filtered.run.time_s[-1]) + 1.0
-        robust = sandwich(fit.covariance, np.concatenate(scores), np.concatenate(time), _STRETCHES * len(fit.runs))
+        robust = _sandwich(fit)
         with np.errstate(invalid="ignore"):
             wider = np.nanmax(np.diag(robust) / np.diag(fit.covariance), initial=0.0)
         if wider > 1.0:
             return PooledUncertainty(robust, "sandwich", steps)
     return PooledUncertainty(fit.covariance, "information", steps)
+
+
+def uncertainty_beside(fit: PooledFit, before: Parabola) -> PooledUncertainty:
+    """Return what the runs of a fit add to its errors where it rests on a parabola of other runs, too.
+
+    Parameters
+    ----------
+    before : Parabola
+        Of the log-likelihood of the others.
+
+    Returns
+    -------
+    PooledUncertainty
+        Covariance of what the errors of these runs alone do to the fit's parameters.
+    """
+    steps = _one_step(fit)
+    own = fit.covariance @ (inverse(fit.covariance) - before.information) @ fit.covariance
+    if any(not_white(one) for one in steps):
+        robust = _sandwich(fit)
+        if np.max(np.diag(robust) / np.maximum(np.diag(own), 1e-300), initial=0.0) > 1.0:
+            return PooledUncertainty(robust, "sandwich", steps)
+    return PooledUncertainty(own, "information", steps)
+
+
+def _one_step(fit: PooledFit) -> tuple[dict[str, Any], ...]:
+    passes = [line.passed for line in fit.linearised]
+    return tuple(
+        one_step_fit(filtered.run.measured, passed.innovation, passed.variance)
+        for filtered, passed in zip(fit.runs, passes, strict=True)
+    )
+
+
+def _sandwich(fit: PooledFit) -> Float:
+    shared = fit.covariance.shape[0]
+    scores, time, end = [], [], 0.0
+    for filtered, line in zip(fit.runs, fit.linearised, strict=True):
+        rows, _ = np.nonzero(np.isfinite(line.passed.innovation))
+        scores.append(_scores(line, shared))
+        time.append(filtered.run.time_s[rows] + end)
+        end += float(filtered.run.time_s[-1]) + 1.0
+    return sandwich(fit.covariance, np.concatenate(scores), np.concatenate(time), _STRETCHES * len(fit.runs))
 
 
 def _scores(line: Linearised, shared: int) -> Float:

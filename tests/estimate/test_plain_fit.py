@@ -12,7 +12,7 @@ import pytest
 from kempf.pipeline.estimate.agreement import LEVEL
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, identify
-from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain
+from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain, off_in_std
 from kempf.pipeline.estimate.pooled_fit import CommonLikelihood
 from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
 from kempf.pipeline.estimate.record.average import step_of
@@ -74,7 +74,7 @@ def test_one_run_by_itself_is_the_estimate_of_that_run() -> None:
 
 def test_the_workers_do_not_matter_to_the_bits() -> None:
     first, second = fitted(run(21), run(22), workers=1), fitted(run(21), run(22))
-    assert first.statistic == second.statistic and first.fit.log_likelihood == second.fit.log_likelihood
+    assert first.agreement == second.agreement and first.fit.log_likelihood == second.fit.log_likelihood
     np.testing.assert_array_equal(first.fit.hull, second.fit.hull)
     np.testing.assert_array_equal(first.fit.covariance, second.fit.covariance)
 
@@ -128,7 +128,7 @@ def test_two_ships_are_no_pool() -> None:
     inputs[:, 1] /= 0.9
     found = fitted(run(21), run(22), replace(other, name="changed", inputs=inputs))
     assert found.agreement.p_value < 1e-6 and found.agreement.widened > 1.5
-    off = {one.run.name: float(np.abs(found.off_in_std(one)).max()) for one in found.alone}
+    off = {one.run.name: float(np.abs(off_in_std(one, found.fit)).max()) for one in found.alone}
     assert max(off, key=lambda name: off[name]) == "changed"
 
 

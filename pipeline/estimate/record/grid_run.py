@@ -312,7 +312,7 @@ def _channel(series: Series | None, start_ns: int, fine: Float) -> Float | None:
     return filled
 
 
-def with_common_slip(runs: Sequence[GridRun]) -> tuple[GridRun, ...]:
+def with_common_slip(runs: Sequence[GridRun], kept_m: float | None = None) -> tuple[GridRun, ...]:
     """Return the runs of a vessel with the shaft speed that keeps the speed of each approach.
 
     The race of a propeller goes with the shaft speed, not with the speed that the ship happens to have at the first
@@ -323,18 +323,24 @@ def with_common_slip(runs: Sequence[GridRun]) -> tuple[GridRun, ...]:
     ----------
     runs : sequence of GridRun
         With a logged shaft speed or without, which then stay as they are.
+    kept_m : float, optional
+        `common_slip` of other runs of hers, which these are to share.
     """
+    kept = common_slip(runs) if kept_m is None else kept_m
+    if kept is None:
+        return tuple(runs)
+    return tuple(
+        replace(run, approach_per_s=run.approach_m_s / kept) if "shaft_speed" in run.channels else run for run in runs
+    )
+
+
+def common_slip(runs: Sequence[GridRun]) -> float | None:
+    """Return the speed that a shaft speed of one revolution a second keeps, m; None where no run has both."""
     shaft = 2 + list(CHANNEL_SYMBOLS).index("n")
-    logged = [run for run in runs if "shaft_speed" in run.channels]
-    turning = [(run.speed_m_s, run.inputs[::ROWS, shaft]) for run in logged]
+    turning = [(run.speed_m_s, run.inputs[::ROWS, shaft]) for run in runs if "shaft_speed" in run.channels]
     ratios = [speed[n > 0.0] / n[n > 0.0] for speed, n in turning if np.any(n > 0.0)]
-    if not ratios:
-        return tuple(runs)
-    kept = float(np.quantile(np.concatenate(ratios), _SETTLED))
-    if kept <= 0.0:
-        return tuple(runs)
-    names = {run.name for run in logged}
-    return tuple(replace(run, approach_per_s=run.approach_m_s / kept) if run.name in names else run for run in runs)
+    kept = float(np.quantile(np.concatenate(ratios), _SETTLED)) if ratios else 0.0
+    return kept if kept > 0.0 else None
 
 
 def spread(measured: Float) -> Float:

@@ -1,0 +1,157 @@
+"""How far a pooled fit that is brought forward log by log lies from one of all logs anew, ship by ship.
+
+The first runs of a ship are fitted together, then one after the other is added as the nightly run does; beside it all
+are fitted anew. Simulated ships are sailed as in the standard trial, on a day of its own each; measured ones are those
+of ``../shared``, where there.
+"""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Iterator, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
+from dataclasses import dataclass, replace
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from time import process_time
+
+import numpy as np
+
+from benchmarks import measured_ships, result_page
+from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.default_model import default_model_of
+from kempf.flows.jobs.ingest_logs import ingest_log
+from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
+from kempf.flows.process.cores import usable
+from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.estimate.agreement import agreement_of
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
+from kempf.pipeline.estimate.posterior import Posterior, posterior_of
+from kempf.pipeline.estimate.updated import updated
+from kempf.pipeline.ingest.log_file import LogFile
+from kempf.pipeline.simulate.csv_log import to_csv
+from kempf.pipeline.simulate.logger_profile import logger_profile
+from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
+from kempf.schemas.errors import KempfError
+from kempf.warehouse.store import Warehouse
+
+_DAY_NS = 86_400_000_000_000
+HULLS = ("mariner", "container", "tanker", "ferry", "usv")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """One ship: a fit of all her runs, and one of the first ones brought forward to as many."""
+
+    ship: str
+    first: int
+    runs: int
+    #: Whether both found the same lasting noise.
+    same_model: bool
+    #: How often all had to be fitted anew on the way.
+    anew: int
+    #: Largest difference of a hull parameter, in its standard error; ratio of standard errors farthest from one.
+    off_std: float
+    widest: float
+    #: Log-likelihood of the others' runs at both, the fit of all less the other.
+    agrees: tuple[float, float]
+    #: Processor seconds of the last run's update, of all fitted anew.
+    seconds: tuple[float, float]
+
+
+def _left(fit: PooledFit) -> Posterior:
+    return posterior_of(fit, uncertainty_of(fit), agreement_of(fit), fit.log_likelihood)
+
+
+def _anew(runs: VesselRuns, count: int, workers: Executor) -> PooledFit:
+    return staged(runs.runs[:count], runs.spec, (), workers)[1][-1]
+
+
+def compare(ship: str, runs: VesselRuns, first: int, last: int, workers: Executor) -> Outcome:
+    """Bring a fit of some runs forward to more, and fit all of these."""
+    fit = _anew(runs, first, workers)
+    left, model, anew, took = _left(fit), fit.model, 0, 0.0
+    for count in range(first, last):
+        began = process_time()
+        made = updated(left, model, [runs.runs[count]], runs.spec, workers) if left.usable else None
+        took = process_time() - began
+        if made is None:
+            fit = _anew(runs, count + 1, workers)
+            left, model, anew = _left(fit), fit.model, anew + 1
+        else:
+            left = posterior_of(made.fit, made.known, made.agreement, made.log_likelihood)
+    began = process_time()
+    whole = _anew(runs, last, workers)
+    took_whole = process_time() - began
+    known = _left(whole)
+    std = np.sqrt(np.diag(known.stated)[:6])
+    ratio = np.sqrt(np.diag(left.stated)[:6]) / std
+    off = float(np.max(np.abs(left.point[:6] - known.point[:6]) / std))
+    widest = float(ratio[np.argmax(np.abs(np.log(ratio)))])
+    same = left.names == known.names
+    agrees = (left.agreement.p_value, known.agreement.p_value)
+    return Outcome(ship, first, last, same, anew, off, widest, agrees, (took, took_whole))
+
+
+def simulated(hull: str, count: int) -> VesselRuns:
+    """Sail a ship on so many days and lay the zigzags out."""
+    with TemporaryDirectory() as folder:
+        warehouse = Warehouse(str(Path(folder) / "warehouse"))
+        for day in range(count):
+            angle = (10.0, 20.0)[day % 2]
+            settings = zigzag_settings(hull, heading_deg=angle, rudder_deg=angle, duration_s=900.0, seed=500 + day)
+            settings = replace(settings, start_utc_ns=settings.start_utc_ns + day * _DAY_NS)
+            log = LogFile(to_csv(simulate_trial(settings), rate_hz=10.0))
+            ingest_log(warehouse, hull, f"day{day}.csv.gz", log, logger_profile(settings), hull)
+        return assembled(warehouse, choose(warehouse, hull), default_model_of(warehouse, hull))
+
+
+def measured(data: Path) -> Iterator[tuple[str, VesselRuns]]:
+    """Take the measured ships in, one after the other; those that are not there are left out."""
+    makers = (measured_ships.tank, measured_ships.pond, measured_ships.boat)
+    for make in makers:
+        try:
+            ship = make(data)
+        except KempfError:
+            continue
+        yield ship.name, _taken_in(ship)
+    for trials in ("trials", "trials_as_sold"):
+        try:
+            ships = measured_ships.fleet(data, trials)
+        except KempfError:
+            continue
+        for ship in ships:
+            yield f"{trials} {ship.name}", _taken_in(ship)
+
+
+def _taken_in(ship: measured_ships.Ship) -> VesselRuns:
+    with TemporaryDirectory() as folder:
+        warehouse = Warehouse(str(Path(folder) / "warehouse"))
+        measured_ships.take_in(warehouse, ship)
+        return assembled(warehouse, choose(warehouse, ship.name), default_model_of(warehouse, ship.name))
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the benchmark and write its page."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--data", type=Path, default=result_page.DATA)
+    parser.add_argument("--runs", type=int, default=32, help="of each simulated ship at most")
+    asked = parser.parse_args(arguments)
+    with ThreadPoolExecutor(usable()) as workers:
+        outcomes = []
+        for name, runs in measured(asked.data):
+            if len(runs.runs) >= 4:
+                outcomes.append(compare(name, runs, len(runs.runs) // 2, len(runs.runs), workers))
+                print(outcomes[-1], flush=True)
+        for hull in HULLS:
+            runs = simulated(hull, asked.runs)
+            first = 2
+            while 2 * first <= len(runs.runs):
+                outcomes.append(compare(f"{hull}, simulated", runs, first, 2 * first, workers))
+                print(outcomes[-1], flush=True)
+                first *= 2
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,96 @@
+"""What a common fit leaves behind of its runs: a parabola of their log-likelihood about its top.
+
+Beside it the runs need not be filtered again: the next run is fitted together with the parabola, as in a recursive
+estimate, where what is known of the parameters is a normal distribution (Ljung 1999, System Identification, sect. 11.2;
+Gelman et al. 2013, Bayesian Data Analysis, sect. 4.1 for the approximation).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.agreement import Agreement
+from kempf.pipeline.estimate.pooled_fit import Parabola, PooledFit
+from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty
+from kempf.pipeline.estimate.search.block_arrow import inverse
+from kempf.schemas.model_spec import HULL_PARAMETERS
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """What is known of hull, effects and lasting noise after a common fit of some runs."""
+
+    #: Of the parameters, hull first.
+    names: tuple[str, ...]
+    #: Shape (q,). Where the log-likelihood is highest.
+    point: Float
+    #: Shape (q, q). Inverse of the expected information, noise levels of the runs unknown.
+    covariance: Float
+    #: Shape (q, q). Of the errors, where prediction errors are not white or a receiver is late; else the same.
+    stated: Float
+    #: ``information`` or ``sandwich``.
+    kind: str
+    #: How well the runs agree on the ship.
+    agreement: Agreement
+    #: Of all runs at the point.
+    log_likelihood: float
+
+    @property
+    def parabola(self) -> Parabola:
+        """Of the log-likelihood."""
+        return Parabola(self.point, inverse(self.covariance))
+
+    @property
+    def usable(self) -> bool:
+        """Whether every parameter is known: one at a bound has no parabola."""
+        return bool(np.all(np.isfinite(self.covariance)) and np.all(np.isfinite(self.stated)))
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return {
+            "names": list(self.names),
+            "point": self.point.tolist(),
+            "covariance": self.covariance.tolist(),
+            "stated": self.stated.tolist(),
+            "kind": self.kind,
+            "statistic": self.agreement.statistic,
+            "degrees_of_freedom": self.agreement.degrees_of_freedom,
+            "log_likelihood": self.log_likelihood,
+        }
+
+
+def from_json(content: Mapping[str, Any]) -> Posterior:
+    """Return what `Posterior.show` gave; what was not finite there is NaN."""
+
+    def array(name: str) -> Float:
+        return np.array(content[name], dtype=np.float64)
+
+    return Posterior(
+        tuple(content["names"]),
+        *(array("point"), array("covariance"), array("stated")),
+        content["kind"],
+        Agreement(float(content["statistic"]), int(content["degrees_of_freedom"])),
+        float(content["log_likelihood"]),
+    )
+
+
+def posterior_of(fit: PooledFit, known: PooledUncertainty, agreement: Agreement, log_likelihood: float) -> Posterior:
+    """Return what a fit leaves behind.
+
+    Parameters
+    ----------
+    known : PooledUncertainty
+        Its errors, not widened by what the runs disagree about.
+    agreement : Agreement
+        Of all runs that it rests on.
+    log_likelihood : float
+        Of all of them.
+    """
+    names = (*HULL_PARAMETERS, *fit.model.names)
+    point = np.concatenate([fit.hull, fit.values])
+    return Posterior(names, point, fit.covariance, known.covariance, known.kind, agreement, log_likelihood)
