@@ -11,6 +11,9 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+#: most of what is read back from a table
+_AS_IT_IS = frozenset({str, int, bool, type(None)})
+
 
 def plain(value: Any, *, name_non_finite: bool = False) -> Any:
     """Return ``value`` as JSON knows it: dict, list, str, int, float, bool or None.
@@ -33,7 +36,7 @@ def plain(value: Any, *, name_non_finite: bool = False) -> Any:
     >>> plain({"b": (1, float("nan"))})
     {'b': [1, None]}
     """
-    if value is None or isinstance(value, bool):
+    if type(value) in _AS_IT_IS:
         return value
     for kind in (str, int):
         if isinstance(value, kind):

@@ -7,13 +7,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from typing import Any
 
 from kempf.pipeline.ingest.readings import Tally
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
 from kempf.warehouse import delta
 from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.remembered import remembered
 from kempf.warehouse.retry import with_retry
+from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
 
@@ -42,7 +45,13 @@ class LogRow:
 
 def all_ingests(warehouse: Warehouse, vessel: str | None = None) -> list[LogRow]:
     """Return every recorded ingest, of one vessel or of all, sorted by start, log and revision."""
-    where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    if vessel is None:
+        return _all_ingests(warehouse, {})
+    hers = {"vessel_key": vessel_key(vessel)}
+    return list(remembered(warehouse, ("logs",), ("ingests", vessel), partial(_all_ingests, warehouse, hers)))
+
+
+def _all_ingests(warehouse: Warehouse, where: Where) -> list[LogRow]:
     frame = delta.read(warehouse, "logs", where).sort("start_utc_ns", "log_id", "revision")
     return [_row(r) for r in frame.rows(named=True)]
 

@@ -253,29 +253,51 @@ def models(warehouse: Warehouse, vessel: str) -> list[tuple[dict[str, Any], str,
 
 @dataclass(frozen=True)
 class Convergence:
-    """Whether a set converged, and which of its segments it leaves out."""
+    """How the search for a set ended, without what it found."""
 
     parameter_set_id: str
+    model_name: str
     estimator: str
+    #: Those that it adds, where it brings another set forward.
     segment_ids: tuple[str, ...]
     converged: bool
-    left_out: tuple[str, ...]
+    #: Why it leaves segments out, by segment.
+    left_out: dict[str, str]
+    #: What separate hulls say of a common one; empty where there are none.
+    pooling: dict[str, Any]
 
 
-def convergences(warehouse: Warehouse, vessel: str | None, code: str) -> list[Convergence]:
-    """Return of every set of one vessel or of all that some code made whether it converged, sorted by id."""
+def convergences(
+    warehouse: Warehouse, vessel: str | None, code: str | None = None, names: Collection[str] | None = None
+) -> list[Convergence]:
+    """Return how the search for each set of one vessel or of all ended, sorted by id.
+
+    Parameters
+    ----------
+    code : str, optional
+        Of the sets that this code made alone.
+    names : collection of str, optional
+        Of these sets alone, by their whole ids.
+    """
     import polars as pl
 
-    where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
-    columns = ("parameter_set_id", "estimator", "segment_ids", "convergence_json", "provenance_json")
-    frame = delta.read(warehouse, "parameter_sets", where, columns)
-    own = frame.filter(pl.col("provenance_json").str.json_path_match("$.code_version") == code).sort("parameter_set_id")
-    found = []
-    for name, estimator, segment_ids, text, _ in own.rows():
-        said = loads(text)
-        left = tuple(sorted(said.get("left_out") or ()))
-        found.append(Convergence(name, estimator, tuple(segment_ids), bool(said.get("converged")), left))
-    return found
+    where: dict[str, str | list[str]] = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    if names is not None:
+        where["parameter_set_id"] = sorted(names)
+    columns = ("parameter_set_id", "model_name", "estimator", "segment_ids", "convergence_json", "provenance_json")
+    with delta.lent(warehouse, "parameter_sets", where) as lazy:
+        by = pl.col("provenance_json").str.json_path_match("$.code_version")
+        said = pl.col("convergence_json").str
+        frame = (lazy if code is None else lazy.filter(by == code)).select(
+            *columns[:4],
+            said.json_path_match("$.converged") == "true",
+            left=said.json_path_match("$.left_out"),
+            pooling=said.json_path_match("$.pooling"),
+        ).collect()
+    return [
+        Convergence(name, model, estimator, tuple(ids), bool(converged), loads(left or "{}"), loads(pooling or "{}"))
+        for name, model, estimator, ids, converged, left, pooling in frame.sort("parameter_set_id").rows()
+    ]
 
 
 def codes(warehouse: Warehouse, vessel: str) -> set[str]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from json import loads
 from typing import Any
 
@@ -12,6 +13,7 @@ from kempf.warehouse import delta, logs, vessels
 from kempf.warehouse.canonical import canonical_json, plain, sha256
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.remembered import remembered
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
@@ -202,8 +204,14 @@ def found_in(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
     NotFound
         ``no_warehouse``, ``no_vessel``.
     """
-    if vessel is not None:
-        vessels.require(warehouse, vessel)
+    if vessel is None:
+        return _found_in(warehouse, None)
+    vessels.require(warehouse, vessel)
+    tables = ("logs", "segments")
+    return list(remembered(warehouse, tables, ("manoeuvres", vessel), partial(_found_in, warehouse, vessel)))
+
+
+def _found_in(warehouse: Warehouse, vessel: str | None) -> list[Segment]:
     ingests = [row.ingest_id for row in logs.current(warehouse, vessel)]
     hers = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
     frame = delta.read(warehouse, "segments", {**hers, "ingest_id": ingests})

@@ -81,10 +81,10 @@ def _taken(warehouse: Warehouse, name: str, key: tuple[object, ...]) -> DeltaTab
             return None
         _, mark, table = _kept.pop(at)
     with suppress(DeltaError, OSError, ValueError):
-        if warehouse.mark_of(name, *_commit(table.version())) != mark:
+        if warehouse.mark_of(name, *commit_of(table.version())) != mark:
             return None
         # in a bucket asking for a commit that is not there costs more than the update
-        if warehouse.folder is None or warehouse.mark_of(name, *_commit(table.version() + 1)) is not None:
+        if warehouse.folder is None or warehouse.mark_of(name, *commit_of(table.version() + 1)) is not None:
             table.update_incremental()
         return table
     return None
@@ -94,7 +94,7 @@ def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: Delta
     mark = None
     if table is not None:
         with suppress(OSError):  # what was done with the table is done: a bucket that is gone now shows at the next
-            mark = warehouse.mark_of(name, *_commit(table.version()))
+            mark = warehouse.mark_of(name, *commit_of(table.version()))
     if table is None or mark is None or table.version() - vars(table)[_BORN] > MOST_COMMITS:
         return
     with _lock:
@@ -102,5 +102,6 @@ def _keep(warehouse: Warehouse, name: str, key: tuple[object, ...], table: Delta
         del _kept[:-MOST]
 
 
-def _commit(version: int) -> tuple[str, str]:
+def commit_of(version: int) -> tuple[str, str]:
+    """Return where the commit of a version stands below its table."""
     return "_delta_log", f"{version:020d}.json"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import without_log
@@ -24,10 +24,9 @@ from kempf.pipeline.estimate.plausibility import may_last
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.model_spec import ModelSpec
+from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, delta, logs, parameter_sets, provenance, segments, vessels
-from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
-from kempf.warehouse.scan import Where
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
@@ -66,9 +65,18 @@ class IdentifyOutcome:
     """What became of one segment: a parameter set (new, or there already), or the reason why there is none."""
 
     segment: Segment
+    #: None where there is none; of `identify_segments` also where it was there already.
     parameter_set: ParameterSet | None
     new: bool = False
     error: KempfError | None = None
+    #: Id of the set; None where there is none.
+    set_id: str | None = None
+    converged: bool = False
+
+
+def _made(segment: Segment, made: ParameterSet) -> IdentifyOutcome:
+    converged = bool(made.convergence.get("converged"))
+    return IdentifyOutcome(segment, made, new=True, set_id=made.parameter_set_id, converged=converged)
 
 
 def identify_vessel(
@@ -102,7 +110,10 @@ def identify_vessel(
     """
     refreshed = refresh_logs(warehouse, vessel, progress)
     with waiting(warehouse, vessel) as new:
-        return identify_segments(warehouse, vessel, request, refreshed, new, flow_run=flow_run, progress=progress)
+        outcomes = identify_segments(warehouse, vessel, request, refreshed, new, flow_run=flow_run, progress=progress)
+    there = [o.set_id for o in outcomes if o.set_id is not None and o.parameter_set is None]
+    kept = {one.parameter_set_id: one for one in parameter_sets.get_all(warehouse, vessel, there)}
+    return [o if o.set_id not in kept else replace(o, parameter_set=kept[o.set_id]) for o in outcomes]
 
 
 def identify_segments(
@@ -117,6 +128,8 @@ def identify_segments(
     progress: Progress = silent,
 ) -> list[IdentifyOutcome]:
     """Do as `identify_vessel` where the logs have just been read anew, and the caller stores what is new.
+
+    Sets that are there already are not read, but named: a vessel may have thousands.
 
     Parameters
     ----------
@@ -138,68 +151,84 @@ def identify_segments(
     if not current:
         raise _no_segments(warehouse, vessel)
     table_versions = delta.versions(warehouse)
-    outcomes: list[IdentifyOutcome] = []
     readable = [segment for segment in current if segment.ingest_id not in refreshed.failed]
-    ingests = list(dict.fromkeys(segment.ingest_id for segment in current))
+    wanted = _wanted(warehouse, request, readable, by_ingest)
+    names = [parameter_set_id(one.inputs) for one in wanted.values()]
+    known = {one.parameter_set_id: one for one in parameter_sets.convergences(warehouse, vessel, names=names)}
+    outcomes = [
+        IdentifyOutcome(segment, None, error=refreshed.failed[segment.ingest_id])
+        for segment in current
+        if segment.ingest_id in refreshed.failed
+    ]
+    missing: dict[str, list[_Wanted]] = {}
+    for one, name in zip(wanted.values(), names, strict=True):
+        held = known.get(name)
+        if held is None:
+            missing.setdefault(one.segment.ingest_id, []).append(one)
+        else:
+            outcomes.append(IdentifyOutcome(one.segment, None, set_id=name, converged=held.converged))
     with ThreadPoolExecutor(max_workers=usable()) as pool:
-        for done, ingest in enumerate(ingests):
-            hers = [segment for segment in current if segment.ingest_id == ingest]
-            progress(done, len(ingests), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
-            if ingest in refreshed.failed:
-                outcomes += [IdentifyOutcome(segment, None, error=refreshed.failed[ingest]) for segment in hers]
-            else:
-                beside = {s.segment_id: companions_of(s, readable, by_ingest) for s in hers if without_log(s)}
-                job = _Identification(warehouse, request, pool, flow_run, table_versions, by_ingest)
-                outcomes += _identify_log(job, by_ingest[ingest], hers, beside)
-                new.keep([o.parameter_set for o in outcomes[-len(hers) :] if o.new and o.parameter_set])
-    progress(len(ingests), len(ingests), "done")
+        for done, (ingest, hers) in enumerate(missing.items()):
+            progress(done, len(missing), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
+            made = _identify_log(warehouse, vessel, hers, pool, flow_run, table_versions, by_ingest)
+            outcomes += made
+            new.keep([o.parameter_set for o in made if o.parameter_set])
+    progress(len(missing), len(missing), "done")
     outcomes.sort(key=lambda o: (o.segment.start_utc_ns, o.segment.segment_id))
-    _point_to_current(new, outcomes, request.spec, adopt=adopt)
+    _point_to_current(new, outcomes, request, adopt=adopt)
     return outcomes
 
 
 @dataclass(frozen=True)
-class _Identification:
-    """What is the same for every log of one call."""
+class _Wanted:
+    """A segment, and all that its set is a function of."""
 
-    warehouse: Warehouse
-    request: Request
-    pool: ThreadPoolExecutor
-    flow_run: str | None
-    table_versions: dict[str, int]
-    by_ingest: Mapping[str, logs.LogRow]
+    segment: Segment
+    inputs: Inputs
+    companions: tuple[Segment, ...]
+    profile: VesselProfile
+
+
+def _wanted(
+    warehouse: Warehouse, request: Request, readable: Sequence[Segment], by_ingest: Mapping[str, logs.LogRow]
+) -> dict[str, _Wanted]:
+    """Return what is wanted of every segment, by its id."""
+    alone = request.estimator not in CAN or bool(request.spec.effects)
+    hashes = dict.fromkeys(by_ingest[segment.ingest_id].profile_sha256 for segment in readable)
+    profiles = {sha256: vessels.get(warehouse, sha256) for sha256 in hashes}
+    found = {}
+    for segment in readable:
+        sha256 = by_ingest[segment.ingest_id].profile_sha256
+        beside = () if alone or not without_log(segment) else companions_of(segment, readable, by_ingest)
+        inputs = inputs_of(segment, sha256, request, beside)
+        found[segment.segment_id] = _Wanted(segment, inputs, tuple(beside), profiles[sha256])
+    return found
 
 
 def _identify_log(
-    job: _Identification, row: logs.LogRow, manoeuvres: Sequence[Segment], beside: Mapping[str, tuple[Segment, ...]]
+    warehouse: Warehouse,
+    vessel: str,
+    wanted: Sequence[_Wanted],
+    pool: ThreadPoolExecutor,
+    flow_run: str | None,
+    table_versions: Mapping[str, int],
+    by_ingest: Mapping[str, logs.LogRow],
 ) -> list[IdentifyOutcome]:
-    """Identify the segments of one log, one a thread; the new sets are stored by the caller.
+    """Identify segments of one log, one a thread; the new sets are stored by the caller."""
+    ingests = {s.ingest_id for one in wanted for s in (one.segment, *one.companions)}
+    held = {by_ingest[i].log_id: channels_of(warehouse, i) for i in sorted(ingests)}
 
-    ``beside`` are the companions by segment, of those without a log.
-    """
-    warehouse, pool = job.warehouse, job.pool
-    profile = vessels.get(warehouse, row.profile_sha256)
-    alone = job.request.estimator not in CAN or bool(job.request.spec.effects)
-    companions = [() if alone else beside.get(s.segment_id, ()) for s in manoeuvres]
-    wanted = [inputs_of(s, row.profile_sha256, job.request, c) for s, c in zip(manoeuvres, companions, strict=True)]
-    missing = _missing(warehouse, row.vessel, wanted)
-    asked = [c for c, inputs in zip(companions, wanted, strict=True) if parameter_set_id(inputs) in missing]
-    ingests = {row.ingest_id, *(s.ingest_id for c in asked for s in c)} if missing else set()
-    held = {job.by_ingest[i].log_id: channels_of(warehouse, i) for i in sorted(ingests)}
-
-    def one(segment: Segment, inputs: Inputs, others: tuple[Segment, ...]) -> IdentifyOutcome:
-        name = parameter_set_id(inputs)
-        if name not in missing:
-            return IdentifyOutcome(segment, parameter_sets.get(warehouse, name))
-        used = [s.ingest_id for s in (segment, *others)]
-        origin = provenance.collect(warehouse, inputs, used, job.flow_run, job.table_versions)
+    def one(asked: _Wanted) -> IdentifyOutcome:
+        used = [s.ingest_id for s in (asked.segment, *asked.companions)]
+        origin = provenance.collect(warehouse, asked.inputs, used, flow_run, table_versions)
+        ids = (asked.segment.segment_id,)
         try:
-            made = build(held, SetRequest(inputs, profile, row.vessel, (segment.segment_id,), origin))
+            made = build(held, SetRequest(asked.inputs, asked.profile, vessel, ids, origin))
         except Exception as error:  # noqa: BLE001 - whatever it is, the other segments are identified
-            return IdentifyOutcome(segment, None, error=wrapped(error))
-        return IdentifyOutcome(segment, made, new=True)
+            return IdentifyOutcome(asked.segment, None, error=wrapped(error))
+        return _made(asked.segment, made)
 
-    return list(pool.map(one, manoeuvres, wanted, companions))
+    return list(pool.map(one, wanted))
 
 
 def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
@@ -212,25 +241,11 @@ def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
     )
 
 
-def _missing(warehouse: Warehouse, vessel: str, wanted: Sequence[Inputs]) -> set[str]:
-    names = {parameter_set_id(inputs) for inputs in wanted}
-    where: Where = {"vessel_key": vessel_key(vessel), "parameter_set_id": sorted(names)}
-    stored = delta.read(warehouse, "parameter_sets", where, ("parameter_set_id",))
-    return names - set(stored["parameter_set_id"].to_list())
-
-
-def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], spec: ModelSpec, *, adopt: bool) -> None:
+def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], request: Request, *, adopt: bool) -> None:
     """Let ``current`` point to the latest whole zigzag whose maximum-likelihood identification converged."""
-    whole = [
-        o.parameter_set
-        for o in outcomes
-        if o.parameter_set is not None
-        and o.segment.kind == "zigzag"
-        and o.parameter_set.convergence.get("converged")
-        and o.parameter_set.estimator == "ml"
-    ]
-    if whole and new.may_move(spec, adopt=adopt):
-        new.point(whole[-1].parameter_set_id)
+    whole = [o.set_id for o in outcomes if o.set_id is not None and o.segment.kind == "zigzag" and o.converged]
+    if whole and request.estimator == SINGLE and new.may_move(request.spec, adopt=adopt):
+        new.point(whole[-1])
 
 
 def inputs_of(segment: Segment, profile_sha256: str, request: Request, companions: Sequence[Segment] = ()) -> Inputs:

@@ -38,7 +38,7 @@ def poolable(warehouse: Warehouse, vessel: str, request: Request, outcomes: Sequ
     if request.estimator != SINGLE:
         return f"the estimator {request.estimator} takes one zigzag at a time; {SINGLE} pools"
     # a log none of whose manoeuvres could be identified stays out
-    usable = {o.segment.ingest_id for o in outcomes if o.parameter_set is not None}
+    usable = {o.segment.ingest_id for o in outcomes if o.set_id is not None}
     if not usable:
         return "no zigzag could be identified"
     unusable = {row.ingest_id for row in logs.current(warehouse, vessel)} - usable

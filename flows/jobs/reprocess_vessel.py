@@ -196,7 +196,7 @@ class _Reprocessing:
                 if outcome.error is not None and outcome.segment.ingest_id not in refreshed.failed:
                     report.fail(outcome.segment.segment_id, outcome.error)
                 report.new_sets += outcome.new
-                report.kept_sets += outcome.parameter_set is not None and not outcome.new
+                report.kept_sets += outcome.set_id is not None and not outcome.new
             self._pool(work, one, outcomes)
 
     def _pool(self, work: _Work, request: Request, outcomes: list[IdentifyOutcome]) -> None:

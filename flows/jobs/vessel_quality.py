@@ -5,13 +5,12 @@ Nothing of it is a failure: the work was done, and this is what a person should 
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any
 
 from kempf.schemas.quality import Kind
 from kempf.warehouse import code_version, examinations, history, logs, parameter_sets, segments
-from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
 
@@ -46,7 +45,9 @@ def quality_of(warehouse: Warehouse, vessel: str) -> list[Finding]:
         ``no_warehouse``, ``no_vessel``.
     """
     found = segments.found_in(warehouse, vessel)
-    sets = parameter_sets.get_all(warehouse, vessel, history.standing(warehouse, vessel))
+    standing = {name: place for place, name in enumerate(history.standing(warehouse, vessel))}
+    sets = parameter_sets.convergences(warehouse, vessel, names=list(standing))
+    sets.sort(key=lambda one: standing[one.parameter_set_id])
     return [*_of_logs(warehouse, vessel, found), *_of_sets(sets)]
 
 
@@ -67,17 +68,16 @@ def _of_logs(warehouse: Warehouse, vessel: str, found: Iterable[segments.Segment
             yield Finding("no_zigzag", row.log_id, f"{row.file_name}: no zigzag was found.")
 
 
-def _of_sets(sets: Iterable[ParameterSet]) -> Iterable[Finding]:
+def _of_sets(sets: Iterable[parameter_sets.Convergence]) -> Iterable[Finding]:
     for one in sets:
         what = f"{one.parameter_set_id} ({one.model_name}, {one.estimator})"
-        if not one.convergence.get("converged"):
+        if not one.converged:
             yield Finding("not_converged", one.parameter_set_id, f"{what} did not converge.", one.segment_ids)
-        pooling = one.convergence.get("pooling") or {}
-        if pooling.get("may_be_pooled") is False:
-            words = f"{what}: its {pooling['segments']} zigzags do not share one hull (p = {pooling['p_value']:.1g})."
+        if one.pooling.get("may_be_pooled") is False:
+            said = one.pooling
+            words = f"{what}: its {said['segments']} zigzags do not share one hull (p = {said['p_value']:.1g})."
             yield Finding("no_shared_hull", one.parameter_set_id, words, one.segment_ids)
-        left: Mapping[str, str] = one.convergence.get("left_out") or {}
-        for name, why in sorted(left.items()):
+        for name, why in sorted(one.left_out.items()):
             yield Finding("left_out", name, f"{what} leaves {name} out: {why}.", (name,))
 
 
