@@ -288,12 +288,16 @@ def convergences(
     with delta.lent(warehouse, "parameter_sets", where) as lazy:
         by = pl.col("provenance_json").str.json_path_match("$.code_version")
         said = pl.col("convergence_json").str
-        frame = (lazy if code is None else lazy.filter(by == code)).select(
-            *columns[:4],
-            said.json_path_match("$.converged") == "true",
-            left=said.json_path_match("$.left_out"),
-            pooling=said.json_path_match("$.pooling"),
-        ).collect()
+        frame = (
+            (lazy if code is None else lazy.filter(by == code))
+            .select(
+                *columns[:4],
+                said.json_path_match("$.converged") == "true",
+                left=said.json_path_match("$.left_out"),
+                pooling=said.json_path_match("$.pooling"),
+            )
+            .collect()
+        )
     return [
         Convergence(name, model, estimator, tuple(ids), bool(converged), loads(left or "{}"), loads(pooling or "{}"))
         for name, model, estimator, ids, converged, left, pooling in frame.sort("parameter_set_id").rows()

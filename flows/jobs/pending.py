@@ -38,13 +38,13 @@ class Waiting:
             parameter_sets.insert(self._warehouse, made)
 
     def standing(self, alias: str = aliases.CURRENT) -> ParameterSet | None:
-        """Return the set that an alias points to, or will."""
+        """Return the set that an alias points to, or will, as it is stored."""
         stored = aliases.of_vessel(self._warehouse, self._vessel).get(alias)
         name = self.aliases.get((self._vessel, alias), stored)
         if name is None:
             return None
         made = next((one for one in self.sets if one.parameter_set_id == name), None)
-        return made or parameter_sets.get(self._warehouse, name)
+        return made or parameter_sets.as_stored(self._warehouse, name)
 
     def may_move(self, spec: ModelSpec, *, adopt: bool) -> bool:
         """Return whether ``current`` may go to a set of this model: from a model with effects only to the like.

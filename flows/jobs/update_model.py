@@ -134,15 +134,15 @@ def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, wanted
     by_id = {row.parameter_set_id: row for row in rows}
     for row in sorted(rows, key=lambda one: (-one.manoeuvres, one.parameter_set_id)):
         settings = {key: value for key, value in row.settings.items() if key not in ("segments", UPDATES)}
-        at_once = row.fitted_at_once
+        at_once, rests_on = row.fitted_at_once, _segments(row, by_id)
         if (
-            settings == mine
+            rests_on is not None
+            and rests_on <= names
+            and settings == mine
             and row.code_version == code_version.fingerprint("estimate")
             and row.profile_sha256 == chosen.profile_sha256
             and at_once >= FEWEST
             and len(names) < GROWN * at_once
-            and row.manoeuvres <= len(names)
-            and _segments(row, by_id) <= names
         ):
             found = parameter_sets.get(warehouse, row.parameter_set_id)
             left = found.convergence.get(POSTERIOR)
@@ -151,9 +151,12 @@ def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, wanted
     return None
 
 
-def _segments(row: parameter_sets.Pooled, by_id: Mapping[str, parameter_sets.Pooled]) -> set[str]:
+def _segments(row: parameter_sets.Pooled, by_id: Mapping[str, parameter_sets.Pooled]) -> set[str] | None:
+    """Return the segments that a set rests on; None where one that it brings forward is lost."""
     found = set(row.segment_ids)
-    while row.updates is not None and row.updates in by_id:
+    while row.updates is not None:
+        if row.updates not in by_id:
+            return None
         row = by_id[row.updates]
         found.update(row.segment_ids)
     return found

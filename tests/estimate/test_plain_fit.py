@@ -52,7 +52,7 @@ def test_one_hull_from_three_zigzags(three: PlainFit) -> None:
     assert three.fit.converged and not three.left_out
     assert np.max(np.abs(three.fit.hull - truth) / three.fit.std) < 3.0
     assert three.agreement.p_value > LEVEL and three.agreement.widened == 1.0
-    assert three.agreement.degrees_of_freedom == 12 and 0.0 < three.statistic < 30.0
+    assert three.agreement.degrees_of_freedom == 12 and 0.0 < three.agreement.statistic < 30.0
     assert [one.run.name for one in three.alone] == ["ferry 21", "ferry 22", "ferry 23"]
 
 
@@ -68,7 +68,7 @@ def test_one_run_by_itself_is_the_estimate_of_that_run() -> None:
     trial = sailed("ferry", seed=21, heading_deg=80.0 * 21, duration_s=500.0)
     alone = identify(record_of(trial), SPEC, trial.truth.wind_arm_per_m, STANDARD, 90.0)
     common = fitted(run(21))
-    assert common.statistic == pytest.approx(0.0, abs=1e-3) and common.agreement.p_value == 1.0
+    assert common.agreement.statistic == pytest.approx(0.0, abs=1e-3) and common.agreement.p_value == 1.0
     assert np.max(np.abs(common.fit.hull - alone.hull.array()) / common.fit.std) < 0.01
 
 
