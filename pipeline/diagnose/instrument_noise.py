@@ -9,18 +9,22 @@ each measurement.
 from __future__ import annotations
 
 from concurrent.futures import Executor
+from dataclasses import replace
 
 import numpy as np
 
 from kempf.pipeline.diagnose.forward_selection import added
 from kempf.pipeline.diagnose.joint_noise import with_joint_noise
 from kempf.pipeline.diagnose.screen import screen
+from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effects import catalogue
 from kempf.schemas.instrument_noise import lasting_noise
 
 #: score below which nobody asks, and log-likelihood that it must gain
 _LEAST_SCORE, _LEAST_GAIN = 30.0, 15.0
+#: runs, and measurements in them, by which lasting noise is looked for
+_FEWEST, _ENOUGH = 3, 60_000
 
 
 def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
@@ -37,8 +41,40 @@ def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
     workers : Executor
         Share the work; nothing depends on it.
     """
-    found = _one_by_one(fit, workers)
-    return found if found is fit else with_joint_noise(found, _LEAST_GAIN, workers)
+    some = _some_of(fit)
+    found = _one_by_one(some, workers)
+    if found is some:
+        return fit
+    found = with_joint_noise(found, _LEAST_GAIN, workers)
+    return found if some is fit else _of_all(fit, some, found, workers)
+
+
+def _some_of(fit: PooledFit) -> PooledFit:
+    """Return a fit as of so many of its runs, spread over them, as show what noise lasts; itself where there are few.
+
+    The instruments are the same in every run, and the search costs a dozen fits.
+    """
+    n = len(fit.runs)
+    many = max(_FEWEST, -(-_ENOUGH * n // max(fit.count, 1)))
+    if many >= n:
+        return fit
+    at = sorted({int((k + 0.5) * n / many) for k in range(many)})
+    lines = tuple(fit.linearised[i] for i in at)
+    return replace(
+        fit,
+        runs=tuple(fit.runs[i] for i in at),
+        levels=fit.levels[at],
+        linearised=lines,
+        log_likelihood=sum(line.passed.log_likelihood for line in lines),
+    )
+
+
+def _of_all(fit: PooledFit, some: PooledFit, found: PooledFit, workers: Executor) -> PooledFit:
+    """Fit all runs with the lasting noise that some of them show."""
+    levels = fit.levels + np.mean(found.levels - some.levels, axis=0)
+    runs = [replace(run, model=found.model) for run in fit.runs]
+    made = pooled_fit.fit(runs, found.hull, levels, found.values, workers)
+    return made if made.log_likelihood > fit.log_likelihood + _LEAST_GAIN else fit
 
 
 def _one_by_one(fit: PooledFit, workers: Executor) -> PooledFit:
