@@ -43,6 +43,7 @@ _VESSEL = (
     Column("vessel", "text", "name of the vessel"),
 )
 _INGEST = Column("ingest_id", "text", "one log read with one profile by one version of the code")
+_MONTH = Column("month", "text", "UTC month of the log's first reading, such as 2025-05; partition")
 _LOG = Column("log_id", "text", "SHA-256 of the log as delivered")
 _CODE = Column("code_version", "text", "hash of the source of the stage that made the row")
 _START = Column("start_utc_ns", "integer", "first instant", "ns")
@@ -95,12 +96,13 @@ _ALL = (
         (
             *_VESSEL,
             _INGEST,
+            _MONTH,
             Column("record", "integer", "number of the line, row or message in the log"),
             Column("time_utc_ns", "integer", "instant of measurement", "ns"),
             Column("source", "text", "instrument: sentence, topic or row"),
             *(Column(channel.column, "real", channel.words, channel.unit) for channel in CHANNELS.values()),
         ),
-        partition_by=("vessel_key", "ingest_id"),
+        partition_by=("vessel_key", "month"),
     ),
     Table(
         "rejected",
@@ -108,6 +110,7 @@ _ALL = (
         (
             *_VESSEL,
             _INGEST,
+            _MONTH,
             Column("record", "integer", "number of the line, row or message in the log"),
             Column("time_utc_ns", "integer", "instant of measurement, null where unknown", "ns"),
             Column("source", "text", "instrument: sentence, topic or row"),
@@ -115,7 +118,7 @@ _ALL = (
             Column("reason", "text", "why it is refused"),
             Column("raw", "text", "the line, row or message as it came"),
         ),
-        partition_by=("vessel_key", "ingest_id"),
+        partition_by=("vessel_key", "month"),
     ),
     Table(
         "lost",

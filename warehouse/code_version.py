@@ -51,7 +51,8 @@ STAGES: dict[Stage, Entry] = {
     ),
     "estimate": Entry(
         (
-            *("channels.instruments", "estimate.estimators", "estimate.pooled_uncertainty"),
+            *("channels.instruments", "estimate.estimators", "estimate.pooled_uncertainty", "estimate.posterior"),
+            *("estimate.updated", "predict.free_run"),
             *("estimate.no_log.companions", "estimate.record.cut", "estimate.record.left_out"),
             *("diagnose.staged", "diagnose.ladder_step", "diagnose.split", "diagnose.late_velocity"),
         ),

@@ -17,13 +17,16 @@ from urllib.parse import unquote
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import delta, seals
+from kempf.warehouse.readings import by_month
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     from deltalake import DeltaTable
 
-#: Tables that grow by single rows; readings come in whole files and are left alone.
+#: Tables of whole logs, with a folder a vessel and month: of the files there one is made.
+_LARGE = ("readings", "rejected")
+#: Tables that grow by single rows.
 _SMALL = (
     *("vessels", "logs", "lost", "segments", "examinations", "parameter_sets"),
     *("diagnoses", "diagnosis_evidence", "aliases", "inbox", "runs", "run_history", "corrections", "notes"),
@@ -55,8 +58,10 @@ class Cleared:
 def compact(warehouse: Warehouse, more_files_than: int = 50) -> tuple[str, ...]:
     """Compact the tables that have many files. Earlier versions stay readable: nothing is deleted.
 
-    A table that is not kept a folder a vessel is sorted by vessel, in small groups of rows, so that reading one vessel
-    skips the others. A table of many files is given a checkpoint, which opens several times as fast as its commits.
+    A table that is not kept a folder a vessel is sorted by vessel, in small groups of rows, so that reading one
+    vessel skips the others. Readings become one file a vessel and month, or few of a month of very long logs; those of
+    earlier versions of kempf, one a log, are laid out so first. A table of many files is given a checkpoint, which
+    opens several times as fast as its commits.
 
     Parameters
     ----------
@@ -87,19 +92,22 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
     table = delta.open_table(warehouse, name)
     if table is None or len(table.file_uris()) <= more_files_than:
         return False
+    relaid = name in _LARGE and table.metadata().partition_columns != list(TABLES[name].partition_by)
+    if relaid:
+        table = delta.relay(warehouse, name, by_month(warehouse, table, name))
     written = WriterProperties(compression="ZSTD", max_row_group_size=_ROW_GROUP)
     sortable = "vessel_key" in {c.name for c in TABLES[name].columns} - set(table.metadata().partition_columns)
     with delta.refusals_as_errors(warehouse.address(name)):
         removed = 0
         if name in _SMALL and sortable:
             removed = table.optimize.z_order(["vessel_key"], writer_properties=written)["numFilesRemoved"]
-        elif name in _SMALL:
+        elif name in (*_SMALL, *_LARGE):
             removed = table.optimize.compact(writer_properties=written)["numFilesRemoved"]
         if warehouse.size_of(name, "_delta_log", f"{table.version():020d}.checkpoint.parquet") is None:
             table.create_checkpoint()
         seals.seal(table)
         seals.seal_checkpoint(table)
-    return int(removed) > 0
+    return relaid or int(removed) > 0
 
 
 def pinned(warehouse: Warehouse) -> dict[str, tuple[int, ...]]:

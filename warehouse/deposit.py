@@ -114,7 +114,7 @@ def _store(warehouse: Warehouse, fresh: Sequence[tuple[Delivery, logs.LogRow]]) 
     if not fresh:
         return ()
     vessels.register_all(warehouse, [(delivery.vessel, delivery.profile) for delivery, _ in fresh])
-    batch = [(row.vessel, row.ingest_id, delivery.readings) for delivery, row in fresh]
+    batch = [(row, delivery.readings) for delivery, row in fresh]
     readings.write(warehouse, batch)
     readings.write_rejected(warehouse, batch)
     lost.write(warehouse, batch)

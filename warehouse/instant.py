@@ -19,3 +19,14 @@ def iso_utc(time_utc_ns: int) -> str:
     digits = f"{nanoseconds:09d}"
     whole = datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%dT%H:%M:%S")
     return f"{whole}.{digits.removesuffix('000')}Z"
+
+
+def month_of(time_utc_ns: int) -> str:
+    """Return the UTC month of an instant.
+
+    Examples
+    --------
+    >>> month_of(1_746_258_421_147_000_000)
+    '2025-05'
+    """
+    return datetime.fromtimestamp(time_utc_ns // _SECOND_NS, UTC).strftime("%Y-%m")

@@ -8,11 +8,12 @@ from kempf.pipeline.ingest.decoded import LostStretch
 from kempf.pipeline.ingest.readings import LogReadings
 from kempf.warehouse import delta
 from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.logs import LogRow
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
 
-def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, LogReadings]]) -> None:
+def write(warehouse: Warehouse, batch: Sequence[tuple[LogRow, LogReadings]]) -> None:
     """Put the lost stretches of several ingests in place of what is there of them, in one commit.
 
     Nothing is written where all logs are whole.
@@ -21,27 +22,27 @@ def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, LogReadings]]) -
     ----------
     warehouse : Warehouse
         Made where there is none.
-    batch : sequence of (str, str, LogReadings)
-        Vessel, ingest id, readings.
+    batch : sequence of (LogRow, LogReadings)
+        The ingest, and what was read of its log.
     """
-    damaged = [(vessel, ingest, item) for vessel, ingest, item in batch if item.lost]
+    damaged = [(row, item) for row, item in batch if item.lost]
     if not damaged:
         return
     rows = [
         {
-            "vessel_key": vessel_key(vessel),
-            "vessel": vessel,
-            "ingest_id": ingest,
+            "vessel_key": vessel_key(row.vessel),
+            "vessel": row.vessel,
+            "ingest_id": row.ingest_id,
             "number": number,
             "since_utc_ns": one.since_ns,
             "until_utc_ns": one.until_ns,
             "messages": one.messages,
             "why": one.why,
         }
-        for vessel, ingest, item in damaged
+        for row, item in damaged
         for number, one in enumerate(item.lost)
     ]
-    predicate = one_of("ingest_id", {ingest for _, ingest, _ in damaged})
+    predicate = one_of("ingest_id", {row.ingest_id for row, _ in damaged})
 
     def attempt() -> None:
         with delta.ensured(warehouse, "lost") as table:

@@ -1,4 +1,7 @@
-"""Readings and refused records of one ingest, at native rates. Nothing here is seen before its row in ``logs``."""
+"""Readings and refused records of one ingest, at native rates. Nothing here is seen before its row in ``logs``.
+
+A table has a folder a vessel and month, where `kempf.warehouse.compaction` makes one file of those of single logs.
+"""
 
 from __future__ import annotations
 
@@ -8,30 +11,36 @@ from typing import TYPE_CHECKING
 
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, LogReadings
 from kempf.warehouse import delta, logs
+from kempf.warehouse.instant import month_of
 from kempf.warehouse.keys import one_of, vessel_key
+from kempf.warehouse.logs import LogRow
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     import polars as pl
+    from deltalake import DeltaTable
+
+#: month of rows of an ingest that is in no register
+_NEVER = "never"
 
 
-def write(warehouse: Warehouse, batch: Sequence[tuple[str, str, LogReadings]]) -> None:
+def write(warehouse: Warehouse, batch: Sequence[tuple[LogRow, LogReadings]]) -> None:
     """Put the readings of several ingests in place of what is there of them, in one commit.
 
     Parameters
     ----------
     warehouse : Warehouse
         Made where there is none.
-    batch : sequence of (str, str, LogReadings)
-        Vessel, ingest id, readings.
+    batch : sequence of (LogRow, LogReadings)
+        The ingest, whether it is recorded already or not, and its readings.
     """
-    _write(warehouse, "readings", [(vessel, ingest, item.frames) for vessel, ingest, item in batch])
+    _write(warehouse, "readings", [(row, item.frames) for row, item in batch])
 
 
-def write_rejected(warehouse: Warehouse, batch: Sequence[tuple[str, str, LogReadings]]) -> None:
+def write_rejected(warehouse: Warehouse, batch: Sequence[tuple[LogRow, LogReadings]]) -> None:
     """Put what was refused in several ingests in place of what is there of them, in one commit."""
-    _write(warehouse, "rejected", [(vessel, ingest, item.rejections) for vessel, ingest, item in batch])
+    _write(warehouse, "rejected", [(row, item.rejections) for row, item in batch])
 
 
 def read(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
@@ -97,29 +106,60 @@ def read_rejected(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
     return found.select(list(REJECTED_SCHEMA)).sort("record", "channel", "reason", "raw")
 
 
+def ingests_held(warehouse: Warehouse, name: str = "readings") -> set[str]:
+    """Return the ingests of which a table has rows."""
+    with delta.lent(warehouse, name) as rows:
+        return set(rows.select("ingest_id").unique().collect()["ingest_id"].to_list())
+
+
+def by_month(warehouse: Warehouse, table: DeltaTable, name: str) -> Iterator[pl.DataFrame]:
+    """Yield all rows of a table that has a folder an ingest, each with its month, in the order of the folders to come.
+
+    Parameters
+    ----------
+    table : DeltaTable
+        Open.
+    """
+    import polars as pl
+
+    months = {row.ingest_id: month_of(row.start_utc_ns) for row in logs.all_ingests(warehouse)}
+    folders = [(str(part["vessel_key"]), str(part["ingest_id"])) for part in table.partitions()]
+    # of an ingest that was never recorded nobody reads anything: it stays, in a month of its own
+    placed = sorted((vessel, months.get(ingest, _NEVER), ingest) for vessel, ingest in folders)
+    for vessel, month, ingest in placed:
+        rows = delta.rows(table, name, {"vessel_key": vessel, "ingest_id": ingest})
+        yield rows.with_columns(pl.lit(month).alias("month"))
+
+
 def _of_ingest(warehouse: Warehouse, ingest_id: str) -> dict[str, str]:
     row = logs.of_ingest(warehouse, ingest_id)
-    return {"vessel_key": vessel_key(row.vessel), "ingest_id": row.ingest_id}
+    return {"vessel_key": vessel_key(row.vessel), "month": month_of(row.start_utc_ns), "ingest_id": row.ingest_id}
 
 
 def _write(
-    warehouse: Warehouse, name: str, batch: Sequence[tuple[str, str, Callable[[], Iterator[pl.DataFrame]]]]
+    warehouse: Warehouse, name: str, batch: Sequence[tuple[LogRow, Callable[[], Iterator[pl.DataFrame]]]]
 ) -> None:
     if not batch:
         return
-    vessels, ingests = ({vessel_key(v) for v, _, _ in batch}, {ingest for _, ingest, _ in batch})
-    predicate = f"{one_of('vessel_key', vessels)} AND {one_of('ingest_id', ingests)}"
 
     def rows() -> Iterator[pl.DataFrame]:
         import polars as pl
 
-        for vessel, ingest, frames in batch:
-            constants = {"vessel_key": vessel_key(vessel), "vessel": vessel, "ingest_id": ingest}
+        for row, frames in batch:
+            constants = {"vessel_key": vessel_key(row.vessel), "vessel": row.vessel, "ingest_id": row.ingest_id}
+            constants["month"] = month_of(row.start_utc_ns)
             for frame in frames():
                 yield frame.with_columns(pl.lit(value).alias(column) for column, value in constants.items())
 
+    given = [row for row, _ in batch]
+    places = [one_of("vessel_key", {vessel_key(row.vessel) for row in given})]
+    months = one_of("month", {month_of(row.start_utc_ns) for row in given})
+    ingests = one_of("ingest_id", {row.ingest_id for row in given})
+
     def attempt() -> None:
         with delta.ensured(warehouse, name) as table:
-            delta.replace(table, name, rows(), predicate)
+            # of a table from before there were months the rows of an ingest may have none
+            own = [*places, months] if "month" in table.metadata().partition_columns else places
+            delta.replace(table, name, rows(), " AND ".join([*own, ingests]))
 
     with_retry(attempt)

@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta, logs, raw, seals, vessels
+from kempf.warehouse import delta, logs, raw, readings, seals, vessels
 from kempf.warehouse.deposit import description
 from kempf.warehouse.store import Warehouse
 
@@ -204,14 +204,8 @@ def _values_of(warehouse: Warehouse, name: str, column: str) -> set[str]:
 
 
 def _ingests_of(warehouse: Warehouse, name: str) -> set[str] | None:
-    """Return the ingests that a table has rows of; of a table with a folder each from its log alone."""
+    """Return the ingests that a table has rows of."""
     try:
-        if "ingest_id" not in TABLES[name].partition_by:
-            return set(delta.read(warehouse, name, columns=("ingest_id",))["ingest_id"].to_list())
-        with delta.reading(warehouse, name) as table:
-            if table is None:
-                return set()
-            folders = [part["ingest_id"] for part in table.partitions()]
-            return {str(one) for one in folders}
+        return readings.ingests_held(warehouse, name)
     except Exception:  # noqa: BLE001 - it is reported as damaged already
         return None

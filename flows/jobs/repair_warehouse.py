@@ -24,6 +24,7 @@ from kempf.schemas.profile import parse
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import code_version, corrections, delta, logs, lost, raw, readings, seals, vessels
 from kempf.warehouse.deposit import description
+from kempf.warehouse.instant import month_of
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
@@ -42,8 +43,10 @@ class Repaired:
     gone: list[str] = field(default_factory=list)
     #: What is still wrong.
     left: list[Problem] = field(default_factory=list)
-    #: Of what logs gave that had to be taken out: ingests, and keys of vessels; None stands for all of them.
+    #: Of what logs gave that had to be taken out: ingests, months (key of the vessel, blank, month), and keys of
+    #: vessels; None stands for all of them.
     ingests: set[str] = field(default_factory=set)
+    months: set[str] = field(default_factory=set)
     vessel_keys: set[str | None] = field(default_factory=set)
     #: Whether rows of the register of logs had to be taken out: then what is kept beside the raw logs counts.
     registers: bool = False
@@ -125,12 +128,15 @@ def _remember(warehouse: Warehouse, folder: Path, path: Path, name: str, found: 
         found.registers = True
     elif name not in _OF_LOGS:
         return
+    elif "month" in parts:
+        found.months.add(f"{parts['vessel_key']} {parts['month']}")
     elif "ingest_id" in parts:
         found.ingests.add(parts["ingest_id"])
     else:
         found.vessel_keys.add(parts.get("vessel_key"))
     content = {
         "ingests": sorted(found.ingests),
+        "months": sorted(found.months),
         "vessel_keys": sorted(found.vessel_keys, key=str),
         "registers": found.registers,
     }
@@ -143,6 +149,7 @@ def _recall(warehouse: Warehouse, found: Repaired) -> None:
     if data is not None:
         content = json.loads(data)
         found.ingests |= set(content["ingests"])
+        found.months |= set(content.get("months", ()))
         found.vessel_keys |= set(content["vessel_keys"])
         found.registers = bool(content["registers"])
 
@@ -263,11 +270,13 @@ def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
     """Return the logs of which something that their bytes gave is missing, and that the present code has read."""
     code = code_version.fingerprint("ingest")
     rows = [row for row in logs.current(warehouse) if row.code_version == code]
-    held = _partitions(warehouse, "readings")
+    held = readings.ingests_held(warehouse)
     examined = set(delta.read(warehouse, "examinations", columns=("ingest_id",))["ingest_id"].to_list())
 
     def whole(row: LogRow) -> bool:
-        touched = row.ingest_id in found.ingests or not found.vessel_keys.isdisjoint({None, vessel_key(row.vessel)})
+        key = vessel_key(row.vessel)
+        touched = row.ingest_id in found.ingests or f"{key} {month_of(row.start_utc_ns)}" in found.months
+        touched = touched or not found.vessel_keys.isdisjoint({None, key})
         return not touched and row.ingest_id in held and row.ingest_id in examined
 
     return [row.log_id for row in rows if not whole(row)]
@@ -276,11 +285,6 @@ def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
 def _unread_left(found: Repaired) -> bool:
     """Return whether a log that was to be read again could not be."""
     return any(words.startswith("the log ") for words in found.gone)
-
-
-def _partitions(warehouse: Warehouse, name: str) -> set[str]:
-    with delta.reading(warehouse, name) as table:
-        return set() if table is None else {str(part["ingest_id"]) for part in table.partitions()}
 
 
 def _read_again(warehouse: Warehouse, name: str) -> str:
@@ -295,7 +299,7 @@ def _read_again(warehouse: Warehouse, name: str) -> str:
                 "other_ingest", f"{row.file_name} is read with other code now.", "Run `kempf reprocess`.", {"log": name}
             )
         search_log.store(warehouse, [found.found])
-        batch = [(row.vessel, row.ingest_id, read)]
+        batch = [(row, read)]
         readings.write(warehouse, batch)
         readings.write_rejected(warehouse, batch)
         lost.write(warehouse, batch)

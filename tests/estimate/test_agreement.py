@@ -49,7 +49,7 @@ def test_an_effect_that_changes_from_run_to_run_has_wider_errors() -> None:
 
 def test_to_first_order_it_is_the_likelihood_ratio_of_separate_hulls() -> None:
     plain = fitted(run(21), run(22), run(23))
-    assert agreement_of(plain.fit).statistic == pytest.approx(plain.statistic, rel=0.3)
+    assert agreement_of(plain.fit).statistic == pytest.approx(plain.agreement.statistic, rel=0.3)
     assert agreement_of(plain.fit).degrees_of_freedom == plain.agreement.degrees_of_freedom
 
 

@@ -84,9 +84,9 @@ def test_interrupted_it_goes_on_where_it_stopped(own: Warehouse, monkeypatch: py
     built: list[str] = []
     real = rerun_all.rebuilt
 
-    def noted(stored: Any, *rest: Any) -> Any:
+    def noted(warehouse: Warehouse, stored: Any, *rest: Any) -> Any:
         built.append(stored.parameter_set_id)
-        return real(stored, *rest)
+        return real(warehouse, stored, *rest)
 
     def stop(done: int, total: int, what: str) -> None:
         if done >= 1:

@@ -20,7 +20,10 @@ ROOT = Path(__file__).parents[2]
 JOBS: dict[Stage, tuple[str, ...]] = {
     "ingest": ("spool",),
     "segment": ("search_log", "find_segments", "examine_log"),
-    "estimate": ("identify_vessel", "pool_vessel", "no_speed_log", "parameter_set_of", "vessel_runs", "vessel_model"),
+    "estimate": (
+        *("identify_vessel", "pool_vessel", "no_speed_log", "parameter_set_of", "vessel_runs", "vessel_model"),
+        "update_model",
+    ),
     "diagnose": ("diagnose_vessel",),
 }
 

@@ -25,10 +25,13 @@ from kempf.warehouse import (
     readings,
     runs,
     segments,
+    table_cache,
 )
 from kempf.warehouse.deposit import deposit
+from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.provenance import collect
 from kempf.warehouse.store import Warehouse
+from kempf.warehouse.verify import verify
 from tests.warehouse.samples import START_NS, delivery, examination, inputs, parameter_set, segment
 from tests.warehouse.samples import readings as readings_of
 
@@ -200,3 +203,64 @@ def test_lost_stretches_are_put_together_too(warehouse: Warehouse) -> None:
     assert content(warehouse) == before
     table = delta.open_table(warehouse, "lost")
     assert table is not None and len(table.file_uris()) == 1
+
+
+def folders(warehouse: Warehouse, name: str) -> list[str]:
+    """Of the files of a table's newest version, below the table."""
+    table = delta.open_table(warehouse, name)
+    assert table is not None
+    return sorted("/".join(uri.split("/")[-3:-1]) for uri in table.file_uris())
+
+
+def months_of_logs(warehouse: Warehouse) -> list[str]:
+    """Take three logs of May and one of June in; return their ingests."""
+    june = readings_of()
+    june = replace(june, frame=june.frame.with_columns(pl.col("time_utc_ns") + 30 * 86_400_000_000_000))
+    given = [delivery("aurora", f"log {i}".encode()) for i in range(3)]
+    return [deposit(warehouse, [one])[0].ingest_id for one in (*given, delivery("aurora", b"june", readings=june))]
+
+
+def test_readings_become_one_file_a_vessel_and_month(warehouse: Warehouse) -> None:
+    ingests = months_of_logs(warehouse)
+    before, key = content(warehouse), vessel_key("aurora")
+    may, june = f"vessel_key={key}/month=2025-05", f"vessel_key={key}/month=2025-06"
+    assert folders(warehouse, "readings") == [may, may, may, june]
+    assert "readings" in compaction.compact(warehouse, more_files_than=1)
+    assert folders(warehouse, "readings") == [may, june]
+    assert content(warehouse) == before
+    assert [readings.read(warehouse, name).height for name in ingests] == [5] * 4
+    # the next log of the month is a file of its own beside it, until the next compaction
+    (again,) = deposit(warehouse, [delivery("aurora", b"one more")])
+    assert folders(warehouse, "readings") == [may, may, june]
+    assert readings.read(warehouse, again.ingest_id).height == 5
+    assert [readings.read(warehouse, name).height for name in ingests] == [5] * 4
+
+
+def test_readings_of_an_earlier_version_are_read_and_then_laid_out_by_month(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with monkeypatch.context() as earlier:
+        for name in ("readings", "rejected"):
+            now = TABLES[name]
+            columns = tuple(column for column in now.columns if column.name != "month")
+            then = replace(now, columns=columns, partition_by=("vessel_key", "ingest_id"))
+            earlier.setitem(TABLES, name, then)
+        ingests = months_of_logs(warehouse)
+        old = delta.versions(warehouse)["readings"]
+        assert all(folder.split("/")[1].startswith("ingest_id=") for folder in folders(warehouse, "readings"))
+    table_cache.forget()
+    assert [readings.read(warehouse, name).height for name in ingests] == [5] * 4
+    # a log that comes before they are laid out anew goes where the others are
+    (added,) = deposit(warehouse, [delivery("aurora", b"meanwhile")])
+    ingests.append(added.ingest_id)
+    assert [readings.read(warehouse, name).height for name in ingests] == [5] * 5
+    assert not [problem for problem in verify(warehouse) if problem.table in ("readings", "rejected")]
+    assert {"readings", "rejected"} <= set(compaction.compact(warehouse, more_files_than=1))
+    key = vessel_key("aurora")
+    may, june = f"vessel_key={key}/month=2025-05", f"vessel_key={key}/month=2025-06"
+    assert folders(warehouse, "readings") == folders(warehouse, "rejected") == [may, june]
+    assert [readings.read(warehouse, name).height for name in ingests] == [5] * 5
+    assert len(readings.read_rejected(warehouse, ingests[0])) == len(readings_of().rejected)
+    assert delta.read(warehouse, "readings", version=old).height == 20
+    assert not [problem for problem in verify(warehouse) if problem.table in ("readings", "rejected")]
+    assert compaction.compact(warehouse, more_files_than=1) == ()

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import polars as pl
@@ -154,7 +155,9 @@ def test_a_damaged_raw_copy_is_mended_by_the_same_deposit(warehouse: Warehouse) 
 
 
 def test_readings_that_no_row_stands_for_are_not_found(warehouse: Warehouse) -> None:
-    readings.write(warehouse, [("aurora", "abc", some_readings())])
+    other = Warehouse(f"{warehouse.uri} of another")
+    (done,) = deposit(other, [delivery()])
+    readings.write(warehouse, [(replace(logs.of_ingest(other, done.ingest_id), ingest_id="abc"), some_readings())])
     for read in (readings.read, readings.read_rejected):
         with pytest.raises(NotFound) as caught:
             read(warehouse, "abc' OR '1'='1")
@@ -180,9 +183,15 @@ def test_units_stand_in_plain_parquet(warehouse: Warehouse) -> None:
 
 def test_the_tables_have_the_columns_of_the_readers() -> None:
     names = [column.name for column in TABLES["readings"].columns]
-    assert names == ["vessel_key", "vessel", "ingest_id", *READING_SCHEMA]
-    assert [c.unit for c in TABLES["readings"].columns][6:] == [c.unit for c in CHANNELS.values()]
-    assert [c.name for c in TABLES["rejected"].columns] == ["vessel_key", "vessel", "ingest_id", *REJECTED_SCHEMA]
+    assert names == ["vessel_key", "vessel", "ingest_id", "month", *READING_SCHEMA]
+    assert [c.unit for c in TABLES["readings"].columns][7:] == [c.unit for c in CHANNELS.values()]
+    assert [c.name for c in TABLES["rejected"].columns] == [
+        "vessel_key",
+        "vessel",
+        "ingest_id",
+        "month",
+        *REJECTED_SCHEMA,
+    ]
 
 
 def test_a_large_log_keeps_its_order(warehouse: Warehouse) -> None:
