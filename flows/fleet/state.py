@@ -7,20 +7,21 @@ give the same sets. The state is compared by its digest, never by a time.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 import kempf.warehouse as storage
 from kempf import flows
 from kempf.warehouse import code_version, delta
 from kempf.warehouse.canonical import canonical_json, sha256
 from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
-#: Sorted, so that the order of rows in the tables does not count.
-_Rows = Sequence[Mapping[str, Any]]
+if TYPE_CHECKING:
+    import polars as pl
 
 
 @dataclass(frozen=True)
@@ -86,44 +87,45 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
     NotFound
         ``no_warehouse``.
     """
+    import polars as pl
+
     asked = None if vessels is None else sorted(set(vessels))
-    where = {} if asked is None else {"vessel_key": [vessel_key(name) for name in asked]}
+    where: Where = {} if asked is None else {"vessel_key": [vessel_key(name) for name in asked]}
 
-    def rows(table: str, *columns: str) -> dict[str, list[dict[str, Any]]]:
-        found: dict[str, list[dict[str, Any]]] = defaultdict(list)
-        frame = delta.read(warehouse, table, where, ("vessel", *columns))
-        for row in frame.sort(frame.columns, nulls_last=True).rows(named=True):
-            found[row["vessel"]].append(row)
-        return found
+    def rows(table: str, *columns: str) -> pl.DataFrame:
+        return delta.read(warehouse, table, where, ("vessel", *columns))
 
-    profiles = {
-        name: found
-        for name, found in rows("vessels", "revision", "profile_sha256", "removed").items()
-        if not found[-1]["removed"]
-    }
-    ingests = rows("logs", "revision", "log_id", "ingest_id", "removed")
-    sets = rows("parameter_sets", "parameter_set_id")
-    pointers = rows("aliases", "alias", "parameter_set_id")
+    newest = pl.all().sort_by("revision").last()
+    counts = pl.col("removed").is_null()
+    profiles = rows("vessels", "revision", "profile_sha256", "removed").group_by("vessel").agg(newest).filter(counts)
+    ingests = rows("logs", "log_id", "revision", "ingest_id", "removed").group_by("vessel", "log_id").agg(newest)
+    current = _by_vessel(ingests.filter(counts), "log_id", "ingest_id")
+    sets = _by_vessel(rows("parameter_sets", "parameter_set_id"), "parameter_set_id")
+    pointers = _by_vessel(rows("aliases", "alias", "parameter_set_id"), "alias", "parameter_set_id", together=True)
     said: dict[str, list[str]] = defaultdict(list)
     for row in delta.read(warehouse, "corrections").sort("number").rows(named=True):
         said[row["log_id"]].append(canonical_json(row))
-    names = sorted(profiles) if asked is None else asked
-    return {
-        name: _state(name, profiles.get(name, ()), ingests[name], sets[name], pointers[name], said) for name in names
-    }
+    hashes = dict(profiles.select("vessel", "profile_sha256").rows())
+    found = {}
+    for name in sorted(hashes) if asked is None else asked:
+        log_ids, ingest_ids = current.get(name, ((), ()))
+        found[name] = VesselState(
+            name,
+            hashes.get(name, ""),
+            tuple(log_ids),
+            tuple(ingest_ids),
+            tuple(sets.get(name, ((),))[0]),
+            tuple(zip(*pointers.get(name, ((), ())), strict=True)),
+            tuple(one for log_id in log_ids for one in said.get(log_id, ())) if said else (),
+        )
+    return found
 
 
-def _state(
-    vessel: str, profiles: _Rows, ingests: _Rows, sets: _Rows, pointers: _Rows, said: Mapping[str, Sequence[str]]
-) -> VesselState:
-    last = {row["log_id"]: row for row in ingests}  # the highest revision stays
-    current = {log_id: row["ingest_id"] for log_id, row in last.items() if row["removed"] is None}
-    return VesselState(
-        vessel,
-        profiles[-1]["profile_sha256"] if profiles else "",
-        tuple(sorted(current)),
-        tuple(sorted(current.values())),
-        tuple(row["parameter_set_id"] for row in sets),
-        tuple((row["alias"], row["parameter_set_id"]) for row in pointers),
-        tuple(one for log_id in sorted(current) for one in said.get(log_id, ())),
-    )
+def _by_vessel(frame: pl.DataFrame, *columns: str, together: bool = False) -> dict[str, tuple[list[str], ...]]:
+    """Return the sorted values of columns by vessel, each column by itself or their rows together."""
+    import polars as pl
+
+    ordered = frame.sort(columns) if together else frame
+    values = [pl.col(name) if together else pl.col(name).sort() for name in columns]
+    grouped = ordered.group_by("vessel", maintain_order=together).agg(values)
+    return {row[0]: row[1:] for row in grouped.select("vessel", *columns).rows()}
