@@ -16,13 +16,11 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
-from kempf.schemas.instrument_noise import lasting
 
 _ROOT_2 = float(np.sqrt(2.0))
 N_HULL, N_LEVELS = 6, 6
-#: steps of the differences: of hull parameters, effects and lasting noise in parts of a typical value, of a noise
-#: level's logarithm. Of lasting noise long records know a part in a hundred, and a step as large as that is no slope.
-_HULL_STEP, _EFFECT_STEP, _NOISE_STEP, _LEVEL_STEP = 1e-4, 1e-2, 1e-4, 1e-3
+#: steps of the differences: of hull parameters and effects in parts of a typical value, of a noise level's logarithm
+_HULL_STEP, _EFFECT_STEP, _LEVEL_STEP = 1e-4, 1e-2, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +82,8 @@ def _steps(filtered: RunFilter, point: Point) -> Float:
     """Return the step of every number of `Point.vector`; away from a bound where one is near."""
     hull = _HULL_STEP * _typical(filtered, point)
     effects = []
-    for (effect, parameter), value in zip(filtered.model.parameters, point.values, strict=True):
-        step = (_NOISE_STEP if lasting(effect) else _EFFECT_STEP) * abs(parameter.steps[0])
+    for (_, parameter), value in zip(filtered.model.parameters, point.values, strict=True):
+        step = _EFFECT_STEP * abs(parameter.steps[0])
         effects.append(-step if value + step > parameter.high else step)
     return np.concatenate([hull, np.array(effects), np.full(N_LEVELS, _LEVEL_STEP)])
 
