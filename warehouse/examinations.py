@@ -11,6 +11,7 @@ from kempf.warehouse import delta
 from kempf.warehouse.canonical import canonical_json, plain
 from kempf.warehouse.keys import one_of, vessel_key
 from kempf.warehouse.retry import with_retry
+from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
 
@@ -73,16 +74,31 @@ def _row(one: StoredExamination) -> dict[str, Any]:
     }
 
 
-def of_ingests(warehouse: Warehouse, ingest_ids: Iterable[str]) -> dict[str, StoredExamination]:
-    """Return the examinations of some ingests, by ingest id; an ingest from before there was a doctor has none."""
-    frame = delta.read(warehouse, "examinations", {"ingest_id": sorted(set(ingest_ids))})
+def of_ingests(
+    warehouse: Warehouse, ingest_ids: Iterable[str], vessels: Iterable[str] | None = None
+) -> dict[str, StoredExamination]:
+    """Return the examinations of some ingests, by ingest id; an ingest from before there was a doctor has none.
+
+    Parameters
+    ----------
+    vessels : iterable of str, optional
+        Whose they are: the files of others need not be looked into.
+    """
+    frame = delta.read(warehouse, "examinations", _where(ingest_ids, vessels))
     return {row["ingest_id"]: _stored(row) for row in frame.sort("ingest_id").rows(named=True)}
 
 
-def codes(warehouse: Warehouse, ingest_ids: Iterable[str]) -> dict[str, str]:
-    """Return the fingerprint of the code that looked through some ingests, by ingest id."""
-    where = {"ingest_id": sorted(set(ingest_ids))}
+def codes(warehouse: Warehouse, ingest_ids: Iterable[str], vessels: Iterable[str] | None = None) -> dict[str, str]:
+    """Return the fingerprint of the code that looked through some ingests, by ingest id; see `of_ingests`."""
+    where = _where(ingest_ids, vessels)
     return dict(delta.read(warehouse, "examinations", where, ("ingest_id", "code_version")).rows())
+
+
+def _where(ingest_ids: Iterable[str], vessels: Iterable[str] | None) -> Where:
+    where: dict[str, str | list[str]] = {"ingest_id": sorted(set(ingest_ids))}
+    if vessels is not None:
+        where["vessel_key"] = sorted({vessel_key(name) for name in vessels})
+    return where
 
 
 def _stored(row: Mapping[str, Any]) -> StoredExamination:

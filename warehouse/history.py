@@ -297,7 +297,7 @@ def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: d
             raise
         return None  # what was found then has been deleted since: earlier versions of kempf did not keep it
     found = rows.filter(rows["excluded"].is_null())["segment_id"].to_list()
-    return found or ([] if examinations.codes(warehouse, ingests) else None)
+    return found or ([] if examinations.codes(warehouse, ingests, [vessel]) else None)
 
 
 def _exploded(table: DeltaTable | None, vessel: str, known: _Logs) -> pl.DataFrame:

@@ -68,9 +68,9 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
     return with_retry(attempt)
 
 
-def get(warehouse: Warehouse, name: str) -> ParameterSet:
+def get(warehouse: Warehouse, name: str, vessel: str | None = None) -> ParameterSet:
     """Return a parameter set by its id, or by a beginning of it that only one has; see `as_stored` and `whole`."""
-    return whole(warehouse, [as_stored(warehouse, name)])[0]
+    return whole(warehouse, [as_stored(warehouse, name, vessel)])[0]
 
 
 def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
@@ -165,8 +165,13 @@ def pooled(warehouse: Warehouse, vessel: str, model_sha256: str, estimator: str)
     ]
 
 
-def as_stored(warehouse: Warehouse, name: str) -> ParameterSet:
+def as_stored(warehouse: Warehouse, name: str, vessel: str | None = None) -> ParameterSet:
     """Return a parameter set as it is stored, by its id or by a beginning of it that only one has.
+
+    Parameters
+    ----------
+    vessel : str, optional
+        Whose it is: the files of others need not be looked into.
 
     Raises
     ------
@@ -175,10 +180,11 @@ def as_stored(warehouse: Warehouse, name: str) -> ParameterSet:
     UsageError
         ``ambiguous_parameter_set``: several begin so.
     """
-    whole = delta.read(warehouse, "parameter_sets", {"parameter_set_id": name})
-    if whole.height:
-        return _set(whole.rows(named=True)[0])
-    ids = delta.read(warehouse, "parameter_sets", columns=("parameter_set_id",))["parameter_set_id"].to_list()
+    hers: dict[str, str | list[str]] = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
+    found_whole = delta.read(warehouse, "parameter_sets", {**hers, "parameter_set_id": name})
+    if found_whole.height:
+        return _set(found_whole.rows(named=True)[0])
+    ids = delta.read(warehouse, "parameter_sets", hers, ("parameter_set_id",))["parameter_set_id"].to_list()
     found = sorted(one for one in ids if one.startswith(name))
     if not name.strip() or not found:
         raise NotFound(
@@ -194,7 +200,7 @@ def as_stored(warehouse: Warehouse, name: str) -> ParameterSet:
             "Give more of the id.",
             {"beginning": name, "found": found},
         )
-    return as_stored(warehouse, found[0])
+    return as_stored(warehouse, found[0], vessel)
 
 
 def all_as_stored(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:

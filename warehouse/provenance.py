@@ -16,6 +16,7 @@ def collect(
     ingest_ids: Sequence[str],
     flow_run: str | None = None,
     table_versions: Mapping[str, int] | None = None,
+    vessel: str | None = None,
 ) -> dict[str, Any]:
     """Return the provenance of a parameter set made now from these inputs.
 
@@ -31,6 +32,8 @@ def collect(
         Run that made it.
     table_versions : mapping of str to int, optional
         Taken before the work began; the present ones by default.
+    vessel : str, optional
+        Whose logs they are: what others have need not be looked into.
 
     Returns
     -------
@@ -40,7 +43,10 @@ def collect(
         ``flow_run``, ``channels``: what the channel doctor said of the logs when the set was made, by log id, those
         with nothing to say left out.
     """
-    seen = examinations.of_ingests(warehouse, ingest_ids).values() if warehouse is not None and ingest_ids else ()
+    whose = None if vessel is None else [vessel]
+    seen = (
+        examinations.of_ingests(warehouse, ingest_ids, whose).values() if warehouse is not None and ingest_ids else ()
+    )
     if table_versions is None:
         table_versions = delta.versions(warehouse) if warehouse is not None else {}
     installed = code_version.packages()

@@ -27,7 +27,7 @@ def chosen_set(warehouse: Warehouse, vessel: str, name: str | None = None) -> tu
     pointed = aliases.of_vessel(warehouse, vessel)
     alias = aliases.CURRENT if name is None else name
     if alias in pointed:
-        return parameter_sets.get(warehouse, pointed[alias]), alias
+        return parameter_sets.get(warehouse, pointed[alias], vessel), alias
     if name is None:
         raise NotFound(
             "no_parameter_set",

@@ -220,7 +220,7 @@ def _identify_log(
 
     def one(asked: _Wanted) -> IdentifyOutcome:
         used = [s.ingest_id for s in (asked.segment, *asked.companions)]
-        origin = provenance.collect(warehouse, asked.inputs, used, flow_run, table_versions)
+        origin = provenance.collect(warehouse, asked.inputs, used, flow_run, table_versions, vessel)
         ids = (asked.segment.segment_id,)
         try:
             made = build(held, SetRequest(asked.inputs, asked.profile, vessel, ids, origin))

@@ -204,7 +204,7 @@ def ingest_log(
             said = corrections.of_logs(warehouse, [row.log_id])
             search_log.store(warehouse, [search_log.search_again(warehouse, row, said.get(row.log_id, ()))])
         stored_segments = tuple(s for s in segments.every(warehouse, vessel) if s.ingest_id == there.ingest_id)
-        seen = examinations.of_ingests(warehouse, [row.ingest_id])[row.ingest_id]
+        seen = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel])[row.ingest_id]
         return _outcome(warehouse, path, "unchanged", row, stored_segments, seen)
     with spooled(file_name, log, profile) as readings:
         give_back(readings.tally.records_read)

@@ -32,7 +32,7 @@ def unread(rows: Sequence[LogRow], profiles: Mapping[str, str]) -> list[LogRow]:
 def unsearched(warehouse: Warehouse, rows: Sequence[LogRow]) -> list[LogRow]:
     """Return those of some logs that were looked through by other code or with other corrections, or never."""
     code = code_version.fingerprint("segment")
-    known = examinations.codes(warehouse, [row.ingest_id for row in rows])
+    known = examinations.codes(warehouse, [row.ingest_id for row in rows], {row.vessel for row in rows})
     said = corrections.of_logs(warehouse, [row.log_id for row in rows])
     return [row for row in rows if known.get(row.ingest_id) != corrections.basis(code, said.get(row.log_id, ()))]
 

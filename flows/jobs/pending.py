@@ -44,7 +44,7 @@ class Waiting:
         if name is None:
             return None
         made = next((one for one in self.sets if one.parameter_set_id == name), None)
-        return made or parameter_sets.as_stored(self._warehouse, name)
+        return made or parameter_sets.as_stored(self._warehouse, name, self._vessel)
 
     def may_move(self, spec: ModelSpec, *, adopt: bool) -> bool:
         """Return whether ``current`` may go to a set of this model: from a model with effects only to the like.

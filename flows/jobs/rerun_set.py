@@ -79,7 +79,7 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9, progress: Pr
     """
     chain = [parameter_sets.as_stored(warehouse, named_set(warehouse, name).parameter_set_id)]
     while (update := chain[0].updates) is not None:
-        chain.insert(0, parameter_sets.as_stored(warehouse, update.set))
+        chain.insert(0, parameter_sets.as_stored(warehouse, update.set, chain[0].vessel))
     verdicts = []
     for done, stored in enumerate(chain):
         progress(done, len(chain), f"building {stored.parameter_set_id} again")
@@ -153,7 +153,7 @@ def rebuilt(
     if inputs.estimator not in (*NAMES, POOLED, WITH_EFFECTS):
         raise _no_estimator(stored)
     ids, origin = stored.segment_ids, dict(stored.provenance)
-    before = parameter_sets.get(warehouse, stored.updates.set) if stored.updates else None
+    before = parameter_sets.get(warehouse, stored.updates.set, stored.vessel) if stored.updates else None
     request = SetRequest(inputs, profile, stored.vessel, ids, origin, stored.parent, before)
     if before is not None:
         return build_updated(instruments, request)

@@ -120,7 +120,7 @@ def stored_model(
     """Return the parameter set of a model of these manoeuvres, None where it is not stored yet."""
     name = parameter_set_id(inputs_of(chosen, spec, own, search))
     there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
-    return parameter_sets.get(warehouse, name) if name in there else None
+    return parameter_sets.get(warehouse, name, chosen.vessel) if name in there else None
 
 
 def effect_settings(spec: ModelSpec, own: Own) -> dict[str, Any]:
@@ -141,7 +141,7 @@ def point(warehouse: Warehouse, model: ParameterSet) -> None:
 def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     """Return a vessel's current model, None where her current set is of no model of this kind."""
     pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
-    current = parameter_sets.get(warehouse, pointed) if pointed else None
+    current = parameter_sets.get(warehouse, pointed, vessel) if pointed else None
     return current if current is not None and current.estimator in (POOLED, WITH_EFFECTS) else None
 
 
@@ -172,7 +172,7 @@ def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
             f"There is nothing to undo: {vessel!r} has {'no current model' if now is None else 'the plain model'}.",
             f"See `kempf ladder --vessel {vessel}`.",
         )
-    before = parameter_sets.get(warehouse, now.parent)
+    before = parameter_sets.get(warehouse, now.parent, vessel)
     point(warehouse, before)
     return before
 
@@ -181,7 +181,7 @@ def _chain(warehouse: Warehouse, model: ParameterSet) -> list[ParameterSet]:
     """Return a model and its parents, the plain one first."""
     chain = [model]
     while chain[0].parent is not None:
-        chain.insert(0, parameter_sets.get(warehouse, chain[0].parent))
+        chain.insert(0, parameter_sets.get(warehouse, chain[0].parent, model.vessel))
     return chain
 
 

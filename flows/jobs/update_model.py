@@ -144,7 +144,7 @@ def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, wanted
             and at_once >= FEWEST
             and len(names) < GROWN * at_once
         ):
-            found = parameter_sets.get(warehouse, row.parameter_set_id)
+            found = parameter_sets.get(warehouse, row.parameter_set_id, chosen.vessel)
             left = found.convergence.get(POSTERIOR)
             usable_set = found.convergence.get("converged") and left and from_json(left).usable
             return found if usable_set or row.manoeuvres == len(names) else None
@@ -187,7 +187,7 @@ def _brought(
     search = {SEARCH: wanted.settings[SEARCH]} if SEARCH in wanted.settings else {}
     inputs = replace(own, settings={**own.settings, **search, UPDATES: update.show()})
     profile = vessels.get(warehouse, chosen.profile_sha256)
-    origin = provenance.collect(warehouse, inputs, list(fewer.ingests.values()), flow_run)
+    origin = provenance.collect(warehouse, inputs, list(fewer.ingests.values()), flow_run, vessel=chosen.vessel)
     ids = tuple(segment.segment_id for segment in further)
     request = SetRequest(inputs, profile, chosen.vessel, ids, origin, parent, before)
     try:

@@ -119,7 +119,9 @@ def store_model(
     made = []
     for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
         if name not in there:
-            origin = provenance.collect(warehouse, inputs, list(chosen.ingests.values()), flow_run)
+            origin = provenance.collect(
+                warehouse, inputs, list(chosen.ingests.values()), flow_run, vessel=chosen.vessel
+            )
             ids = tuple(segment.segment_id for segment in chosen.segments)
             made.append(_model_set(fit, fitted, SetRequest(inputs, profile, chosen.vessel, ids, origin, parent)))
     if keep is None:

@@ -54,7 +54,7 @@ def quality_of(warehouse: Warehouse, vessel: str) -> list[Finding]:
 def _of_logs(warehouse: Warehouse, vessel: str, found: Iterable[segments.Segment]) -> Iterable[Finding]:
     with_zigzag = {one.ingest_id for one in found if one.is_zigzag}
     rows = logs.current(warehouse, vessel)
-    said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows])
+    said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows], [vessel])
     for row in rows:
         seen = said.get(row.ingest_id)
         if seen is not None:

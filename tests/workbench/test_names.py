@@ -59,7 +59,7 @@ def check_names(place: Path) -> None:
     }
     for part in parts - allowed - tables:
         hexadecimal = set(part.split("=")[-1].removesuffix(".json")) <= set("0123456789abcdef")
-        assert hexadecimal or part.startswith("part-") or part[:20].isdigit(), part
+        assert hexadecimal or part.startswith(("part-", "month=")) or part[:20].isdigit(), part
 
 
 @pytest.mark.parametrize("name", HOSTILE, ids=range(len(HOSTILE)))

@@ -151,7 +151,7 @@ def show(log_id: str, uri: str, as_json: bool) -> None:
 
     warehouse = Warehouse(uri)
     row = logs.by_prefix(warehouse, log_id)
-    seen = examinations.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id)
+    seen = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel]).get(row.ingest_id)
     facts = {**_facts(row), "notes": _notes(row, seen)}
     if as_json:
         print_json({**facts, "channels": dict(seen.content) if seen else None})

@@ -80,17 +80,20 @@ def command(
 def _one(warehouse: Warehouse, set_id: str, tolerance: float, *, as_json: bool) -> None:
     from kempf.flows.jobs.rerun_set import rerun
 
-    result = rerun(warehouse, set_id, tolerance)
+    with progress_bar() as progress:
+        result = rerun(warehouse, set_id, tolerance, progress)
     if as_json:
         print_json(result.show())
     else:
         _print_rerun(result)
-    if result.verdict == "different":
+    if "different" in (result.verdict, *result.rests_on.values()):
         sys.exit(ThresholdExceeded.exit_code)
 
 
 def _print_rerun(result: Rerun) -> None:
     click.echo(f"{result.parameter_set_id}: {result.verdict}")
+    for name, verdict in result.rests_on.items():
+        click.echo(f"  rests on {name}: {verdict}")
     if result.code_changed:
         click.echo("  the code is not the one that made it")
     for name, (then, now) in result.packages_changed.items():
