@@ -278,6 +278,19 @@ _ALL = (
         ),
     ),
     Table(
+        "equivalents",
+        "one version of the code that counts as another one; only ever added, its time is that of the commit",
+        (
+            Column("number", "integer", "place of the commit among those of the table, from 1"),
+            Column("stage", "text", "ingest, segment, estimate"),
+            Column("code", "text", "fingerprint of the code"),
+            Column("stands_for", "text", "fingerprint under which it goes on"),
+            Column("sets", "integer", "parameter sets that were compared and were the same, bit for bit", "1"),
+            Column("vessels", "texts", "of which vessels these were"),
+            Column("git_commit", "text", "commit of the code, null outside a checkout"),
+        ),
+    ),
+    Table(
         "run_history",
         "one vessel that a run worked on; only ever added, its time is that of the commit",
         (

@@ -13,8 +13,9 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from kempf.schemas.errors import KempfError, UsageError
-from kempf.warehouse import code_version, delta, examinations, vessels
+from kempf.warehouse import delta, examinations, vessels
 from kempf.warehouse.canonical import plain
+from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.parameter_set import UPDATES
@@ -118,7 +119,7 @@ def of_vessel(
     with _sets_as_of(warehouse, as_of) as table:
         if table is None and as_of is not None:
             vessels.require(warehouse, vessel)
-            nothing = _exploded(None, vessel, _Logs([], None))
+            nothing = _exploded(None, vessel, _Logs([], None, code_of(warehouse, "estimate")))
             return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
         frame = _exploded(table, vessel, _logs_of(warehouse, vessel, as_of))
         version = table.version() if table is not None else None
@@ -269,20 +270,23 @@ class _Logs:
     past: list[str]
     #: Segments found in the others; None where nobody had looked for any, or nobody knows any more.
     segments: list[str] | None
+    #: Fingerprint under which the present code estimates.
+    code: str
 
 
 def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs:
     """Return what is known of a vessel's logs, or was by a time."""
     version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
     if as_of is not None and version is None:
-        return _Logs([], None)
+        return _Logs([], None, code_of(warehouse, "estimate"))
     columns = ("log_id", "ingest_id", "revision", "removed")
     hers = {"vessel_key": vessel_key(vessel)}
     rows = delta.read(warehouse, "logs", hers, columns, version).sort("log_id", "revision")
     last = {row["log_id"]: row for row in rows.rows(named=True)}
     present = {log: row["ingest_id"] for log, row in last.items() if row["removed"] is None}
     past = [row["ingest_id"] for row in rows.rows(named=True) if present.get(row["log_id"]) != row["ingest_id"]]
-    return _Logs(past, _segments_in(warehouse, vessel, sorted(present.values()), as_of))
+    found = _segments_in(warehouse, vessel, sorted(present.values()), as_of)
+    return _Logs(past, found, code_of(warehouse, "estimate"))
 
 
 def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: datetime | None) -> list[str] | None:
@@ -326,8 +330,7 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
     at = provenance.json_path_match("$.table_versions.parameter_sets").cast(pl.Int64).fill_null(-1)
     sets = sets.with_columns(_code=provenance.json_path_match("$.code_version"), _at=at)
     codes = sets["_code"].to_list()
-    own = code_version.fingerprint("estimate")
-    newest = own if own in codes else next(iter(sets.sort("_at", descending=True)["_code"]), None)
+    newest = known.code if known.code in codes else next(iter(sets.sort("_at", descending=True)["_code"]), None)
     old = pl.col("_code").ne_missing(newest)
     if known.past:
         # a set of several logs is superseded with any of them; ids are of one length, so that none stands in another

@@ -38,7 +38,8 @@ def collect(
     Returns
     -------
     dict
-        JSON content with the keys ``inputs``, ``ingest_ids``, ``profile_sha256``, ``code_version``, ``git_commit``,
+        JSON content with the keys ``inputs``, ``ingest_ids``, ``profile_sha256``, ``code_version`` (that
+        under which the code goes on), ``made_by`` (its own), ``git_commit``,
         ``packages``, ``python``, ``machine`` (system, processor, hash of all that is installed), ``table_versions``,
         ``flow_run``, ``channels``: what the channel doctor said of the logs when the set was made, by log id, those
         with nothing to say left out.
@@ -55,6 +56,7 @@ def collect(
         "ingest_ids": sorted(set(ingest_ids)),
         "profile_sha256": inputs.profile_sha256,
         "code_version": inputs.code_version,
+        "made_by": code_version.fingerprint("estimate"),
         "git_commit": code_version.git_commit(),
         "packages": {name: found for name, found in installed.items() if name != "python"},
         "python": installed["python"],

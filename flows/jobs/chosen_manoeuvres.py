@@ -11,6 +11,7 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import logs, segments
 from kempf.warehouse.deduplicate import once, same
+from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
@@ -24,6 +25,8 @@ class Chosen:
 
     vessel: str
     profile_sha256: str
+    #: Fingerprint under which the present code estimates.
+    code_version: str
     #: Sorted by log and time, as the inputs of a parameter set are.
     segments: tuple[Segment, ...]
     #: Ingest by log, of these segments.
@@ -81,6 +84,7 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
     return Chosen(
         vessel,
         profile_sha256,
+        code_of(warehouse, "estimate"),
         tuple(kept),
         {s.log_id: s.ingest_id for s in kept},
         {s.log_id: rows[s.ingest_id].file_name for s in kept},

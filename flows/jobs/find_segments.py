@@ -24,7 +24,6 @@ from kempf.pipeline.segment.turning_circle import TurningCircle
 from kempf.pipeline.segment.zigzag import Zigzag
 from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version
 from kempf.warehouse.segments import Segment, segment_id
 
 
@@ -36,6 +35,8 @@ class Ingest:
     log_id: str
     ingest_id: str
     file_name: str
+    #: Fingerprint under which the present code finds manoeuvres.
+    code_version: str
 
 
 def find_segments(
@@ -108,7 +109,7 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
         end_utc_ns=zigzag.end_utc_ns,
         executes_utc_ns=zigzag.executes_utc_ns,
         overshoots_deg=tuple(o.beyond_nominal_deg for o in zigzag.overshoots),
-        code_version=code_version.fingerprint("segment"),
+        code_version=ingest.code_version,
         imo={shown.pop("name"): shown for shown in map(asdict, criteria)},
         quality=asdict(zigzag.quality),
         detail={
@@ -151,7 +152,7 @@ def _kept_aside(one: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: 
         end_utc_ns=one.end_utc_ns,
         executes_utc_ns=executes,
         overshoots_deg=(),
-        code_version=code_version.fingerprint("segment"),
+        code_version=ingest.code_version,
         imo=imo,
         quality=quality,
         detail={"length_m": profile.length_m, **detail},

@@ -26,6 +26,7 @@ from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import code_version, delta, logs, parameter_sets, provenance, segments, vessels
+from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
@@ -196,11 +197,11 @@ def _wanted(
     alone = request.estimator not in CAN or bool(request.spec.effects)
     hashes = dict.fromkeys(by_ingest[segment.ingest_id].profile_sha256 for segment in readable)
     profiles = {sha256: vessels.get(warehouse, sha256) for sha256 in hashes}
-    found = {}
+    found, code = {}, code_of(warehouse, "estimate")
     for segment in readable:
         sha256 = by_ingest[segment.ingest_id].profile_sha256
         beside = () if alone or not without_log(segment) else companions_of(segment, readable, by_ingest)
-        inputs = inputs_of(segment, sha256, request, beside)
+        inputs = inputs_of(segment, sha256, request, beside, code)
         found[segment.segment_id] = _Wanted(segment, inputs, tuple(beside), profiles[sha256])
     return found
 
@@ -248,13 +249,21 @@ def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], request
         new.point(whole[-1])
 
 
-def inputs_of(segment: Segment, profile_sha256: str, request: Request, companions: Sequence[Segment] = ()) -> Inputs:
+def inputs_of(
+    segment: Segment,
+    profile_sha256: str,
+    request: Request,
+    companions: Sequence[Segment] = (),
+    code: str | None = None,
+) -> Inputs:
     """Return all that the parameter set of one segment is a function of.
 
     Parameters
     ----------
     companions : sequence of Segment
         Of a segment without a log.
+    code : str, optional
+        Fingerprint under which the present code estimates; its own by default.
     """
     settings = request.all_settings()
     if request.estimator in CAN and without_log(segment) and not request.spec.effects:
@@ -266,7 +275,7 @@ def inputs_of(segment: Segment, profile_sha256: str, request: Request, companion
         model_spec=request.spec.model_dump(mode="json"),
         estimator=request.estimator,
         settings=settings,
-        code_version=code_version.fingerprint("estimate"),
+        code_version=code or code_version.fingerprint("estimate"),
         companions=tuple(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns) for s in companions),
     )
 

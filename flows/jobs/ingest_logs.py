@@ -26,8 +26,9 @@ from kempf.pipeline.ingest.readings import LogReadings, Tally
 from kempf.schemas.correction import Correction
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.schemas.profile import VesselProfile, overlay
-from kempf.warehouse import code_version, corrections, examinations, logs, lost, segments, vessels
+from kempf.warehouse import corrections, examinations, logs, lost, segments, vessels
 from kempf.warehouse.deposit import Delivery, Deposit, deposit, held
+from kempf.warehouse.equivalents import Codes, codes_of
 from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.keys import ingest_id, vessel_key
 from kempf.warehouse.segments import Segment
@@ -196,8 +197,8 @@ def ingest_log(
     KempfError
         The log cannot be read, or is another vessel's; nothing of it was stored.
     """
-    code = code_version.fingerprint("ingest")
-    there = held(warehouse, vessel, file_name, log, profile_sha256=profile.sha256, code_version=code)
+    codes = codes_of(warehouse)
+    there = held(warehouse, vessel, file_name, log, profile_sha256=profile.sha256, code_version=codes.ingest)
     if there is not None:
         row = logs.of_ingest(warehouse, there.ingest_id)
         if unsearched(warehouse, [row]):
@@ -209,7 +210,7 @@ def ingest_log(
     with spooled(file_name, log, profile) as readings:
         give_back(readings.tally.records_read)
         said = corrections.of_logs(warehouse, [log.sha256])
-        read = look_through(vessel, file_name, log, profile, readings, said.get(log.sha256, ()))
+        read = look_through(vessel, file_name, log, profile, readings, said.get(log.sha256, ()), codes)
         give_back(readings.tally.records_read)
         (stored,) = store(warehouse, [read])
     row = logs.of_ingest(warehouse, stored.ingest_id)
@@ -253,16 +254,17 @@ def look_through(
     profile: VesselProfile,
     readings: LogReadings,
     said: Sequence[Correction],
+    codes: Codes,
 ) -> ReadLog:
     """Find the manoeuvres of a log that was read, as a person corrected them, and compare its channels."""
-    code = code_version.fingerprint("ingest")
-    this_ingest = Ingest(vessel, log.sha256, ingest_id(log.sha256, profile.sha256, code), file_name)
+    name = ingest_id(log.sha256, profile.sha256, codes.ingest)
+    this_ingest = Ingest(vessel, log.sha256, name, file_name, codes.segment)
     instruments = from_readings(readings.lazy())
     give_back(readings.tally.records_read)
     refused = count(readings.rejections())
     records = readings.tally.records_read
     searched = search(this_ingest, profile, file_name, readings.format, instruments, refused, records, said)
-    return ReadLog(Delivery(vessel, file_name, log, profile, readings, code), searched)
+    return ReadLog(Delivery(vessel, file_name, log, profile, readings, codes.ingest), searched)
 
 
 def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:

@@ -9,7 +9,8 @@ import shlex
 from collections import Counter
 from collections.abc import Collection, Iterable, Mapping, Sequence
 
-from kempf.warehouse import code_version, corrections, examinations, logs, parameter_sets, vessels
+from kempf.warehouse import corrections, examinations, logs, parameter_sets, vessels
+from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -17,7 +18,7 @@ from kempf.warehouse.store import Warehouse
 _OLDER = "with an older profile or another version of kempf"
 
 
-def unread(rows: Sequence[LogRow], profiles: Mapping[str, str]) -> list[LogRow]:
+def unread(warehouse: Warehouse, rows: Sequence[LogRow], profiles: Mapping[str, str]) -> list[LogRow]:
     """Return those of some logs that were read by other code than the present or with another profile.
 
     Parameters
@@ -25,13 +26,13 @@ def unread(rows: Sequence[LogRow], profiles: Mapping[str, str]) -> list[LogRow]:
     profiles : mapping of str to str
         Hash of the present profile by vessel.
     """
-    code = code_version.fingerprint("ingest")
+    code = code_of(warehouse, "ingest")
     return [row for row in rows if (row.code_version, row.profile_sha256) != (code, profiles.get(row.vessel))]
 
 
 def unsearched(warehouse: Warehouse, rows: Sequence[LogRow]) -> list[LogRow]:
     """Return those of some logs that were looked through by other code or with other corrections, or never."""
-    code = code_version.fingerprint("segment")
+    code = code_of(warehouse, "segment")
     known = examinations.codes(warehouse, [row.ingest_id for row in rows], {row.vessel for row in rows})
     said = corrections.of_logs(warehouse, [row.log_id for row in rows])
     return [row for row in rows if known.get(row.ingest_id) != corrections.basis(code, said.get(row.log_id, ()))]
@@ -62,14 +63,14 @@ def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
     """
     stale = _stale(warehouse, vessel).total()
     codes = parameter_sets.codes(warehouse, vessel)
-    old = bool(codes) and code_version.fingerprint("estimate") not in codes
+    old = bool(codes) and code_of(warehouse, "estimate") not in codes
     parts = [f"{_logs(stale)} read"] * bool(stale) + ["parameter sets made"] * old
     return f"{vessel}: {' and '.join(parts)} {_OLDER}; next: {_next([vessel])}" if parts else None
 
 
-def said_of_sets(sets: Iterable[ParameterSet]) -> str | None:
+def said_of_sets(warehouse: Warehouse, sets: Iterable[ParameterSet]) -> str | None:
     """Return the sentence that some parameter sets are of other code than the present; None where none is."""
-    code = code_version.fingerprint("estimate")
+    code = code_of(warehouse, "estimate")
     old = [stored for stored in sets if stored.provenance.get("code_version") != code]
     if not old:
         return None
@@ -80,7 +81,7 @@ def said_of_sets(sets: Iterable[ParameterSet]) -> str | None:
 def _stale(warehouse: Warehouse, vessel: str | None) -> Counter[str]:
     """Count the logs, by vessel, that were not read and looked through by the present code with the present profile."""
     rows = logs.current(warehouse, vessel)
-    old = unread(rows, vessels.current_hashes(warehouse, vessel))
+    old = unread(warehouse, rows, vessels.current_hashes(warehouse, vessel))
     names = {row.ingest_id for row in old}
     old += unsearched(warehouse, [row for row in rows if row.ingest_id not in names])
     return Counter(row.vessel for row in old)

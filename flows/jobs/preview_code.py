@@ -16,11 +16,13 @@ from typing import Any
 from kempf.flows.jobs.out_of_date import unsearched
 from kempf.flows.jobs.parameter_changes import Move, NewSet, paired
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import aliases, code_version, history, logs, parameter_sets, raw
 from kempf.warehouse import vessels as vessel_table
+from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.keys import ingest_id
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -98,30 +100,49 @@ def preview_all(warehouse: Warehouse, vessels: Sequence[str] = (), progress: Pro
 def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
     """Say what the present code would make of the parameter sets of one vessel that stand; nothing is stored."""
     vessel_table.require(warehouse, vessel)
-    code = code_version.fingerprint("estimate")
+    code, present = code_of(warehouse, "estimate"), code_version.fingerprint("estimate")
     stand = standing_sets(warehouse, vessel)
     old = [stored for stored in stand if stored.provenance["code_version"] != code]
     ready = len(stand) - len(old)
     rows = logs.current(warehouse, vessel)
-    read = all(row.code_version == code_version.fingerprint("ingest") for row in rows)
+    read = all(row.code_version == code_of(warehouse, "ingest") for row in rows)
     if not old and read and not unsearched(warehouse, rows):
         return VesselPreview(vessel, ready, ready)
     with _scratch() as scratch:
         failures = _seed(warehouse, scratch, vessel)
         report = reprocess_vessel(scratch, vessel)
-        now = [stored for stored in standing_sets(scratch, vessel) if stored.provenance["code_version"] == code]
+        now = [stored for stored in standing_sets(scratch, vessel) if stored.provenance["code_version"] == present]
+    same = _built_again(warehouse, old)
+    old = [stored for stored in old if stored.parameter_set_id not in same]
+    # in the other warehouse nothing is there to be brought forward: all manoeuvres are fitted at once
+    now = [made for made in now if (made.model_sha256, made.estimator) not in same.values()]
     there = set(parameter_sets.summaries(warehouse, vessel)["parameter_set_id"].to_list())
     pairs = paired(old, now)
     return VesselPreview(
         vessel,
-        sets=len(old) + ready,
+        sets=len(stand),
         up_to_date=ready,
-        identical=pairs.identical,
+        identical=pairs.identical + len(same),
         moves=pairs.moves,
         new=tuple(stored for stored in pairs.new if stored.parameter_set_id not in there),
         gone=pairs.gone,
         failures=(*failures, *report.failures),
     )
+
+
+def _built_again(warehouse: Warehouse, old: Sequence[ParameterSet]) -> dict[str, tuple[str, str]]:
+    """Return model and estimator, by id, of sets that rest on others and are built again with these, bit for bit."""
+    found = {}
+    for stored in old:
+        if stored.updates is None:
+            continue
+        try:
+            again = rerun(warehouse, stored.parameter_set_id)
+        except KempfError:
+            continue  # compared with what comes of all manoeuvres, like any other set
+        if {again.verdict, *again.rests_on.values()} == {"bit-identical"}:
+            found[stored.parameter_set_id] = stored.model_sha256, stored.estimator
+    return found
 
 
 def standing_sets(warehouse: Warehouse, vessel: str) -> list[ParameterSet]:

@@ -16,6 +16,7 @@ from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import corrections, logs, raw, vessels
+from kempf.warehouse.equivalents import codes_of
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
 
@@ -70,7 +71,7 @@ def stale_logs(warehouse: Warehouse, vessel: str) -> Stale:
     """
     profile = vessels.current(warehouse, vessel)
     hers = logs.current(warehouse, vessel)
-    old = unread(hers, {vessel: profile.sha256})
+    old = unread(warehouse, hers, {vessel: profile.sha256})
     names = {row.ingest_id for row in old}
     others = [row for row in hers if row.ingest_id not in names]
     return Stale(profile, len(hers), tuple(old), tuple(unsearched(warehouse, others)))
@@ -125,7 +126,7 @@ def _read_anew(
     from kempf.flows.jobs.spool import spooled
 
     failed: dict[str, KempfError] = {}
-    said = corrections.of_logs(warehouse, [row.log_id for row in rows])
+    codes, said = codes_of(warehouse), corrections.of_logs(warehouse, [row.log_id for row in rows])
     for chunk in _chunks(rows):
         read: dict[str, ReadLog] = {}
         with ExitStack() as until_stored:
@@ -136,7 +137,7 @@ def _read_anew(
                     log = until_stored.enter_context(raw.opened(warehouse, row.log_id))
                     readings = until_stored.enter_context(spooled(row.file_name, log, profile))
                     read[row.ingest_id] = look_through(
-                        row.vessel, row.file_name, log, profile, readings, said.get(row.log_id, ())
+                        row.vessel, row.file_name, log, profile, readings, said.get(row.log_id, ()), codes
                     )
                 except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it
                     failed[row.ingest_id] = wrapped(error)

@@ -16,6 +16,7 @@ from kempf.flows.jobs.spool import spooled
 from kempf.schemas.errors import NotFound, UsageError
 from kempf.warehouse import aliases, corrections, logs, raw, vessels
 from kempf.warehouse.deposit import description
+from kempf.warehouse.equivalents import codes_of
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.store import Warehouse
 
@@ -118,7 +119,7 @@ def move(
         )
     with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as readings:
         said = corrections.of_logs(warehouse, [row.log_id]).get(row.log_id, ())
-        read = look_through(whose, row.file_name, log, profile, readings, said)
+        read = look_through(whose, row.file_name, log, profile, readings, said, codes_of(warehouse))
         found = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
         store(warehouse, [read])
     return found, logs.by_prefix(warehouse, row.log_id)

@@ -22,8 +22,9 @@ from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import parse
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import code_version, corrections, delta, logs, lost, raw, readings, seals, vessels
+from kempf.warehouse import corrections, delta, logs, lost, raw, readings, seals, vessels
 from kempf.warehouse.deposit import description
+from kempf.warehouse.equivalents import code_of, codes_of
 from kempf.warehouse.instant import month_of
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.logs import LogRow
@@ -268,7 +269,7 @@ def _profiles(warehouse: Warehouse, found: Repaired) -> None:
 
 def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
     """Return the logs of which something that their bytes gave is missing, and that the present code has read."""
-    code = code_version.fingerprint("ingest")
+    code = code_of(warehouse, "ingest")
     rows = [row for row in logs.current(warehouse) if row.code_version == code]
     held = readings.ingests_held(warehouse)
     examined = set(delta.read(warehouse, "examinations", columns=("ingest_id",))["ingest_id"].to_list())
@@ -293,7 +294,7 @@ def _read_again(warehouse: Warehouse, name: str) -> str:
     profile = vessels.get(warehouse, row.profile_sha256)
     said = corrections.of_logs(warehouse, [name]).get(name, ())
     with raw.opened(warehouse, name) as log, spooled(row.file_name, log, profile) as read:
-        found = look_through(row.vessel, row.file_name, log, profile, read, said)
+        found = look_through(row.vessel, row.file_name, log, profile, read, said, codes_of(warehouse))
         if found.found.examination.ingest_id != row.ingest_id:
             raise KempfError(
                 "other_ingest", f"{row.file_name} is read with other code now.", "Run `kempf reprocess`.", {"log": name}

@@ -28,7 +28,8 @@ from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.estimate.names import NAMES
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, code_version, history, parameter_sets, segments
+from kempf.warehouse import aliases, history, parameter_sets, segments
+from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.store import Warehouse
 
 
@@ -288,7 +289,7 @@ def _withdraw(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
 
 
 def _verify(warehouse: Warehouse, vessel: str, report: VesselReport) -> None:
-    code = code_version.fingerprint("estimate")
+    code = code_of(warehouse, "estimate")
     for stored in parameter_sets.all_as_stored(warehouse, vessel):
         if stored.provenance["code_version"] != code:
             continue

@@ -189,7 +189,13 @@ def _verdict(stored: ParameterSet, result: Rerun) -> RerunVerdict:
 
 
 def _failed(stored: ParameterSet, error: KempfError) -> RerunVerdict:
-    return RerunVerdict(stored.vessel, stored.parameter_set_id, FAILED, code_changed(inputs_of(stored)), error=error)
+    return RerunVerdict(
+        stored.vessel,
+        stored.parameter_set_id,
+        FAILED,
+        code_changed(inputs_of(stored), stored.provenance.get("made_by")),
+        error=error,
+    )
 
 
 def _run_id(parameter_set_id: str, tolerance: float) -> str:

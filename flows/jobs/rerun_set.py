@@ -181,15 +181,22 @@ def judged(stored: ParameterSet, again: ParameterSet, tolerance: float = 1e-9) -
     # sets of earlier versions do not say on which machine they were made
     then = {**(stored.provenance.get("packages") or {}), **(stored.provenance.get("machine") or {})}
     changed = {name: [then.get(name), now.get(name)] for name in sorted(then) if then.get(name) != now.get(name)}
-    return Rerun(stored.parameter_set_id, verdict, differences, code_changed(inputs_of(stored)), changed)
+    other = code_changed(inputs_of(stored), stored.provenance.get("made_by"))
+    return Rerun(stored.parameter_set_id, verdict, differences, other, changed)
 
 
-def code_changed(inputs: Inputs) -> bool:
-    """Return whether the code, or what an effect of the model computes, is another than when a set was made."""
+def code_changed(inputs: Inputs, made_by: str | None = None) -> bool:
+    """Return whether the code, or what an effect of the model computes, is another than when a set was made.
+
+    Parameters
+    ----------
+    made_by : str, optional
+        Fingerprint of the code itself, where it went on under another one.
+    """
     then = inputs.settings.get("effects", {})
     now = known_effects(Own.from_json(inputs.settings.get("own") or {})) if then else {}
     changed = any(name not in now or now[name].sha256 != hashed for name, hashed in then.items())
-    return changed or inputs.code_version != code_version.fingerprint("estimate")
+    return changed or (made_by or inputs.code_version) != code_version.fingerprint("estimate")
 
 
 def inputs_of(stored: ParameterSet) -> Inputs:

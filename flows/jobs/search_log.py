@@ -14,7 +14,8 @@ from kempf.pipeline.channels.doctor.refused import count
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version, corrections, examinations, readings, segments, vessels
+from kempf.warehouse import corrections, examinations, readings, segments, vessels
+from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.segments import Segment
@@ -65,7 +66,7 @@ def search(
         log.vessel,
         log.ingest_id,
         log.log_id,
-        corrections.basis(code_version.fingerprint("segment"), said),
+        corrections.basis(log.code_version, said),
         content["verdict"],
         tuple(finding["words"] for finding in content["findings"]),
         {**content, "notes": list(notes)},
@@ -87,7 +88,7 @@ def search_again(warehouse: Warehouse, row: LogRow, said: Sequence[Correction]) 
         ``no_profile``: the profile that it was read with is lost.
     """
     profile = vessels.get(warehouse, row.profile_sha256)
-    log = Ingest(row.vessel, row.log_id, row.ingest_id, row.file_name)
+    log = Ingest(row.vessel, row.log_id, row.ingest_id, row.file_name, code_of(warehouse, "segment"))
     instruments = channels_of(warehouse, row.ingest_id)
     refused = count([readings.read_rejected(warehouse, row.ingest_id)])
     return search(log, profile, row.file_name, row.format, instruments, refused, row.tally.records_read, said)

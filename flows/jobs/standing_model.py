@@ -16,7 +16,7 @@ from kempf.schemas.effect import Effect
 from kempf.schemas.effect_file import read
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import aliases, code_version, parameter_sets, vessels
+from kempf.warehouse import aliases, parameter_sets, vessels
 from kempf.warehouse.parameter_set import Bounds, Inputs, ParameterSet, parameter_set_id
 from kempf.warehouse.store import Warehouse
 
@@ -110,7 +110,7 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own, search: Mapping[str, An
         model_spec=spec.model_dump(mode="json"),
         estimator=POOLED,
         settings={**settings, **({SEARCH: dict(search)} if search else {})},
-        code_version=code_version.fingerprint("estimate"),
+        code_version=chosen.code_version,
     )
 
 

@@ -32,7 +32,7 @@ from kempf.schemas.effect import Effect
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.instrument_noise import lasting_noise
 from kempf.schemas.model_spec import ModelSpec
-from kempf.warehouse import code_version, parameter_sets, provenance, vessels
+from kempf.warehouse import parameter_sets, provenance, vessels
 from kempf.warehouse.parameter_set import UPDATES, Inputs, ParameterSet, Update
 from kempf.warehouse.store import Warehouse
 
@@ -139,7 +139,7 @@ def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, wanted
             rests_on is not None
             and rests_on <= names
             and settings == mine
-            and row.code_version == code_version.fingerprint("estimate")
+            and row.code_version == chosen.code_version
             and row.profile_sha256 == chosen.profile_sha256
             and at_once >= FEWEST
             and len(names) < GROWN * at_once

@@ -10,7 +10,8 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from kempf.schemas.quality import Kind
-from kempf.warehouse import code_version, examinations, history, logs, parameter_sets, segments
+from kempf.warehouse import examinations, history, logs, parameter_sets, segments
+from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.store import Warehouse
 
 
@@ -90,7 +91,7 @@ def marks(warehouse: Warehouse, vessel: str | None = None) -> dict[str, list[str
         ``no_warehouse``.
     """
     marked: dict[str, list[str]] = {}
-    for row in parameter_sets.convergences(warehouse, vessel, code_version.fingerprint("estimate")):
+    for row in parameter_sets.convergences(warehouse, vessel, code_of(warehouse, "estimate")):
         said = dict.fromkeys(row.left_out, "left out of the pooled set")
         # of a pooled set that did not converge no single zigzag is at fault
         if not row.converged and len(row.segment_ids) == 1:

@@ -12,17 +12,30 @@ import yaml
 
 from kempf.flows.fleet import state
 from kempf.flows.jobs import preview_code, rerun_all
+from kempf.flows.jobs.adopt_code import adopt_code
 from kempf.flows.jobs.identify_vessel import Request, build, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.out_of_date import said_of_vessel
 from kempf.flows.jobs.parameter_changes import Move, paired
 from kempf.flows.jobs.preview_code import VesselPreview, preview_all, standing_sets
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_all import verify_all
+from kempf.flows.jobs.rerun_set import inputs_of
 from kempf.pipeline.ingest.log_file import LogFile
-from kempf.schemas.errors import NotFound
+from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import code_version, compaction, delta, logs, parameter_sets, runs
+from kempf.warehouse import (
+    code_version,
+    compaction,
+    delta,
+    equivalents,
+    history,
+    logs,
+    parameter_sets,
+    provenance,
+    runs,
+)
 from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import fresh, seen
@@ -265,3 +278,43 @@ def test_requests_that_make_no_sense(own: Warehouse, tmp_path: Path):
     refused(kempf("compact", "--warehouse", tmp_path / "none", "--json"), 4, "no_warehouse")
     with pytest.raises(NotFound):
         verify_all(fresh(tmp_path / "none"))
+
+
+def test_code_that_moves_nothing_is_adopted_and_nothing_is_made_anew(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    def sets() -> list[str]:
+        return [one.parameter_set_id for one in parameter_sets.get_all(own, "mariner")]
+
+    before, standing = sets(), history.standing(own, "mariner")
+    other_code(monkeypatch)
+    assert said_of_vessel(own, "mariner") is not None
+    with pytest.raises(KempfError) as caught:
+        adopt_code(own, [VesselPreview("mariner", 0, 0)])
+    assert caught.value.code == "nothing_compared"
+    output = kempf("rerun", "--all", "--preview", "--adopt", "--warehouse", own.uri)
+    assert output.code == 0 and "on the evidence of 2 sets of 1 vessel" in output.out, output
+    assert said_of_vessel(own, "mariner") is None
+    report = reprocess_vessel(own, "mariner")
+    assert (report.status, report.reread, report.searched, report.new_sets) == ("unchanged", 0, 0, 0)
+    assert sets() == before and history.standing(own, "mariner") == standing
+    (same,) = preview_all(own)
+    assert (same.sets, same.up_to_date) == (2, 2)
+    # what comes goes on under the fingerprint of the code before, and says which code made it
+    made = provenance.collect(own, inputs_of(parameter_sets.get(own, before[0])), [])
+    assert made["made_by"] == code_version.fingerprint("estimate") != made["code_version"]
+    again = kempf("rerun", "--all", "--preview", "--adopt", "--warehouse", own.uri)
+    assert again.code == 0 and "nothing to adopt" in again.out
+    # taken back, everything is of other code again
+    taken = kempf("rerun", "--unadopt", "--warehouse", own.uri, "--json")
+    assert {one["stage"] for one in taken.json["taken_back"]} == {one.stage for one in equivalents.all_of(own)}
+    assert said_of_vessel(own, "mariner") is not None
+    assert "nothing to take back" in kempf("rerun", "--unadopt", "--warehouse", own.uri).out
+
+
+def test_code_that_moves_something_is_not_adopted(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    other_code(monkeypatch)
+    (found,) = preview_all(own)
+    moving = replace(found, gone=("ps-1",))
+    with pytest.raises(KempfError) as caught:
+        adopt_code(own, [moving])
+    assert caught.value.code == "code_moves" and equivalents.all_of(own) == []
+    assert kempf("rerun", "--all", "--adopt", "--warehouse", own.uri).code == 2

@@ -192,7 +192,7 @@ def _linear(set_id: str | None, vessel: str | None, uri: str, speed: float | Non
 
     warehouse = Warehouse(uri)
     ship = ship_of_set(warehouse, named_set(warehouse, set_id, vessel), speed)
-    print_note(said_of_sets([ship.parameter_set]))
+    print_note(said_of_sets(warehouse, [ship.parameter_set]))
     return linear(ship, step, radians(course))
 
 
@@ -202,8 +202,9 @@ def _text(form: str, set_id: str | None, vessel: str | None, output: Path | None
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.export import as_text
 
-    one = named_set(Warehouse(uri), set_id, vessel)
-    print_note(said_of_sets([one]))
+    warehouse = Warehouse(uri)
+    one = named_set(warehouse, set_id, vessel)
+    print_note(said_of_sets(warehouse, [one]))
     _deliver(form, one.parameter_set_id, as_text(one, form), output, as_json)
 
 

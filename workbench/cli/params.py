@@ -77,8 +77,9 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.parameter_set_table import tell_set
 
-    one = named_set(Warehouse(uri), set_id, vessel)
-    print_note(said_of_sets([one]))
+    warehouse = Warehouse(uri)
+    one = named_set(warehouse, set_id, vessel)
+    print_note(said_of_sets(warehouse, [one]))
     if as_json:
         print_json(one.show())
         return
@@ -117,7 +118,7 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     warehouse = Warehouse(uri)
     one, other = named_set(warehouse, first, vessel), named_set(warehouse, second, vessel)
     found = compare(one, other)
-    print_note(said_of_sets([one, other]))
+    print_note(said_of_sets(warehouse, [one, other]))
     if as_json:
         print_json({"first": one.parameter_set_id, "second": other.parameter_set_id, "parameters": found})
         return
@@ -145,8 +146,9 @@ def export(set_id: str | None, vessel: str | None, form: str, output: Path | Non
     from kempf.workbench.export import as_text
     from kempf.workbench.new_file import write_new
 
-    one = named_set(Warehouse(uri), set_id, vessel)
-    print_note(said_of_sets([one]))
+    warehouse = Warehouse(uri)
+    one = named_set(warehouse, set_id, vessel)
+    print_note(said_of_sets(warehouse, [one]))
     text = as_text(one, "json" if as_json else form)
     if output is None:
         click.echo(text, nl=False)
@@ -205,7 +207,7 @@ def steering(
 
     warehouse = Warehouse(uri)
     ship = ship_of_set(warehouse, named_set(warehouse, set_id, vessel), speed)
-    print_note(said_of_sets([ship.parameter_set]))
+    print_note(said_of_sets(warehouse, [ship.parameter_set]))
     linear = linear_hull(ship.hull, ship.effects, ship.covariance, ship.speed_m_s)
     constants = nomoto(linear.hull, linear.covariance, ship.speed_m_s, ship.length_m)
     judged = stability(linear.hull, linear.covariance, ship.speed_m_s)

@@ -30,6 +30,12 @@ if TYPE_CHECKING:
 @vessel_option(multiple=True)
 @click.option("--tolerance", type=float, default=1e-9, show_default=True, help="Relative; what still counts as equal.")
 @click.option("--afresh", is_flag=True, help="With --all: also sets that this code has verified before.")
+@click.option(
+    "--adopt",
+    is_flag=True,
+    help="With --preview: where nothing would change, let the present code count as the one that made what is stored.",
+)
+@click.option("--unadopt", is_flag=True, help="Take back what --adopt said of the present code.")
 @click.option("--fail-above", type=float, metavar="X", help="With --preview: exit code 5 above X standard errors.")
 @warehouse_option
 @json_option
@@ -41,6 +47,8 @@ def command(
     tolerance: float,
     afresh: bool,
     fail_above: float | None,
+    adopt: bool,
+    unadopt: bool,
     uri: str,
     as_json: bool,
 ) -> None:
@@ -54,6 +62,11 @@ def command(
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.warehouse.store import Warehouse
 
+    if unadopt:
+        from kempf.workbench.cli.adopted import take_back
+
+        take_back(Warehouse(uri), as_json=as_json)
+        return
     if all_sets == (set_id is not None):
         raise UsageError(
             "one_or_all",
@@ -66,6 +79,8 @@ def command(
         )
     if fail_above is not None and verify:
         raise UsageError("only_with_preview", "--fail-above goes with --preview.", "Add --preview, or leave it out.")
+    if adopt and verify:
+        raise UsageError("only_with_preview", "--adopt goes with --preview.", "Add --preview, or leave it out.")
     warehouse, vessels = Warehouse(uri), sorted(set(vessel))
     if set_id is not None:
         _one(warehouse, named_set(warehouse, set_id, *vessel).parameter_set_id, tolerance, as_json=as_json)
@@ -74,7 +89,7 @@ def command(
     else:
         from kempf.workbench.cli.rerun_preview import preview
 
-        preview(warehouse, vessels, fail_above, as_json=as_json)
+        preview(warehouse, vessels, fail_above, adopt=adopt, as_json=as_json)
 
 
 def _one(warehouse: Warehouse, set_id: str, tolerance: float, *, as_json: bool) -> None:

@@ -15,20 +15,25 @@ from kempf.workbench.terminal import number, print_json, print_table, progress_b
 if TYPE_CHECKING:
     from kempf.flows.jobs.parameter_changes import Move
     from kempf.flows.jobs.preview_code import VesselPreview
+    from kempf.warehouse.equivalents import Equivalent
     from kempf.warehouse.store import Warehouse
 
 #: Lines for a person; --json has all.
 _SHOWN = 20
 
 
-def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, *, as_json: bool) -> None:
-    """Show it; exit code 3 where something could not be done, 5 where a parameter moves further than is allowed."""
+def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, *, adopt: bool, as_json: bool) -> None:
+    """Show it; exit code 3 where something could not be done, 5 where a parameter moves further than is allowed.
+
+    With ``adopt`` the present code then counts as the one before; where something moves that is refused.
+    """
     from kempf.flows.jobs.preview_code import preview_all
 
     with progress_bar() as progress:
         previews = preview_all(warehouse, vessels, progress)
     moves = sorted((m for vessel_preview in previews for m in vessel_preview.moves), key=lambda m: -m.size)
     lines = _by_parameter(moves)
+    adopted = _adopted(warehouse, previews) if adopt else []
     if as_json:
         shown = [{k: v for k, v in line.items() if k != "size"} for line in lines]
         print_json(
@@ -37,14 +42,33 @@ def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, 
                 "parameters": shown,
                 "vessels": [vessel_preview.show() for vessel_preview in previews],
                 "moves": [m.show() for m in moves],
+                **({"adopted": [vars(one) for one in adopted]} if adopt else {}),
             }
         )
     else:
         _print_preview(previews, lines)
+        if adopt:
+            _print_adopted(adopted)
     if any(vessel_preview.failures for vessel_preview in previews):
         sys.exit(DataRejected.exit_code)
     if fail_above is not None and moves and moves[0].size > fail_above:
         sys.exit(ThresholdExceeded.exit_code)
+
+
+def _adopted(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> list[Equivalent]:
+    from kempf.flows.jobs.adopt_code import adopt_code
+
+    return adopt_code(warehouse, previews)
+
+
+def _print_adopted(adopted: Sequence[Equivalent]) -> None:
+    if not adopted:
+        click.echo("There is nothing to adopt: the present code counts as the one that made what is stored.")
+    for one in adopted:
+        click.echo(
+            f"adopted: {one.stage} code {one.code} counts as {one.stands_for}, on the evidence of {one.sets} sets of "
+            f"{len(one.vessels)} vessel{'' if len(one.vessels) == 1 else 's'}"
+        )
 
 
 def _counts(previews: Sequence[VesselPreview]) -> dict[str, int]:
