@@ -17,7 +17,6 @@ from urllib.parse import unquote
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import delta, seals
-from kempf.warehouse.readings import by_month
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.store import Warehouse
 
@@ -70,8 +69,8 @@ def compact(warehouse: Warehouse, more_files_than: int = 50) -> tuple[str, ...]:
 
     A table that is not kept a folder a vessel is sorted by vessel, in small groups of rows, so that reading one
     vessel skips the others. Readings become one file a vessel and month, or few of a month of very long logs; those of
-    earlier versions of kempf, one a log, are laid out so first. A table of many files is given a checkpoint, which
-    opens several times as fast as its commits.
+    earlier versions of kempf stay one file a log. A table of many files is given a checkpoint, which opens several
+    times as fast as its commits.
 
     Parameters
     ----------
@@ -102,9 +101,6 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
     table = delta.open_table(warehouse, name)
     if table is None or len(table.file_uris()) <= more_files_than:
         return False
-    relaid = name in _LARGE and table.metadata().partition_columns != list(TABLES[name].partition_by)
-    if relaid:
-        table = delta.relay(warehouse, name, by_month(warehouse, table, name))
     written = WriterProperties(compression="ZSTD", max_row_group_size=_ROW_GROUP)
     sortable = "vessel_key" in {c.name for c in TABLES[name].columns} - set(table.metadata().partition_columns)
     with delta.refusals_as_errors(warehouse.address(name)):
@@ -117,7 +113,7 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
             table.create_checkpoint()
         seals.seal(table)
         seals.seal_checkpoint(table)
-    return relaid or int(removed) > 0
+    return int(removed) > 0
 
 
 def pinned(warehouse: Warehouse) -> dict[str, tuple[int, ...]]:

@@ -333,46 +333,6 @@ def replace(
         seals.seal(table)
 
 
-def relay(warehouse: Warehouse, name: str, frames: Iterator[pl.DataFrame]) -> DeltaTable:
-    """Lay a table out in the folders that it has now, in one commit; earlier versions stay readable as they were.
-
-    Parameters
-    ----------
-    frames : iterator of polars.DataFrame
-        All rows that it is to have, with every column; those of one folder one after the other.
-
-    Returns
-    -------
-    DeltaTable
-        Open.
-
-    Raises
-    ------
-    deltalake.exceptions.CommitFailedError
-        Another writer was first.
-    KempfError
-        ``disk_full``, ``warehouse_not_writable``.
-    """
-    import pyarrow as pa
-    from deltalake import WriterProperties, write_deltalake
-
-    schema = arrow_schema(TABLES[name])
-    table = ensure_table(warehouse, name)
-    with refusals_as_errors(table.table_uri):
-        write_deltalake(
-            table,
-            pa.RecordBatchReader.from_batches(schema, _batches(frames, schema)),
-            mode="overwrite",
-            schema_mode="overwrite",
-            partition_by=list(TABLES[name].partition_by),
-            writer_properties=WriterProperties(compression="ZSTD"),
-        )
-        seals.seal(table)
-    made = open_table(warehouse, name)
-    assert made is not None
-    return made
-
-
 def _as_described(table: DeltaTable, schema: pa.Schema) -> pa.Schema:
     """Return a schema with the units and words that a table has: other words than its own no table takes."""
     import pyarrow as pa

@@ -10,20 +10,15 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 from kempf.pipeline.ingest.readings import READING_SCHEMA, REJECTED_SCHEMA, LogReadings
-from kempf.warehouse import delta, logs, seals
+from kempf.warehouse import delta, logs
 from kempf.warehouse.instant import month_of
 from kempf.warehouse.keys import one_of, vessel_key
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.retry import with_retry
-from kempf.warehouse.scan import empty_table
 from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     import polars as pl
-    from deltalake import DeltaTable
-
-#: month of rows of an ingest that is in no register
-_NEVER = "never"
 
 
 def write(warehouse: Warehouse, batch: Sequence[tuple[LogRow, LogReadings]]) -> None:
@@ -111,46 +106,6 @@ def ingests_held(warehouse: Warehouse, name: str = "readings") -> set[str]:
     """Return the ingests of which a table has rows."""
     with delta.lent(warehouse, name) as rows:
         return set(rows.select("ingest_id").unique().collect()["ingest_id"].to_list())
-
-
-def by_month(warehouse: Warehouse, table: DeltaTable, name: str) -> Iterator[pl.DataFrame]:
-    """Return all rows of a table that has a folder an ingest, each with its month, in the order of the folders to come.
-
-    Parameters
-    ----------
-    table : DeltaTable
-        Open. What is said of it is read now and the rows later: nobody can ask a table while it is written.
-
-    Raises
-    ------
-    KempfError
-        ``table_damaged``.
-    """
-    months = {row.ingest_id: month_of(row.start_utc_ns) for row in logs.all_ingests(warehouse)}
-    uris = table.file_uris()
-    folder = seals.folder_of(table)
-    if folder is not None:
-        seals.compare_files(folder, name, uris)
-    placed = []
-    for uri in uris:
-        said = dict(part.split("=", 1) for part in uri.split("/") if "=" in part)
-        # of an ingest that was never recorded nobody reads anything: it stays, in a month of its own
-        placed.append((said["vessel_key"], months.get(said["ingest_id"], _NEVER), said["ingest_id"], uri))
-    return _with_months(sorted(placed), warehouse.options, empty_table(name))
-
-
-def _with_months(
-    placed: Sequence[tuple[str, str, str, str]], options: dict[str, str] | None, empty: pl.DataFrame
-) -> Iterator[pl.DataFrame]:
-    import polars as pl
-
-    for vessel, month, ingest, uri in placed:
-        rows = pl.read_parquet(uri, storage_options=options, glob=False, hive_partitioning=False)
-        constants = {"vessel_key": vessel, "ingest_id": ingest, "month": month}
-        whole = rows.with_columns(pl.lit(value).alias(column) for column, value in constants.items())
-        absent = [name for name in empty.columns if name not in whole.columns]
-        kinds = empty.schema
-        yield whole.with_columns(pl.lit(None, dtype=kinds[name]).alias(name) for name in absent).select(empty.columns)
 
 
 def _of_ingest(warehouse: Warehouse, ingest_id: str) -> dict[str, str]:
