@@ -28,17 +28,8 @@ _LARGE = ("readings", "rejected")
 #: Tables that grow by single rows.
 _SMALL = (
     *("vessels", "logs", "lost", "segments", "examinations", "parameter_sets"),
-    *(
-        "diagnoses",
-        "diagnosis_evidence",
-        "aliases",
-        "inbox",
-        "runs",
-        "run_history",
-        "corrections",
-        "notes",
-        "equivalents",
-    ),
+    *("diagnoses", "diagnosis_evidence", "aliases", "inbox"),
+    *("runs", "run_history", "corrections", "notes", "equivalents"),
 )
 #: Rows that are read or skipped together.
 _ROW_GROUP = 8192

@@ -227,6 +227,20 @@ def read(
         return (lazy.select(columns) if columns else lazy).collect()
 
 
+def distinct(warehouse: Warehouse, name: str, column: str) -> set[str]:
+    """Return the values that a column of a table has; of a large one they alone are held.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    KempfError
+        ``table_unreadable``.
+    """
+    with lent(warehouse, name) as lazy:
+        return set(lazy.select(column).unique().collect()[column].to_list())
+
+
 @contextmanager
 def reading(warehouse: Warehouse, name: str, version: int | None = None) -> Iterator[DeltaTable | None]:
     """Lend a table for reading, as `open_table` opens it; what was lent is not to be used after, and not to be written.

@@ -18,7 +18,7 @@ from kempf.warehouse.canonical import plain
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.parameter_set import UPDATES
+from kempf.warehouse.parameter_set import update_in
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
@@ -232,7 +232,7 @@ def _known(row: dict[str, Any]) -> dict[str, str]:
 
 
 def _not_comparable(row: dict[str, Any], names: dict[str, str], seen: set[str]) -> str:
-    if len(row["segment_ids"]) != 1 or json.loads(row["settings_json"]).get(UPDATES):
+    if len(row["segment_ids"]) != 1 or update_in(json.loads(row["settings_json"])):
         return "made of several segments"
     if row["segment_ids"][0] in seen:
         return "of a segment that is there already"

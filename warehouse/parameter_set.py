@@ -103,6 +103,12 @@ class Update:
         return dict(vars(self))
 
 
+def update_in(settings: Mapping[str, Any]) -> Update | None:
+    """Return what a set of these settings brings forward; None where it stands by itself."""
+    said = settings.get(UPDATES)
+    return None if said is None else Update(**said)
+
+
 @dataclass(frozen=True)
 class ParameterSet:
     """One identified model.
@@ -163,8 +169,7 @@ class ParameterSet:
     @property
     def updates(self) -> Update | None:
         """The set that this one brings forward; None where it stands by itself."""
-        said = self.settings.get(UPDATES)
-        return None if said is None else Update(**said)
+        return update_in(self.settings)
 
     def show(self) -> dict[str, Any]:
         """Return the parameter set as the command line's JSON object."""

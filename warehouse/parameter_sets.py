@@ -12,7 +12,7 @@ from kempf.warehouse import delta
 from kempf.warehouse.agreement import content_digest, differences
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.keys import one_of, vessel_key
-from kempf.warehouse.parameter_set import UPDATES, ParameterSet, StoredValue, brought_forward
+from kempf.warehouse.parameter_set import ParameterSet, StoredValue, Update, brought_forward, update_in
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
@@ -78,26 +78,18 @@ def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = N
     return whole(warehouse, all_as_stored(warehouse, vessel, names))
 
 
-def whole(warehouse: Warehouse, sets: Sequence[ParameterSet], bases: Sequence[ParameterSet] = ()) -> list[ParameterSet]:
+def whole(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> list[ParameterSet]:
     """Return sets of one vessel, those that bring others forward with what these say of their manoeuvres.
-
-    Parameters
-    ----------
-    bases : sequence of ParameterSet, optional
-        Whole ones that they may bring forward.
 
     Raises
     ------
     KempfError
         ``set_lost``: one of these is not stored any more.
     """
-    if not any(one.updates for one in sets):
+    updating = [one for one in sets if one.updates]
+    if not updating:
         return list(sets)
     known = {one.parameter_set_id: one for one in sets}
-    ready = {one.parameter_set_id: one for one in bases}
-    if all(one.updates is None or one.updates.set in ready for one in sets):
-        return [brought_forward(ready[one.updates.set], one) if one.updates else one for one in sets]
-    updating = [one for one in sets if one.updates]
     models, estimators = (sorted({getattr(one, name) for one in updating}) for name in ("model_sha256", "estimator"))
     where: Where = {"vessel_key": vessel_key(sets[0].vessel), "model_sha256": models, "estimator": estimators}
     for row in delta.read(warehouse, "parameter_sets", where).rows(named=True):
@@ -134,22 +126,19 @@ class Pooled:
     profile_sha256: str
 
     @property
-    def updates(self) -> str | None:
-        """Id of the set that it brings forward."""
-        said = self.settings.get(UPDATES)
-        return None if said is None else str(said["set"])
+    def updates(self) -> Update | None:
+        """The set that it brings forward; None where it stands by itself."""
+        return update_in(self.settings)
 
     @property
     def manoeuvres(self) -> int:
         """How many it rests on, with all that it brings forward."""
-        said = self.settings.get(UPDATES) or {"manoeuvres": 0}
-        return int(said["manoeuvres"]) + len(self.segment_ids)
+        return (self.updates.manoeuvres if self.updates else 0) + len(self.segment_ids)
 
     @property
     def fitted_at_once(self) -> int:
         """How many the first of these was fitted to."""
-        said = self.settings.get(UPDATES)
-        return int(said["fitted_at_once"]) if said else len(self.segment_ids)
+        return self.updates.fitted_at_once if self.updates else len(self.segment_ids)
 
 
 def pooled(warehouse: Warehouse, vessel: str, model_sha256: str, estimator: str) -> list[Pooled]:

@@ -102,12 +102,6 @@ def read_rejected(warehouse: Warehouse, ingest_id: str) -> pl.DataFrame:
     return found.select(list(REJECTED_SCHEMA)).sort("record", "channel", "reason", "raw")
 
 
-def ingests_held(warehouse: Warehouse, name: str = "readings") -> set[str]:
-    """Return the ingests of which a table has rows."""
-    with delta.lent(warehouse, name) as rows:
-        return set(rows.select("ingest_id").unique().collect()["ingest_id"].to_list())
-
-
 def _of_ingest(warehouse: Warehouse, ingest_id: str) -> dict[str, str]:
     row = logs.of_ingest(warehouse, ingest_id)
     return {"vessel_key": vessel_key(row.vessel), "month": month_of(row.start_utc_ns), "ingest_id": row.ingest_id}
@@ -128,15 +122,14 @@ def _write(
             for frame in frames():
                 yield frame.with_columns(pl.lit(value).alias(column) for column, value in constants.items())
 
-    given = [row for row, _ in batch]
-    places = [one_of("vessel_key", {vessel_key(row.vessel) for row in given})]
-    months = one_of("month", {month_of(row.start_utc_ns) for row in given})
-    ingests = one_of("ingest_id", {row.ingest_id for row in given})
+    held = {row.ingest_id: row for row, _ in batch}
+    named = [one_of("vessel_key", {vessel_key(row.vessel) for row in held.values()}), one_of("ingest_id", held)]
+    months = one_of("month", {month_of(row.start_utc_ns) for row in held.values()})
 
     def attempt() -> None:
         with delta.ensured(warehouse, name) as table:
             # of a table from before there were months the rows of an ingest may have none
-            own = [*places, months] if "month" in table.metadata().partition_columns else places
-            delta.replace(table, name, rows(), " AND ".join([*own, ingests]))
+            where = [*named, months] if "month" in table.metadata().partition_columns else named
+            delta.replace(table, name, rows(), " AND ".join(where))
 
     with_retry(attempt)

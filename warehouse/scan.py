@@ -46,7 +46,7 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     if table is not None and "month" in asked and "month" not in table.metadata().partition_columns:
         del asked["month"]
     single = {column: value for column, value in asked.items() if isinstance(value, str)}
-    empty = empty_table(name)
+    empty = _empty(name)
     if table is None:
         lazy = empty.lazy()
     # the table format takes a blank value for a null one
@@ -106,14 +106,7 @@ def _files(table: DeltaTable, single: Mapping[str, str]) -> list[str]:
     return found
 
 
-def empty_table(name: str) -> pl.DataFrame:
-    """Return a table of no rows, with every column.
-
-    Parameters
-    ----------
-    name : str
-        Key of `kempf.schemas.tables.TABLES`.
-    """
+def _empty(name: str) -> pl.DataFrame:
     import polars as pl
 
     # by way of an empty table, pyarrow would import pandas wherever that is installed

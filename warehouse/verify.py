@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
-from kempf.warehouse import delta, logs, raw, readings, seals, vessels
+from kempf.warehouse import delta, logs, raw, seals, vessels
 from kempf.warehouse.deposit import description
 from kempf.warehouse.store import Warehouse
 
@@ -206,6 +206,6 @@ def _values_of(warehouse: Warehouse, name: str, column: str) -> set[str]:
 def _ingests_of(warehouse: Warehouse, name: str) -> set[str] | None:
     """Return the ingests that a table has rows of."""
     try:
-        return readings.ingests_held(warehouse, name)
+        return delta.distinct(warehouse, name, "ingest_id")
     except Exception:  # noqa: BLE001 - it is reported as damaged already
         return None

@@ -99,33 +99,30 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
     counts = pl.col("removed").is_null()
     profiles = rows("vessels", "revision", "profile_sha256", "removed").group_by("vessel").agg(newest).filter(counts)
     ingests = rows("logs", "log_id", "revision", "ingest_id", "removed").group_by("vessel", "log_id").agg(newest)
-    current = _by_vessel(ingests.filter(counts), "log_id", "ingest_id")
+    current = ingests.filter(counts)
+    log_ids, ingest_ids = _by_vessel(current, "log_id"), _by_vessel(current, "ingest_id")
     sets = _by_vessel(rows("parameter_sets", "parameter_set_id"), "parameter_set_id")
-    pointers = _by_vessel(rows("aliases", "alias", "parameter_set_id"), "alias", "parameter_set_id", together=True)
+    pointers = _by_vessel(rows("aliases", "alias", "parameter_set_id"), "alias", "parameter_set_id")
     said: dict[str, list[str]] = defaultdict(list)
     for row in delta.read(warehouse, "corrections").sort("number").rows(named=True):
         said[row["log_id"]].append(canonical_json(row))
     hashes = dict(profiles.select("vessel", "profile_sha256").rows())
     found = {}
     for name in sorted(hashes) if asked is None else asked:
-        log_ids, ingest_ids = current.get(name, ((), ()))
+        (held,), (read_as,), (made,) = (of.get(name, ([],)) for of in (log_ids, ingest_ids, sets))
         found[name] = VesselState(
             name,
             hashes.get(name, ""),
-            tuple(log_ids),
-            tuple(ingest_ids),
-            tuple(sets.get(name, ((),))[0]),
-            tuple(zip(*pointers.get(name, ((), ())), strict=True)),
-            tuple(one for log_id in log_ids for one in said.get(log_id, ())) if said else (),
+            tuple(held),
+            tuple(read_as),
+            tuple(made),
+            tuple(zip(*pointers.get(name, ([], [])), strict=True)),
+            tuple(one for log_id in held for one in said.get(log_id, ())) if said else (),
         )
     return found
 
 
-def _by_vessel(frame: pl.DataFrame, *columns: str, together: bool = False) -> dict[str, tuple[list[str], ...]]:
-    """Return the sorted values of columns by vessel, each column by itself or their rows together."""
-    import polars as pl
-
-    ordered = frame.sort(columns) if together else frame
-    values = [pl.col(name) if together else pl.col(name).sort() for name in columns]
-    grouped = ordered.group_by("vessel", maintain_order=together).agg(values)
-    return {row[0]: row[1:] for row in grouped.select("vessel", *columns).rows()}
+def _by_vessel(frame: pl.DataFrame, *columns: str) -> dict[str, tuple[list[str], ...]]:
+    """Return the values of columns by vessel, in the order of the rows sorted by them."""
+    grouped = frame.sort(columns).group_by("vessel", maintain_order=True).agg(columns)
+    return {row[0]: row[1:] for row in grouped.rows()}

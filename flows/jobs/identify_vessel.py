@@ -154,7 +154,7 @@ def identify_segments(
     table_versions = delta.versions(warehouse)
     readable = [segment for segment in current if segment.ingest_id not in refreshed.failed]
     wanted = _wanted(warehouse, request, readable, by_ingest)
-    names = [parameter_set_id(one.inputs) for one in wanted.values()]
+    names = [one.set_id for one in wanted]
     known = {one.parameter_set_id: one for one in parameter_sets.convergences(warehouse, vessel, names=names)}
     outcomes = [
         IdentifyOutcome(segment, None, error=refreshed.failed[segment.ingest_id])
@@ -162,12 +162,12 @@ def identify_segments(
         if segment.ingest_id in refreshed.failed
     ]
     missing: dict[str, list[_Wanted]] = {}
-    for one, name in zip(wanted.values(), names, strict=True):
-        held = known.get(name)
+    for one in wanted:
+        held = known.get(one.set_id)
         if held is None:
             missing.setdefault(one.segment.ingest_id, []).append(one)
         else:
-            outcomes.append(IdentifyOutcome(one.segment, None, set_id=name, converged=held.converged))
+            outcomes.append(IdentifyOutcome(one.segment, None, set_id=one.set_id, converged=held.converged))
     with ThreadPoolExecutor(max_workers=usable()) as pool:
         for done, (ingest, hers) in enumerate(missing.items()):
             progress(done, len(missing), f"identifying {len(hers)} segments of {by_ingest[ingest].file_name}")
@@ -186,23 +186,24 @@ class _Wanted:
 
     segment: Segment
     inputs: Inputs
+    set_id: str
     companions: tuple[Segment, ...]
     profile: VesselProfile
 
 
 def _wanted(
     warehouse: Warehouse, request: Request, readable: Sequence[Segment], by_ingest: Mapping[str, logs.LogRow]
-) -> dict[str, _Wanted]:
-    """Return what is wanted of every segment, by its id."""
+) -> list[_Wanted]:
+    """Return what is wanted of every segment."""
     alone = request.estimator not in CAN or bool(request.spec.effects)
     hashes = dict.fromkeys(by_ingest[segment.ingest_id].profile_sha256 for segment in readable)
     profiles = {sha256: vessels.get(warehouse, sha256) for sha256 in hashes}
-    found, code = {}, code_of(warehouse, "estimate")
+    found, code = [], code_of(warehouse, "estimate")
     for segment in readable:
         sha256 = by_ingest[segment.ingest_id].profile_sha256
         beside = () if alone or not without_log(segment) else companions_of(segment, readable, by_ingest)
         inputs = inputs_of(segment, sha256, request, beside, code)
-        found[segment.segment_id] = _Wanted(segment, inputs, tuple(beside), profiles[sha256])
+        found.append(_Wanted(segment, inputs, parameter_set_id(inputs), tuple(beside), profiles[sha256]))
     return found
 
 

@@ -271,8 +271,8 @@ def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
     """Return the logs of which something that their bytes gave is missing, and that the present code has read."""
     code = code_of(warehouse, "ingest")
     rows = [row for row in logs.current(warehouse) if row.code_version == code]
-    held = readings.ingests_held(warehouse)
-    examined = set(delta.read(warehouse, "examinations", columns=("ingest_id",))["ingest_id"].to_list())
+    held = delta.distinct(warehouse, "readings", "ingest_id")
+    examined = delta.distinct(warehouse, "examinations", "ingest_id")
 
     def whole(row: LogRow) -> bool:
         key = vessel_key(row.vessel)

@@ -33,7 +33,7 @@ from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.instrument_noise import lasting_noise
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import parameter_sets, provenance, vessels
-from kempf.warehouse.parameter_set import UPDATES, Inputs, ParameterSet, Update
+from kempf.warehouse.parameter_set import UPDATES, Inputs, ParameterSet, Update, brought_forward
 from kempf.warehouse.store import Warehouse
 
 #: fewer manoeuvres are all fitted at once, and so are they when they have become so many times as many
@@ -114,11 +114,13 @@ def bring_forward(
         if before is None:
             return None
         if len(before.segment_ids) < len(chosen.segments):
-            made = _brought(warehouse, chosen, wanted, before, parent, progress, flow_run)
+            fewer = _further(chosen, before)
+            inputs = _updating(inputs_of(fewer, one, own, search), before)
+            made = _brought(warehouse, fewer, inputs, before, parent, progress, flow_run)
             if made is None:
                 return None
             new.append(made)
-            before = parameter_sets.whole(warehouse, [made], [before])[0]
+            before = brought_forward(before, made)
         parent = before.parameter_set_id
     assert before is not None
     return BroughtForward(tuple(new), before)
@@ -155,47 +157,49 @@ def _segments(row: parameter_sets.Pooled, by_id: Mapping[str, parameter_sets.Poo
     """Return the segments that a set rests on; None where one that it brings forward is lost."""
     found = set(row.segment_ids)
     while row.updates is not None:
-        if row.updates not in by_id:
+        if row.updates.set not in by_id:
             return None
-        row = by_id[row.updates]
+        row = by_id[row.updates.set]
         found.update(row.segment_ids)
     return found
 
 
+def _further(chosen: Chosen, before: ParameterSet) -> Chosen:
+    """Return the chosen manoeuvres on which a set does not rest yet."""
+    there = set(before.segment_ids)
+    further = tuple(segment for segment in chosen.segments if segment.segment_id not in there)
+    logs = {segment.log_id for segment in further}
+    ingests = {log: ingest for log, ingest in chosen.ingests.items() if log in logs}
+    return replace(chosen, segments=further, ingests=ingests, skipped={})
+
+
+def _updating(inputs: Inputs, before: ParameterSet) -> Inputs:
+    """Return the inputs of further manoeuvres with the set that is brought forward by them."""
+    at_once = before.updates.fitted_at_once if before.updates else len(before.segment_ids)
+    update = Update(before.parameter_set_id, len(before.segment_ids), at_once)
+    return replace(inputs, settings={**inputs.settings, UPDATES: update.show()})
+
+
 def _brought(
     warehouse: Warehouse,
-    chosen: Chosen,
-    wanted: Inputs,
+    fewer: Chosen,
+    inputs: Inputs,
     before: ParameterSet,
     parent: str | None,
     progress: Progress,
     flow_run: str | None,
 ) -> ParameterSet | None:
     """Compute what a set adds to the one before it; None where all manoeuvres are to be fitted at once."""
-    there = set(before.segment_ids)
-    further = tuple(segment for segment in chosen.segments if segment.segment_id not in there)
-    logs = {segment.log_id for segment in further}
-    fewer = replace(
-        chosen,
-        segments=further,
-        ingests={log: ingest for log, ingest in chosen.ingests.items() if log in logs},
-        skipped={},
-    )
-    own = inputs_of(fewer, ModelSpec.model_validate(dict(wanted.model_spec)), Own.from_json(wanted.settings["own"]))
-    at_once = before.updates.fitted_at_once if before.updates else len(before.segment_ids)
-    update = Update(before.parameter_set_id, len(before.segment_ids), at_once)
-    search = {SEARCH: wanted.settings[SEARCH]} if SEARCH in wanted.settings else {}
-    inputs = replace(own, settings={**own.settings, **search, UPDATES: update.show()})
-    profile = vessels.get(warehouse, chosen.profile_sha256)
-    origin = provenance.collect(warehouse, inputs, list(fewer.ingests.values()), flow_run, vessel=chosen.vessel)
-    ids = tuple(segment.segment_id for segment in further)
-    request = SetRequest(inputs, profile, chosen.vessel, ids, origin, parent, before)
+    profile = vessels.get(warehouse, fewer.profile_sha256)
+    origin = provenance.collect(warehouse, inputs, list(fewer.ingests.values()), flow_run, vessel=fewer.vessel)
+    ids = tuple(segment.segment_id for segment in fewer.segments)
+    request = SetRequest(inputs, profile, fewer.vessel, ids, origin, parent, before)
     try:
         runs = assembled(warehouse, fewer, request.spec, progress, _like(before))
     except NotFound:
         # none of them can be laid out: all manoeuvres together say so of each
         return None
-    progress(0, 1, f"bringing {before.parameter_set_id} forward by {len(further)}")
+    progress(0, 1, f"bringing {before.parameter_set_id} forward by {len(ids)}")
     return _updated_set(runs, request, before)
 
 
@@ -252,16 +256,10 @@ def _updated_set(runs: VesselRuns, request: SetRequest, before: ParameterSet) ->
     if found is None:
         return None
     errors = errors_of(found.fit, found.known)
-    together = errors.together
-    effects = bool(found.fit.ship.model.effects)
-    known = (
-        errors.widened(found.agreement)
-        if effects
-        else replace(together, covariance=together.covariance * found.agreement.widened**2)
-    )
-    made = as_set(found.fit, known, runs, sum(sum(one.gross_errors.values()) for one in found.alone), request)
+    gross_errors = sum(sum(one.gross_errors.values()) for one in found.alone)
+    made = as_set(found.fit, errors.widened(found.agreement), runs, gross_errors, request)
     then = before.convergence
-    behind = posterior_of(found.fit, together, found.agreement, found.log_likelihood)
+    behind = posterior_of(found.fit, errors.together, found.agreement, found.log_likelihood)
     skipped = {name: why for name, why in {**runs.skipped, **found.left_out}.items() if name in request.segment_ids}
     number = len(then["levels"])
     return replace(
@@ -273,13 +271,13 @@ def _updated_set(runs: VesselRuns, request: SetRequest, before: ParameterSet) ->
             "log_likelihood": found.log_likelihood,
             "measurements": then["measurements"] + found.fit.count,
             "speed_m_s": _mean(then["speed_m_s"], number, made.convergence["speed_m_s"], len(found.fit.runs)),
-            "gross_errors": then["gross_errors"] + made.convergence["gross_errors"],
+            "gross_errors": then["gross_errors"] + gross_errors,
             "held_out": [],
             "left_out": skipped,
             POSTERIOR: {**behind.show(), "slip_m": then[POSTERIOR]["slip_m"]},
             **(
                 {"widened": found.agreement.widened}
-                if effects
+                if errors.of_effects
                 else {"pooling": pooling(found.agreement, found.alone, found.fit, then["pooling"]["segments"])}
             ),
         },

@@ -220,12 +220,8 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
     before = fitted.ahead[number - 1] if number else None
     plain, errors = fitted.plain, errors_of(fit, uncertainty_of(fit))
     agreement = agreement_of(fit) if effects else plain.agreement
-    together = errors.together
-    known = replace(together, covariance=together.covariance * agreement.widened**2)
-    if effects:
-        known = errors.widened(agreement)
-    made = as_set(fit, known, runs, plain.gross_errors, request)
-    left_behind = posterior_of(fit, together, agreement, fit.log_likelihood)
+    made = as_set(fit, errors.widened(agreement), runs, plain.gross_errors, request)
+    left_behind = posterior_of(fit, errors.together, agreement, fit.log_likelihood)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     # of the manoeuvres that the inputs name, so that a rerun says the same
     skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in request.segment_ids}
@@ -259,6 +255,8 @@ class Errors:
     known: PooledUncertainty
     #: Shape (6 + p, 6 + p). What is not known of a receiver's lateness adds.
     late: Float
+    #: Whether the model has effects: their diagnosis widens the first alone.
+    of_effects: bool
 
     @property
     def together(self) -> PooledUncertainty:
@@ -266,16 +264,20 @@ class Errors:
         return replace(self.known, covariance=self.known.covariance + self.late)
 
     def widened(self, agreement: Agreement) -> PooledUncertainty:
-        """Return both, the first wider by what the runs disagree about."""
-        return replace(self.known, covariance=self.known.covariance * agreement.widened**2 + self.late)
+        """Return both, wider by what the runs disagree about."""
+        if self.of_effects:
+            return replace(self.known, covariance=self.known.covariance * agreement.widened**2 + self.late)
+        both = self.together
+        return replace(both, covariance=both.covariance * agreement.widened**2)
 
 
 def errors_of(fit: PooledFit, known: PooledUncertainty) -> Errors:
     """Return the errors of a fit with those of lateness; of a model with effects those that its diagnosis states."""
-    if fit.ship.model.effects:
+    of_effects = bool(fit.ship.model.effects)
+    if of_effects:
         known = replace(known, covariance=fit.covariance, kind="information")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        return Errors(known, covariance_of_lateness(fit, workers))
+        return Errors(known, covariance_of_lateness(fit, workers), of_effects)
 
 
 def pooling(agreement: Agreement, alone: Sequence[Alone], fit: PooledFit, before: int = 0) -> dict[str, Any]:

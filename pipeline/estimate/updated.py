@@ -1,7 +1,7 @@
 """A common fit brought forward by further runs, at their own cost and not at that of all runs before (decision 0061).
 
-The runs before stand in for themselves by the parabola that they left (`kempf.pipeline.estimate.posterior`); the new
-ones are filtered, each with noise levels of its own. Where the new top lies far from that of the parabola, or is not
+Of the runs before the parabola is taken that they left (`kempf.pipeline.estimate.posterior`); the new ones are
+filtered, each with noise levels of its own. Where the new top lies far from that of the parabola, or is not
 found, the parabola says nothing of it, and all runs are to be fitted anew.
 """
 
