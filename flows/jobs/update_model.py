@@ -255,7 +255,7 @@ def _updated_set(runs: VesselRuns, request: SetRequest, before: ParameterSet) ->
         found = updated(left, model, runs.runs, runs.spec, workers, search)
     if found is None:
         return None
-    errors = errors_of(found.fit, found.known)
+    errors = errors_of(found.fit, found.known, found.beside)
     gross_errors = sum(sum(one.gross_errors.values()) for one in found.alone)
     made = as_set(found.fit, errors.widened(found.agreement), runs, gross_errors, request)
     then = before.convergence

@@ -271,13 +271,22 @@ class Errors:
         return replace(both, covariance=both.covariance * agreement.widened**2)
 
 
-def errors_of(fit: PooledFit, known: PooledUncertainty) -> Errors:
-    """Return the errors of a fit with those of lateness; of a model with effects those that its diagnosis states."""
+def errors_of(fit: PooledFit, known: PooledUncertainty, before: Float | None = None) -> Errors:
+    """Return the errors of a fit with those of lateness; of a model with effects those that its diagnosis states.
+
+    Parameters
+    ----------
+    known : PooledUncertainty
+        Of all runs, without the lateness of those that are fitted here.
+    before : array, shape (6 + p, 6 + p), optional
+        What of ``known`` is not information, such as the lateness of runs that the fit brings forward.
+    """
     of_effects = bool(fit.ship.model.effects)
     if of_effects:
         known = replace(known, covariance=fit.covariance, kind="information")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        return Errors(known, covariance_of_lateness(fit, workers), of_effects)
+        late = covariance_of_lateness(fit, workers)
+    return Errors(known, late if before is None or not of_effects else late + before, of_effects)
 
 
 def pooling(agreement: Agreement, alone: Sequence[Alone], fit: PooledFit, before: int = 0) -> dict[str, Any]:

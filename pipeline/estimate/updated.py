@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.agreement import Agreement, agreement_of
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.level_bounds import to_intensities
@@ -45,6 +46,8 @@ class Updated:
     left_out: dict[str, str]
     #: Errors of all, not widened by what the runs disagree about, and without a receiver's lateness in the new runs.
     known: PooledUncertainty
+    #: Shape (q, q). What else than their information the runs before state, such as a receiver's lateness, of it.
+    beside: Float
     #: How well all runs agree on the ship.
     agreement: Agreement
     #: Of all runs.
@@ -99,17 +102,17 @@ def updated(
     scatter = before.agreement.widened**2
     if loss > _FAR * scatter or Agreement(added.statistic / scatter, added.degrees_of_freedom).p_value < _ODD:
         return None
-    known = _known(before, fit)
+    share = fit.covariance @ before.parabola.information
+    known, beside = _known(before, fit, share), share @ (before.stated - before.covariance) @ share.T
     agreement = Agreement(
         before.agreement.statistic + added.statistic,
         before.agreement.degrees_of_freedom + added.degrees_of_freedom,
     )
-    return Updated(fit, alone, left_out, known, agreement, before.log_likelihood - loss + fit.log_likelihood)
+    return Updated(fit, alone, left_out, known, beside, agreement, before.log_likelihood - loss + fit.log_likelihood)
 
 
-def _known(before: Posterior, fit: PooledFit) -> PooledUncertainty:
+def _known(before: Posterior, fit: PooledFit, share: Float) -> PooledUncertainty:
     """Return the errors of all runs: those that the others had, as far as they still count, and those of the new."""
     added = uncertainty_beside(fit, before.parabola)
-    share = fit.covariance @ before.parabola.information
     kind = "sandwich" if "sandwich" in (before.kind, added.kind) else "information"
     return PooledUncertainty(share @ before.stated @ share.T + added.covariance, kind, added.one_step)

@@ -54,6 +54,19 @@ def test_the_workers_and_the_way_through_json_do_not_matter_to_the_bits(before: 
     assert first.log_likelihood == second.log_likelihood
 
 
+def test_errors_that_are_no_information_still_count_as_far_as_their_runs_do(before: Posterior) -> None:
+    late = 0.5 * before.covariance
+    plain, made = brought(before, run(25)), brought(replace(before, stated=before.stated + late), run(25))
+    assert plain is not None and made is not None
+    np.testing.assert_array_equal(made.fit.hull, plain.fit.hull)
+    share = np.diag(made.beside - plain.beside) / np.diag(late)
+    # four of the five runs: of the weight of a run's errors, each counts with its share twice
+    assert np.all((share > 0.4) & (share < 1.0))
+    np.testing.assert_allclose(
+        made.known.covariance - plain.known.covariance, made.beside - plain.beside, rtol=0, atol=1e-12
+    )
+
+
 def test_a_run_of_another_ship_is_not_brought_in(before: Posterior) -> None:
     inputs = run(25).inputs.copy()
     inputs[:, 1] /= 0.8
