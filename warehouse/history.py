@@ -14,11 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 from kempf.schemas.errors import KempfError, UsageError
 from kempf.warehouse import delta, examinations, vessels
-from kempf.warehouse.canonical import plain
+from kempf.warehouse.canonical import canonical_json, plain
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
-from kempf.warehouse.parameter_set import update_in
+from kempf.warehouse.parameter_set import UPDATES, update_in
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
@@ -319,7 +319,8 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
 
     A set is superseded where one of its logs has been read anew since or removed, where one of its segments is found no
     longer, and where there are sets of newer code: of the present code, else of the one that was at work last; where
-    this is so of a set that it brings forward; and where a pooled set of the same model rests on more manoeuvres.
+    this is so of a set that it brings forward; and where a pooled set of the same model and settings
+    rests on all of its manoeuvres and more.
     """
     import polars as pl
 
@@ -343,39 +344,62 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
 
 
 def _with_chains(sets: pl.DataFrame) -> pl.Series:
-    """Return which sets are superseded, those that rest on others and pooled ones of fewer manoeuvres with them."""
+    """Return which sets are superseded: those that rest on such ones, and pooled ones that another one contains."""
     import polars as pl
 
-    settings, converged = pl.col("settings_json").str, pl.col("convergence_json").str
-    frame = sets.select(
-        "parameter_set_id",
-        "superseded",
-        "estimator",
-        "model_sha256",
-        updates=settings.json_path_match("$.updates.set"),
-        many=settings.json_path_match("$.updates.manoeuvres").cast(pl.Int64).fill_null(0)
-        + pl.col("segment_ids").list.len().cast(pl.Int64),
-        converged=converged.json_path_match("$.converged").eq_missing("true"),
-    )
-    rows = {row["parameter_set_id"]: row for row in frame.rows(named=True)}
-    # a set rests on fewer manoeuvres than one that brings it forward
-    for row in sorted(rows.values(), key=lambda one: one["many"]):
-        if row["updates"] is not None:
-            before = rows.get(row["updates"])
-            row["superseded"] = row["superseded"] or before is None or before["invalid"]
-        row["invalid"] = row["superseded"]
-    most: dict[tuple[str, str], int] = {}
-    for row in rows.values():
-        if row["many"] > 1 and row["converged"] and not row["invalid"]:
-            kind = row["estimator"], row["model_sha256"]
-            most[kind] = max(most.get(kind, 0), row["many"])
+    columns = ("parameter_set_id", "superseded", "estimator", "model_sha256", "segment_ids", "settings_json")
+    converged = pl.col("convergence_json").str.json_path_match("$.converged").eq_missing("true")
+    rows = sets.select(*columns, converged=converged).rows(named=True)
+    known = {row["parameter_set_id"]: _Rests(row) for row in rows}
+    for one in sorted(known.values(), key=lambda one: one.update.manoeuvres if one.update else 0):
+        if one.update is not None:
+            # it rests on fewer manoeuvres, so that what that one rests on is known
+            one.on(known.get(one.update.set))
+    kinds: dict[tuple[str, ...], list[_Rests]] = {}
+    for one in known.values():
+        if one.pooled and one.converged and not one.superseded:
+            kinds.setdefault(one.kind, []).append(one)
     return pl.Series(
         [
-            row["invalid"] or 1 < row["many"] < most.get((row["estimator"], row["model_sha256"]), 0)
-            for row in (rows[name] for name in frame["parameter_set_id"].to_list())
+            one.superseded or (one.pooled and any(other.replaces(one) for other in kinds.get(one.kind, ())))
+            for one in known.values()
         ],
         dtype=pl.Boolean,
     )
+
+
+class _Rests:
+    """What a set rests on, and whether anything of it is superseded."""
+
+    def __init__(self, row: Mapping[str, Any]) -> None:
+        settings = json.loads(row["settings_json"])
+        self.update = update_in(settings)
+        self.segments = frozenset(row["segment_ids"])
+        self.superseded: bool = row["superseded"]
+        self.converged: bool = row["converged"]
+        self._id: str = row["parameter_set_id"]
+        asked = canonical_json({key: value for key, value in settings.items() if key not in ("segments", UPDATES)})
+        self.kind = (row["estimator"], row["model_sha256"], asked)
+
+    def on(self, before: _Rests | None) -> None:
+        """Rest on another one, too; None where that is lost."""
+        self.superseded = self.superseded or before is None or before.superseded
+        self.segments |= before.segments if before is not None else frozenset()
+
+    @property
+    def pooled(self) -> bool:
+        return len(self.segments) > 1
+
+    def replaces(self, other: _Rests) -> bool:
+        """Whether it is of more manoeuvres, or of the same ones and more of them fitted at once."""
+        if self.segments != other.segments:
+            return self.segments > other.segments
+        return self._rank < other._rank
+
+    @property
+    def _rank(self) -> tuple[int, str]:
+        at_once = self.update.fitted_at_once if self.update else len(self.segments)
+        return -at_once, self._id
 
 
 def _only(frame: pl.DataFrame, parameter: str) -> pl.DataFrame:

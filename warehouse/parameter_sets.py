@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from functools import reduce
 from json import loads
 from typing import TYPE_CHECKING, Any
 
@@ -69,49 +70,59 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
 
 
 def get(warehouse: Warehouse, name: str, vessel: str | None = None) -> ParameterSet:
-    """Return a parameter set by its id, or by a beginning of it that only one has; see `as_stored` and `whole`."""
-    return whole(warehouse, [as_stored(warehouse, name, vessel)])[0]
+    """Return a parameter set by its id, or by a beginning of it that only one has, with all that it rests on.
 
-
-def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
-    """Return the parameter sets of a vessel, all or some by their whole ids; see `all_as_stored` and `whole`."""
-    return whole(warehouse, all_as_stored(warehouse, vessel, names))
-
-
-def whole(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> list[ParameterSet]:
-    """Return sets of one vessel, those that bring others forward with what these say of their manoeuvres.
+    Where it brings another one forward, what that says of its manoeuvres stands in it; see `as_stored`.
 
     Raises
     ------
     KempfError
-        ``set_lost``: one of these is not stored any more.
+        ``set_lost``: one that it rests on is not stored any more.
     """
-    updating = [one for one in sets if one.updates]
-    if not updating:
-        return list(sets)
+    one = as_stored(warehouse, name, vessel)
+    chain, lost = _chain(one, _beside(warehouse, [one]))
+    if lost is not None:
+        raise KempfError(
+            "set_lost",
+            f"{one.parameter_set_id} brings {lost} forward, which is not in the warehouse any more.",
+            "See with `kempf verify` what is damaged; `kempf reprocess` fits all manoeuvres anew.",
+            {"parameter_set_id": one.parameter_set_id, "updates": lost},
+        )
+    return reduce(brought_forward, chain)
+
+
+def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:
+    """Return the parameter sets of a vessel with all that they rest on, all or some by their whole ids.
+
+    One that rests on a set that is not stored any more is left out: it cannot be read, and is superseded. See
+    `all_as_stored`.
+    """
+    sets = all_as_stored(warehouse, vessel, names)
+    known = _beside(warehouse, sets)
+    chains = [_chain(one, known) for one in sets]
+    return [reduce(brought_forward, chain) for chain, lost in chains if lost is None]
+
+
+def _beside(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> dict[str, ParameterSet]:
+    """Return sets of one vessel with those that they may rest on, by id."""
     known = {one.parameter_set_id: one for one in sets}
-    models, estimators = (sorted({getattr(one, name) for one in updating}) for name in ("model_sha256", "estimator"))
-    where: Where = {"vessel_key": vessel_key(sets[0].vessel), "model_sha256": models, "estimator": estimators}
-    for row in delta.read(warehouse, "parameter_sets", where).rows(named=True):
-        known.setdefault(row["parameter_set_id"], _set(row))
-    return [_on_its_base(one, known) for one in sets]
+    updating = [one for one in sets if one.updates]
+    if updating:
+        models, estimators = (sorted({getattr(one, n) for one in updating}) for n in ("model_sha256", "estimator"))
+        where: Where = {"vessel_key": vessel_key(sets[0].vessel), "model_sha256": models, "estimator": estimators}
+        for row in delta.read(warehouse, "parameter_sets", where).rows(named=True):
+            known.setdefault(row["parameter_set_id"], _set(row))
+    return known
 
 
-def _on_its_base(one: ParameterSet, known: Mapping[str, ParameterSet]) -> ParameterSet:
+def _chain(one: ParameterSet, known: Mapping[str, ParameterSet]) -> tuple[list[ParameterSet], str | None]:
+    """Return a set behind those that it brings forward, the first one in front, and which of these is lost."""
     chain = [one]
-    while (update := chain[-1].updates) is not None:
+    while (update := chain[0].updates) is not None:
         if update.set not in known:
-            raise KempfError(
-                "set_lost",
-                f"{one.parameter_set_id} brings {update.set} forward, which is not in the warehouse any more.",
-                "See with `kempf verify` what is damaged; `kempf reprocess` fits all manoeuvres anew.",
-                {"parameter_set_id": one.parameter_set_id, "updates": update.set},
-            )
-        chain.append(known[update.set])
-    made = chain.pop()
-    while chain:
-        made = brought_forward(made, chain.pop())
-    return made
+            return chain, update.set
+        chain.insert(0, known[update.set])
+    return chain, None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ import kempf.warehouse as storage
 from kempf import flows
 from kempf.warehouse import code_version, delta
 from kempf.warehouse.canonical import canonical_json, sha256
+from kempf.warehouse.equivalents import Codes, codes_of
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
@@ -40,6 +41,8 @@ class VesselState:
     aliases: tuple[tuple[str, str], ...] = ()
     #: What was said of manoeuvres in her logs, in order.
     corrections: tuple[str, ...] = ()
+    #: Fingerprints under which the present code goes on in the warehouse.
+    codes: Codes | None = None
 
     @property
     def inputs(self) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
@@ -49,7 +52,8 @@ class VesselState:
     @property
     def digest(self) -> str:
         """SHA-256 of the state and of the code that is responsible for it, 64 hex digits."""
-        content = [self.vessel, *self.inputs, self.ingest_ids, self.set_ids, self.aliases]
+        codes = vars(self.codes) if self.codes else None
+        content = [self.vessel, *self.inputs, self.ingest_ids, self.set_ids, self.aliases, codes]
         return sha256(canonical_json([responsible_code(), *content]))
 
 
@@ -106,6 +110,7 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
     said: dict[str, list[str]] = defaultdict(list)
     for row in delta.read(warehouse, "corrections").sort("number").rows(named=True):
         said[row["log_id"]].append(canonical_json(row))
+    codes = codes_of(warehouse)
     hashes = dict(profiles.select("vessel", "profile_sha256").rows())
     found = {}
     for name in sorted(hashes) if asked is None else asked:
@@ -118,6 +123,7 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
             tuple(made),
             tuple(zip(*pointers.get(name, ([], [])), strict=True)),
             tuple(one for log_id in held for one in said.get(log_id, ())) if said else (),
+            codes,
         )
     return found
 

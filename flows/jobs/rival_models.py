@@ -12,6 +12,7 @@ from kempf.flows.jobs.vessel_model import store_model
 from kempf.flows.process.progress import Progress, silent
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import diagnoses, parameter_sets
+from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
@@ -66,7 +67,12 @@ def rivals_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = sile
 
 def _same_data(inputs: Mapping[str, Any], one: ParameterSet) -> bool:
     own: Mapping[str, Any] = one.provenance.get("inputs") or {}
-    return all(inputs.get(key) == own.get(key) for key in ("segments", "profile_sha256"))
+    return _manoeuvres(inputs) == _manoeuvres(own) and inputs.get("profile_sha256") == own.get("profile_sha256")
+
+
+def _manoeuvres(inputs: Mapping[str, Any]) -> list[str]:
+    """Return the bounds of the manoeuvres in some inputs; sets that were brought forward have them in another order."""
+    return sorted(canonical_json(bounds) for bounds in inputs.get("segments") or ())
 
 
 def _of_same_data(warehouse: Warehouse, one: ParameterSet) -> list[ParameterSet]:

@@ -134,7 +134,7 @@ def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, wanted
     rows = parameter_sets.pooled(warehouse, chosen.vessel, spec.sha256, wanted.estimator)
     mine = {key: value for key, value in wanted.settings.items() if key != "segments"}
     by_id = {row.parameter_set_id: row for row in rows}
-    for row in sorted(rows, key=lambda one: (-one.manoeuvres, one.parameter_set_id)):
+    for row in sorted(rows, key=lambda one: (-one.manoeuvres, -one.fitted_at_once, one.parameter_set_id)):
         settings = {key: value for key, value in row.settings.items() if key not in ("segments", UPDATES)}
         at_once, rests_on = row.fitted_at_once, _segments(row, by_id)
         if (
