@@ -32,9 +32,10 @@ def adopt_code(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> list[
     Raises
     ------
     DataRejected
-        ``code_moves``: something would be otherwise. ``nothing_compared``: no set was made by both.
+        ``code_moves``: something would be otherwise. ``nothing_compared``: no set was made by both, or no log read and
+        looked through, where that is to be adopted.
     """
-    moving = [one.vessel for one in previews if one.moves or one.new or one.gone or one.failures]
+    moving = [one.vessel for one in previews if any((one.moves, one.new, one.gone, one.failures, one.logs_otherwise))]
     if moving:
         raise DataRejected(
             "code_moves",
@@ -44,17 +45,19 @@ def adopt_code(warehouse: Warehouse, previews: Sequence[VesselPreview]) -> list[
             {"vessels": moving},
         )
     made_by = _codes(warehouse, previews)
-    sets, vessels = sum(one.identical for one in previews), tuple(one.vessel for one in previews if one.identical)
+    sets, read = sum(one.identical for one in previews), sum(one.logs for one in previews)
+    compared = tuple(one.vessel for one in previews if one.identical or one.logs)
     found = []
     for stage, old in made_by.items():
         present = code_version.fingerprint(stage)
         if old is not None and old not in (present, equivalents.code_of(warehouse, stage)):
-            found.append(Equivalent(stage, present, old, sets, vessels, code_version.git_commit()))
-    if found and not sets:
+            found.append(Equivalent(stage, present, old, sets, compared, code_version.git_commit()))
+    if any(not (sets if one.stage == "estimate" else read) for one in found):
         raise DataRejected(
             "nothing_compared",
-            f"No parameter set of {len(previews)} vessels was made by the present code and by the one before.",
-            "Preview a vessel that has parameter sets.",
+            f"The present code and the one before made {sets} parameter sets of {len(previews)} vessels and read "
+            f"{read} logs: too little to say that they do the same.",
+            "Preview a vessel that has logs and parameter sets.",
         )
     equivalents.adopt(warehouse, found)
     return found

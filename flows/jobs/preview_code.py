@@ -20,11 +20,25 @@ from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import aliases, code_version, history, logs, parameter_sets, raw
+from kempf.warehouse import (
+    aliases,
+    code_version,
+    corrections,
+    examinations,
+    history,
+    logs,
+    parameter_sets,
+    raw,
+    readings,
+    segments,
+)
 from kempf.warehouse import vessels as vessel_table
+from kempf.warehouse.canonical import canonical_json, plain
 from kempf.warehouse.equivalents import code_of
+from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.keys import ingest_id
 from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
 
@@ -45,6 +59,9 @@ class VesselPreview:
     new: tuple[NewSet, ...] = ()
     #: Sets that would have no counterpart any more.
     gone: tuple[str, ...] = ()
+    #: How many logs were read and looked through anew, and those of them in which something else was found.
+    logs: int = 0
+    logs_otherwise: tuple[str, ...] = ()
     #: What the present code cannot do that is to be done, each with the error's JSON.
     failures: tuple[dict[str, Any], ...] = field(default=())
 
@@ -58,6 +75,8 @@ class VesselPreview:
             "moved": len({move.parameter_set_id for move in self.moves}),
             "new": [one.show() for one in self.new],
             "gone": list(self.gone),
+            "logs": self.logs,
+            "logs_otherwise": list(self.logs_otherwise),
             "failures": list(self.failures),
         }
 
@@ -111,6 +130,7 @@ def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
     with _scratch() as scratch:
         failures = _seed(warehouse, scratch, vessel)
         report = reprocess_vessel(scratch, vessel)
+        otherwise = _otherwise(warehouse, scratch, vessel)
         now = [stored for stored in standing_sets(scratch, vessel) if stored.provenance["code_version"] == present]
     same = _built_again(warehouse, old)
     old = [stored for stored in old if stored.parameter_set_id not in same]
@@ -126,6 +146,8 @@ def _preview(warehouse: Warehouse, vessel: str) -> VesselPreview:
         moves=pairs.moves,
         new=tuple(stored for stored in pairs.new if stored.parameter_set_id not in there),
         gone=pairs.gone,
+        logs=len(rows),
+        logs_otherwise=otherwise,
         failures=(*failures, *report.failures),
     )
 
@@ -159,7 +181,7 @@ def _scratch() -> Iterator[Warehouse]:
 
 
 def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[str, Any]]:
-    """Put into an empty warehouse what reprocessing starts from: profiles, logs, sets, models, aliases."""
+    """Put into an empty warehouse what reprocessing starts from: profiles, logs, corrections, sets, aliases."""
     failures = []
     versions = vessel_table.versions(warehouse, vessel)
     vessel_table.register_all(scratch, [(vessel, one.profile) for one in versions])
@@ -173,11 +195,44 @@ def _seed(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> list[dict[st
         except KempfError as error:
             failures.append(_failure(row.file_name, error))
     logs.record(scratch, kept)
+    for one in corrections.all_of(warehouse, [row.log_id for row in kept]):
+        corrections.add(scratch, one.log_id, one.segment_id, one.correction)
     # those that no longer stand, too: their models are brought up to date with the others
     parameter_sets.insert(scratch, parameter_sets.all_as_stored(warehouse, vessel))
     for alias, name in aliases.of_vessel(warehouse, vessel).items():
         aliases.point(scratch, vessel, name, alias)
     return failures
+
+
+def _otherwise(warehouse: Warehouse, scratch: Warehouse, vessel: str) -> tuple[str, ...]:
+    """Return the names of logs in which something else was read or found in the other warehouse, sorted."""
+    there = {row.log_id: row for row in logs.current(scratch, vessel)}
+    found, found_there = _found_in(warehouse, vessel), _found_in(scratch, vessel)
+    return tuple(
+        sorted(
+            row.file_name
+            for row in logs.current(warehouse, vessel)
+            if row.log_id not in there
+            or found[row.log_id] != found_there[row.log_id]
+            or not readings.read(warehouse, row.ingest_id).equals(readings.read(scratch, there[row.log_id].ingest_id))
+        )
+    )
+
+
+def _found_in(warehouse: Warehouse, vessel: str) -> dict[str, str]:
+    """Return what was counted, examined and found in a vessel's logs, as text by log, but for the code that did it."""
+    rows = logs.current(warehouse, vessel)
+    examined = examinations.of_ingests(warehouse, [row.ingest_id for row in rows], [vessel])
+    by_log: dict[str, list[Any]] = {row.log_id: [vars(row.tally), row.notes] for row in rows}
+    for row in rows:
+        by_log[row.log_id].append(_without_code(examined[row.ingest_id]) if row.ingest_id in examined else None)
+    for segment in segments.found_in(warehouse, vessel):
+        by_log[segment.log_id].append(_without_code(segment))
+    return {name: canonical_json(plain(content)) for name, content in by_log.items()}
+
+
+def _without_code(one: StoredExamination | Segment) -> dict[str, Any]:
+    return {key: value for key, value in vars(one).items() if key not in ("ingest_id", "code_version")}
 
 
 def _failure(what: str, error: KempfError) -> dict[str, Any]:

@@ -30,11 +30,13 @@ from kempf.warehouse import (
     compaction,
     delta,
     equivalents,
+    examinations,
     history,
     logs,
     parameter_sets,
     provenance,
     runs,
+    segments,
 )
 from kempf.warehouse.parameter_set import ParameterSet, StoredValue
 from kempf.warehouse.store import Warehouse
@@ -308,6 +310,54 @@ def test_code_that_moves_nothing_is_adopted_and_nothing_is_made_anew(own: Wareho
     assert {one["stage"] for one in taken.json["taken_back"]} == {one.stage for one in equivalents.all_of(own)}
     assert said_of_vessel(own, "mariner") is not None
     assert "nothing to take back" in kempf("rerun", "--unadopt", "--warehouse", own.uri).out
+
+
+def only_search(monkeypatch: pytest.MonkeyPatch) -> None:
+    known = code_version.fingerprint
+    monkeypatch.setattr(code_version, "fingerprint", lambda stage: "f" * 16 if stage == "segment" else known(stage))
+
+
+def test_a_search_that_finds_the_same_is_adopted_by_itself(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    only_search(monkeypatch)
+    (found,) = preview_all(own)
+    assert (found.identical, found.logs, found.logs_otherwise) == (0, 2, ())
+    assert [one.stage for one in adopt_code(own, [found])] == ["segment"]
+    assert said_of_vessel(own, "mariner") is None
+
+
+def test_a_search_that_finds_something_else_is_named_and_not_adopted(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    # as if the code before had said something else of one log's channels and of one manoeuvre
+    rows = logs.current(own, "mariner")
+    examined = examinations.of_ingests(own, [rows[0].ingest_id])[rows[0].ingest_id]
+    examinations.replace(own, [replace(examined, findings=("the rudder is held upside down",))])
+    only_search(monkeypatch)
+    (found,) = preview_all(own)
+    assert found.logs_otherwise == (rows[0].file_name,)
+    with pytest.raises(KempfError) as caught:
+        adopt_code(own, [found])
+    assert caught.value.code == "code_moves" and equivalents.all_of(own) == []
+    output = kempf("rerun", "--all", "--preview", "--warehouse", own.uri)
+    assert f"in 1 of 2 logs other things are read or found: {rows[0].file_name}" in output.out
+
+
+def test_what_a_person_said_of_a_manoeuvre_is_no_difference(own: Warehouse, monkeypatch: pytest.MonkeyPatch):
+    one = segments.found_in(own, "mariner")[0]
+    done = kempf("segments", "exclude", one.segment_id, "--reason", "a tug pushed", "--yes", "--warehouse", own.uri)
+    assert done.code == 0, done
+    only_search(monkeypatch)
+    (found,) = preview_all(own)
+    assert found.logs == 2 and not (found.logs_otherwise or found.moves or found.new or found.gone)
+
+
+def test_the_fleet_looks_at_every_vessel_again_when_code_was_adopted_or_taken_back(
+    own: Warehouse, monkeypatch: pytest.MonkeyPatch
+):
+    other_code(monkeypatch)
+    before = state.fleet_state(own)["mariner"].digest
+    adopt_code(own, preview_all(own))
+    adopted = state.fleet_state(own)["mariner"].digest
+    equivalents.withdraw(own)
+    assert adopted != before == state.fleet_state(own)["mariner"].digest
 
 
 def test_code_that_moves_something_is_not_adopted(own: Warehouse, monkeypatch: pytest.MonkeyPatch):

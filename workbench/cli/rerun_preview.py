@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from kempf.warehouse.store import Warehouse
 
 #: Lines for a person; --json has all.
-_SHOWN = 20
+_SHOWN, _NAMED = 20, 3
 
 
 def preview(warehouse: Warehouse, vessels: list[str], fail_above: float | None, *, adopt: bool, as_json: bool) -> None:
@@ -79,6 +79,7 @@ def _counts(previews: Sequence[VesselPreview]) -> dict[str, int]:
         "moved": sum(len({m.parameter_set_id for m in vessel_preview.moves}) for vessel_preview in previews),
         "new": sum(len(vessel_preview.new) for vessel_preview in previews),
         "gone": sum(len(vessel_preview.gone) for vessel_preview in previews),
+        "logs_otherwise": sum(len(vessel_preview.logs_otherwise) for vessel_preview in previews),
         "failures": sum(len(vessel_preview.failures) for vessel_preview in previews),
     }
 
@@ -110,7 +111,9 @@ def _by_parameter(moves: Sequence[Move]) -> list[dict[str, Any]]:
 
 def _print_preview(previews: Sequence[VesselPreview], lines: Sequence[dict[str, Any]]) -> None:
     counts = _counts(previews)
-    if counts["sets"] == counts["up_to_date"] and not counts["new"] and not counts["failures"]:
+    if counts["sets"] == counts["up_to_date"] and not any(
+        counts[name] for name in ("new", "failures", "logs_otherwise")
+    ):
         click.echo(f"All {counts['sets']} current parameter sets were made by this code.")
         return
     click.echo(
@@ -118,6 +121,12 @@ def _print_preview(previews: Sequence[VesselPreview], lines: Sequence[dict[str, 
         f"bit-identical, {counts['moved']} would change, {counts['gone']} would be withdrawn without replacement, "
         f"{counts['new']} would be new."
     )
+    for one in previews:
+        if one.logs_otherwise:
+            names = ", ".join(one.logs_otherwise[:_NAMED]) + (" ..." if one.logs_otherwise[_NAMED:] else "")
+            click.echo(
+                f"{one.vessel}: in {len(one.logs_otherwise)} of {one.logs} logs other things are read or found: {names}"
+            )
     if lines:
         head = ["vessel", "parameter", "largest change in s.e.", "median", "s.e. ratio", "before", "after", "unit"]
         head += ["sets", "estimator", "model", "parameter set"]
