@@ -278,6 +278,21 @@ _ALL = (
         ),
     ),
     Table(
+        "purges",
+        "a log that was deleted for good, the receipt; only ever added, its time is that of the commit",
+        (
+            Column("number", "integer", "place among the purges, from 1"),
+            *_VESSEL,
+            _LOG,
+            Column("file_name", "text", "name of its file"),
+            Column("size_bytes", "integer", "size of the log as delivered", "B"),
+            Column("readings", "integer", "rows of readings that were deleted, of every ingest", "1"),
+            Column("rejected", "integer", "rows of what was refused that were deleted, of every ingest", "1"),
+            Column("evidence", "integer", "diagnoses whose reports lost the measurements that they showed", "1"),
+            Column("reason", "text", "why"),
+        ),
+    ),
+    Table(
         "equivalents",
         "one version of the code that counts as another one; only ever added, its time is that of the commit",
         (

@@ -29,7 +29,7 @@ _LARGE = ("readings", "rejected")
 _SMALL = (
     *("vessels", "logs", "lost", "segments", "examinations", "parameter_sets"),
     *("diagnoses", "diagnosis_evidence", "aliases", "inbox"),
-    *("runs", "run_history", "corrections", "notes", "equivalents"),
+    *("runs", "run_history", "corrections", "notes", "equivalents", "purges"),
 )
 #: Rows that are read or skipped together.
 _ROW_GROUP = 8192

@@ -13,7 +13,7 @@ from typing import Any, Literal
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.ingest.readings import LogReadings
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import logs, lost, raw, readings, vessels
+from kempf.warehouse import logs, lost, purges, raw, readings, vessels
 from kempf.warehouse.keys import ingest_id, vessel_key
 from kempf.warehouse.store import Warehouse
 
@@ -57,11 +57,13 @@ def held(
     Raises
     ------
     DataRejected
-        ``log_of_another_vessel``.
+        ``log_of_another_vessel``, ``log_purged``.
     """
     name = log.sha256
     row = logs.find(warehouse, [name]).get(name)
     logs.refuse_other_vessel(row, vessel, file_name)
+    if row is not None:
+        purges.refuse(warehouse, [name])
     if row is None or row.removed is not None or row.ingest_id != ingest_id(name, profile_sha256, code_version):
         return None
     raw.put(warehouse, log)
@@ -86,9 +88,11 @@ def deposit(warehouse: Warehouse, deliveries: Sequence[Delivery]) -> list[Deposi
     Raises
     ------
     DataRejected
-        ``log_of_another_vessel``: bytes that are kept, or given, for two vessels; then nothing is recorded.
+        ``log_of_another_vessel``: bytes that are kept, or given, for two vessels; ``log_purged``: it is not to be
+        kept. Then nothing is recorded.
     """
     rows = [_row(delivery) for delivery in deliveries]
+    purges.refuse(warehouse, [row.log_id for row in rows])
     known = logs.find(warehouse, [row.log_id for row in rows])
     first: dict[str, logs.LogRow] = {}
     fresh: dict[str, tuple[Delivery, logs.LogRow]] = {}

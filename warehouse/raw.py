@@ -10,6 +10,7 @@ from typing import Any
 
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import DataRejected, KempfError, NotFound
+from kempf.warehouse import purges
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.store import Warehouse
 
@@ -72,12 +73,15 @@ def opened(warehouse: Warehouse, name: str) -> Iterator[LogFile]:
     ------
     NotFound
         ``no_warehouse``, or ``no_raw_log``: the log was never kept here.
+    DataRejected
+        ``log_purged``.
     KempfError
         ``raw_bytes_damaged``: what is kept no longer has the hash it is kept under.
     """
     warehouse.require()
     with warehouse.opened(*_place(name)) as stream:
         if stream is None:
+            purges.refuse(warehouse, [name])
             raise NotFound(
                 "no_raw_log",
                 f"The warehouse {warehouse.uri} keeps no raw log {name!r}.",
@@ -118,6 +122,12 @@ def described(warehouse: Warehouse, name: str) -> dict[str, Any] | None:
     except ValueError:
         return None
     return facts if isinstance(facts, dict) and {"vessel", "file_name", "profile"} <= facts.keys() else None
+
+
+def delete(warehouse: Warehouse, name: str) -> None:
+    """Delete a log, and what is kept beside it."""
+    warehouse.delete(*_place(name))
+    warehouse.delete(*_beside(name))
 
 
 def kept(warehouse: Warehouse) -> list[str]:

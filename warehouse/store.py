@@ -154,6 +154,15 @@ class Warehouse:
         where = fs.FileSelector("/".join((root, *parts)), recursive=True, allow_not_found=True)
         return sorted(one.base_name for one in files.get_file_info(where) if one.is_file)
 
+    def paths_below(self, *parts: str) -> list[str]:
+        """Return the paths of all files in a folder inside and in those below it, from there on, sorted."""
+        from pyarrow import fs
+
+        files, root = self._files
+        top = "/".join((root, *parts))
+        where = fs.FileSelector(top, recursive=True, allow_not_found=True)
+        return sorted(one.path.removeprefix(f"{top}/") for one in files.get_file_info(where) if one.is_file)
+
     def size_of(self, *parts: str) -> int | None:
         """Return the size of a file inside, bytes; None where there is none."""
         files, root = self._files

@@ -146,12 +146,14 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
     rows = column("logs", "log_id", "ingest_id", "profile_sha256", "vessel")
     kept = set(raw.kept(warehouse))
     log_ids = {row[0] for row in rows or ()}
-    for log_id in sorted(log_ids - kept):
+    purged = _values_of(warehouse, "purges", "log_id")
+    for log_id in sorted(log_ids - kept - purged):
         yield Problem("reference", "logs", log_id, f"The log {log_id} is not kept as delivered.")
     profiles = {row[0] for row in column("vessels", "profile_sha256") or ()}
     for hash_ in sorted({row[2] for row in rows or ()} - profiles):
         yield Problem("reference", "vessels", hash_, f"The profile {hash_} that logs were read with is lost.")
-    ingests = {row[1] for row in rows or ()}
+    ingests = {row[1] for row in rows or () if row[0] not in purged}
+    yield from _half_purged(purged & kept, {row[1]: row[0] for row in rows or () if row[0] in purged}, warehouse)
     for name in ("readings", "examinations"):
         held = _ingests_of(warehouse, name)
         if held is not None and rows is not None:
@@ -167,6 +169,14 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
             words = f"The raw log {log_id} ({facts['file_name']} of {facts['vessel']}) is in no table."
             yield Problem("reference", "logs", log_id, words)
     yield from _descriptions(warehouse)
+
+
+def _half_purged(kept: set[str], ingests: dict[str, str], warehouse: Warehouse) -> Iterator[Problem]:
+    """Yield the logs that were to be deleted for good and of which something is still there."""
+    there = {ingests[one] for one in (_ingests_of(warehouse, "readings") or set()) & ingests.keys()}
+    for log_id in sorted(kept | there):
+        words = f"Of the purged log {log_id} something is still there: `kempf purge {log_id[:12]}` goes on."
+        yield Problem("reference", "purges", log_id, words)
 
 
 def _descriptions(warehouse: Warehouse) -> Iterator[Problem]:

@@ -14,7 +14,7 @@ from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
 from kempf.schemas.errors import NotFound, UsageError
-from kempf.warehouse import aliases, corrections, logs, raw, vessels
+from kempf.warehouse import aliases, corrections, logs, purges, raw, vessels
 from kempf.warehouse.deposit import description
 from kempf.warehouse.equivalents import codes_of
 from kempf.warehouse.logs import LogRow
@@ -66,8 +66,11 @@ def restore(warehouse: Warehouse, name: str) -> LogRow:
         ``no_log``: none that was removed has this name. ``no_vessel``: its vessel was removed too.
     UsageError
         ``ambiguous_log``.
+    DataRejected
+        ``log_purged``.
     """
     row = logs.by_prefix(warehouse, name, removed=True)
+    purges.refuse(warehouse, [row.log_id])
     vessels.require(warehouse, row.vessel)
     _mark(warehouse, [row], None)
     return logs.by_prefix(warehouse, row.log_id)
@@ -108,7 +111,7 @@ def move(
         It cannot be read with the other vessel's profile; then nothing has changed.
     """
     require_reason(reason)
-    row = _held_or_removed(warehouse, name)
+    row = held_or_removed(warehouse, name)
     whose, profile = settle_vessel(warehouse, vessel, None, new_vessel=new_vessel)
     if row.vessel == whose and row.removed is None:
         raise UsageError(
@@ -125,7 +128,16 @@ def move(
     return found, logs.by_prefix(warehouse, row.log_id)
 
 
-def _held_or_removed(warehouse: Warehouse, name: str) -> LogRow:
+def held_or_removed(warehouse: Warehouse, name: str) -> LogRow:
+    """Return a log by a beginning of its id or by its file name, else one that was removed.
+
+    Raises
+    ------
+    NotFound
+        ``no_log``.
+    UsageError
+        ``ambiguous_log``.
+    """
     try:
         return logs.by_prefix(warehouse, name)
     except NotFound as error:

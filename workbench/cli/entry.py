@@ -43,6 +43,7 @@ COMMANDS = {
     "rerun": "Build parameter sets again from the raw bytes: are they the same, what would this code change?",
     "reprocess": "Bring the whole fleet up to date with its profiles and the code.",
     "compact": "Put the many small files of the tables into few; delete what nothing refers to.",
+    "purge": "Delete a log for good that must not be kept, with a receipt.",
     "verify": "Check raw logs and tables: is everything there and as it was written?",
     "repair": "Make again what is damaged, from sealed copies and from the raw logs.",
     "vessels": "List vessels, show and set their profiles, rename and remove them.",

@@ -1,0 +1,161 @@
+"""A log that must not be kept: deleted for good from everything that was measured, with a receipt, and never let in."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from shutil import copytree
+
+import polars as pl
+import pytest
+
+from kempf.flows.jobs import purge_logs
+from kempf.flows.jobs.files import read_profiles
+from kempf.flows.jobs.identify_vessel import identify_vessel
+from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.purge_logs import purge, what_goes
+from kempf.flows.jobs.remove_logs import move, remove, restore
+from kempf.flows.jobs.repair_warehouse import repair
+from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_set import rerun
+from kempf.schemas.errors import DataRejected
+from kempf.warehouse import compaction, delta, diagnoses, history, logs, parameter_sets, purges, raw, readings
+from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.logs import LogRow
+from kempf.warehouse.store import Warehouse
+from kempf.warehouse.verify import verify
+from tests.conftest import Ship
+from tests.flows.content import fresh
+from tests.workbench.driving import kempf, refused
+
+
+@pytest.fixture(scope="module")
+def _filled(mariner: Ship, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = mariner.write(tmp_path_factory.mktemp("purge"))
+    warehouse = fresh(folder / "w")
+    given = read_profiles([folder / "profile.yaml"])
+    paths = [folder / "mariner.mcap", folder / "mariner.nmea.gz"]
+    ingest(warehouse, paths, given=given)
+    # read once more, with another profile: earlier versions of the tables hold what was read before
+    ingest(warehouse, paths, given=given.model_copy(update={"length_m": 170.0}))
+    identify_vessel(warehouse, "mariner")
+    row = logs.current(warehouse)[0]
+    inputs = {"segments": [{"log_id": row.log_id, "start_utc_ns": 0, "end_utc_ns": 1}]}
+    diagnoses.insert(
+        warehouse, diagnoses.StoredDiagnosis("dx-1", "mariner", "ps-1", 0, "no known effect", (), {}, inputs, "f" * 16)
+    )
+    shown = {"vessel_key": vessel_key("mariner"), "vessel": "mariner", "diagnosis_id": "dx-1", "evidence_json": "{}"}
+    with delta.ensured(warehouse, "diagnosis_evidence") as table:
+        delta.replace(table, "diagnosis_evidence", [shown], "diagnosis_id = 'dx-1'")
+    return folder
+
+
+@pytest.fixture
+def warehouse(_filled: Path, tmp_path: Path) -> Warehouse:
+    return Warehouse(str(copytree(_filled / "w", tmp_path / "w")))
+
+
+def held(warehouse: Warehouse, ingest_ids: set[str]) -> list[str]:
+    """Files of any version of any table of measurements that hold a row of some ingests."""
+    found = []
+    assert warehouse.folder is not None
+    for table in ("readings", "rejected", "lost", "examinations"):
+        for path in sorted((warehouse.folder / table).rglob("*.parquet")):
+            if "_delta_log" not in path.parts and ingest_ids & set(pl.read_parquet(path)["ingest_id"]):
+                found.append(path.name)
+    return found
+
+
+def ingests_of(warehouse: Warehouse, row: LogRow) -> set[str]:
+    return {one.ingest_id for one in logs.all_ingests(warehouse) if one.log_id == row.log_id}
+
+
+def test_nothing_that_was_measured_is_left_in_any_version(warehouse: Warehouse) -> None:
+    row, other = logs.current(warehouse)
+    mine = ingests_of(warehouse, row)
+    kept = readings.read(warehouse, other.ingest_id)
+    # of both ingests: one superseded stays in the table, too
+    rows = 2 * readings.read(warehouse, row.ingest_id).height
+    assert len(mine) == 2 and len(held(warehouse, mine)) >= 4
+    receipt = purge(warehouse, row.log_id[:12], "the charterer's contract")
+    assert (receipt.log_id, receipt.readings, receipt.evidence) == (row.log_id, rows, 1)
+    assert purges.of_logs(warehouse) == {row.log_id: receipt}
+    assert held(warehouse, mine) == [] and raw.kept(warehouse) == [other.log_id]
+    assert warehouse.folder is not None and not list(warehouse.folder.rglob(f"{row.log_id}*"))
+    assert delta.read(warehouse, "diagnosis_evidence").height == 0 and diagnoses.find(warehouse, "dx-1") is not None
+    # the other log is whole, and so is what was made of it
+    assert readings.read(warehouse, other.ingest_id).equals(kept)
+    assert [one for one in verify(warehouse) if one.table not in {"diagnoses", "aliases"}] == []
+    (gone,) = logs.removed(warehouse)
+    assert gone.removed == "purged: the charterer's contract"
+    hers = [one for one in parameter_sets.get_all(warehouse, "mariner") if one.log_ids == (other.log_id,)]
+    assert hers and {rerun(warehouse, one.parameter_set_id).verdict for one in hers} == {"bit-identical"}
+    assert not reprocess_vessel(warehouse, "mariner").failures
+    standing = parameter_sets.get_all(warehouse, "mariner", history.standing(warehouse, "mariner"))
+    assert standing and all(one.log_ids == (other.log_id,) for one in standing)
+    # what looks after the tables goes on
+    compaction.compact(warehouse, 1)
+    compaction.vacuum(warehouse)
+    assert repair(warehouse).gone == []
+
+
+def test_it_is_never_let_in_again(warehouse: Warehouse, _filled: Path) -> None:
+    row = logs.current(warehouse)[0]
+    name = row.file_name
+    purge(warehouse, row.log_id, "by law")
+    (again,) = ingest(warehouse, [_filled / name], "mariner")
+    assert again.error is not None and again.error.code == "log_purged" and name in again.error.message
+    sets = [one for one in parameter_sets.get_all(warehouse, "mariner") if one.log_ids == (row.log_id,)]
+    for attempt in (
+        lambda: restore(warehouse, row.log_id),
+        lambda: move(warehouse, row.log_id, "mariner", "hers"),
+        lambda: rerun(warehouse, sets[0].parameter_set_id),
+    ):
+        with pytest.raises(DataRejected) as caught:
+            attempt()
+        assert caught.value.code == "log_purged"
+    assert raw.kept(warehouse) == [one.log_id for one in logs.current(warehouse)]
+
+
+@pytest.mark.parametrize("table", ["readings", "examinations"])
+def test_one_that_was_cut_off_is_named_and_goes_on(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch, table: str
+) -> None:
+    row = logs.current(warehouse)[0]
+    mine, whole = ingests_of(warehouse, row), purge_logs.erase
+
+    def cut_off(warehouse: Warehouse, name: str, *rest: object) -> None:
+        if name == table:
+            raise KeyboardInterrupt
+        whole(warehouse, name, *rest)  # type: ignore[arg-type]
+
+    with monkeypatch.context() as patch:
+        patch.setattr(purge_logs, "erase", cut_off)
+        with pytest.raises(KeyboardInterrupt):
+            purge(warehouse, row.log_id, "by law")
+    named = [one for one in verify(warehouse) if one.table == "purges"]
+    assert [one.where for one in named] == [row.log_id] and f"kempf purge {row.log_id[:12]}" in named[0].words
+    first = purges.of_logs(warehouse)[row.log_id]
+    assert purge(warehouse, row.log_id, "once more") == first
+    assert held(warehouse, mine) == [] and not [one for one in verify(warehouse) if one.table == "purges"]
+    assert purges.of_logs(warehouse) == {row.log_id: first}
+
+
+def test_one_that_was_removed_before_can_be_purged(warehouse: Warehouse) -> None:
+    row = logs.current(warehouse)[0]
+    remove(warehouse, [row], "another ship")
+    purge(warehouse, row.file_name, "by law")
+    (gone,) = logs.removed(warehouse)
+    assert gone.removed == "another ship" and held(warehouse, ingests_of(warehouse, row)) == []
+
+
+def test_the_command_says_first_what_goes(warehouse: Warehouse) -> None:
+    row = logs.current(warehouse)[0]
+    at = ("--warehouse", warehouse.uri)
+    asked = kempf("purge", row.log_id, "--reason", "by law", *at)
+    assert asked.code == 2 and "is deleted for good" in asked.err and "--yes" in asked.err
+    assert purges.of_logs(warehouse) == {} and what_goes(warehouse, row.log_id, "by law").readings > 0
+    done = kempf("purge", row.log_id, "--reason", "by law", "--yes", "--json", *at)
+    assert done.code == 0 and done.json == purges.of_logs(warehouse)[row.log_id].show()
+    refused(kempf("purge", "nothing", "--reason", "by law", "--yes", "--json", *at), 4, "no_log")
+    blank = kempf("purge", row.log_id, "--reason", " ", "--yes", "--json", *at)
+    refused(blank, 2, "no_reason")

@@ -1,0 +1,66 @@
+"""Logs that were deleted for good: the receipts. Nothing takes one back."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from kempf.schemas.errors import DataRejected
+from kempf.warehouse import delta, said
+from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.store import Warehouse
+
+_TABLE = "purges"
+
+
+@dataclass(frozen=True)
+class Purge:
+    """One log that was deleted for good."""
+
+    vessel: str
+    log_id: str
+    file_name: str
+    #: Of the log as delivered.
+    size_bytes: int
+    #: readings, rejected, evidence: Rows that were deleted of every ingest of the log; diagnoses whose reports lost the
+    #: measurements that they showed.
+    readings: int
+    rejected: int
+    evidence: int
+    reason: str
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return asdict(self)
+
+
+def add(warehouse: Warehouse, one: Purge) -> None:
+    """Write a receipt."""
+    said.add(warehouse, _TABLE, {**asdict(one), "vessel_key": vessel_key(one.vessel)})
+
+
+def of_logs(warehouse: Warehouse, log_ids: Collection[str] | None = None) -> dict[str, Purge]:
+    """Return the receipts of some logs or of all, by log, in order; those that were not deleted are left out."""
+    if not warehouse.exists() or (log_ids is not None and not log_ids):
+        return {}
+    where = {} if log_ids is None else {"log_id": sorted(set(log_ids))}
+    rows = delta.read(warehouse, _TABLE, where).sort("number").drop("number", "vessel_key").rows(named=True)
+    return {row["log_id"]: Purge(**row) for row in rows}
+
+
+def refuse(warehouse: Warehouse, log_ids: Collection[str]) -> None:
+    """Do nothing unless one of some logs was deleted for good.
+
+    Raises
+    ------
+    DataRejected
+        ``log_purged``.
+    """
+    for one in of_logs(warehouse, log_ids).values():
+        raise DataRejected(
+            "log_purged",
+            f"The log {one.file_name} of {one.vessel!r} was purged ({one.reason}): it is not to be kept here.",
+            "Take the file away from where it is delivered. What was purged cannot be brought back.",
+            {"log_id": one.log_id, "vessel": one.vessel},
+        )

@@ -1,0 +1,39 @@
+"""``kempf purge``."""
+
+from __future__ import annotations
+
+import click
+
+from kempf.workbench.cli.confirm import confirm, reason_option, yes_option
+from kempf.workbench.cli.options import json_option, warehouse_option
+from kempf.workbench.terminal import counted, one_line, print_json
+
+
+@click.command("purge")
+@click.argument("log_id")
+@reason_option
+@yes_option
+@warehouse_option
+@json_option
+def command(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
+    """Delete a log for good: its bytes, every measurement in it, also in earlier versions. Nothing brings it back.
+
+    What was concluded from it stays and counts no longer: its manoeuvres, parameter sets, diagnoses. The receipt is
+    kept, and the log is not taken in again. For what was only a mistake there is `kempf logs remove`.
+    """
+    from kempf.flows.jobs.purge_logs import purge, what_goes
+    from kempf.warehouse.store import Warehouse
+
+    warehouse = Warehouse(uri)
+    goes = what_goes(warehouse, log_id, reason)
+    shown = (
+        f"{one_line(goes.file_name)} of {goes.vessel!r} is deleted for good: {counted(goes.size_bytes, 'byte')}, "
+        f"{counted(goes.readings, 'reading')}, {counted(goes.rejected, 'rejected record')}, and what was measured "
+        f"in the reports of {goes.evidence} of her diagnoses"
+    )
+    confirm(shown, yes=yes)
+    receipt = purge(warehouse, goes.log_id, reason)
+    if as_json:
+        print_json(receipt.show())
+    else:
+        click.echo(f"{shown}. Log {receipt.log_id}; next: kempf reprocess --vessel {receipt.vessel!r}")
