@@ -20,7 +20,7 @@ from kempf.flows.jobs.standing_model import POOLED
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import code_version, parameter_sets, runs
+from kempf.warehouse import code_version, delta, parameter_sets, purges, runs
 from kempf.warehouse import vessels as vessel_table
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -73,6 +73,8 @@ class Verification:
     """Every verdict, sorted by vessel, start and id."""
 
     verdicts: tuple[RerunVerdict, ...]
+    #: Sets that rest on a log that was purged: nobody can build them again.
+    of_purged_logs: tuple[str, ...] = ()
 
     def counts(self, *, code_changed: bool | None = None) -> dict[str, int]:
         """Return how many sets there are of each verdict, of all or of those whose code is, or is not, another now."""
@@ -87,6 +89,7 @@ class Verification:
             "verdicts": self.counts(),
             "of_this_code": self.counts(code_changed=False),
             "of_other_code": self.counts(code_changed=True),
+            "of_purged_logs": list(self.of_purged_logs),
             "not_identical": [v.show() for v in self.verdicts if v.verdict != VERDICTS[0]],
         }
 
@@ -118,7 +121,10 @@ def verify_all(
     for vessel in vessels:
         vessel_table.require(warehouse, vessel)
     listed = parameter_sets.summaries(warehouse).select("vessel", "parameter_set_id").rows()
+    purged = _of_purged_logs(warehouse)
     asked = [(vessel, name) for vessel, name in listed if not vessels or vessel in vessels]
+    out = tuple(name for _, name in asked if name in purged)
+    asked = [(vessel, name) for vessel, name in asked if name not in purged]
     known = {} if afresh else {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
     found: dict[str, RerunVerdict] = {}
     for _, name in asked:
@@ -136,7 +142,16 @@ def verify_all(
             found.update((v.parameter_set_id, v) for v in verdicts)
             done += len(group)
     progress(len(asked), len(asked), "done")
-    return Verification(tuple(found[name] for _, name in asked))
+    return Verification(tuple(found[name] for _, name in asked), out)
+
+
+def _of_purged_logs(warehouse: Warehouse) -> set[str]:
+    """Return the sets that rest on a log that was deleted for good."""
+    gone = set(purges.of_logs(warehouse))
+    if not gone:
+        return set()
+    rows = delta.read(warehouse, "parameter_sets", columns=("parameter_set_id", "log_ids")).rows()
+    return {name for name, log_ids in rows if not gone.isdisjoint(log_ids)}
 
 
 def _groups(sets: Sequence[ParameterSet]) -> Iterator[list[ParameterSet]]:

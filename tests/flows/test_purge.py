@@ -16,6 +16,7 @@ from kempf.flows.jobs.purge_logs import purge, what_goes
 from kempf.flows.jobs.remove_logs import move, remove, restore
 from kempf.flows.jobs.repair_warehouse import repair
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
+from kempf.flows.jobs.rerun_all import verify_all
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse import compaction, delta, diagnoses, history, logs, parameter_sets, purges, raw, readings
@@ -92,6 +93,10 @@ def test_nothing_that_was_measured_is_left_in_any_version(warehouse: Warehouse) 
     assert not reprocess_vessel(warehouse, "mariner").failures
     standing = parameter_sets.get_all(warehouse, "mariner", history.standing(warehouse, "mariner"))
     assert standing and all(one.log_ids == (other.log_id,) for one in standing)
+    counted = verify_all(warehouse)
+    every = parameter_sets.get_all(warehouse, "mariner")
+    rest_on_it = {one.parameter_set_id for one in every if row.log_id in one.log_ids}
+    assert rest_on_it and set(counted.of_purged_logs) == rest_on_it and counted.counts()["failed"] == 0
     # what looks after the tables goes on
     compaction.compact(warehouse, 1)
     compaction.vacuum(warehouse)

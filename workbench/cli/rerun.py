@@ -141,6 +141,8 @@ def _print_verification(found: Verification) -> None:
     before = sum(v.known_before for v in found.verdicts)
     if before:
         click.echo(f"{before} of these were verified before by this code; --afresh builds them again, too.")
+    if found.of_purged_logs:
+        click.echo(f"{len(found.of_purged_logs)} rest on a log that was purged, and cannot be built again.")
     for one in found.verdicts:
         if one.error is not None:
             click.echo(f"{one.vessel}, {one.parameter_set_id}: {one.error.message} {one.error.next_step}", err=True)
