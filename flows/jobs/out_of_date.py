@@ -50,7 +50,7 @@ def said_of_logs(warehouse: Warehouse, vessel: str | None = None) -> str | None:
     if not stale:
         return None
     whose = f" of {next(iter(stale))}" if len(stale) == 1 else f" of {len(stale)} vessels"
-    return f"{_logs(stale.total())}{whose} read {_OLDER}; next: {_next(stale)}"
+    return f"{_logs(stale.total())}{whose} read {_OLDER}; next: {command_for(stale)}"
 
 
 def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
@@ -65,7 +65,7 @@ def said_of_vessel(warehouse: Warehouse, vessel: str) -> str | None:
     codes = parameter_sets.codes(warehouse, vessel)
     old = bool(codes) and code_of(warehouse, "estimate") not in codes
     parts = [f"{_logs(stale)} read"] * bool(stale) + ["parameter sets made"] * old
-    return f"{vessel}: {' and '.join(parts)} {_OLDER}; next: {_next([vessel])}" if parts else None
+    return f"{vessel}: {' and '.join(parts)} {_OLDER}; next: {command_for([vessel])}" if parts else None
 
 
 def said_of_sets(warehouse: Warehouse, sets: Iterable[ParameterSet]) -> str | None:
@@ -75,7 +75,7 @@ def said_of_sets(warehouse: Warehouse, sets: Iterable[ParameterSet]) -> str | No
     if not old:
         return None
     names = ", ".join(stored.parameter_set_id for stored in old)
-    return f"{names}: made with another version of kempf; next: {_next({stored.vessel for stored in old})}"
+    return f"{names}: made with another version of kempf; next: {command_for({stored.vessel for stored in old})}"
 
 
 def _stale(warehouse: Warehouse, vessel: str | None) -> Counter[str]:
@@ -91,6 +91,7 @@ def _logs(count: int) -> str:
     return f"{count} log{'' if count == 1 else 's'}"
 
 
-def _next(names: Collection[str]) -> str:
+def command_for(names: Collection[str]) -> str:
+    """Return the command that brings one vessel up to date, of several the whole fleet, as a shell takes it."""
     only = f" --vessel {shlex.quote(next(iter(names)))}" if len(names) == 1 else ""
     return f"kempf reprocess{only}"

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.out_of_date import command_for
 from kempf.flows.jobs.parameter_set_of import SetRequest
 from kempf.flows.jobs.standing_model import SEARCH, Own, inputs_of, known_effects, stored_model
 from kempf.flows.jobs.vessel_model import POSTERIOR, as_set, errors_of, pooling, store_model
@@ -228,7 +229,7 @@ def build_updated(instruments: Mapping[str, Instruments], request: SetRequest) -
             "not_brought_forward",
             f"With this code {before.parameter_set_id} cannot be brought forward by {len(bounds)} manoeuvres: its "
             "model is to be fitted to all of them at once.",
-            f"Make it so with `kempf reprocess --vessel {request.vessel!r}`.",
+            f"Make it so with `{command_for([request.vessel])}`.",
         )
     return made
 

@@ -116,6 +116,9 @@ def test_history_of_the_fleet_in_three_forms(place: Warehouse, tmp_path: Path) -
     assert again.code == 2 and "it is there already" in again.err
     alone = kempf("history", "--format", "csv", *at, "--json")
     assert alone.json["error"]["code"] == "format_without_output"
+    for other in ("--changes", "--json"):
+        both = kempf("history", "--format", "csv", "--output", tmp_path / "both.csv", other, *at)
+        assert both.code == 2 and "format_beside" in both.out + both.err and not (tmp_path / "both.csv").exists()
 
 
 def test_a_date_means_the_whole_day(place: Warehouse) -> None:

@@ -149,13 +149,15 @@ COMMANDS = (correct, exclude, accept, add, list_corrections)
 
 def _carry_out(warehouse: Warehouse, planned: Planned, *, yes: bool, as_json: bool) -> None:
     """Say what a correction changes, ask, and store it."""
+    from kempf.flows.jobs.out_of_date import command_for
+
     confirm(_words(planned), yes=yes)
     planned.store(warehouse)
     if as_json:
         print_json(planned.show())
         return
     click.echo(f"{_words(planned)}.")
-    click.echo(f"next: kempf reprocess --vessel {planned.log.vessel}")
+    click.echo(f"next: {command_for([planned.log.vessel])}")
 
 
 def _words(planned: Planned) -> str:

@@ -74,7 +74,7 @@ def command(
     from kempf.warehouse import history, vessels
     from kempf.warehouse.store import Warehouse
 
-    _require_sense(file_format, output, figure, changes=changes)
+    _require_sense(file_format, output, figure, changes=changes, as_json=as_json)
     warehouse, instant = Warehouse(uri), end_of(as_of, "--as-of") if as_of is not None else None
     histories = {
         name: history.of_vessel(warehouse, name, parameter, instant, superseded=superseded)
@@ -109,10 +109,18 @@ def command(
         _print_all(document["changes"])
 
 
-def _require_sense(file_format: str | None, output: Path | None, figure: Path | None, *, changes: bool) -> None:
-    """Refuse options that say nothing without each other."""
+def _require_sense(
+    file_format: str | None, output: Path | None, figure: Path | None, *, changes: bool, as_json: bool
+) -> None:
+    """Refuse options that say nothing without each other, or beside each other."""
     if (file_format is None) != (output is None):
         raise UsageError("format_without_output", "--format and --output belong together.", "Give both, or neither.")
+    if file_format is not None and (changes or as_json):
+        raise UsageError(
+            "format_beside",
+            f"--format writes the history to a file, and {'--changes' if changes else '--json'} shows something else.",
+            "Ask for one after the other.",
+        )
     if figure is not None and not changes:
         raise UsageError("figure_without_changes", "--figure draws what --changes found.", "Add --changes.")
     if output is not None:

@@ -280,6 +280,7 @@ def dismiss_file(file: str, reason: str, uri: str, as_json: bool) -> None:
 def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Let a log count no longer. Nothing is deleted: `restore` brings it back, `history --as-of` still knows it."""
     from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.out_of_date import command_for
     from kempf.flows.jobs.remove_logs import remove
     from kempf.warehouse import logs
     from kempf.warehouse.store import Warehouse
@@ -291,7 +292,7 @@ def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
     if as_json:
         print_json(found.show())
     else:
-        click.echo(f"{one_line(row.file_name)}: removed; next: kempf reprocess --vessel {row.vessel}")
+        click.echo(f"{one_line(row.file_name)}: removed; next: {command_for([row.vessel])}")
 
 
 @command.command("restore")
@@ -300,6 +301,7 @@ def remove_log(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> 
 @json_option
 def restore_log(log_id: str, uri: str, as_json: bool) -> None:
     """Let a log that was removed count again."""
+    from kempf.flows.jobs.out_of_date import command_for
     from kempf.flows.jobs.remove_logs import restore
     from kempf.warehouse.store import Warehouse
 
@@ -307,7 +309,7 @@ def restore_log(log_id: str, uri: str, as_json: bool) -> None:
     if as_json:
         print_json(_facts(row))
     else:
-        click.echo(f"{one_line(row.file_name)}: counts again; next: kempf reprocess --vessel {row.vessel}")
+        click.echo(f"{one_line(row.file_name)}: counts again; next: {command_for([row.vessel])}")
 
 
 @command.command("move")

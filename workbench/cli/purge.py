@@ -21,6 +21,7 @@ def command(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> Non
     What was concluded from it stays and counts no longer: its manoeuvres, parameter sets, diagnoses. The receipt is
     kept, and the log is not taken in again. For what was only a mistake there is `kempf logs remove`.
     """
+    from kempf.flows.jobs.out_of_date import command_for
     from kempf.flows.jobs.purge_logs import purge, what_goes
     from kempf.warehouse.store import Warehouse
 
@@ -36,4 +37,4 @@ def command(log_id: str, reason: str, yes: bool, uri: str, as_json: bool) -> Non
     if as_json:
         print_json(receipt.show())
     else:
-        click.echo(f"{shown}. Log {receipt.log_id}; next: kempf reprocess --vessel {receipt.vessel!r}")
+        click.echo(f"{shown}. Log {receipt.log_id}; next: {command_for([receipt.vessel])}")

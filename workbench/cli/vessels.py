@@ -104,6 +104,7 @@ def remove(name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
 def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: bool) -> None:
     """Give a vessel another name: her logs are read for it again, her models are identified again by `reprocess`."""
     from kempf.flows.jobs.following import of_logs
+    from kempf.flows.jobs.out_of_date import command_for
     from kempf.flows.jobs.remove_logs import rename_vessel
     from kempf.warehouse import logs, vessels
     from kempf.warehouse.store import Warehouse
@@ -122,4 +123,4 @@ def rename(name: str, new_name: str, reason: str, yes: bool, uri: str, as_json: 
     if as_json:
         print_json({"vessel": new_name, "was": name, "logs": [row.log_id for row in rows]})
     else:
-        click.echo(f"{name}: now {new_name}, {counted(len(rows), 'log')}; next: kempf reprocess --vessel {new_name}")
+        click.echo(f"{name}: now {new_name}, {counted(len(rows), 'log')}; next: {command_for([new_name])}")
