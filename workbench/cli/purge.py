@@ -5,11 +5,12 @@ from __future__ import annotations
 import click
 
 from kempf.workbench.cli.confirm import confirm, reason_option, yes_option
+from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, warehouse_option
 from kempf.workbench.terminal import counted, one_line, print_json
 
 
-@click.command("purge")
+@click.command("purge", cls=GivenOnce)
 @click.argument("log_id")
 @reason_option
 @yes_option
