@@ -359,6 +359,9 @@ def _with_chains(sets: pl.DataFrame) -> pl.Series:
     for one in known.values():
         if one.pooled and one.converged and not one.superseded:
             kinds.setdefault(one.kind, []).append(one)
+    for alike in kinds.values():
+        # the largest first: it contains most others, so that few are compared
+        alike.sort(key=lambda one: len(one.segments), reverse=True)
     return pl.Series(
         [
             one.superseded or (one.pooled and any(other.replaces(one) for other in kinds.get(one.kind, ())))

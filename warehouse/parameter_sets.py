@@ -72,7 +72,15 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
 def get(warehouse: Warehouse, name: str, vessel: str | None = None) -> ParameterSet:
     """Return a parameter set by its id, or by a beginning of it that only one has, with all that it rests on.
 
-    Where it brings another one forward, what that says of its manoeuvres stands in it; see `as_stored`.
+    Where it brings another one forward, what that says of its manoeuvres stands in it. It raises what `chain_of` does.
+    """
+    return reduce(brought_forward, chain_of(warehouse, name, vessel))
+
+
+def chain_of(warehouse: Warehouse, name: str, vessel: str | None = None) -> list[ParameterSet]:
+    """Return a parameter set behind those that it brings forward, the first one in front, each as it is stored.
+
+    Errors are those of `as_stored`, and:
 
     Raises
     ------
@@ -88,7 +96,7 @@ def get(warehouse: Warehouse, name: str, vessel: str | None = None) -> Parameter
             "See with `kempf verify` what is damaged; `kempf reprocess` fits all manoeuvres anew.",
             {"parameter_set_id": one.parameter_set_id, "updates": lost},
         )
-    return reduce(brought_forward, chain)
+    return chain
 
 
 def get_all(warehouse: Warehouse, vessel: str, names: Collection[str] | None = None) -> list[ParameterSet]:

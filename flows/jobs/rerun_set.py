@@ -77,9 +77,8 @@ def rerun(warehouse: Warehouse, name: str, tolerance: float = 1e-9, progress: Pr
     KempfError
         ``raw_bytes_damaged``.
     """
-    chain = [parameter_sets.as_stored(warehouse, named_set(warehouse, name).parameter_set_id)]
-    while (update := chain[0].updates) is not None:
-        chain.insert(0, parameter_sets.as_stored(warehouse, update.set, chain[0].vessel))
+    named = named_set(warehouse, name)
+    chain = parameter_sets.chain_of(warehouse, named.parameter_set_id, named.vessel)
     verdicts = []
     for done, stored in enumerate(chain):
         progress(done, len(chain), f"building {stored.parameter_set_id} again")

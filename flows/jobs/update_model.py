@@ -137,15 +137,15 @@ def _stored_before(warehouse: Warehouse, chosen: Chosen, spec: ModelSpec, wanted
     by_id = {row.parameter_set_id: row for row in rows}
     for row in sorted(rows, key=lambda one: (-one.manoeuvres, -one.fitted_at_once, one.parameter_set_id)):
         settings = {key: value for key, value in row.settings.items() if key not in ("segments", UPDATES)}
-        at_once, rests_on = row.fitted_at_once, _segments(row, by_id)
+        at_once = row.fitted_at_once
         if (
-            rests_on is not None
-            and rests_on <= names
-            and settings == mine
+            settings == mine
             and row.code_version == chosen.code_version
             and row.profile_sha256 == chosen.profile_sha256
             and at_once >= FEWEST
             and len(names) < GROWN * at_once
+            and (rests_on := _segments(row, by_id)) is not None
+            and rests_on <= names
         ):
             found = parameter_sets.get(warehouse, row.parameter_set_id, chosen.vessel)
             left = found.convergence.get(POSTERIOR)
