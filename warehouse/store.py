@@ -148,11 +148,7 @@ class Warehouse:
 
     def files_below(self, *parts: str) -> list[str]:
         """Return the names of all files in a folder inside and in those below it, without their folders, sorted."""
-        from pyarrow import fs
-
-        files, root = self._files
-        where = fs.FileSelector("/".join((root, *parts)), recursive=True, allow_not_found=True)
-        return sorted(one.base_name for one in files.get_file_info(where) if one.is_file)
+        return sorted(path.rpartition("/")[2] for path in self.paths_below(*parts))
 
     def paths_below(self, *parts: str) -> list[str]:
         """Return the paths of all files in a folder inside and in those below it, from there on, sorted."""

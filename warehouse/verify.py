@@ -153,7 +153,7 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
     for hash_ in sorted({row[2] for row in rows or ()} - profiles):
         yield Problem("reference", "vessels", hash_, f"The profile {hash_} that logs were read with is lost.")
     ingests = {row[1] for row in rows or () if row[0] not in purged}
-    yield from _half_purged(purged & kept, {row[1]: row[0] for row in rows or () if row[0] in purged}, warehouse)
+    yield from _half_purged(warehouse, purged & kept, {row[1]: row[0] for row in rows or () if row[0] in purged})
     for name in ("readings", "examinations"):
         held = _ingests_of(warehouse, name)
         if held is not None and rows is not None:
@@ -171,7 +171,7 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
     yield from _descriptions(warehouse)
 
 
-def _half_purged(kept: set[str], ingests: dict[str, str], warehouse: Warehouse) -> Iterator[Problem]:
+def _half_purged(warehouse: Warehouse, kept: set[str], ingests: dict[str, str]) -> Iterator[Problem]:
     """Yield the logs that were to be deleted for good and of which something is still there."""
     there = {ingests[one] for one in (_ingests_of(warehouse, "readings") or set()) & ingests.keys()}
     for log_id in sorted(kept | there):
