@@ -13,11 +13,12 @@ from statistics import NormalDist
 from typing import TYPE_CHECKING, Any
 
 from kempf.schemas.errors import KempfError, UsageError
-from kempf.warehouse import delta, examinations, vessels
+from kempf.warehouse import delta, examinations, notes, vessels
 from kempf.warehouse.canonical import canonical_json, plain
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.notes import Note
 from kempf.warehouse.parameter_set import UPDATES, update_in
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
@@ -270,6 +271,8 @@ class _Logs:
     past: list[str]
     #: Segments found in the others; None where nobody had looked for any, or nobody knows any more.
     segments: list[str] | None
+    #: Notes on her and what is hers.
+    notes: list[Note]
     #: Fingerprint under which the present code estimates.
     code: str
 
@@ -278,7 +281,7 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     """Return what is known of a vessel's logs, or was by a time."""
     version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
     if as_of is not None and version is None:
-        return _Logs([], None, code_of(warehouse, "estimate"))
+        return _Logs([], None, [], code_of(warehouse, "estimate"))
     columns = ("log_id", "ingest_id", "revision", "removed")
     hers = {"vessel_key": vessel_key(vessel)}
     rows = delta.read(warehouse, "logs", hers, columns, version).sort("log_id", "revision")
@@ -286,7 +289,13 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     present = {log: row["ingest_id"] for log, row in last.items() if row["removed"] is None}
     past = [row["ingest_id"] for row in rows.rows(named=True) if present.get(row["log_id"]) != row["ingest_id"]]
     found = _segments_in(warehouse, vessel, sorted(present.values()), as_of)
-    return _Logs(past, found, code_of(warehouse, "estimate"))
+    return _Logs(past, found, _notes_of(warehouse, vessel, as_of), code_of(warehouse, "estimate"))
+
+
+def _notes_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> list[Note]:
+    """Return what is noted on a vessel, or was by a time."""
+    among = notes.of_vessel(warehouse, vessel)
+    return [one for one in among if as_of is None or (one.written is not None and one.written <= as_of)]
 
 
 def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: datetime | None) -> list[str] | None:
@@ -320,7 +329,7 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
     A set is superseded where one of its logs has been read anew since or removed, where one of its segments is found no
     longer, and where there are sets of newer code: of the present code, else of the one that was at work last; where
     this is so of a set that it brings forward; and where a pooled set of the same model and settings
-    rests on all of its manoeuvres and more.
+    rests on all of its manoeuvres and more. A set that goes by noted draughts is superseded where others are noted now.
     """
     import polars as pl
 
@@ -338,9 +347,32 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
         old |= provenance.json_path_match("$.ingest_ids").str.contains_any(known.past).fill_null(value=False)
     if known.segments is not None:
         old |= ~pl.col("segment_ids").list.eval(pl.element().is_in(known.segments)).list.all()
+    noted = [
+        text is not None and _noted_otherwise(json.loads(text), known.notes) for text in _inputs_with_draughts(sets)
+    ]
+    old |= pl.Series(noted, dtype=pl.Boolean)
     sets = sets.with_columns(superseded=old).drop("_code", "_at")
     marked = sets.with_columns(superseded=_with_chains(sets)).drop(extra)
     return marked.sort("start_utc_ns", "superseded", "parameter_set_id", descending=[False, True, False])
+
+
+def _inputs_with_draughts(sets: pl.DataFrame) -> list[str | None]:
+    """Return the inputs of every set as JSON, None for those that go by no draught."""
+    import polars as pl
+
+    text = pl.col("provenance_json").str
+    inputs = pl.when(text.contains('"draughts_m"', literal=True)).then(text.json_path_match("$.inputs"))
+    found: list[str | None] = sets.select(inputs.alias("inputs"))["inputs"].to_list()
+    return found
+
+
+def _noted_otherwise(inputs: dict[str, Any], among: Sequence[Note]) -> bool:
+    """Return whether other draughts are noted now than those that a set goes by."""
+    held: dict[str, float] = inputs.get("draughts_m") or {}
+    began: dict[str, int] = {}
+    for one in inputs["segments"]:
+        began[one["log_id"]] = min(one["start_utc_ns"], began.get(one["log_id"], one["start_utc_ns"]))
+    return bool(held) and notes.draughts_m(among, began) != held
 
 
 def _with_chains(sets: pl.DataFrame) -> pl.Series:
@@ -348,8 +380,9 @@ def _with_chains(sets: pl.DataFrame) -> pl.Series:
     import polars as pl
 
     columns = ("parameter_set_id", "superseded", "estimator", "model_sha256", "segment_ids", "settings_json")
+    noted = pl.col("provenance_json").str.contains('"draughts_m"', literal=True)
     converged = pl.col("convergence_json").str.json_path_match("$.converged").eq_missing("true")
-    rows = sets.select(*columns, converged=converged).rows(named=True)
+    rows = sets.select(*columns, converged=converged, noted=noted).rows(named=True)
     known = {row["parameter_set_id"]: _Rests(row) for row in rows}
     for one in sorted(known.values(), key=lambda one: one.update.manoeuvres if one.update else 0):
         if one.update is not None:
@@ -380,6 +413,8 @@ class _Rests:
         self.segments = frozenset(row["segment_ids"])
         self.superseded: bool = row["superseded"]
         self.converged: bool = row["converged"]
+        #: Whether it goes by draughts that were noted.
+        self.noted: bool = row["noted"]
         self._id: str = row["parameter_set_id"]
         asked = canonical_json({key: value for key, value in settings.items() if key not in ("segments", UPDATES)})
         self.kind = (row["estimator"], row["model_sha256"], asked)
@@ -394,15 +429,15 @@ class _Rests:
         return len(self.segments) > 1
 
     def replaces(self, other: _Rests) -> bool:
-        """Whether it is of more manoeuvres, or of the same ones and more of them fitted at once."""
+        """Whether it is of more manoeuvres, or of the same ones and by draughts, or with more fitted at once."""
         if self.segments != other.segments:
             return self.segments > other.segments
         return self._rank < other._rank
 
     @property
-    def _rank(self) -> tuple[int, str]:
+    def _rank(self) -> tuple[bool, int, str]:
         at_once = self.update.fitted_at_once if self.update else len(self.segments)
-        return -at_once, self._id
+        return not self.noted, -at_once, self._id
 
 
 def _only(frame: pl.DataFrame, parameter: str) -> pl.DataFrame:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import Any, Literal
@@ -120,6 +121,63 @@ def of_vessel(warehouse: Warehouse, vessel: str | None = None) -> list[Note]:
         )
         for row in delta.read(warehouse, "notes", where).sort("number").rows(named=True)
     ]
+
+
+def carry(warehouse: Warehouse, subject: Literal["vessel", "log"], subject_id: str, vessel: str, to: str) -> None:
+    """Write the notes on a vessel, or on a log, again for the vessel that takes her place; the old ones stay.
+
+    What is written again already is left out, so that an interrupted move goes on.
+
+    Parameters
+    ----------
+    subject_id : str
+        The vessel's old name, or the id of the log.
+    vessel : str
+        Whose notes they are.
+    to : str
+        Whose they are to be.
+    """
+    new_id = to if subject == "vessel" else subject_id
+    there = {one.text for one in of_vessel(warehouse, to) if (one.subject, one.subject_id) == (subject, new_id)}
+    for one in of_vessel(warehouse, vessel):
+        if (one.subject, one.subject_id) == (subject, subject_id):
+            text = f"{one.text} [{vessel}, note {one.number}]"
+            if text not in there:
+                add(warehouse, to, subject, new_id, text, event_utc_ns=one.event_utc_ns, draught_m=one.draught_m)
+
+
+def draughts_m(among: Sequence[Note], began_utc_ns: Mapping[str, int]) -> dict[str, float]:
+    """Return the draught of logs as notes have it.
+
+    A note on a log is the log's, the newest one counts; else the last one on the vessel that is dated no later than the
+    log begins.
+
+    Parameters
+    ----------
+    among : sequence of Note
+        Of one vessel, in the order in which they were written.
+    began_utc_ns : mapping of str to int
+        When each log begins, by its id.
+
+    Returns
+    -------
+    dict of str to float
+        m, by log; a log that no note speaks of is left out.
+    """
+    stating = [one for one in among if one.draught_m is not None]
+    own = {one.subject_id: one.draught_m for one in stating if one.subject == "log"}
+    dated = [
+        (one.event_utc_ns, one.number, one.draught_m)
+        for one in stating
+        if one.subject == "vessel" and one.event_utc_ns is not None
+    ]
+    found = {}
+    for log, began in began_utc_ns.items():
+        before = max((one for one in dated if one[0] <= began), default=(0, 0, None))
+        draught = own.get(log, before[2])
+        if draught is not None:
+            found[log] = draught
+    return found
 
 
 def _written(warehouse: Warehouse, number: int) -> datetime | None:

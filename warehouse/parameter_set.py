@@ -52,6 +52,8 @@ class Inputs:
     code_version: str
     #: Segments that say something of these without being identified themselves; kept sorted likewise.
     companions: tuple[Bounds, ...] = ()
+    #: Draught by log, m, of a model that goes by it.
+    draughts_m: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "log_ids", tuple(sorted(set(self.log_ids))))
@@ -68,6 +70,7 @@ class Inputs:
                 "profile_sha256": self.profile_sha256,
                 "segments": [vars(bounds) for bounds in self.bounds],
                 **companions,
+                **({"draughts_m": dict(sorted(self.draughts_m.items()))} if self.draughts_m else {}),
                 "model": self.model_spec,
                 "estimator": self.estimator,
                 "settings": self.settings,

@@ -41,13 +41,15 @@ class VesselState:
     aliases: tuple[tuple[str, str], ...] = ()
     #: What was said of manoeuvres in her logs, in order.
     corrections: tuple[str, ...] = ()
+    #: Notes that state a draught, in order.
+    draughts: tuple[str, ...] = ()
     #: Fingerprints under which the present code goes on in the warehouse.
     codes: Codes | None = None
 
     @property
-    def inputs(self) -> tuple[str, tuple[str, ...], tuple[str, ...]]:
+    def inputs(self) -> tuple[str, tuple[str, ...], tuple[str, ...], tuple[str, ...]]:
         """What reprocessing starts from and does not change itself."""
-        return self.profile_sha256, self.log_ids, self.corrections
+        return self.profile_sha256, self.log_ids, self.corrections, self.draughts
 
     @property
     def digest(self) -> str:
@@ -74,7 +76,7 @@ def deciding_code() -> str:
 
 
 def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> dict[str, VesselState]:
-    """Return the state of some vessels or of all, from five reads.
+    """Return the state of some vessels or of all, from seven reads.
 
     Parameters
     ----------
@@ -110,6 +112,10 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
     said: dict[str, list[str]] = defaultdict(list)
     for row in delta.read(warehouse, "corrections").sort("number").rows(named=True):
         said[row["log_id"]].append(canonical_json(row))
+    draughts: dict[str, list[str]] = defaultdict(list)
+    for note in delta.read(warehouse, "notes", where).sort("number").rows(named=True):
+        if note["draught_m"] is not None:
+            draughts[note["vessel"]].append(canonical_json(note))
     codes = codes_of(warehouse)
     hashes = dict(profiles.select("vessel", "profile_sha256").rows())
     found = {}
@@ -123,6 +129,7 @@ def fleet_state(warehouse: Warehouse, vessels: Iterable[str] | None = None) -> d
             tuple(made),
             tuple(zip(*pointers.get(name, ([], [])), strict=True)),
             tuple(one for log_id in held for one in said.get(log_id, ())) if said else (),
+            tuple(draughts.get(name, ())),
             codes,
         )
     return found

@@ -49,6 +49,8 @@ class AsSailed:
     arm_per_m: float
     #: ``fitted`` where the set was identified from it, ``held_out`` else.
     sample: str
+    #: How the ship was laden, see `pipeline.estimate.record.loads`; None where no run says.
+    load: float | None = None
 
     def on_the_day(self, model: Identified, basis: Basis) -> Identified:
         """Return a model as it was on the day of this manoeuvre."""
@@ -63,6 +65,7 @@ class AsSailed:
             air=self.began.air,
             settled_m_s=None if shaft is None or kept is None else ratio * kept * shaft,
             start=self.began.start,
+            day=model.waters.day if self.load is None else self.load,
         )
         # the gear is that of the logs, whatever other one a prediction was asked for
         own = replace(model, waters=waters, rudder_rate=basis.rudder_rate)
@@ -108,6 +111,7 @@ def _one(predicted: Predicted, asked: Manoeuvre, segment: Segment, log: Instrume
         wind_force_m_s2=_steady_wind(run, passed) if run and passed else (0.0, 0.0),
         arm_per_m=run.run.ship.arm_per_m if run else 0.0,
         sample="fitted" if fitted else "held_out",
+        load=run.run.load if run else None,
     )
 
 

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from types import MappingProxyType
 
 from kempf.flows.jobs.refresh_logs import Refreshed, refresh_logs
 from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.estimate.record.loads import loads
 from kempf.schemas.errors import NotFound
-from kempf.warehouse import logs, segments
+from kempf.warehouse import logs, notes, segments
 from kempf.warehouse.deduplicate import once, same
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.segments import Segment
@@ -35,6 +36,10 @@ class Chosen:
     file_names: dict[str, str]
     #: Why a segment does not count, by its id: of every one that the current reading of the logs holds.
     skipped: dict[str, str]
+    #: Draught by log as it was noted, m, where it was for every log; else empty.
+    draughts_m: dict[str, float] = field(default_factory=dict)
+    #: Load by log, see `pipeline.estimate.record.loads`.
+    loads: dict[str, float] = field(default_factory=dict)
 
 
 def without_log(segment: Segment) -> bool:
@@ -81,6 +86,7 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
         skipped |= {s.segment_id: "no speed through the water, unlike others" for s in kept if s not in logged}
         kept = logged
     kept.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
+    noted, laden = _laden(warehouse, vessel, kept)
     return Chosen(
         vessel,
         profile_sha256,
@@ -89,7 +95,18 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
         {s.log_id: s.ingest_id for s in kept},
         {s.log_id: rows[s.ingest_id].file_name for s in kept},
         skipped,
+        noted,
+        laden,
     )
+
+
+def _laden(warehouse: Warehouse, vessel: str, kept: Sequence[Segment]) -> tuple[dict[str, float], dict[str, float]]:
+    """Return the draught of every log as it was noted, where it was for all of them, and how each is laden."""
+    began: dict[str, int] = {}
+    for segment in sorted(kept, key=lambda s: (s.start_utc_ns, s.segment_id)):
+        began.setdefault(segment.log_id, segment.start_utc_ns)
+    noted = notes.draughts_m(notes.of_vessel(warehouse, vessel), began)
+    return (noted if noted.keys() == began.keys() else {}), loads(list(began), noted)
 
 
 def choose_refreshed(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Chosen:

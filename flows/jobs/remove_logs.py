@@ -14,7 +14,7 @@ from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
 from kempf.schemas.errors import NotFound, UsageError
-from kempf.warehouse import aliases, corrections, logs, purges, raw, vessels
+from kempf.warehouse import aliases, corrections, logs, notes, purges, raw, vessels
 from kempf.warehouse.deposit import description
 from kempf.warehouse.equivalents import codes_of
 from kempf.warehouse.logs import LogRow
@@ -125,6 +125,7 @@ def move(
         read = look_through(whose, row.file_name, log, profile, readings, said, codes_of(warehouse))
         found = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
         store(warehouse, [read])
+    notes.carry(warehouse, "log", row.log_id, row.vessel, whose)
     return found, logs.by_prefix(warehouse, row.log_id)
 
 
@@ -205,5 +206,6 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
     vessels.register(warehouse, name, renamed)
     for row in logs.current(warehouse, vessel):
         move(warehouse, row.log_id, name, reason)
+    notes.carry(warehouse, "vessel", vessel, vessel, name)
     vessels.remove(warehouse, vessel, f"renamed to {name!r}: {reason}")
     return logs.current(warehouse, name)

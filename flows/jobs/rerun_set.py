@@ -210,4 +210,5 @@ def inputs_of(stored: ParameterSet) -> Inputs:
         settings=inputs["settings"],
         code_version=inputs["code_version"],
         companions=tuple(Bounds(**bounds) for bounds in inputs.get("companions", ())),
+        draughts_m=inputs.get("draughts_m", {}),
     )

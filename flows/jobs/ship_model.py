@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate.record.loads import loads
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.steering.carried import carried, sentences
 from kempf.pipeline.steering.motion import ShipEffects
@@ -17,7 +18,7 @@ from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import vessels
-from kempf.warehouse.parameter_set import ParameterSet, StoredValue
+from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue
 from kempf.warehouse.store import Warehouse
 
 #: noise level of a set by the field of `NoiseLevels` that it is
@@ -120,8 +121,17 @@ def _effects(one: ParameterSet, profile: VesselProfile) -> ShipEffects | None:
         np.array([values[name] for name in model.names]),
         length_m=profile.length_m or LENGTH_M,
         draught_m=profile.draught_m or 1.0,
-        day=len(one.log_ids) - 1.0,
+        day=_last_load(one),
     )
+
+
+def _last_load(one: ParameterSet) -> float:
+    """Return how the ship was laden in the last log of a set, which she is taken to be still."""
+    from kempf.flows.jobs.vessel_runs import logs_in_order
+
+    inputs = one.provenance["inputs"]
+    order = logs_in_order([("", Bounds(**bounds)) for bounds in inputs["segments"]])
+    return loads(order, inputs.get("draughts_m", {}))[order[-1]]
 
 
 def _covariance(one: ParameterSet, wanted: list[str]) -> Float:

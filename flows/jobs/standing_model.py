@@ -111,7 +111,13 @@ def inputs_of(chosen: Chosen, spec: ModelSpec, own: Own, search: Mapping[str, An
         estimator=POOLED,
         settings={**settings, **({SEARCH: dict(search)} if search else {})},
         code_version=chosen.code_version,
+        draughts_m=chosen.draughts_m if goes_by_load(spec, own) else {},
     )
+
+
+def goes_by_load(spec: ModelSpec, own: Own) -> bool:
+    """Return whether an effect of a model goes by how the ship is laden in each log."""
+    return any(effect.uses("day") for effect in named(spec.effects, known_effects(own)))
 
 
 def stored_model(

@@ -25,6 +25,8 @@ def inputs_of_diagnosis(chosen: Chosen, spec: ModelSpec, own: Own) -> dict[str, 
         "code_version": code_version.fingerprint("diagnose"),
         "settings": asdict(STANDARD),
         "own": own.as_json(),
+        # an effect that is tried may go by them, whatever the model to begin from
+        **({"draughts_m": chosen.draughts_m} if chosen.draughts_m else {}),
         "catalogue": {name: effect.sha256 for name, effect in known_effects(own).items()},
     }
 

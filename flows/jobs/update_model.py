@@ -17,7 +17,7 @@ import numpy as np
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.out_of_date import command_for
 from kempf.flows.jobs.parameter_set_of import SetRequest
-from kempf.flows.jobs.standing_model import SEARCH, Own, inputs_of, known_effects, stored_model
+from kempf.flows.jobs.standing_model import SEARCH, Own, goes_by_load, inputs_of, known_effects, stored_model
 from kempf.flows.jobs.vessel_model import POSTERIOR, as_set, errors_of, pooling, store_model
 from kempf.flows.jobs.vessel_runs import Like, VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
@@ -101,9 +101,8 @@ def bring_forward(
     BroughtForward or None
         None where all manoeuvres are to be fitted at once.
     """
-    known = known_effects(own)
-    if any(known[name].uses("day") for name in spec.effects if name in known):
-        # its measure is the number of the log among all of them
+    if goes_by_load(spec, own):
+        # how a log is laden counts from the first of all
         return None
     new: list[ParameterSet] = []
     parent: str | None = None

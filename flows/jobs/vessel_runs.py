@@ -13,6 +13,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.estimate.record.average import step_of
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run, with_common_slip
+from kempf.pipeline.estimate.record.loads import loads
 from kempf.pipeline.estimate.record.record import Record
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
@@ -60,7 +61,7 @@ def assembled(
     progress(len(chosen.ingests), len(chosen.ingests), "laying the manoeuvres out")
     profile = vessels.get(warehouse, chosen.profile_sha256)
     bounds = [(s.segment_id, Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in chosen.segments]
-    made = assemble(instruments, profile, bounds, spec, like)
+    made = assemble(instruments, profile, bounds, spec, like, chosen.loads)
     return VesselRuns(made.spec, made.runs, made.records, chosen.skipped | made.skipped)
 
 
@@ -70,6 +71,7 @@ def assemble(
     bounds: Sequence[tuple[str, Bounds]],
     spec: ModelSpec,
     like: Like | None = None,
+    laden: Mapping[str, float] | None = None,
 ) -> VesselRuns:
     """Make runs of segments; a function of its arguments alone, so that a rerun makes the same.
 
@@ -81,6 +83,8 @@ def assemble(
         Segments with their names.
     like : Like, optional
         What they are to share with other runs of the vessel.
+    laden : mapping of str to float, optional
+        Load by log, see `pipeline.estimate.record.loads`; by default the number of the log among these.
 
     Raises
     ------
@@ -88,7 +92,7 @@ def assemble(
         ``no_runs``.
     """
     records, skipped = [], {}
-    for name, one in sorted(bounds, key=lambda entry: (entry[1].start_utc_ns, entry[0])):
+    for name, one in _in_order(bounds):
         try:
             records.append((name, one, make_record(instruments[one.log_id], one.start_utc_ns, one.end_utc_ns)))
         except KempfError as error:
@@ -105,12 +109,23 @@ def assemble(
     ready = spec.with_arm(arm)
     ship = ShipConstants(profile.length_m or LENGTH_M, profile.draught_m or 1.0, arm or 0.0)
     step = like.grid_step_s if like else step_of([record for _, _, record in records], profile.length_m)
-    days = {log_id: k for k, log_id in enumerate(dict.fromkeys(one.log_id for _, one, _ in records))}
+    order = logs_in_order(bounds)
+    load = laden or loads(order, {})
+    days = {log_id: day for day, log_id in enumerate(order)}
     runs = with_common_slip(
         [
-            make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id])
+            make_run(name, record, instruments[one.log_id], ready, ship, step, days[one.log_id], load[one.log_id])
             for name, one, record in records
         ],
         like.slip_m if like else None,
     )
     return VesselRuns(ready, runs, tuple(record for _, _, record in records), skipped)
+
+
+def logs_in_order(bounds: Sequence[tuple[str, Bounds]]) -> list[str]:
+    """Return the logs of named segments in the order of time."""
+    return list(dict.fromkeys(one.log_id for _, one in _in_order(bounds)))
+
+
+def _in_order(bounds: Sequence[tuple[str, Bounds]]) -> list[tuple[str, Bounds]]:
+    return sorted(bounds, key=lambda entry: (entry[1].start_utc_ns, entry[0]))

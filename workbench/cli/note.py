@@ -40,7 +40,8 @@ def command(
 ) -> None:
     """Write a note on a vessel, log, manoeuvre or parameter set; without TEXT list the notes.
 
-    Notes are only ever added. Nothing is computed from them; `kempf history` shows them.
+    Notes are only ever added; `kempf history` shows them. Where a draught is noted for every log of a vessel, the
+    effect load_condition goes by it.
     """
     from kempf.warehouse import notes, vessels
     from kempf.warehouse.store import Warehouse

@@ -70,9 +70,12 @@ class GridRun:
     #: Canonical channels that the run has beyond those it must have.
     channels: frozenset[str]
     ship: ShipConstants
+    #: Number of the log among the vessel's.
     day: int
     #: See `kempf.pipeline.estimate.record.record.Record`.
     velocity_late_std_s: float = 0.0
+    #: See `kempf.pipeline.estimate.record.loads`.
+    load: float = 0.0
 
     @property
     def time_s(self) -> Float:
@@ -214,6 +217,7 @@ def make_run(
     ship: ShipConstants,
     step_s: float,
     day: int = 0,
+    load: float | None = None,
 ) -> GridRun:
     """Lay a record on the grid.
 
@@ -226,6 +230,10 @@ def make_run(
         For the channels that effects ask for.
     spec : ModelSpec
         For the frame of the current.
+    day : int, optional
+        Number of the log among the vessel's.
+    load : float, optional
+        See `pipeline.estimate.record.loads`; the number of the log by default.
     """
     n = instants_of(record, step_s)
     time = step_s * np.arange(n)
@@ -250,7 +258,8 @@ def make_run(
     if known.any():
         heading = np.interp(fine, record.time_s[known], record.heading_rad[known])
     first_of_run = 2 + len(CHANNEL_SYMBOLS)
-    inputs[:, first_of_run], inputs[:, first_of_run + 1], inputs[:, first_of_run + 2] = heading, fine, day
+    load = float(day) if load is None else load
+    inputs[:, first_of_run], inputs[:, first_of_run + 1], inputs[:, first_of_run + 2] = heading, fine, load
     inputs[:, SPEED_ERROR_GAIN] = np.interp(fine, record.time_s, record.speed_error.gain_rad_s_m)
     coarse = heading[::ROWS]
     shaft = 2 + list(CHANNEL_SYMBOLS).index("n")
@@ -278,6 +287,7 @@ def make_run(
         channels=frozenset(have),
         ship=ship,
         day=day,
+        load=load,
         velocity_late_std_s=record.velocity_late_std_s,
     )
 
