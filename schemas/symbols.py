@@ -65,8 +65,8 @@ INSTRUMENT_STATES: tuple[str, ...] = ("m5", "m6", "m7")
 RUN_SYMBOLS: dict[str, str] = {
     "K": "true heading, rad",
     "t": "time from the beginning of the run, s",
-    "day": "0 in runs of the vessel's first log, 1 in the second, and so on; where a draught is noted for each log, by how "
-    "many tenths of the first one she lies deeper",
+    "day": "0 in runs of the vessel's first log, 1 in the second, and so on; where a draught is noted for each log, by "
+    "how many tenths of the first one she lies deeper",
 }
 SYMBOLS: tuple[str, ...] = (
     *STATE_SYMBOLS,

@@ -120,7 +120,7 @@ def of_vessel(
     with _sets_as_of(warehouse, as_of) as table:
         if table is None and as_of is not None:
             vessels.require(warehouse, vessel)
-            nothing = _exploded(None, vessel, _Logs([], None, code_of(warehouse, "estimate")))
+            nothing = _exploded(None, vessel, _Logs([], None, [], code_of(warehouse, "estimate")))
             return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
         frame = _exploded(table, vessel, _logs_of(warehouse, vessel, as_of))
         version = table.version() if table is not None else None

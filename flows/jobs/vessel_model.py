@@ -34,8 +34,8 @@ from kempf.pipeline.estimate.pooled_fit import PooledFit, ShipPart
 from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncertainty_of
 from kempf.pipeline.estimate.posterior import posterior_of
 from kempf.pipeline.estimate.record.grid_run import common_slip
-from kempf.pipeline.estimate.record.loads import loads
 from kempf.pipeline.estimate.record.left_out import instants_left_out
+from kempf.pipeline.estimate.record.loads import loads
 from kempf.pipeline.estimate.result import discrete_values
 from kempf.pipeline.shooting.ahead import Ahead, ahead_of
 from kempf.schemas.errors import NotFound
