@@ -54,6 +54,7 @@ STAGES: dict[Stage, Entry] = {
             *("channels.instruments", "estimate.estimators", "estimate.pooled_uncertainty", "estimate.posterior"),
             *("estimate.updated", "predict.free_run"),
             *("estimate.no_log.companions", "estimate.record.cut", "estimate.record.left_out"),
+            "estimate.record.loads",
             *("diagnose.staged", "diagnose.ladder_step", "diagnose.split", "diagnose.late_velocity"),
         ),
         ("ingest",),
