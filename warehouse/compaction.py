@@ -187,6 +187,8 @@ def _vacuumed(
         if there and not dry_run:
             ask(dry_run=False)
             seals.seal(table)
+        if not dry_run:
+            seals.forget_deleted(table)
     return Cleared(name, len(there), sum(there), len(keep))
 
 

@@ -370,3 +370,20 @@ def mend_seals(folder: Path, name: str, paths: Iterable[Path]) -> list[str]:
 def forget(folder: Path, path: Path) -> None:
     """Take the seal of a file away that is no longer one of its table."""
     _file_seal(folder, path.name).unlink(missing_ok=True)
+
+
+def forget_deleted(table: DeltaTable) -> int:
+    """Take away the seals of files that a table has no longer, also those an interrupted call left; return how many.
+
+    Commits keep theirs: they say that a commit was there.
+    """
+    folder = folder_of(table)
+    if folder is None:
+        return 0
+    # seals first: a file is there before its seal is, so that one written meanwhile is not taken for deleted
+    marks = sorted((folder / FOLDER / "data").glob("*.sha256"))
+    there = {path.name for path in folder.rglob("*.parquet")}
+    gone = [mark for mark in marks if mark.name.removesuffix(".sha256") not in there]
+    for mark in gone:
+        mark.unlink(missing_ok=True)
+    return len(gone)

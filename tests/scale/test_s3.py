@@ -8,11 +8,13 @@ from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
 
+import polars as pl
 import pytest
 import yaml
 
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.purge_logs import purge
 from kempf.flows.jobs.release_log import release
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
@@ -20,7 +22,7 @@ from kempf.flows.jobs.take_inbox import take_inbox
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, compaction, delta, logs, parameter_sets, raw, runs, segments, vessels
+from kempf.warehouse import aliases, compaction, delta, logs, parameter_sets, purges, raw, runs, segments, vessels
 from kempf.warehouse.source_folder import SourceFolder
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
@@ -173,3 +175,22 @@ def test_an_inbox_in_a_bucket(bucket: Bucket, ferry: Ship, tmp_path: Path) -> No
     with pytest.raises(KempfError) as found:
         take_inbox(warehouse, SourceFolder("s3://no-such-bucket/x", bucket.settings))
     assert found.value.code in ("no_inbox", "inbox_unreadable")
+
+
+def test_a_log_is_purged_from_a_bucket(bucket: Bucket, ferry: Ship, tmp_path: Path) -> None:
+    place = taken_in(Warehouse(f"{bucket.uri}/purged", bucket.settings), ferry, tmp_path)
+    (row,) = logs.current(place)
+    # of earlier versions, too: what compaction put together lies beside what it was put together from
+    compaction.compact(place, 1)
+    assert any(row.log_id in path for path in place.paths_below("raw"))
+    receipt = purge(place, row.log_id, "end of the charter")
+    assert receipt.readings > 1000 and purges.of_logs(place) == {row.log_id: receipt}
+    assert raw.kept(place) == [] and not any(row.log_id in path for path in place.paths_below("raw"))
+    for table in ("readings", "rejected", "lost", "examinations"):
+        assert delta.read(place, table).height == 0
+        for path in place.paths_below(table):
+            if path.endswith(".parquet") and not path.startswith("_delta_log"):
+                with place.opened(table, *path.split("/")) as stream:
+                    assert stream is not None and row.ingest_id not in set(pl.read_parquet(stream)["ingest_id"])
+    (refused,) = ingest(place, [tmp_path / "ferry.csv.gz"], given=VesselProfile.model_validate(ferry.profile))
+    assert refused.error is not None and refused.error.code == "log_purged"

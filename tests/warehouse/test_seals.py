@@ -142,6 +142,24 @@ def test_compacting_keeps_all_sealed(warehouse: Warehouse) -> None:
     assert runs.all_runs(warehouse) == wanted
 
 
+def test_the_seals_of_deleted_files_are_deleted(warehouse: Warehouse) -> None:
+    def sealed() -> set[str]:
+        return {path.name.removesuffix(".sha256") for path in (folder(warehouse) / "_seals" / "data").iterdir()}
+
+    before = {path.name for path in folder(warehouse).glob("*.parquet")}
+    compaction.compact(warehouse, 1)
+    held = sealed()
+    assert before < held
+    compaction.vacuum(warehouse, 0.0, dry_run=True)
+    assert sealed() == held
+    # as a call leaves them that was cut off between the files and their seals
+    left = folder(warehouse) / "_seals" / "data" / "part-gone.parquet.sha256"
+    left.write_bytes(b"0")
+    compaction.vacuum(warehouse, 0.0)
+    assert sealed() == {path.name for path in folder(warehouse).rglob("*.parquet")}
+    assert not before & sealed() and verify(warehouse) == []
+
+
 def test_a_seal_holds_the_commit_as_it_was(warehouse: Warehouse) -> None:
     content = json.loads((folder(warehouse) / "_seals" / "log" / f"{1:020d}.json").read_text(encoding="utf-8"))
     assert content["commit"].encode() == commit(warehouse, 1).read_bytes()
