@@ -40,7 +40,7 @@ ROOMS = {
 STORED = tuple(f"kempf.pipeline.ingest.{name}." for name in ("decoded", "readings", "log_file"))
 #: Libraries with one door, and the files that are it.
 DOORS = {
-    "prefect": ("flows/fleet/alarms.py", "flows/fleet/engine.py", "flows/fleet/flows.py"),
+    "prefect": ("flows/fleet/alarms.py", "flows/fleet/engine.py", "flows/fleet/flows.py", "flows/fleet/hooks.py"),
     "deltalake": ("warehouse/",),
     "click": ("workbench/",),
     "rich": ("workbench/",),

@@ -14,6 +14,7 @@ os.environ.setdefault("PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS", "180")
 from prefect.context import FlowRunContext
 from prefect.task_runners import ThreadPoolTaskRunner
 
+from kempf.flows.process.configuration import setting
 from kempf.flows.process.cores import usable
 from kempf.schemas.errors import UsageError
 
@@ -34,7 +35,7 @@ def task_runner(address: str | None = None) -> Any:
     UsageError
         ``dask_absent``: a scheduler is named, but prefect-dask is not installed.
     """
-    address = address if address is not None else os.environ.get(DASK_SETTING, "")
+    address = address if address is not None else setting("dask")
     if not address:
         # the compiled likelihood and the readers run outside the interpreter's lock: one thread a core
         return ThreadPoolTaskRunner(max_workers=usable())

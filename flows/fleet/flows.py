@@ -28,6 +28,7 @@ from prefect.states import Completed, Failed
 from kempf.flows.fleet import arrivals, plan
 from kempf.flows.fleet import report as fleet_report
 from kempf.flows.fleet.diagnosis_summary import summary
+from kempf.flows.fleet.hooks import HOOKS
 from kempf.flows.fleet.state import responsible_code
 from kempf.flows.jobs import ingest_logs
 from kempf.flows.jobs.default_model import default_model_of
@@ -72,7 +73,7 @@ def inbox_task(warehouse: str, folder: str) -> InboxRun:
     return run
 
 
-@flow(name="ingest")
+@flow(name="ingest", **HOOKS)
 def ingest(
     paths: list[str], warehouse: str = "kempf-data", vessel: str | None = None, profiles: Sequence[str] = ()
 ) -> list[dict[str, Any]] | State[Any]:
@@ -145,7 +146,7 @@ def identify_task(warehouse: str, vessel: str, estimator: str, spec: dict[str, A
     ]
 
 
-@flow(name="identify")
+@flow(name="identify", **HOOKS)
 def identify(
     vessel: str, warehouse: str = "kempf-data", estimator: str = "ml", spec: dict[str, Any] | None = None
 ) -> list[dict[str, Any]]:
@@ -227,7 +228,7 @@ class _Run:
         return reports
 
 
-@flow(name="reprocess", task_runner=task_runner(), persist_result=False, result_serializer="json")
+@flow(name="reprocess", task_runner=task_runner(), persist_result=False, result_serializer="json", **HOOKS)
 def reprocess(
     warehouse: str = "kempf-data",
     vessels: list[str] | None = None,
@@ -319,7 +320,7 @@ def diagnose_batch(warehouse: str, vessels: Sequence[str], spec: dict[str, Any])
     return documents
 
 
-@flow(name="diagnose")
+@flow(name="diagnose", **HOOKS)
 def diagnose(
     warehouse: str = "kempf-data", vessels: list[str] | None = None, spec: dict[str, Any] | None = None
 ) -> list[dict[str, Any]]:

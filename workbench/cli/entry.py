@@ -51,6 +51,7 @@ COMMANDS = {
     "logs": "List the logs, what was rejected in one and why; remove, move, release from quarantine.",
     "demo": "Simulate a trial, ingest it, identify the ship and compare with the truth.",
     "reproduce-paper": "Repeat the paper's experiment: its figures, its accuracy beside ours.",
+    "config": "Show the settings in force, and what sets each.",
     "completion": "Print the shell completion script.",
 }
 
@@ -64,7 +65,8 @@ COMMANDS = {
 def cli() -> None:
     """Turn raw ship sea-trial logs into manoeuvring models one can trust.
 
-    Every command that works on a warehouse takes --warehouse URI (else KEMPF_WAREHOUSE, else ./kempf-data) and --json.
+    Every command that works on a warehouse takes --warehouse URI (else KEMPF_WAREHOUSE, else of kempf.toml, else ./kempf-data)
+    and --json.
     Exit codes: 0 ok, 1 internal, 2 usage, 3 data rejected, 4 not found, 5 threshold exceeded.
     """
 

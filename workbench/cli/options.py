@@ -13,14 +13,20 @@ F = TypeVar("F", bound=Callable[..., Any])
 DEFAULT_WAREHOUSE = "kempf-data"
 
 
+def configured_warehouse() -> str:
+    """Return the address of the warehouse that is set, else the default one; raises what `setting` raises."""
+    from kempf.flows.process.configuration import setting
+
+    return setting("warehouse") or DEFAULT_WAREHOUSE
+
+
 def warehouse_option(function: F) -> F:
     """Add ``--warehouse``."""
     return click.option(
         "--warehouse",
         "uri",
-        envvar="KEMPF_WAREHOUSE",
-        default=DEFAULT_WAREHOUSE,
-        show_default="KEMPF_WAREHOUSE, else ./kempf-data",
+        default=configured_warehouse,
+        show_default="KEMPF_WAREHOUSE, else of kempf.toml, else ./kempf-data",
         metavar="URI",
         help="Where everything is kept: a folder or s3://bucket/prefix.",
     )(function)

@@ -11,7 +11,7 @@ import polars as pl
 
 from kempf.warehouse import vessels
 from kempf.warehouse.store import Warehouse
-from kempf.workbench.cli.options import DEFAULT_WAREHOUSE
+from kempf.workbench.cli.options import configured_warehouse
 from kempf.workbench.notebook.frames import frame_of
 from kempf.workbench.notebook.vessel_view import VesselView
 
@@ -29,14 +29,15 @@ def open_warehouse(uri: str | os.PathLike[str] | None = None) -> WarehouseView:
     Parameters
     ----------
     uri : str or path, optional
-        A folder, or ``s3://bucket/prefix``; by default KEMPF_WAREHOUSE, else ``kempf-data``.
+        A folder, or ``s3://bucket/prefix``; by default KEMPF_WAREHOUSE, else that of
+        ``kempf.toml``, else ``kempf-data``.
 
     Raises
     ------
     UsageError
-        ``warehouse_path``.
+        ``warehouse_path``, ``configuration_invalid``.
     """
-    given = os.environ.get("KEMPF_WAREHOUSE") or DEFAULT_WAREHOUSE if uri is None else uri
+    given = configured_warehouse() if uri is None else uri
     return WarehouseView(Warehouse(os.fspath(given)))
 
 

@@ -1,0 +1,134 @@
+"""Figures of a run for Prometheus: a flow is a batch job, so they are left or pushed at its end, not scraped."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from kempf.flows.process.configuration import setting
+
+if TYPE_CHECKING:
+    from prometheus_client import CollectorRegistry
+
+#: Figures by name, what each is, and by what it is divided.
+FIGURES: dict[str, tuple[str, tuple[str, ...]]] = {
+    "kempf_run_end_timestamp_seconds": ("When the flow's last run ended, s since 1970", ()),
+    "kempf_run_duration_seconds": ("How long the flow's last run took", ()),
+    "kempf_run_succeeded": ("1 where the flow's last run ended as Completed, else 0", ()),
+    "kempf_run_vessels": ("Vessels of the flow's last run", ("status",)),
+    "kempf_run_new_parameter_sets": ("Parameter sets that the flow's last run made", ()),
+    "kempf_run_failures": ("What failed in the flow's last run", ("code",)),
+    "kempf_run_findings": ("Findings on logs and models in the flow's last run", ("kind",)),
+    "kempf_run_logs": ("Logs of the flow's last run", ("outcome",)),
+}
+#: Label of every figure: which flow it is of.
+_FLOW = "flow"
+Figure = tuple[str, tuple[str, ...], float]
+
+
+def figures_of(flow: str, found: Any) -> Iterator[Figure]:
+    """Yield what a run's result says, each with the name of the figure and the values of its labels.
+
+    Parameters
+    ----------
+    flow : str
+        Name of the flow.
+    found : object
+        What it returned, or the error that it ended with.
+    """
+    details = getattr(found, "details", None)
+    rows = details if isinstance(details, Mapping) else found
+    if flow == "ingest":
+        yield from _counted("kempf_run_logs", _outcomes(rows))
+    elif flow == "reprocess":
+        reports = _rows(rows, "reports")
+        yield from _counted("kempf_run_vessels", [one["status"] for one in reports])
+        yield from _counted("kempf_run_findings", [f["kind"] for one in reports for f in one["findings"]])
+        yield from _counted("kempf_run_failures", [f["error"]["code"] for one in reports for f in one["failures"]])
+        if reports:
+            yield "kempf_run_new_parameter_sets", (), float(sum(one["new_sets"] for one in reports))
+    elif flow == "identify":
+        made = [one for one in _rows(rows, "rows") if one.get("parameter_set")]
+        yield "kempf_run_new_parameter_sets", (), float(len(made))
+    elif flow == "diagnose":
+        said = {row["vessel"]: row for row in _rows(rows, "rows")}
+        yield from _counted("kempf_run_vessels", [row["verdict"] for row in said.values()])
+
+
+def _outcomes(rows: Any) -> list[str]:
+    """Return what became of every log, whether the run was of logs or of an inbox, and however it ended."""
+    found = [one["outcome"] for key in ("outcomes", "ingested") for one in _rows(rows, key)]
+    return found + ["quarantined" for _ in (_rows(rows, "quarantined") if isinstance(rows, Mapping) else ())]
+
+
+def _rows(found: Any, key: str) -> Sequence[Any]:
+    """Return the rows of a result; of an error's details those under a key. Of neither there are none."""
+    if isinstance(found, Mapping):
+        return list(found.get(key, ()))
+    return list(found) if isinstance(found, list) and key in ("rows", "reports", "outcomes") else []
+
+
+def _counted(name: str, values: Sequence[str]) -> Iterator[Figure]:
+    for value, count in sorted(Counter(values).items()):
+        yield name, (value,), float(count)
+
+
+def registry_of(flow: str, *, end_s: float, duration_s: float, succeeded: bool, found: Any) -> CollectorRegistry:
+    """Return the figures of one run.
+
+    Parameters
+    ----------
+    end_s, duration_s : float
+        When it ended, s since 1970, and how long it took, s.
+    succeeded : bool
+        Whether it ended as Completed.
+    found : object
+        See `figures_of`.
+    """
+    from prometheus_client import CollectorRegistry, Gauge
+
+    registry = CollectorRegistry()
+    gauges = {name: Gauge(name, text, (_FLOW, *by), registry=registry) for name, (text, by) in FIGURES.items()}
+    of_run = (
+        ("kempf_run_end_timestamp_seconds", (), end_s),
+        ("kempf_run_duration_seconds", (), duration_s),
+        ("kempf_run_succeeded", (), float(succeeded)),
+    )
+    for name, labels, value in (*of_run, *figures_of(flow, found)):
+        gauges[name].labels(flow, *labels).set(value)
+    return registry
+
+
+def publish(flow: str, registry: CollectorRegistry) -> list[str]:
+    """Leave the figures of a run where the settings say.
+
+    Returns
+    -------
+    list of str
+        Why it could not be done, a sentence each: a run does not fail by it.
+    """
+    from prometheus_client import pushadd_to_gateway, write_to_textfile
+
+    failed = []
+    folder, gateway = setting("metrics.textfile"), setting("metrics.pushgateway")
+    if folder:
+        path = Path(folder).expanduser() / f"kempf_{re.sub(r'[^a-z]', '_', flow)}.prom"
+        try:
+            write_to_textfile(os.fspath(path), registry)
+        except OSError as error:
+            failed.append(f"The metrics of the run could not be written to {path}: {error.strerror or error}.")
+    if gateway:
+        try:
+            pushadd_to_gateway(gateway, job="kempf", registry=registry, grouping_key={_FLOW: flow}, timeout=10)
+        except (OSError, ValueError) as error:
+            failed.append(f"The metrics of the run could not be pushed to {gateway}: {error}.")
+    return failed
+
+
+def wanted() -> bool:
+    """Return whether the settings name a place for metrics."""
+    return bool(setting("metrics.textfile") or setting("metrics.pushgateway"))

@@ -1,0 +1,108 @@
+"""The settings of this process: an environment variable goes before the file ``kempf.toml``, the file before a default."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from kempf.schemas.configuration import EMPTY, VARIABLES, Configuration, parse, value_of
+from kempf.schemas.errors import NotFound, UsageError
+
+#: Variable that names the file, and its name where nobody names one.
+FILE_VARIABLE, FILE = "KEMPF_CONFIG", "kempf.toml"
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One setting as it is in force."""
+
+    name: str
+    #: None where nothing sets it.
+    value: str | None
+    #: The variable or the file that sets it; None where nothing does.
+    source: str | None
+
+    def show(self) -> dict[str, str | None]:
+        """Return the setting as JSON content."""
+        return dict(vars(self))
+
+
+def setting(name: str, environment: Mapping[str, str] | None = None) -> str | None:
+    """Return a setting, None where nothing sets it.
+
+    Parameters
+    ----------
+    name : str
+        Of `schemas.configuration.VARIABLES`.
+    environment : mapping of str, optional
+        Instead of that of the process.
+
+    Raises
+    ------
+    NotFound
+        ``no_configuration``: the file that is named is not there.
+    UsageError
+        ``configuration_invalid``, ``secret_in_configuration``, ``log_level_unknown``.
+    """
+    return in_force(name, environment).value
+
+
+def in_force(name: str, environment: Mapping[str, str] | None = None) -> Setting:
+    """Return a setting with what sets it; the parameters and errors are those of `setting`."""
+    variables = os.environ if environment is None else environment
+    variable = VARIABLES[name]
+    if variables.get(variable):
+        return Setting(name, variables[variable], variable)
+    path, configuration = read(variables)
+    value = value_of(configuration, name)
+    return Setting(name, value, str(path) if value is not None else None)
+
+
+def every(environment: Mapping[str, str] | None = None) -> list[Setting]:
+    """Return all settings; errors are those of `setting`."""
+    return [in_force(name, environment) for name in VARIABLES]
+
+
+def read(environment: Mapping[str, str]) -> tuple[Path | None, Configuration]:
+    """Return the file that is in force with what it says; None where there is none."""
+    path = _file(environment)
+    if path is None:
+        return None, EMPTY
+    import tomllib
+
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise UsageError(
+            "configuration_invalid",
+            f"{path} is no TOML text: {error}.",
+            'Write a line a setting, such as warehouse = "/data/kempf".',
+            {"path": str(path)},
+        ) from error
+    except OSError as error:
+        raise UsageError(
+            "configuration_unreadable",
+            f"{path} cannot be read: {error.strerror or error}.",
+            f"Look at its permissions, or name another file with {FILE_VARIABLE}.",
+            {"path": str(path)},
+        ) from error
+    return path, parse(content, str(path))
+
+
+def _file(environment: Mapping[str, str]) -> Path | None:
+    named = environment.get(FILE_VARIABLE)
+    if named:
+        path = Path(named).expanduser()
+        if not path.is_file():
+            raise NotFound(
+                "no_configuration",
+                f"{FILE_VARIABLE} names {named!r}, which is no file.",
+                f"Write the file, or unset {FILE_VARIABLE}.",
+                {"path": named},
+            )
+        return path
+    home = environment.get("XDG_CONFIG_HOME") or (Path(environment["HOME"]) / ".config" if "HOME" in environment else None)
+    places = [Path(FILE), *([Path(home) / "kempf" / FILE] if home else [])]
+    return next((place.absolute() for place in places if place.is_file()), None)

@@ -1,0 +1,97 @@
+"""What an installation sets once: the file ``kempf.toml``, beside the environment variables of the same settings."""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from kempf.schemas.errors import UsageError
+from kempf.schemas.faults import faults_of
+
+LogLevel = Literal["debug", "info", "warning", "error"]
+
+
+class Metrics(BaseModel):
+    """Where the figures of a run go, for Prometheus."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    textfile: str | None = Field(default=None, description="folder that node_exporter's textfile collector reads")
+    pushgateway: str | None = Field(default=None, description="address of a Pushgateway")
+
+
+class Lineage(BaseModel):
+    """Where the OpenLineage events of a run go."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    url: str | None = Field(default=None, description="address of a server that takes OpenLineage events")
+
+
+class Configuration(BaseModel):
+    """The settings; None where nothing is said."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    warehouse: str | None = Field(default=None, description="folder or s3://bucket/prefix where everything is kept")
+    inbox: str | None = Field(default=None, description="folder or s3://bucket/prefix where logs arrive")
+    dask: str | None = Field(default=None, description="address of a Dask scheduler whose workers share the batches")
+    log_level: LogLevel | None = Field(default=None, description="from which level on a command says what it does")
+    metrics: Metrics = Field(default_factory=Metrics, description="where the figures of a run go, for Prometheus")
+    lineage: Lineage = Field(default_factory=Lineage, description="where the OpenLineage events of a run go")
+
+
+#: By name, the environment variable that goes before the file. That of lineage is OpenLineage's own.
+VARIABLES = {
+    "warehouse": "KEMPF_WAREHOUSE",
+    "inbox": "KEMPF_INBOX",
+    "dask": "KEMPF_DASK",
+    "log_level": "KEMPF_LOG_LEVEL",
+    "metrics.textfile": "KEMPF_METRICS_TEXTFILE",
+    "metrics.pushgateway": "KEMPF_METRICS_PUSHGATEWAY",
+    "lineage.url": "OPENLINEAGE_URL",
+}
+#: None where nothing is set anywhere.
+EMPTY = Configuration()
+
+
+def value_of(configuration: Configuration, name: str) -> str | None:
+    """Return a setting by its name in `VARIABLES`."""
+    found: Any = configuration
+    for part in name.split("."):
+        found = getattr(found, part)
+    return None if found is None else str(found)
+
+
+def parse(content: dict[str, Any], where: str) -> Configuration:
+    """Return the settings that the content of a file states.
+
+    Parameters
+    ----------
+    where : str
+        Address of the file, for the message.
+
+    Raises
+    ------
+    UsageError
+        ``configuration_invalid``: every fault is named with its place. ``secret_in_configuration``.
+    """
+    secret = [name for name in content if name.lower().startswith("aws_")]
+    if secret:
+        raise UsageError(
+            "secret_in_configuration",
+            f"{where} holds {', '.join(secret)}: credentials are read from the environment alone, and kept nowhere.",
+            "Take them out of the file, and set them in the environment of whoever runs kempf.",
+            {"path": where, "names": secret},
+        )
+    try:
+        return Configuration.model_validate(content)
+    except ValidationError as error:
+        faults = faults_of(error, "file", content)
+        raise UsageError(
+            "configuration_invalid",
+            f"{where} holds what is no setting: {'; '.join(faults)}.",
+            f"Settings are {', '.join(VARIABLES)}; `kempf config` shows each with its value.",
+            {"path": where, "faults": faults},
+        ) from error
