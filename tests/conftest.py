@@ -14,6 +14,9 @@ import yaml
 
 from tests.made_once import made_once
 
+# of the tests and of all processes they start: nobody's own settings
+os.environ["XDG_CONFIG_HOME"] = os.devnull
+
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
     """One process more than there are cores: tests with servers, workers and kills wait more than they compute."""

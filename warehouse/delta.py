@@ -7,6 +7,7 @@ under `kempf.warehouse.retry.with_retry`. (Merges lose the units in the field me
 
 from __future__ import annotations
 
+import logging
 import os
 from bisect import bisect_right
 from collections.abc import Iterator, Sequence
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 # One thread moves the rows of a write on: with more, those that read ahead outrun the one that packs, and a log of
 # gigabytes piles up between them. Packing is done by that one alone in any case. Asked for when the library starts.
 os.environ.setdefault("TOKIO_WORKER_THREADS", "1")
+
+_log = logging.getLogger("kempf.warehouse")
 
 #: Rows that are handed to the writer at once; it holds some ten such batches.
 _BATCH_ROWS = 16_384
@@ -345,6 +348,7 @@ def replace(
             writer_properties=WriterProperties(compression="ZSTD"),
         )
         seals.seal(table)
+    _log.debug("table %s: version %d is committed", name, table.version())
 
 
 def _as_described(table: DeltaTable, schema: pa.Schema) -> pa.Schema:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
 
 _ESTIMATES = ("parameters", "discrete", "noise")
 _TEXTS = ("settings", "fit", "iterations", "convergence", "provenance")
+
+
+_log = logging.getLogger("kempf.warehouse")
 
 
 def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...]:
@@ -66,7 +70,11 @@ def insert(warehouse: Warehouse, sets: Sequence[ParameterSet]) -> tuple[str, ...
                 delta.replace(table, "parameter_sets", rows, predicate)
             return tuple(fresh)
 
-    return with_retry(attempt)
+    fresh = with_retry(attempt)
+    for name in fresh:
+        one = given[name]
+        _log.info("%s of %s is stored: %s, %s", name, one.vessel, one.model_name, one.estimator)
+    return fresh
 
 
 def get(warehouse: Warehouse, name: str, vessel: str | None = None) -> ParameterSet:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import logging
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
@@ -18,6 +19,7 @@ from kempf.flows.process.progress import Progress, silent
 #: Columns of the narrowest terminal that a table is not to overflow; how narrow a folded column may become.
 WIDEST, _NARROWEST = 100, 8
 _GAP = "  "
+_log = logging.getLogger("kempf.progress")
 
 
 def print_json(content: Any) -> None:
@@ -146,11 +148,15 @@ def number(value: float | None, digits: int = 4) -> str:
     return "-" if value is None or isnan(value) else f"{value:.{digits}g}"
 
 
+def _logged(done: int, total: int, what: str) -> None:
+    _log.info("%s (%d of %d)", what, done, total)
+
+
 @contextmanager
 def progress_bar() -> Iterator[Progress]:
-    """Give a `Progress` that draws a bar on stderr where that is a terminal, and nothing elsewhere."""
+    """Give a `Progress` that draws a bar on stderr where that is a terminal, and log lines elsewhere."""
     if not sys.stderr.isatty():
-        yield silent
+        yield _logged if _log.isEnabledFor(logging.INFO) else silent
         return
     from rich.console import Console
     from rich.progress import BarColumn, MofNCompleteColumn, TextColumn, TimeElapsedColumn

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import os
 from typing import Any
 
@@ -11,10 +12,18 @@ os.environ.setdefault("PREFECT_SERVER_ANALYTICS_ENABLED", "false")
 # A busy machine needs longer than Prefect's 20 s to start the server of a run.
 os.environ.setdefault("PREFECT_SERVER_EPHEMERAL_STARTUP_TIMEOUT_SECONDS", "180")
 
+from kempf.flows.process.configuration import log_level, setting
+
+if (_level := log_level()) is not None and not logging.getLogger("kempf").handlers:
+    # what jobs log goes to the run; a command shows it itself
+    os.environ.setdefault("PREFECT_LOGGING_EXTRA_LOGGERS", "kempf")
+    os.environ.setdefault("PREFECT_LOGGING_LEVEL", _level.upper())
+    # a thread of a job knows no run
+    os.environ.setdefault("PREFECT_LOGGING_TO_API_WHEN_MISSING_FLOW", "ignore")
+
 from prefect.context import FlowRunContext
 from prefect.task_runners import ThreadPoolTaskRunner
 
-from kempf.flows.process.configuration import setting
 from kempf.flows.process.cores import usable
 from kempf.schemas.errors import UsageError
 

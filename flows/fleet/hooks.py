@@ -13,7 +13,7 @@ from kempf.flows.fleet import lineage, metrics
 _ENDS: dict[str, lineage.What] = {"COMPLETED": "COMPLETE", "CANCELLED": "ABORT"}
 
 
-def began(flow: Any, run: Any, state: Any) -> None:  # noqa: ARG001 - as Prefect calls it
+def began(flow: Any, run: Any, state: Any) -> None:
     """Say that a run began."""
     if lineage.wanted():
         _warn(run, lineage.emit(lineage.Event("START", flow.name, str(run.id), run.parameters)))

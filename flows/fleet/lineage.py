@@ -84,7 +84,9 @@ def _run_event(event: Event) -> Any:
     warehouse = Warehouse(address)
     versions = _versions(warehouse)
     read, written = TABLES[event.flow]
-    facets = {"errorMessage": error_message_run.ErrorMessageRunFacet(event.message, "PYTHON")} if event.message else {}
+    facets: dict[str, Any] = {}
+    if event.message:
+        facets["errorMessage"] = error_message_run.ErrorMessageRunFacet(event.message, "PYTHON")
     logs = [InputDataset(*_place(str(path))) for path in event.parameters.get("paths") or ()]
     # what is written has its version once it is written
     after = versions if event.what != "START" else {}

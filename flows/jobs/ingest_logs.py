@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,6 +34,8 @@ from kempf.warehouse.examinations import StoredExamination
 from kempf.warehouse.keys import ingest_id, vessel_key
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
+
+_log = logging.getLogger("kempf.jobs")
 
 
 @dataclass(frozen=True)
@@ -264,6 +267,10 @@ def look_through(
     refused = count(readings.rejections())
     records = readings.tally.records_read
     searched = search(this_ingest, profile, file_name, readings.format, instruments, refused, records, said)
+    _log.info(
+        "%s of %s: %d records read, %d kept; %d manoeuvres",
+        *(file_name, vessel, records, readings.tally.records_kept, len(searched.segments)),
+    )
     return ReadLog(Delivery(vessel, file_name, log, profile, readings, codes.ingest), searched)
 
 

@@ -1,4 +1,4 @@
-"""The settings of this process: an environment variable goes before the file ``kempf.toml``, the file before a default."""
+"""The settings of this process: an environment variable goes before the file ``kempf.toml``."""
 
 from __future__ import annotations
 
@@ -6,8 +6,9 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
+from typing import get_args
 
-from kempf.schemas.configuration import EMPTY, VARIABLES, Configuration, parse, value_of
+from kempf.schemas.configuration import EMPTY, VARIABLES, Configuration, LogLevel, parse, value_of
 from kempf.schemas.errors import NotFound, UsageError
 
 #: Variable that names the file, and its name where nobody names one.
@@ -47,6 +48,19 @@ def setting(name: str, environment: Mapping[str, str] | None = None) -> str | No
         ``configuration_invalid``, ``secret_in_configuration``, ``log_level_unknown``.
     """
     return in_force(name, environment).value
+
+
+def log_level(environment: Mapping[str, str] | None = None) -> str | None:
+    """Return from which level on something is logged, None where nothing sets it; errors are those of `setting`."""
+    found = in_force("log_level", environment)
+    if found.value is not None and found.value not in get_args(LogLevel):
+        raise UsageError(
+            "log_level_unknown",
+            f"{found.source} sets the log level {found.value!r}; expected one of {', '.join(get_args(LogLevel))}.",
+            "Give one of these.",
+            {"found": found.value},
+        )
+    return found.value
 
 
 def in_force(name: str, environment: Mapping[str, str] | None = None) -> Setting:
@@ -103,6 +117,6 @@ def _file(environment: Mapping[str, str]) -> Path | None:
                 {"path": named},
             )
         return path
-    home = environment.get("XDG_CONFIG_HOME") or (Path(environment["HOME"]) / ".config" if "HOME" in environment else None)
-    places = [Path(FILE), *([Path(home) / "kempf" / FILE] if home else [])]
+    home = environment.get("XDG_CONFIG_HOME") or "~/.config"
+    places = (Path(FILE), Path(home).expanduser() / "kempf" / FILE)
     return next((place.absolute() for place in places if place.is_file()), None)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import json
 import os
 import signal
@@ -10,7 +11,7 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
@@ -84,12 +85,28 @@ def wait_for(reached, within_s: float = 60.0, every_s: float = 0.1) -> None:
 def receiver() -> Iterator[tuple[str, list[dict[str, Any]]]]:
     """Lend an address, and what is posted to it as JSON."""
     received: list[dict[str, Any]] = []
+    with _server(lambda path, body: received.append(json.loads(body))) as url:
+        yield f"{url}/alarm", received
 
+
+@contextmanager
+def received_text() -> Iterator[tuple[str, list[tuple[str, str]]]]:
+    """Lend an address, and what is posted or put below it as text, each with its path."""
+    received: list[tuple[str, str]] = []
+    with _server(lambda path, body: received.append((path, body.decode()))) as url:
+        yield url, received
+
+
+@contextmanager
+def _server(take: Callable[[str, bytes], None]) -> Iterator[str]:
     class Receiver(BaseHTTPRequestHandler):
         def do_POST(self) -> None:
-            received.append(json.loads(self.rfile.read(int(self.headers["Content-Length"]))))
+            body = self.rfile.read(int(self.headers["Content-Length"]))
+            take(self.path, gzip.decompress(body) if self.headers.get("Content-Encoding") == "gzip" else body)
             self.send_response(204)
             self.end_headers()
+
+        do_PUT = do_POST  # noqa: N815 - as the server looks for it
 
         def log_message(self, *arguments: Any) -> None:
             """Say nothing."""
@@ -98,7 +115,7 @@ def receiver() -> Iterator[tuple[str, list[dict[str, Any]]]]:
     thread = threading.Thread(target=server.serve_forever, daemon=True)
     thread.start()
     try:
-        yield f"http://127.0.0.1:{server.server_port}/alarm", received
+        yield f"http://127.0.0.1:{server.server_port}"
     finally:
         server.shutdown()
         thread.join()

@@ -17,6 +17,7 @@ import click
 
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, UsageError
+from kempf.workbench import log_lines
 from kempf.workbench.cli.lazy import LazyGroup
 from kempf.workbench.terminal import one_line
 
@@ -62,13 +63,27 @@ COMMANDS = {
     context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
 )
 @click.version_option(package_name="kempf", prog_name="kempf")
-def cli() -> None:
+@click.option(
+    "--log-level",
+    type=click.Choice(["debug", "info", "warning", "error"]),
+    help="Say on stderr what a command does, from this level on. [default: KEMPF_LOG_LEVEL, else of kempf.toml]",
+)
+def cli(log_level: str | None) -> None:
     """Turn raw ship sea-trial logs into manoeuvring models one can trust.
 
-    Every command that works on a warehouse takes --warehouse URI (else KEMPF_WAREHOUSE, else of kempf.toml, else ./kempf-data)
-    and --json.
+    Every command that works on a warehouse takes --warehouse URI (else KEMPF_WAREHOUSE, else that of kempf.toml, else
+    ./kempf-data) and --json.
     Exit codes: 0 ok, 1 internal, 2 usage, 3 data rejected, 4 not found, 5 threshold exceeded.
     """
+    level = log_level or _configured_level()
+    if level is not None:
+        log_lines.show(level)
+
+
+def _configured_level() -> str | None:
+    from kempf.flows.process.configuration import log_level
+
+    return log_level()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @click.command("inbox", cls=GivenOnce)
-@click.argument("folder", metavar="PATH")
+@click.argument("folder", metavar="[PATH]", required=False)
 @new_vessel_option("Make a vessel of every folder whose name is none yet.")
 @click.option(
     "--settle",
@@ -29,19 +29,29 @@ if TYPE_CHECKING:
 @verbose_option
 @warehouse_option
 @json_option
-def command(folder: str, new_vessel: bool, settle_s: float, verbose: bool, uri: str, as_json: bool) -> None:
+def command(folder: str | None, new_vessel: bool, settle_s: float, verbose: bool, uri: str, as_json: bool) -> None:
     """Ingest what is new in a folder or under s3://bucket/prefix, one folder a vessel.
 
-    A file whose vessel or format is not clear goes into quarantine and stops no other; `kempf logs quarantine` lists
-    them. Nothing in the inbox is moved or deleted. The exit code is 3 while something is in quarantine.
+    Without PATH it is the inbox that KEMPF_INBOX or kempf.toml names. A file whose vessel or format is not clear goes
+    into quarantine and stops no other; `kempf logs quarantine` lists them. Nothing in the inbox is moved or deleted.
+    The exit code is 3 while something is in quarantine.
     """
     from kempf.flows.jobs.take_inbox import NeedsAPerson, take_inbox
+    from kempf.flows.process.configuration import setting
+    from kempf.schemas.errors import UsageError
     from kempf.warehouse.source_folder import SourceFolder
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.cli.ingest import tell_outcomes
 
+    place = folder or setting("inbox")
+    if place is None:
+        raise UsageError(
+            "no_inbox",
+            "No inbox is named.",
+            "Give its address, or set it: `inbox` in kempf.toml, or KEMPF_INBOX.",
+        )
     with progress_bar() as progress:
-        run = take_inbox(Warehouse(uri), SourceFolder(folder), progress, new_vessels=new_vessel, settle_s=settle_s)
+        run = take_inbox(Warehouse(uri), SourceFolder(place), progress, new_vessels=new_vessel, settle_s=settle_s)
     if as_json:
         print_json(run.show())
     else:
