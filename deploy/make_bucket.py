@@ -1,4 +1,4 @@
-"""Make the bucket that KEMPF_WAREHOUSE names, on the S3 server at AWS_ENDPOINT_URL; one that is there is left as it is."""
+"""Make the bucket that KEMPF_WAREHOUSE names, on the server at AWS_ENDPOINT_URL; one that is there stays as it is."""
 
 from __future__ import annotations
 

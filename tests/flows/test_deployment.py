@@ -37,7 +37,7 @@ def test_the_schedules_are_valid(deployments: list[dict[str, Any]]):
     from prefect.client.schemas.schedules import CronSchedule
 
     schedules = [schedule for one in deployments for schedule in one.get("schedules", [])]
-    assert any(one["entrypoint"] == "flows/fleet/flows.py:reprocess" and one["schedules"] for one in deployments)
+    assert any(one["entrypoint"] == "kempf.flows.fleet.flows.reprocess" and one["schedules"] for one in deployments)
     for schedule in schedules:
         assert CronSchedule(cron=schedule["cron"], timezone=schedule["timezone"]).cron == schedule["cron"]
     with pytest.raises(ValueError, match="cron"):  # the check can fail
