@@ -52,7 +52,18 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Image:
 
 
 @pytest.fixture(scope="module")
-def place(built: Image, ferry: Ship) -> Iterator[Place]:
+def installed(built: Image) -> dict[Path, int]:
+    return files(built)
+
+
+def files(built: Image) -> dict[Path, int]:
+    """When each file of the packages was written, ns; left out is what goes elsewhere where it may not be written."""
+    found = Path(built.here("/opt/kempf")).rglob("*")
+    return {path: path.lstat().st_mtime_ns for path in found if path.is_file() and "__pycache__" not in path.parts}
+
+
+@pytest.fixture(scope="module")
+def place(built: Image, installed: dict[Path, int], ferry: Ship) -> Iterator[Place]:
     """Every service but the tables, which come once there is something to show; two ships in the inbox."""
     inbox = Path(built.here("/data/inbox"))
     rows = gzip.decompress(ferry.csv)
@@ -91,13 +102,13 @@ def test_the_image_holds_what_the_tests_ran_on(built: Image) -> None:
     done = subprocess.run(
         [*run, lists], env=built.environment(), cwd=built.folder, capture_output=True, text=True, check=True
     )
-    installed = {re.sub(r"[-_.]+(?=.*==)", "-", one.lower()) for one in done.stdout.split()}
+    there = {re.sub(r"[-_.]+(?=.*==)", "-", one.lower()) for one in done.stdout.split()}
     locked, tested = (pins(ROOT / "requirements" / f"{name}.txt") for name in ("deploy", "develop"))
     assert locked.items() <= tested.items()
     assert pins(ROOT / "requirements" / "runtime.txt").items() <= locked.items()
     pinned = {one.partition(" ")[0] for one in locked}
-    assert installed - pinned == {f"kempf=={version()}"}
-    assert "prefect-dask" in {one.partition("==")[0] for one in installed}
+    assert there - pinned == {f"kempf=={version()}"}
+    assert "prefect-dask" in {one.partition("==")[0] for one in there}
 
 
 def pins(path: Path) -> dict[str, frozenset[str]]:
@@ -138,6 +149,11 @@ def test_a_night_from_the_inbox_to_the_dashboard(place: Place) -> None:
         for target in panel["targets"]:
             query = target["rawSql"].replace("${tables}", place.here(asked)).replace("${vessel}", VESSELS[0])
             assert duckdb.sql(query).fetchall(), query
+
+
+def test_no_service_writes_where_the_image_lets_only_root(place: Place, installed: dict[Path, int]) -> None:
+    assert len(place.logs) == len(place.services) - 1, "all but Grafana have run"
+    assert len(installed) > 1000 and files(place.image) == installed
 
 
 def answer(address: str, asked: dict[str, Any] | None = None) -> bytes:
