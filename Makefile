@@ -86,6 +86,9 @@ lock: $(VENV)/.uv
 		--no-emit-find-links --no-header --group build --group dev pyproject.toml -c requirements/runtime.txt \
 		-o requirements/develop.txt
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+		--no-emit-find-links --no-header --group build --extra dask pyproject.toml -c requirements/develop.txt \
+		-o requirements/deploy.txt
+	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 		--no-emit-find-links --no-header --group build --group rivals pyproject.toml -c requirements/develop.txt \
 		-o requirements/rivals.txt
 

@@ -173,8 +173,20 @@ def _processor() -> str:
 
 @cache
 def git_commit() -> str | None:
-    """Return the commit of the source, ``-dirty`` behind it where files differ from it; None outside a checkout."""
-    return commit_of(_folder(pipeline.__file__))
+    """Return the commit of the source, ``-dirty`` behind it where files differ from it; None where nothing tells it.
+
+    Outside a checkout it is what was written into the package when that was built.
+    """
+    package = _folder(pipeline.__file__)
+    return commit_of(package) or built_from(package.parent)
+
+
+def built_from(folder: Path) -> str | None:
+    """Return the commit that the builder of a package wrote into its folder, None where none did."""
+    try:
+        return (folder / "commit.txt").read_text(encoding="utf-8").strip() or None
+    except OSError:
+        return None
 
 
 def commit_of(package: Path) -> str | None:

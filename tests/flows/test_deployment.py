@@ -24,9 +24,8 @@ def test_every_deployment_runs_a_flow_that_is_there(deployments: list[dict[str, 
 
     assert deployments
     for one in deployments:
-        path, _, name = one["entrypoint"].partition(":")
-        assert (ROOT / path).is_file()
-        flow = getattr(import_module(path.removesuffix(".py").replace("/", ".")), name)
+        module, _, name = one["entrypoint"].rpartition(".")
+        flow = getattr(import_module(module), name)
         assert isinstance(flow, Flow)
         parameters = inspect.signature(flow.fn).parameters
         assert set(one.get("parameters", {})) <= set(parameters)
@@ -37,7 +36,7 @@ def test_the_schedules_are_valid(deployments: list[dict[str, Any]]):
     from prefect.client.schemas.schedules import CronSchedule
 
     schedules = [schedule for one in deployments for schedule in one.get("schedules", [])]
-    assert any(one["entrypoint"] == "flows/fleet/flows.py:reprocess" and one["schedules"] for one in deployments)
+    assert any(one["entrypoint"] == "kempf.flows.fleet.flows.reprocess" and one["schedules"] for one in deployments)
     for schedule in schedules:
         assert CronSchedule(cron=schedule["cron"], timezone=schedule["timezone"]).cron == schedule["cron"]
     with pytest.raises(ValueError, match="cron"):  # the check can fail

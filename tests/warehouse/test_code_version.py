@@ -94,6 +94,14 @@ def test_without_git_there_is_no_commit(tmp_path: Path, monkeypatch: pytest.Monk
     assert code_version.commit_of(ROOT / "pipeline") is None
 
 
+def test_a_package_may_say_which_commit_it_was_built_from(tmp_path: Path) -> None:
+    assert code_version.built_from(tmp_path) is None
+    (tmp_path / "commit.txt").write_text("0123abc\n")
+    assert code_version.built_from(tmp_path) == "0123abc"
+    (tmp_path / "commit.txt").write_text("\n")
+    assert code_version.built_from(tmp_path) is None
+
+
 def test_importing_the_store_loads_no_heavy_library() -> None:
     code = (
         "import sys, kempf.warehouse.store, kempf.warehouse.raw;"
