@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from typing import Any, Literal
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
 from kempf.schemas.errors import UsageError
 from kempf.schemas.faults import faults_of
-
-LogLevel = Literal["debug", "info", "warning", "error"]
+from kempf.schemas.settings import VARIABLES, LogLevel
 
 
 class Metrics(BaseModel):
@@ -42,22 +41,8 @@ class Configuration(BaseModel):
     lineage: Lineage = Field(default_factory=Lineage, description="where the OpenLineage events of a run go")
 
 
-#: By name, the environment variable that goes before the file. That of lineage is OpenLineage's own.
-VARIABLES = {
-    "warehouse": "KEMPF_WAREHOUSE",
-    "inbox": "KEMPF_INBOX",
-    "dask": "KEMPF_DASK",
-    "log_level": "KEMPF_LOG_LEVEL",
-    "metrics.textfile": "KEMPF_METRICS_TEXTFILE",
-    "metrics.pushgateway": "KEMPF_METRICS_PUSHGATEWAY",
-    "lineage.url": "OPENLINEAGE_URL",
-}
-#: None where nothing is set anywhere.
-EMPTY = Configuration()
-
-
 def value_of(configuration: Configuration, name: str) -> str | None:
-    """Return a setting by its name in `VARIABLES`."""
+    """Return a setting by its name in `settings.VARIABLES`."""
     found: Any = configuration
     for part in name.split("."):
         found = getattr(found, part)

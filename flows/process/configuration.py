@@ -6,10 +6,13 @@ import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import get_args
+from typing import TYPE_CHECKING, get_args
 
-from kempf.schemas.configuration import EMPTY, VARIABLES, Configuration, LogLevel, parse, value_of
 from kempf.schemas.errors import NotFound, UsageError
+from kempf.schemas.settings import VARIABLES, LogLevel
+
+if TYPE_CHECKING:
+    from kempf.schemas.configuration import Configuration
 
 #: Variable that names the file, and its name where nobody names one.
 FILE_VARIABLE, FILE = "KEMPF_CONFIG", "kempf.toml"
@@ -36,7 +39,7 @@ def setting(name: str, environment: Mapping[str, str] | None = None) -> str | No
     Parameters
     ----------
     name : str
-        Of `schemas.configuration.VARIABLES`.
+        Of `schemas.settings.VARIABLES`.
     environment : mapping of str, optional
         Instead of that of the process.
 
@@ -69,8 +72,12 @@ def in_force(name: str, environment: Mapping[str, str] | None = None) -> Setting
     variable = VARIABLES[name]
     if variables.get(variable):
         return Setting(name, variables[variable], variable)
-    path, configuration = read(variables)
-    value = value_of(configuration, name)
+    path = file_of(variables)
+    if path is None:
+        return Setting(name, None, None)
+    from kempf.schemas.configuration import value_of
+
+    value = value_of(_read(path), name)
     return Setting(name, value, str(path) if value is not None else None)
 
 
@@ -79,12 +86,12 @@ def every(environment: Mapping[str, str] | None = None) -> list[Setting]:
     return [in_force(name, environment) for name in VARIABLES]
 
 
-def read(environment: Mapping[str, str]) -> tuple[Path | None, Configuration]:
-    """Return the file that is in force with what it says; None where there is none."""
-    path = _file(environment)
-    if path is None:
-        return None, EMPTY
+def _read(path: Path) -> Configuration:
+    """Return what a file says."""
+    # what most commands do without: they have no file
     import tomllib
+
+    from kempf.schemas.configuration import parse
 
     try:
         content = tomllib.loads(path.read_text(encoding="utf-8"))
@@ -102,10 +109,11 @@ def read(environment: Mapping[str, str]) -> tuple[Path | None, Configuration]:
             f"Look at its permissions, or name another file with {FILE_VARIABLE}.",
             {"path": str(path)},
         ) from error
-    return path, parse(content, str(path))
+    return parse(content, str(path))
 
 
-def _file(environment: Mapping[str, str]) -> Path | None:
+def file_of(environment: Mapping[str, str]) -> Path | None:
+    """Return the file that is in force, None where there is none; raises ``no_configuration``."""
     named = environment.get(FILE_VARIABLE)
     if named:
         path = Path(named).expanduser()

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from kempf.flows.process.configuration import every, setting
-from kempf.schemas.configuration import VARIABLES
+from kempf.schemas.settings import VARIABLES
 from kempf.workbench.notebook.warehouse_view import open_warehouse
 from tests.conftest import Ship
 from tests.workbench.driving import kempf, process, refused

@@ -18,7 +18,7 @@ def command(as_json: bool) -> None:
     KEMPF_CONFIG names, else ./kempf.toml, else kempf/kempf.toml in XDG_CONFIG_HOME (~/.config).
     """
     from kempf.flows.process.configuration import every
-    from kempf.schemas.configuration import VARIABLES
+    from kempf.schemas.settings import VARIABLES
 
     settings = every()
     if as_json:
