@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from functools import reduce
 from json import loads
 from typing import TYPE_CHECKING, Any
+from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.warehouse import delta
@@ -362,3 +363,36 @@ def _set(row: dict[str, Any]) -> ParameterSet:
     contents |= {name: tuple(StoredValue(**item) for item in row.pop(name)) for name in _ESTIMATES}
     del row["vessel_key"]
     return ParameterSet(**row, **contents)
+
+
+def stored_at_ms(warehouse: Warehouse) -> dict[str, int]:
+    """Return when each parameter set was stored, ms since 1970, by id: the time of the commit that brought it.
+
+    The files of all commits are kept, see `kempf.warehouse.compaction.ALWAYS`; a set whose file is damaged has no time.
+    """
+    found: dict[str, int] = {}
+    with delta.reading(warehouse, "parameter_sets") as table:
+        times = delta.commit_times(table) if table is not None else []
+    for version, milliseconds in enumerate(times):
+        for path in _files_added(warehouse, version):
+            for name in _ids_in(warehouse, path):
+                # compaction brings it again
+                found.setdefault(name, milliseconds)
+    return found
+
+
+def _ids_in(warehouse: Warehouse, path: str) -> list[str]:
+    import polars as pl
+
+    with warehouse.opened("parameter_sets", *path.split("/")) as stream:
+        try:
+            return [] if stream is None else pl.read_parquet(stream, columns=["parameter_set_id"]).to_series().to_list()
+        except pl.exceptions.PolarsError:
+            return []
+
+
+def _files_added(warehouse: Warehouse, version: int) -> list[str]:
+    """Return the paths of the data files that a commit added, below the table."""
+    commit = warehouse.read_bytes("parameter_sets", "_delta_log", f"{version:020d}.json") or b""
+    actions = [loads(line) for line in commit.splitlines() if line.strip()]
+    return [unquote(action["add"]["path"]) for action in actions if "add" in action]

@@ -11,7 +11,7 @@ from typing import Any
 
 import polars as pl
 
-from kempf.warehouse import aliases, delta, examinations, history, logs, said, segments, vessels
+from kempf.warehouse import aliases, delta, examinations, history, logs, parameter_sets, said, segments, vessels
 from kempf.warehouse.store import Warehouse
 
 _TIME = pl.Datetime("us", "UTC")
@@ -25,7 +25,8 @@ def parameter_history(warehouse: Warehouse) -> pl.DataFrame:
     """
     names = vessels.names(warehouse)
     schema: dict[str, Any] = {"vessel": pl.String, **_PARAMETER}
-    frames = [_of_vessel(warehouse, name) for name in names]
+    stored = parameter_sets.stored_at_ms(warehouse) if names else {}
+    frames = [_of_vessel(warehouse, name, stored) for name in names]
     found = pl.concat([pl.DataFrame(schema=schema), *frames]) if frames else pl.DataFrame(schema=schema)
     return found.sort("vessel", "start_at", "parameter_set_id", "parameter")
 
@@ -50,7 +51,7 @@ _PARAMETER: dict[str, Any] = {
 }
 
 
-def _of_vessel(warehouse: Warehouse, vessel: str) -> pl.DataFrame:
+def _of_vessel(warehouse: Warehouse, vessel: str, stored_ms: Mapping[str, int]) -> pl.DataFrame:
     found = history.of_vessel(warehouse, vessel, superseded=True)
     current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
     facts = _sets(warehouse, vessel)
@@ -59,6 +60,7 @@ def _of_vessel(warehouse: Warehouse, vessel: str) -> pl.DataFrame:
             **{key: row[key] for key in ("parameter", "value", "std", "low", "high", "unit", "model", "estimator")},
             **{key: row[key] for key in ("converged", "superseded", "parameter_set_id")},
             **facts[row["parameter_set_id"]],
+            "stored_at": _in_us(stored_ms.get(row["parameter_set_id"])),
             "vessel": vessel,
             "start_at": row["start_utc_ns"] // 1000,
             "current": row["parameter_set_id"] == current,
@@ -72,22 +74,20 @@ def _of_vessel(warehouse: Warehouse, vessel: str) -> pl.DataFrame:
 
 
 def _sets(warehouse: Warehouse, vessel: str) -> dict[str, dict[str, Any]]:
-    """Return effects, code and the time at which it was stored of every set of a vessel, by id."""
+    """Return effects and code of every set of a vessel, by id."""
     from kempf.warehouse.keys import vessel_key
 
     columns = ("parameter_set_id", "model_json", "provenance_json")
     frame = delta.read(warehouse, "parameter_sets", {"vessel_key": vessel_key(vessel)}, columns)
-    with delta.reading(warehouse, "parameter_sets") as table:
-        times = delta.commit_times(table) if table is not None else []
-    return {name: _facts(loads(model), loads(provenance), times) for name, model, provenance in frame.rows()}
+    return {name: _facts(loads(model), loads(provenance)) for name, model, provenance in frame.rows()}
 
 
-def _facts(model: Mapping[str, Any], provenance: Mapping[str, Any], times: list[int]) -> dict[str, Any]:
-    # it was stored by the first commit behind the version that it was made beside
-    before = int((provenance.get("table_versions") or {}).get("parameter_sets", -1))
-    stored = times[before + 1] * 1000 if before + 1 < len(times) else None
-    code = provenance.get("code_version")
-    return {"effects": " + ".join(model.get("effects") or ()), "stored_at": stored, "code": code}
+def _facts(model: Mapping[str, Any], provenance: Mapping[str, Any]) -> dict[str, Any]:
+    return {"effects": " + ".join(model.get("effects") or ()), "code": provenance.get("code_version")}
+
+
+def _in_us(milliseconds: int | None) -> int | None:
+    return None if milliseconds is None else milliseconds * 1000
 
 
 def manoeuvres(warehouse: Warehouse) -> pl.DataFrame:

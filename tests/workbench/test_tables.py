@@ -15,9 +15,10 @@ from kempf.flows.jobs.correct_segments import plan_for
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.warehouse import history, segments
+from kempf.warehouse import compaction, delta, history, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
+from tests.warehouse.samples import inputs, parameter_set
 from tests.workbench.driving import kempf
 
 duckdb = pytest.importorskip("duckdb", reason="duckdb is not installed: no SQL to try")
@@ -69,6 +70,23 @@ def test_parameters_are_a_row_each(place: Warehouse, written: Path) -> None:
     assert (rows[1][2], rows[1][3]) == (own["value"], own["std"]) and rows[1][9] == own["start_utc_ns"] // 1000
     stored = rows[1][8]
     assert isinstance(stored, datetime) and timedelta(0) < datetime.now(UTC) - stored.astimezone(UTC) < timedelta(1)
+
+
+def test_a_set_was_stored_when_the_commit_that_brought_it_was_made(tmp_path: Path) -> None:
+    warehouse = Warehouse(str(tmp_path / "w"))
+    # both made beside a warehouse without sets, as those of parallel batches are
+    made = [parameter_set(made_of=inputs(letter * 64)) for letter in "ab"]
+    for one in made:
+        parameter_sets.insert(warehouse, [one])
+    with delta.reading(warehouse, "parameter_sets") as table:
+        assert table is not None
+        times = delta.commit_times(table)
+    first, second = (one.parameter_set_id for one in made)
+    stored = parameter_sets.stored_at_ms(warehouse)
+    assert stored == {first: times[1], second: times[2]}
+    compaction.compact(warehouse, 1)
+    compaction.vacuum(warehouse, 0.0)
+    assert parameter_sets.stored_at_ms(warehouse) == stored
 
 
 def test_manoeuvres_logs_and_runs(written: Path) -> None:
