@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import csv
 import json
 import re
@@ -145,3 +146,24 @@ def test_a_date_means_the_whole_day(place: Warehouse) -> None:
     assert len(kempf(*at, "--as-of", today.isoformat()).json) == 6
     assert kempf(*at, "--as-of", (today - timedelta(days=1)).isoformat()).json == []
     assert kempf(*at, "--as-of", f"{today.isoformat()}T00:00").json == []
+
+
+def test_the_notebook_runs_on_the_tables(written: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("TABLES", str(written))
+    monkeypatch.setenv("MPLBACKEND", "agg")
+    notebook = json.loads((ROOT / "docs" / "notebooks" / "fleet.ipynb").read_text(encoding="utf-8"))
+    names: dict[str, object] = {}
+    shown = []
+    for cell in notebook["cells"]:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == []
+            *before, last = ast.parse("".join(cell["source"])).body
+            exec(compile(ast.Module(before, []), "cell", "exec"), names)  # noqa: S102 - the notebook is ours
+            if isinstance(last, ast.Expr):
+                found = eval(compile(ast.Expression(last.value), "cell", "eval"), names)  # noqa: S307
+                shown += [found] if isinstance(found, pl.DataFrame) else []
+            else:
+                exec(compile(ast.Module([last], []), "cell", "exec"), names)  # noqa: S102
+    models, sailed, _, nights = shown
+    assert models["vessel"].to_list() == ["mariner"] and models["parameters"].to_list() == [6]
+    assert sailed["vessel"].to_list() == ["mariner"] and nights["new_sets"].sum() == 2

@@ -37,20 +37,24 @@ def list_vessels(uri: str, as_json: bool) -> None:
 @warehouse_option
 @json_option
 def show(name: str, uri: str, as_json: bool) -> None:
-    """Show a vessel's current profile and how often it changed."""
+    """Show a vessel's current profile, how often it changed, and which folders of the tables are hers."""
     import yaml
 
     from kempf.warehouse import vessels
+    from kempf.warehouse.keys import vessel_key
     from kempf.warehouse.store import Warehouse
 
     versions = vessels.versions(Warehouse(uri), name)
     profile = versions[-1].profile.model_dump(mode="json", exclude_none=True)
-    shown = {"vessel": name, "profile": profile, "versions": [v.profile_sha256 for v in versions]}
+    partition = f"vessel_key={vessel_key(name)}"
+    hashes = [v.profile_sha256 for v in versions]
+    shown = {"vessel": name, "profile": profile, "versions": hashes, "partition": partition}
     if as_json:
         print_json(shown)
         return
     click.echo(yaml.safe_dump(profile, sort_keys=False, allow_unicode=True), nl=False)
     click.echo(f"# version {number(len(versions))} of the profile, {versions[-1].profile_sha256}")
+    click.echo(f"# her rows are in the folders {partition} of the tables")
 
 
 @command.command("set")
