@@ -7,6 +7,7 @@ import os
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import pytest
@@ -14,8 +15,9 @@ import yaml
 
 from tests.made_once import made_once
 
-# of the tests and of all processes they start: nobody's own settings
-os.environ["XDG_CONFIG_HOME"] = os.devnull
+# the tests and all processes that they start read nobody's own settings
+_NO_SETTINGS = TemporaryDirectory(prefix="kempf-tests-")
+os.environ["XDG_CONFIG_HOME"] = _NO_SETTINGS.name
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:
