@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -26,6 +27,8 @@ if TYPE_CHECKING:
 
 #: Logs that are stored together, at most; and their bytes as delivered, which compression may hide twentyfold.
 _MOST_LOGS, _MOST_BYTES = 60, 8 << 20
+
+_log = logging.getLogger("kempf.jobs")
 
 
 @dataclass(frozen=True)
@@ -110,6 +113,9 @@ def refresh_all(warehouse: Warehouse, stale: Mapping[str, Stale], progress: Prog
         progress(next(done), steps, what)
 
     profiles = {vessel: hers.profile for vessel, hers in stale.items()}
+    if steps:
+        unread_logs = sum(len(hers.unread) for hers in stale.values())
+        _log.info("%d logs to be read anew, %d only searched anew", unread_logs, steps - unread_logs)
     failed = _read_anew(warehouse, [row for hers in stale.values() for row in hers.unread], profiles, begin)
     failed |= _search_anew(warehouse, [row for hers in stale.values() for row in hers.unsearched], begin)
     return {vessel: _refreshed(hers, failed) for vessel, hers in stale.items()}

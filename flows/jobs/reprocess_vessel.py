@@ -6,6 +6,7 @@ and each commit looks at all of them.
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -31,6 +32,8 @@ from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, history, parameter_sets, segments
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.store import Warehouse
+
+_log = logging.getLogger("kempf.jobs")
 
 
 def reprocess_vessel(
@@ -109,6 +112,12 @@ def reprocess_vessels(
     runs = [(w.report, w.report.as_run(w.left, changed_only=changed_only, estimator=estimator)) for w in all_of_them]
     _together(all_of_them, lambda: remember_all(warehouse, runs))
     _together(all_of_them, lambda: remember_history(warehouse, [w.report for w in all_of_them], flow_run))
+    for report in (work.report for work in all_of_them):
+        _log.info(
+            "%s: %s; %d logs, %d read anew; %d zigzags; %d sets made, %d kept; %d failures, %d findings",
+            *(report.vessel, report.status, report.logs, report.reread, report.segments, report.new_sets),
+            *(report.kept_sets, len(report.failures), len(report.findings)),
+        )
     return [work.report for work in all_of_them]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,6 +22,8 @@ from kempf.warehouse.canonical import canonical_json, sha256
 from kempf.warehouse.inbox import InboxFile
 from kempf.warehouse.source_folder import SourceFile, SourceFolder
 from kempf.warehouse.store import Warehouse
+
+_log = logging.getLogger("kempf.jobs")
 
 #: a file that was written less than so many seconds ago may still be being written
 SETTLE_S = 60.0
@@ -137,6 +140,10 @@ def take_inbox(
         else:
             due.append(_placed(register, file))
     todo = [one for one in due if one.is_new(before.get(one.file.address))]
+    _log.info(
+        "inbox %s: %d files to look at, %d known, %d left for the next run",
+        *(folder.address, len(todo), len(due) - len(todo), len(waiting)),
+    )
     rows, outcomes = [*folders.rows(before), *_gone(files, before)], []
     for done, one in enumerate(todo):
         progress(done, len(todo), f"reading {one.file.name}")
@@ -272,6 +279,7 @@ def take(warehouse: Warehouse, folder: SourceFolder, one: Placed) -> tuple[Inbox
         found = wrapped(error)
         if found.code in _NO_FILES:
             raise found from error
+        _log.info("%s: into quarantine: [%s] %s", file.path, found.code, found.message)
         return _quarantined(file, one.vessel, found, one.basis), None
     row = InboxFile(
         *(file.address, file.size_bytes, file.modified_utc_ns, "ingested", one.vessel, outcome.log_id),
