@@ -80,6 +80,19 @@ def seal(table: DeltaTable) -> None:
     vars(table)[_SEALED] = newest
 
 
+def unsealed(folder: Path) -> list[int]:
+    """Return the versions of a table whose commits are there and not sealed, in order."""
+    known = set(sealed_versions(folder))
+    names = [path.stem for path in (folder / "_delta_log").glob("*.json")]
+    return sorted(int(name) for name in names if name.isdigit() and int(name) not in known)
+
+
+def seal_every(folder: Path) -> None:
+    """Seal every version of a table that is not sealed yet, whatever came after it."""
+    for version in unsealed(folder):
+        _seal_version(folder, version)
+
+
 def seal_checkpoint(table: DeltaTable) -> None:
     """Seal the checkpoint of the open version, where it has one."""
     folder = folder_of(table)
