@@ -3,8 +3,7 @@
 A data file in which a bit has flipped is often read as other numbers, and a table whose last commit is gone as the
 table of before. So every commit is copied with its hash into ``_seals/log`` beside the table, and the hash of every
 data file into ``_seals/data``; both are compared before anything is read. What is not sealed, because its writer was
-killed or was an earlier version, is sealed by the next writer. In a bucket there are no seals: the store itself keeps
-checksums.
+killed, is sealed by the next writer. In a bucket there are no seals: the store itself keeps checksums.
 """
 
 from __future__ import annotations

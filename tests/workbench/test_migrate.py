@@ -19,9 +19,14 @@ from typing import Any
 
 import pytest
 
-from kempf.warehouse import delta, parameter_sets, seals
+import kempf as kempf_package
+from kempf.flows.fleet import flows
+from kempf.flows.jobs.take_inbox import take_inbox
+from kempf.schemas.errors import KempfError
+from kempf.warehouse import delta, logs, parameter_sets, seals
 from kempf.warehouse.marker import LAYOUT, Marker
 from kempf.warehouse.migrations.chain import forward
+from kempf.warehouse.source_folder import SourceFolder
 from kempf.warehouse.store import Warehouse
 from tests.flows.content import TOLD, seen
 from tests.workbench.driving import environment, kempf, refused, tree
@@ -142,6 +147,32 @@ def test_a_set_is_built_again_with_the_same_values(brought: Path) -> None:
     # other code or packages than those of then may move what follows from the bytes
     if not done.json["code_changed"] and not done.json["packages_changed"]:
         assert done.code == 0 and done.json["verdict"] == "bit-identical", done
+
+
+def test_notebook_and_flows_say_the_same(place: Path, tmp_path: Path) -> None:
+    (tmp_path / "inbox" / "ferry").mkdir(parents=True)
+    (tmp_path / "inbox" / "ferry" / "day.csv").write_text("time,heading\n", "utf-8")
+    inbox = SourceFolder(str(tmp_path / "inbox"))
+    for ask in (
+        kempf_package.open(str(place)).vessels,
+        lambda: flows.reprocess.fn(str(place)),
+        lambda: take_inbox(Warehouse(str(place)), inbox, settle_s=0.0),
+    ):
+        with pytest.raises(KempfError) as caught:
+            ask()
+        assert caught.value.code == "warehouse_layout_old" and "kempf migrate" in caught.value.next_step
+
+
+def test_what_is_purged_after_is_gone_from_the_files_of_before_too(tmp_path: Path) -> None:
+    place = unpacked("earlier_warehouse", tmp_path) / "warehouse"
+    assert kempf("migrate", "--yes", "--warehouse", place).code == 0
+    log, other = kempf("logs", "list", "--warehouse", place, "--json").json
+    ingest = {row.log_id: row.ingest_id for row in logs.current(Warehouse(str(place)))}
+    done = kempf("purge", log["log_id"], "--reason", "end of the charter", "--yes", "--warehouse", place)
+    assert done.code == 0, done
+    files = [path.parent.name for path in (place / "readings").rglob("part-*.parquet")]
+    assert f"ingest_id={ingest[log['log_id']]}" not in files and f"ingest_id={ingest[other['log_id']]}" in files
+    assert kempf("verify", "--warehouse", place).out.strip() == "all is well"
 
 
 #: Brings a warehouse forward a commit a log, and dies before the so-many-th time that it would write; without a number
