@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import polars as pl
 
@@ -15,9 +15,6 @@ from kempf.warehouse.store import Warehouse
 
 #: the set that every command takes unless another is named
 CURRENT = "current"
-#: what earlier versions pointed to the model with effects and to the pooled set, before there was one ``current``; they
-#: come first where a warehouse still has them, and go when ``current`` is pointed anew
-EARLIER = ("model", "pooled")
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9._-]{0,63}")
 
 
@@ -72,15 +69,10 @@ def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tu
             keys = sorted({row["vessel_key"] for row in rows.values()})
             known = delta.rows(table, "aliases", {"vessel_key": keys}).rows(named=True)
             stored = {(row["vessel"], row["alias"]): row["parameter_set_id"] for row in known}
-            dated = {vessel for vessel, alias in stored if alias in EARLIER}
-            changed = tuple(
-                key for key in rows if stored.get(key) != wanted[key] or (key[1] == CURRENT and key[0] in dated)
-            )
+            changed = tuple(key for key in rows if stored.get(key) != wanted[key])
             if changed:
                 # of one name only: several would also name what is not among them
                 of = {alias: [rows[key]["vessel_key"] for key in changed if key[1] == alias] for _, alias in changed}
-                if CURRENT in of:
-                    of |= dict.fromkeys(EARLIER, of[CURRENT])
                 predicate = " OR ".join(
                     f"({one_of('vessel_key', whose)} AND alias = {quoted(alias)})" for alias, whose in of.items()
                 )
@@ -102,19 +94,33 @@ def holders(warehouse: Warehouse, alias: str) -> dict[str, str]:
     return {vessel: names[alias] for vessel, names in pointed.items() if alias in names}
 
 
+def named(warehouse: Warehouse, names: Sequence[str]) -> dict[tuple[str, str], str]:
+    """Return the parameter set id that each of some aliases points to, by vessel and alias."""
+    rows = delta.read(warehouse, "aliases", {"alias": list(names)}).rows(named=True)
+    return {(row["vessel"], row["alias"]): row["parameter_set_id"] for row in rows}
+
+
+def drop(warehouse: Warehouse, names: Sequence[str]) -> None:
+    """Take aliases of some names away from every vessel."""
+
+    def attempt() -> None:
+        with delta.ensured(warehouse, "aliases") as table:
+            delta.replace(table, "aliases", [], one_of("alias", names))
+
+    with_retry(attempt)
+
+
 def _pointed(rows: pl.DataFrame) -> dict[str, str]:
     """Return the parameter set id of every alias in the rows of one vessel, sorted by alias."""
-    stored = dict(zip(rows["alias"].to_list(), rows["parameter_set_id"].to_list(), strict=True))
-    dated = [stored.pop(alias) for alias in EARLIER if alias in stored]
-    return dict(sorted((stored | ({CURRENT: dated[0]} if dated else {})).items()))
+    return dict(sorted(zip(rows["alias"].to_list(), rows["parameter_set_id"].to_list(), strict=True)))
 
 
 def _require_name(alias: str) -> None:
-    if not _NAME.fullmatch(alias) or alias in EARLIER or alias.startswith("ps-"):
+    if not _NAME.fullmatch(alias) or alias.startswith("ps-"):
         raise UsageError(
             "alias_invalid",
             f"{alias!r} cannot name a parameter set; expected a letter, then letters, digits, dots, hyphens or "
-            f"underscores, not {' or '.join(map(repr, EARLIER))}, and nothing that looks like an id.",
+            "underscores, and nothing that looks like an id.",
             "Choose a name such as 'as-built' or 'after-docking'.",
         )
 

@@ -59,9 +59,8 @@ def compact(warehouse: Warehouse, more_files_than: int = 50) -> tuple[str, ...]:
     """Compact the tables that have many files. Earlier versions stay readable: nothing is deleted.
 
     A table that is not kept a folder a vessel is sorted by vessel, in small groups of rows, so that reading one
-    vessel skips the others. Readings become one file a vessel and month, or few of a month of very long logs; those of
-    earlier versions of kempf stay one file a log. A table of many files is given a checkpoint, which opens several
-    times as fast as its commits.
+    vessel skips the others. Readings become one file a vessel and month, or few of a month of very long logs. A table
+    of many files is given a checkpoint, which opens several times as fast as its commits.
 
     Parameters
     ----------

@@ -10,7 +10,7 @@ from __future__ import annotations
 import logging
 import os
 from bisect import bisect_right
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from datetime import UTC, datetime
 from itertools import accumulate
@@ -349,6 +349,50 @@ def replace(
         )
         seals.seal(table)
     _log.debug("table %s: version %d is committed", name, table.version())
+
+
+def append_alone(
+    table: DeltaTable, name: str, new: Iterator[pl.DataFrame], lay_out: Mapping[str, Any] | None = None
+) -> None:
+    """Add rows in one commit on the very version that is open, or fail: no commit of another process is passed over.
+
+    Parameters
+    ----------
+    table : DeltaTable
+        From `open_table`.
+    name : str
+        Its name.
+    new : iterator of polars.DataFrame
+        New rows, with every column of the table.
+    lay_out : mapping, optional
+        Take all rows of before out and give the table the columns and folders that it has in
+        `kempf.schemas.tables.TABLES`; this is what the commit says of itself.
+
+    Raises
+    ------
+    deltalake.exceptions.CommitFailedError
+        Another process committed since the table was opened.
+    KempfError
+        ``disk_full``, ``warehouse_not_writable``.
+    """
+    import pyarrow as pa
+    from deltalake import CommitProperties, WriterProperties, write_deltalake
+
+    schema = arrow_schema(TABLES[name])
+    schema = schema if lay_out is not None else _as_described(table, schema)
+    anew: dict[str, Any] = {"mode": "append"}
+    if lay_out is not None:
+        folders = list(TABLES[name].partition_by)
+        anew = {"mode": "overwrite", "schema_mode": "overwrite", "partition_by": folders}
+    with refusals_as_errors(table.table_uri):
+        write_deltalake(
+            table,
+            pa.RecordBatchReader.from_batches(schema, _batches(new, schema)),
+            writer_properties=WriterProperties(compression="ZSTD"),
+            commit_properties=CommitProperties(custom_metadata=dict(lay_out or {}) or None, max_commit_retries=0),
+            **anew,
+        )
+        seals.seal(table)
 
 
 def _as_described(table: DeltaTable, schema: pa.Schema) -> pa.Schema:

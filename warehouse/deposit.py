@@ -137,6 +137,23 @@ def description(row: logs.LogRow, profile: VesselProfile) -> dict[str, Any]:
     }
 
 
+def not_described(warehouse: Warehouse) -> dict[str, dict[str, Any]]:
+    """Return what should be kept beside every raw log beside which something else is, or nothing.
+
+    One whose profile is lost is left out.
+    """
+    profiles = {one.profile_sha256: one.profile for one in vessels.all_versions(warehouse)}
+    known = logs.find(warehouse, raw.kept(warehouse))
+    facts = {n: description(r, profiles[r.profile_sha256]) for n, r in known.items() if r.profile_sha256 in profiles}
+    return {name: wanted for name, wanted in sorted(facts.items()) if raw.described(warehouse, name) != wanted}
+
+
+def describe_all(warehouse: Warehouse) -> None:
+    """Keep beside every raw log what its register says; one whose profile is lost is left as it is."""
+    for name, facts in not_described(warehouse).items():
+        raw.describe(warehouse, name, facts)
+
+
 def _outcome(revision: int | None, was_removed: bool) -> Outcome:
     if revision is None:  # it was there, or another process recorded the same ingest meanwhile
         return "unchanged"

@@ -123,13 +123,14 @@ def _write(
                 yield frame.with_columns(pl.lit(value).alias(column) for column, value in constants.items())
 
     held = {row.ingest_id: row for row, _ in batch}
-    named = [one_of("vessel_key", {vessel_key(row.vessel) for row in held.values()}), one_of("ingest_id", held)]
-    months = one_of("month", {month_of(row.start_utc_ns) for row in held.values()})
+    where = (
+        one_of("vessel_key", {vessel_key(row.vessel) for row in held.values()}),
+        one_of("ingest_id", held),
+        one_of("month", {month_of(row.start_utc_ns) for row in held.values()}),
+    )
 
     def attempt() -> None:
         with delta.ensured(warehouse, name) as table:
-            # of a table from before there were months the rows of an ingest may have none
-            where = [*named, months] if "month" in table.metadata().partition_columns else named
             delta.replace(table, name, rows(), " AND ".join(where))
 
     with_retry(attempt)

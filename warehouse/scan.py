@@ -33,7 +33,7 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     name : str
         Key of `kempf.schemas.tables.TABLES`; a column of it that the table lacks is null.
     where : mapping, optional
-        A month is not asked for in a table from before there were folders by month: nothing else depends on it.
+        As `kempf.warehouse.delta.read` takes it.
 
     Returns
     -------
@@ -43,8 +43,6 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     import polars as pl
 
     asked = {c: v[0] if not isinstance(v, str) and len(v) == 1 else v for c, v in (where or {}).items()}
-    if table is not None and "month" in asked and "month" not in table.metadata().partition_columns:
-        del asked["month"]
     single = {column: value for column, value in asked.items() if isinstance(value, str)}
     empty = _empty(name)
     if table is None:

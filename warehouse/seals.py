@@ -3,8 +3,7 @@
 A data file in which a bit has flipped is often read as other numbers, and a table whose last commit is gone as the
 table of before. So every commit is copied with its hash into ``_seals/log`` beside the table, and the hash of every
 data file into ``_seals/data``; both are compared before anything is read. What is not sealed, because its writer was
-killed or was an earlier version, is sealed by the next writer. In a bucket there are no seals: the store itself keeps
-checksums.
+killed, is sealed by the next writer. In a bucket there are no seals: the store itself keeps checksums.
 """
 
 from __future__ import annotations
@@ -78,6 +77,19 @@ def seal(table: DeltaTable) -> None:
         with suppress(FileNotFoundError):  # cleaned up, or being brought forward: then there is nothing to seal
             _seal_version(folder, version)
     vars(table)[_SEALED] = newest
+
+
+def unsealed(folder: Path) -> list[int]:
+    """Return the versions of a table whose commits are there and not sealed, in order."""
+    known = set(sealed_versions(folder))
+    names = [path.stem for path in (folder / "_delta_log").glob("*.json")]
+    return sorted(int(name) for name in names if name.isdigit() and int(name) not in known)
+
+
+def seal_every(folder: Path) -> None:
+    """Seal every version of a table that is not sealed yet, whatever came after it."""
+    for version in unsealed(folder):
+        _seal_version(folder, version)
 
 
 def seal_checkpoint(table: DeltaTable) -> None:

@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import hashlib
-import json
 import os
 import re
 import secrets
@@ -23,11 +21,9 @@ from typing import Any, BinaryIO
 from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.warehouse import marker as markers
 from kempf.warehouse import object_store
-
-#: Name and content of the file that marks a warehouse.
-MARKER = "kempf-warehouse.json"
-LAYOUT = 2
+from kempf.warehouse.marker import LAYOUT, MARKER, Marker
 
 #: Characters that the readers of the tables give another meaning: escapes, patterns, and = as a partition's folder.
 _UNADDRESSABLE = "%=[]*?^|{}" if os.sep == "\\" else "%=[]*?^|{}\\"
@@ -44,6 +40,8 @@ class Warehouse:
     storage_options : mapping of str, optional
         Options of the object store, such as ``AWS_ENDPOINT_URL``; they go before those of the environment, and are
         never stored.
+    migrating : bool, optional
+        Whether it is opened by what brings it forward: then one of an earlier layout is a warehouse, too.
 
     Raises
     ------
@@ -53,6 +51,7 @@ class Warehouse:
 
     uri: str
     storage_options: Mapping[str, str] | None = field(default=None, repr=False, hash=False)
+    migrating: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
         if not self.uri.strip():
@@ -223,29 +222,66 @@ class Warehouse:
         Raises
         ------
         KempfError
-            ``warehouse_layout``: it is there, but was made by a newer version; ``warehouse_marker_damaged``.
+            ``warehouse_layout``, ``warehouse_layout_old``, ``warehouse_migrating``: it is there, but of a newer or an
+            earlier layout, or on the way to this one; ``warehouse_marker_damaged``.
         """
         if self.folder is None and vars(self).get("_stood"):
             return True  # a bucket is asked once; a folder may be moved away while we look
-        marker = self.read_bytes(MARKER)
-        if marker is None:
+        found = self.marker()
+        if found is None:
             return False
-        layout = _layout(marker)
-        if layout is None:
+        self._refuse_other_layout(found)
+        vars(self)["_stood"] = True
+        return True
+
+    def _refuse_other_layout(self, found: Marker) -> None:
+        told = {"found": found.layout, "expected": LAYOUT}
+        if found.layout > LAYOUT:
+            raise KempfError(
+                "warehouse_layout",
+                f"The warehouse {self.uri} has layout {found.layout}; this version reads layout {LAYOUT}.",
+                "Update kempf, or give another folder with --warehouse.",
+                told,
+            )
+        if self.migrating:
+            return
+        if found.migrating is not None:
+            raise KempfError(
+                "warehouse_migrating",
+                f"The warehouse {self.uri} is being brought from layout {found.migrating} to layout {found.layout}, "
+                "which is not finished.",
+                "Wait where it is going on; `kempf migrate` finishes one that was interrupted.",
+                {**told, "from": found.migrating},
+            )
+        if found.layout < LAYOUT:
+            raise KempfError(
+                "warehouse_layout_old",
+                f"The warehouse {self.uri} has layout {found.layout}; this version works with layout {LAYOUT}.",
+                "`kempf migrate` brings it forward; nothing is lost.",
+                told,
+            )
+
+    def marker(self) -> Marker | None:
+        """Return what marks the warehouse; None where there is none.
+
+        Raises
+        ------
+        KempfError
+            ``warehouse_marker_damaged``.
+        """
+        data = self.read_bytes(MARKER)
+        found = None if data is None else markers.read(data)
+        if data is not None and found is None:
             raise KempfError(
                 "warehouse_marker_damaged",
                 f"The file {MARKER} of the warehouse {self.uri} is damaged.",
                 "`kempf repair` writes it anew.",
             )
-        if layout != LAYOUT:
-            raise KempfError(
-                "warehouse_layout",
-                f"The warehouse {self.uri} has layout {layout!r}; this version reads layout {LAYOUT}.",
-                "Update kempf, or give another folder with --warehouse.",
-                {"found": layout, "expected": LAYOUT},
-            )
-        vars(self)["_stood"] = True
-        return True
+        return found
+
+    def mark(self, marker: Marker) -> None:
+        """Write what marks the warehouse; raises what `write` raises."""
+        self.write_bytes(marker.written(), MARKER)
 
     def reach(self) -> None:
         """Do nothing where the bucket answers, or for a folder; asked after an error that does not tell the difference.
@@ -307,41 +343,7 @@ class Warehouse:
                     "Give another folder with --warehouse.",
                     {"uri": self.uri},
                 )
-        self.write_bytes(_marker(LAYOUT), MARKER)
-
-    def mend_marker(self) -> bool:
-        """Write the marker anew where it is damaged, or where there are tables and no marker; return whether it was.
-
-        A warehouse of another layout stays as it is.
-        """
-        marker = self.read_bytes(MARKER)
-        damaged = _layout(marker) is None if marker is not None else self._has_tables()
-        if damaged:
-            self.write_bytes(_marker(LAYOUT), MARKER)
-            return True
-        return False
-
-    def _has_tables(self) -> bool:
-        return self.folder is not None and (self.folder / "logs" / "_delta_log").is_dir()
-
-
-def _marker(layout: int) -> bytes:
-    return json.dumps({"layout": layout, "check": _check(layout)}).encode() + b"\n"
-
-
-def _check(layout: int) -> str:
-    """Return what shows that the number of a layout is the one that was written."""
-    return hashlib.sha256(f"kempf layout {layout}".encode()).hexdigest()[:12]
-
-
-def _layout(marker: bytes) -> int | None:
-    """Return the layout that a marker states; None where it is damaged. Earlier versions wrote no check."""
-    try:
-        content = json.loads(marker)
-        layout = int(content["layout"])
-        return layout if content.keys() == {"layout"} or content["check"] == _check(layout) else None
-    except (ValueError, KeyError, TypeError, AttributeError):
-        return None
+        self.mark(Marker(LAYOUT))
 
 
 def _write_through(path: str) -> None:

@@ -66,10 +66,11 @@ def verify(warehouse: Warehouse, look: Look = lambda what: None) -> list[Problem
         look(f"table {name}")
         found += damages(warehouse, name)
     look("references")
-    return [*found, *_unfinished(warehouse), *_references(warehouse)]
+    return [*found, *unfinished(warehouse), *_references(warehouse)]
 
 
-def _unfinished(warehouse: Warehouse) -> Iterator[Problem]:
+def unfinished(warehouse: Warehouse) -> Iterator[Problem]:
+    """Yield the repair that was not finished, where there is one."""
     if warehouse.read_bytes(*UNFINISHED) is not None:
         yield Problem("reference", "readings", "/".join(UNFINISHED), "A repair was not finished.")
 

@@ -23,11 +23,12 @@ from kempf.schemas.errors import KempfError
 from kempf.schemas.profile import parse
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import corrections, delta, logs, lost, raw, readings, seals, vessels
-from kempf.warehouse.deposit import description
+from kempf.warehouse.deposit import describe_all
 from kempf.warehouse.equivalents import code_of, codes_of
 from kempf.warehouse.instant import month_of
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.logs import LogRow
+from kempf.warehouse.migrations.chain import mend_marker
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import ASIDE, UNFINISHED, Problem, verify
 
@@ -44,9 +45,8 @@ class Repaired:
     gone: list[str] = field(default_factory=list)
     #: What is still wrong.
     left: list[Problem] = field(default_factory=list)
-    #: Of what logs gave that had to be taken out: ingests, months (key of the vessel, blank, month), and keys of
-    #: vessels; None stands for all of them.
-    ingests: set[str] = field(default_factory=set)
+    #: Of what logs gave that had to be taken out: months (key of the vessel, blank, month), and keys of vessels; None
+    #: stands for all of them.
     months: set[str] = field(default_factory=set)
     vessel_keys: set[str | None] = field(default_factory=set)
     #: Whether rows of the register of logs had to be taken out: then what is kept beside the raw logs counts.
@@ -66,7 +66,7 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
         ``no_warehouse``.
     """
     found = Repaired()
-    if warehouse.mend_marker():
+    if mend_marker(warehouse):
         found.done.append("The file that marks the warehouse was written anew.")
     warehouse.require()
     _recall(warehouse, found)
@@ -81,7 +81,7 @@ def repair(warehouse: Warehouse, progress: Progress = silent) -> Repaired:
     _removed_again(warehouse, found)
     _each(warehouse, found, progress, _missing_logs(warehouse, found), _taken_in)
     _each(warehouse, found, progress, _unread_logs(warehouse, found), _read_again)
-    _describe(warehouse)
+    describe_all(warehouse)
     if not _unread_left(found):
         warehouse.delete(*UNFINISHED)
     found.left = verify(warehouse, lambda what: progress(0, 1, what))
@@ -131,12 +131,9 @@ def _remember(warehouse: Warehouse, folder: Path, path: Path, name: str, found: 
         return
     elif "month" in parts:
         found.months.add(f"{parts['vessel_key']} {parts['month']}")
-    elif "ingest_id" in parts:
-        found.ingests.add(parts["ingest_id"])
     else:
         found.vessel_keys.add(parts.get("vessel_key"))
     content = {
-        "ingests": sorted(found.ingests),
         "months": sorted(found.months),
         "vessel_keys": sorted(found.vessel_keys, key=str),
         "registers": found.registers,
@@ -149,8 +146,7 @@ def _recall(warehouse: Warehouse, found: Repaired) -> None:
     data = warehouse.read_bytes(*UNFINISHED)
     if data is not None:
         content = json.loads(data)
-        found.ingests |= set(content["ingests"])
-        found.months |= set(content.get("months", ()))
+        found.months |= set(content["months"])
         found.vessel_keys |= set(content["vessel_keys"])
         found.registers = bool(content["registers"])
 
@@ -276,7 +272,7 @@ def _unread_logs(warehouse: Warehouse, found: Repaired) -> list[str]:
 
     def whole(row: LogRow) -> bool:
         key = vessel_key(row.vessel)
-        touched = row.ingest_id in found.ingests or f"{key} {month_of(row.start_utc_ns)}" in found.months
+        touched = f"{key} {month_of(row.start_utc_ns)}" in found.months
         touched = touched or not found.vessel_keys.isdisjoint({None, key})
         return not touched and row.ingest_id in held and row.ingest_id in examined
 
@@ -305,11 +301,3 @@ def _read_again(warehouse: Warehouse, name: str) -> str:
         readings.write_rejected(warehouse, batch)
         lost.write(warehouse, batch)
     return f"{row.file_name} of {row.vessel} was read again from its raw bytes."
-
-
-def _describe(warehouse: Warehouse) -> None:
-    """Keep beside every raw log what its register says; one whose profile is lost is left as it is."""
-    profiles = {one.profile_sha256: one.profile for one in vessels.all_versions(warehouse)}
-    for name, row in logs.find(warehouse, raw.kept(warehouse)).items():
-        if row.profile_sha256 in profiles:
-            raw.describe(warehouse, name, description(row, profiles[row.profile_sha256]))

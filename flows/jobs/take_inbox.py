@@ -30,7 +30,8 @@ SETTLE_S = 60.0
 #: errors that are the warehouse's or the inbox's and no file's: the run ends with them
 _NO_FILES = (
     *("disk_full", "warehouse_not_writable", "warehouse_unreachable", "table_unreadable", "table_damaged"),
-    *("warehouse_busy", "warehouse_layout", "warehouse_marker_damaged", "inbox_unreadable"),
+    *("warehouse_busy", "warehouse_layout", "warehouse_layout_old", "warehouse_migrating"),
+    *("warehouse_marker_damaged", "inbox_unreadable"),
 )
 #: errors that may be gone at the next attempt though the file is the same
 _PASSING = ("file_unreadable", "no_such_file", "log_unreadable", "internal")

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import json
+import tarfile
 import time
 from concurrent.futures import ThreadPoolExecutor
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import Any
 
 import polars as pl
 import pytest
@@ -22,15 +24,31 @@ from kempf.flows.jobs.take_inbox import take_inbox
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.profile import VesselProfile
-from kempf.warehouse import aliases, compaction, delta, logs, parameter_sets, purges, raw, runs, segments, vessels
+from kempf.warehouse import (
+    aliases,
+    compaction,
+    delta,
+    logs,
+    parameter_sets,
+    purges,
+    raw,
+    readings,
+    runs,
+    segments,
+    vessels,
+)
+from kempf.warehouse.marker import LAYOUT, Marker
+from kempf.warehouse.migrations import by_month, chain
 from kempf.warehouse.source_folder import SourceFolder
 from kempf.warehouse.store import Warehouse
+from kempf.warehouse.verify import verify
 from tests.conftest import Ship
 from tests.flows.content import seen
 from tests.scale.conftest import Bucket
 from tests.warehouse.samples import START_NS, inputs, parameter_set, raw_bytes
 from tests.workbench.driving import kempf
 
+ROOT = Path(__file__).parents[2]
 QUICK = Request(estimator="least-squares")
 
 
@@ -194,3 +212,47 @@ def test_a_log_is_purged_from_a_bucket(bucket: Bucket, ferry: Ship, tmp_path: Pa
                     assert stream is not None and row.ingest_id not in set(pl.read_parquet(stream)["ingest_id"])
     (refused,) = ingest(place, [tmp_path / "ferry.csv.gz"], given=VesselProfile.model_validate(ferry.profile))
     assert refused.error is not None and refused.error.code == "log_purged"
+
+
+def test_an_earlier_warehouse_is_brought_forward_in_a_bucket(
+    bucket: Bucket, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    with tarfile.open(ROOT / "tests" / "workbench" / "earlier_warehouse.tar.xz") as packed:
+        packed.extractall(tmp_path, filter="data")
+    warehouse = Warehouse(f"{bucket.uri}/earlier", bucket.settings)
+    top = tmp_path / "warehouse"
+    for path in sorted(path for path in top.rglob("*") if path.is_file()):
+        warehouse.write_bytes(path.read_bytes(), *path.relative_to(top).parts)
+    with pytest.raises(KempfError, match="works with layout 3"):
+        logs.current(warehouse)
+    place = chain.forward(warehouse)
+    before = by_month.contents(place, "readings")
+    monkeypatch.setattr(by_month, "MOST_LOGS", 1)
+    with monkeypatch.context() as cut_off:
+        # another process compacts the table after the first log
+        commits, commit = [0], delta.append_alone
+
+        def overtaken(*arguments: Any, **named: Any) -> None:
+            commits[0] += 1
+            if commits[0] == 3:
+                table = delta.open_table(place, "readings")
+                assert table is not None
+                rows = delta.rows(table, "readings")
+                delta.replace(table, "readings", iter([rows]), "month = '2025-05'")
+            commit(*arguments, **named)
+
+        cut_off.setattr(delta, "append_alone", overtaken)
+        with pytest.raises(KempfError) as caught:
+            chain.migrate(warehouse, lambda done, total, what: None)
+    assert caught.value.code == "warehouse_busy"
+    with pytest.raises(KempfError, match="not finished"):
+        logs.current(Warehouse(warehouse.uri, bucket.settings))
+    said = chain.migrate(warehouse, lambda done, total, what: None)
+    assert said == ["readings: 2 ingests have the same rows as before."]
+    assert by_month.contents(warehouse, "readings") == before and len(before) == 2
+    table = delta.open_table(warehouse, "readings")
+    assert table is not None and all("/month=2025-05/" in uri for uri in table.file_uris())
+    assert verify(warehouse) == [] and warehouse.marker() == Marker(LAYOUT)
+    assert [readings.read(warehouse, row.ingest_id).height for row in logs.current(warehouse)] == [
+        count for count, _, _ in before.values()
+    ]

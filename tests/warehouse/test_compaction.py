@@ -25,13 +25,11 @@ from kempf.warehouse import (
     readings,
     runs,
     segments,
-    table_cache,
 )
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.provenance import collect
 from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
 from tests.warehouse.samples import START_NS, delivery, examination, inputs, parameter_set, segment
 from tests.warehouse.samples import readings as readings_of
 
@@ -234,27 +232,3 @@ def test_readings_become_one_file_a_vessel_and_month(warehouse: Warehouse) -> No
     assert folders(warehouse, "readings") == [may, may, june]
     assert readings.read(warehouse, again.ingest_id).height == 5
     assert [readings.read(warehouse, name).height for name in ingests] == [5] * 4
-
-
-def test_readings_of_an_earlier_version_are_read_and_written_as_they_are_laid_out(
-    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    with monkeypatch.context() as earlier:
-        for name in ("readings", "rejected"):
-            now = TABLES[name]
-            columns = tuple(column for column in now.columns if column.name != "month")
-            then = replace(now, columns=columns, partition_by=("vessel_key", "ingest_id"))
-            earlier.setitem(TABLES, name, then)
-        ingests = months_of_logs(warehouse)
-        assert all(folder.split("/")[1].startswith("ingest_id=") for folder in folders(warehouse, "readings"))
-    table_cache.forget()
-    assert [readings.read(warehouse, name).height for name in ingests] == [5] * 4
-    # a log that comes now goes where the others are
-    (added,) = deposit(warehouse, [delivery("aurora", b"meanwhile")])
-    ingests.append(added.ingest_id)
-    assert [readings.read(warehouse, name).height for name in ingests] == [5] * 5
-    assert not [problem for problem in verify(warehouse) if problem.table in ("readings", "rejected")]
-    assert not {"readings", "rejected"} & set(compaction.compact(warehouse, more_files_than=1))
-    assert all("/ingest_id=" in folder for folder in folders(warehouse, "readings"))
-    assert [readings.read(warehouse, name).height for name in ingests] == [5] * 5
-    assert len(readings.read_rejected(warehouse, ingests[0])) == len(readings_of().rejected)

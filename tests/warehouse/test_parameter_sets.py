@@ -10,7 +10,6 @@ from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import aliases, delta, parameter_sets, provenance
 from kempf.warehouse.agreement import content_digest, differences, verdict
 from kempf.warehouse.canonical import canonical_json
-from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue, parameter_set_id
 from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import START_NS, inputs, parameter_set
@@ -178,22 +177,6 @@ def test_provenance_says_what_a_rerun_needs(warehouse: Warehouse) -> None:
     assert stored.provenance == found  # nothing in it that JSON does not know
 
 
-def test_the_aliases_of_earlier_versions_are_current_until_it_is_pointed_anew(warehouse: Warehouse) -> None:
-    first, second = parameter_set(), parameter_set(made_of=inputs("d" * 64))
-    parameter_sets.insert(warehouse, [first, second])
-    with delta.ensured(warehouse, "aliases") as table:
-        row = {"vessel_key": vessel_key("aurora"), "vessel": "aurora"}
-        rows = [
-            {**row, "alias": "current", "parameter_set_id": first.parameter_set_id},
-            {**row, "alias": "pooled", "parameter_set_id": second.parameter_set_id},
-        ]
-        delta.replace(table, "aliases", rows, "vessel = 'aurora'")
-    assert aliases.of_vessel(warehouse, "aurora") == {"current": second.parameter_set_id}
-    assert aliases.point(warehouse, "aurora", first.parameter_set_id)
-    assert aliases.of_vessel(warehouse, "aurora") == {"current": first.parameter_set_id}
-    assert not aliases.point(warehouse, "aurora", first.parameter_set_id)
-
-
 def test_an_alias_moves_and_the_sets_stay(warehouse: Warehouse) -> None:
     first, second = parameter_set(), parameter_set(made_of=inputs("d" * 64))
     parameter_sets.insert(warehouse, [first, second])
@@ -208,7 +191,7 @@ def test_an_alias_moves_and_the_sets_stay(warehouse: Warehouse) -> None:
         "current": second.parameter_set_id,
     }
     assert aliases.holders(warehouse, "as-built") == {"aurora": first.parameter_set_id}
-    for name in ("best ' of all", "model", "pooled", "ps-0123", ""):
+    for name in ("best ' of all", "ps-0123", ""):
         with pytest.raises(UsageError) as refused:
             aliases.point(warehouse, "aurora", first.parameter_set_id, name)
         assert refused.value.code == "alias_invalid"

@@ -119,7 +119,12 @@ def test_what_is_no_warehouse_is_not_made_one(logs: Path, tmp_path: Path, kind: 
 
 
 @pytest.mark.parametrize(
-    ("marker", "code"), [(b"{", "warehouse_marker_damaged"), (b'{"layout": 99}', "warehouse_layout")]
+    ("marker", "code"),
+    [
+        (b"{", "warehouse_marker_damaged"),
+        (b'{"layout": 99}', "warehouse_layout"),
+        (b'{"layout": 2}', "warehouse_layout_old"),
+    ],
 )
 def test_a_warehouse_of_another_time(tmp_path: Path, marker: bytes, code: str):
     (tmp_path / "kempf-warehouse.json").write_bytes(marker)

@@ -1,4 +1,6 @@
-"""A warehouse that an earlier version wrote: every command that reads opens it and leaves it alone; then it is renewed.
+"""A warehouse that an earlier version wrote, brought forward: every command that reads opens it and leaves it alone.
+
+Then it is renewed.
 
 ``earlier_warehouse.tar.xz`` was written before the stages had fingerprints of their own: two logs of a simulated ferry,
 identified by five estimators, of which three are gone since, pooled, diagnosed, with the effect ``rudder_lag`` added.
@@ -24,6 +26,7 @@ def earlier(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("earlier")
     with tarfile.open(PACKED) as packed:
         packed.extractall(folder, filter="data")
+    assert kempf("migrate", "--yes", "--warehouse", folder / "warehouse").code == 0
     return folder / "warehouse"
 
 

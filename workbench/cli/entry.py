@@ -47,6 +47,7 @@ COMMANDS = {
     "purge": "Delete a log for good that must not be kept, with a receipt.",
     "verify": "Check raw logs and tables: is everything there and as it was written?",
     "repair": "Make again what is damaged, from sealed copies and from the raw logs.",
+    "migrate": "Bring a warehouse of an earlier version of kempf forward.",
     "vessels": "List vessels, show and set their profiles, rename and remove them.",
     "profile": "Draft the profile of a log that does not describe itself.",
     "logs": "List the logs, what was rejected in one and why; remove, move, release from quarantine.",

@@ -24,11 +24,12 @@ def command(yes: bool, uri: str, as_json: bool) -> None:
     still wrong.
     """
     from kempf.flows.jobs.repair_warehouse import repair
+    from kempf.warehouse.migrations.chain import mend_marker
     from kempf.warehouse.store import Warehouse
     from kempf.warehouse.verify import verify
 
     warehouse = Warehouse(uri)
-    mended = warehouse.mend_marker()
+    mended = mend_marker(warehouse)
     with progress_bar() as progress:
         found = verify(warehouse, lambda what: progress(0, 1, what))
     if found:

@@ -1,0 +1,230 @@
+"""Laying out by vessel and month a table of readings that has a folder a log.
+
+The first commit gives the table its new folders and takes all files of before out of it; it says which version these
+were. The logs of that version are then written again, some of them a commit, until none is missing: a migration that
+was killed goes on with those that are. Every commit rests on the very version that was read. One that another process
+put in between makes it fail; and a process that still holds the table as it was cannot commit to it any more, because
+its folders changed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kempf.schemas.errors import KempfError
+from kempf.schemas.tables import TABLES
+from kempf.warehouse import delta, logs, purges
+from kempf.warehouse.instant import month_of
+from kempf.warehouse.scan import scanned
+from kempf.warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    import polars as pl
+    from deltalake import DeltaTable
+
+#: Rows and logs of one commit: what a writer holds at a time.
+MOST_ROWS = 4_000_000
+MOST_LOGS = 256
+#: What the first commit says of itself: the version that holds the rows of before.
+_BEFORE = "kempf_laid_out_from"
+#: Of logs that were never recorded and have no reading with a time.
+_NEVER = "1970-01"
+
+
+@dataclass(frozen=True)
+class Held:
+    """One ingest in a table that has a folder a log."""
+
+    vessel_key: str
+    month: str
+    ingest_id: str
+    rows: int
+
+
+def missing(warehouse: Warehouse, name: str) -> list[Held]:
+    """Return the ingests that are still to be laid out by month, by folder; none of a table that is laid out so.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Opened to be brought forward.
+    name : str
+        ``readings`` or ``rejected``.
+    """
+    before = version_before(warehouse, name)
+    if before is None:
+        return []
+    held = set() if is_by_log(warehouse, name) else delta.distinct(warehouse, name, "ingest_id")
+    held |= _purged(warehouse)
+    return [one for one in _held(warehouse, name, before) if one.ingest_id not in held]
+
+
+def lay_out(warehouse: Warehouse, name: str) -> Iterator[int]:
+    """Lay a table out by month; yields how many ingests are done after every commit.
+
+    Raises
+    ------
+    KempfError
+        ``warehouse_busy``: another process committed to the table meanwhile; ``table_damaged``, ``disk_full``, ...
+    """
+    before = version_before(warehouse, name)
+    table = delta.open_table(warehouse, name)
+    if before is None or table is None:
+        return
+    todo = missing(warehouse, name)
+    if is_by_log(warehouse, name):
+        if table.version() != before:
+            raise _overtaken(name)
+        _commit(table, name, (), first=before)
+    source = delta.open_table(warehouse, name, before)
+    done = 0
+    for batch in _batches(todo):
+        # asked before anything is written: a table cannot be asked while the library writes
+        parts = [(one, scanned(source, name, _where(one))) for one in batch]
+        _commit(table, name, parts, first=None)
+        done += len(batch)
+        yield done
+
+
+def version_before(warehouse: Warehouse, name: str) -> int | None:
+    """Return the version that holds the rows a folder a log; None of a table that never had such folders."""
+    table = delta.open_table(warehouse, name)
+    if table is None:
+        return None
+    if is_by_log(warehouse, name):
+        return table.version()
+    said = (entry.get(_BEFORE) for entry in table.history())
+    return next((int(version) for version in said if version is not None), None)
+
+
+def contents(warehouse: Warehouse, name: str, version: int | None = None) -> dict[str, tuple[int, int, int]]:
+    """Return of every ingest in a version of a table how many rows it has, and two sums of hashes of their content.
+
+    The sums do not depend on the order of the rows, nor on the month.
+    """
+    import polars as pl
+
+    columns = [column.name for column in TABLES[name].columns if column.name != "month"]
+    table = delta.open_table(warehouse, name, version)
+    row = pl.struct(columns)
+    hashed = scanned(table, name).select("ingest_id", one=row.hash(1), other=row.hash(2))
+    found = hashed.group_by("ingest_id").agg(pl.len(), pl.col("one", "other").sum()).collect(engine="streaming")
+    return {ingest: (count, one, other) for ingest, count, one, other in found.iter_rows()}
+
+
+def require_same(warehouse: Warehouse, name: str) -> int:
+    """Return how many ingests were compared: each says the same, row by row, as before it was laid out by month.
+
+    Raises
+    ------
+    KempfError
+        ``migration_differs``.
+    """
+    before = version_before(warehouse, name)
+    if before is None:
+        return 0
+    then, now = contents(warehouse, name, before), contents(warehouse, name)
+    differ = sorted(ingest for ingest in then.keys() - _purged(warehouse) if now.get(ingest) != then[ingest])
+    if differ:
+        first = differ[0]
+        had, has = then[first][0], now.get(first, (0, 0, 0))[0]
+        raise KempfError(
+            "migration_differs",
+            f"Of {len(then)} ingests in the table {name} {len(differ)} say something else than before, the first "
+            f"{first}: {had} rows before, {has} now.",
+            f"Nothing of before was deleted: it is version {before} of the table. Report it, and leave the warehouse "
+            "as it is.",
+            {"table": name, "version": before, "ingest_ids": differ},
+        )
+    return len(then)
+
+
+def is_by_log(warehouse: Warehouse, name: str) -> bool:
+    """Return whether a table has a folder a log."""
+    table = delta.open_table(warehouse, name)
+    return table is not None and "ingest_id" in table.metadata().partition_columns
+
+
+def _purged(warehouse: Warehouse) -> set[str]:
+    """Return the ingests of logs that were deleted for good: they must not come back."""
+    gone = purges.of_logs(warehouse).keys()
+    return {row.ingest_id for row in logs.all_ingests(warehouse) if row.log_id in gone} if gone else set()
+
+
+def _held(warehouse: Warehouse, name: str, version: int) -> list[Held]:
+    """Return the ingests in a version of a table that has a folder a log, by vessel and month."""
+    import polars as pl
+
+    table = delta.open_table(warehouse, name, version)
+    assert table is not None
+    if not table.file_uris():
+        return []
+    files = pl.DataFrame(table.get_add_actions(flatten=True))
+    key, ingest = pl.col("partition.vessel_key").alias("vessel_key"), pl.col("partition.ingest_id").alias("ingest_id")
+    rows = files.group_by(key, ingest).agg(pl.col("num_records").sum()).rows()
+    months = _months(warehouse, {str(row[1]) for row in rows})
+    found = [Held(str(key), months.get(str(name), _NEVER), str(name), int(count or 0)) for key, name, count in rows]
+    return sorted(found, key=lambda one: (one.vessel_key, one.month, one.ingest_id))
+
+
+def _months(warehouse: Warehouse, ingests: set[str]) -> dict[str, str]:
+    """Return the month of each ingest: that of its first reading, as its row in ``logs`` has it.
+
+    Where a writer was killed before it wrote that row, the readings themselves tell.
+    """
+    import polars as pl
+
+    months = {row.ingest_id: month_of(row.start_utc_ns) for row in logs.all_ingests(warehouse)}
+    unknown = sorted(ingests - months.keys())
+    if unknown:
+        before = version_before(warehouse, "readings")
+        table = delta.open_table(warehouse, "readings", before)
+        first = pl.col("time_utc_ns").min()
+        rows = scanned(table, "readings", {"ingest_id": unknown}).group_by("ingest_id").agg(first).collect().rows()
+        months |= {str(name): month_of(start) for name, start in rows if start is not None}
+    return months
+
+
+def _where(one: Held) -> dict[str, str]:
+    return {"vessel_key": one.vessel_key, "ingest_id": one.ingest_id}
+
+
+def _batches(todo: Sequence[Held]) -> Iterator[list[Held]]:
+    """Yield ingests that are written together, in the order of their folders."""
+    batch: list[Held] = []
+    for one in todo:
+        if batch and (len(batch) == MOST_LOGS or sum(b.rows for b in batch) + one.rows > MOST_ROWS):
+            yield batch
+            batch = []
+        batch.append(one)
+    if batch:
+        yield batch
+
+
+def _frames(parts: Sequence[tuple[Held, pl.LazyFrame]]) -> Iterator[pl.DataFrame]:
+    import polars as pl
+
+    for one, rows in parts:
+        for batch in rows.collect_batches(maintain_order=True):
+            yield batch.with_columns(pl.lit(one.month).alias("month"))
+
+
+def _commit(table: DeltaTable, name: str, parts: Sequence[tuple[Held, pl.LazyFrame]], *, first: int | None) -> None:
+    from deltalake.exceptions import CommitFailedError
+
+    said = None if first is None else {_BEFORE: first}
+    try:
+        delta.append_alone(table, name, _frames(parts), lay_out=said)
+    except CommitFailedError as error:
+        raise _overtaken(name) from error
+
+
+def _overtaken(name: str) -> KempfError:
+    return KempfError(
+        "warehouse_busy",
+        f"Another process committed to the table {name} meanwhile.",
+        "End whatever else works on the warehouse, then run `kempf migrate` again: it goes on, and nothing is lost.",
+        {"table": name},
+    )

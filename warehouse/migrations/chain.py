@@ -1,0 +1,129 @@
+"""The steps from each layout to the next, in order, and the marker that says how far a warehouse is."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from kempf.schemas.errors import KempfError
+from kempf.schemas.tables import TABLES
+from kempf.warehouse.marker import LAYOUT, Marker
+from kempf.warehouse.migrations import to_3
+from kempf.warehouse.store import Warehouse
+from kempf.warehouse.verify import damages, unfinished
+
+
+@dataclass(frozen=True)
+class Step:
+    """What brings a warehouse of one layout to the next."""
+
+    #: to_do: What is to be done, a phrase each; carry_out: Does it, however far an earlier attempt came.
+    to_do: Callable[[Warehouse], list[str]]
+    carry_out: Callable[[Warehouse, to_3.Look], list[str]]
+
+
+#: By the layout that each begins with.
+STEPS = {2: Step(to_3.to_do, to_3.carry_out)}
+
+
+def standing(warehouse: Warehouse) -> int:
+    """Return the layout that a warehouse has to be brought forward from; `LAYOUT` where there is nothing to do.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    KempfError
+        ``warehouse_layout``: it is newer; ``warehouse_marker_damaged``.
+    """
+    forward(warehouse).require()
+    found = warehouse.marker()
+    assert found is not None
+    begun = found.layout if found.migrating is None else found.migrating
+    if begun != LAYOUT and begun not in STEPS:
+        raise KempfError(
+            "warehouse_layout_old",
+            f"The warehouse {warehouse.uri} has layout {begun}, from which no step leads to layout {LAYOUT}.",
+            "Bring it forward with an earlier version of kempf first.",
+            {"found": begun, "expected": LAYOUT},
+        )
+    return begun
+
+
+def forward(warehouse: Warehouse) -> Warehouse:
+    """Return a warehouse opened to be brought forward."""
+    return replace(warehouse, migrating=True)
+
+
+def to_do(warehouse: Warehouse) -> list[str]:
+    """Return what the next step has to do, a phrase each."""
+    begun = standing(warehouse)
+    return [] if begun == LAYOUT else STEPS[begun].to_do(forward(warehouse))
+
+
+def migrate(warehouse: Warehouse, look: to_3.Look) -> list[str]:
+    """Bring a warehouse to the layout of this version, a step after the other; one that was killed goes on.
+
+    Returns
+    -------
+    list of str
+        What was compared, a sentence each.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``.
+    KempfError
+        ``warehouse_damaged``: something has to be repaired first, nothing was changed; ``warehouse_busy``,
+        ``migration_differs``.
+    """
+    said: list[str] = []
+    passing = forward(warehouse)
+    while (begun := standing(warehouse)) != LAYOUT:
+        if passing.marker() == Marker(begun):
+            _require_whole(passing, look)
+            # first, so that versions that would write as before find a newer layout from here on
+            passing.mark(Marker(LAYOUT, migrating=begun))
+        said += STEPS[begun].carry_out(passing, look)
+        passing.mark(Marker(LAYOUT) if begun + 1 == LAYOUT else Marker(LAYOUT, migrating=begun + 1))
+    return said
+
+
+def _require_whole(warehouse: Warehouse, look: to_3.Look) -> None:
+    found = list(unfinished(warehouse))
+    for name in TABLES:
+        look(0, 1, f"table {name}")
+        found += [one for one in damages(warehouse, name) if not one.past]
+    if found:
+        raise KempfError(
+            "warehouse_damaged",
+            f"The warehouse {warehouse.uri} cannot be brought forward: {len(found)} problems, the first: "
+            f"{found[0].words}",
+            "Repair it with the version of kempf that wrote it: `kempf repair`; nothing was changed.",
+            {"problems": [one.show() for one in found]},
+        )
+
+
+def mend_marker(warehouse: Warehouse) -> bool:
+    """Write the marker anew where it is damaged, or where there are tables and no marker; return whether it was.
+
+    A warehouse of another layout stays as it is. The tables tell which layout they have; where they have an earlier
+    one, `kempf migrate` goes on from there.
+    """
+    try:
+        found = warehouse.marker()
+    except KempfError as error:
+        if error.code != "warehouse_marker_damaged":
+            raise
+    else:
+        if found is not None or not _has_tables(warehouse):
+            return False
+    passing = forward(warehouse)
+    passing.mark(Marker(LAYOUT, migrating=LAYOUT - 1))
+    if to_3.holds(passing):
+        passing.mark(Marker(LAYOUT))
+    return True
+
+
+def _has_tables(warehouse: Warehouse) -> bool:
+    return warehouse.folder is not None and (warehouse.folder / "logs" / "_delta_log").is_dir()

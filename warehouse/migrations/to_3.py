@@ -1,0 +1,116 @@
+"""Layout 3: readings by vessel and month, every table of a folder sealed, one alias ``current``, raw logs described.
+
+Each part looks for what is still to be done and does that, so that a migration that was killed goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from kempf.schemas.errors import KempfError
+from kempf.schemas.tables import TABLES
+from kempf.warehouse import aliases, deposit, seals
+from kempf.warehouse.migrations import by_month
+from kempf.warehouse.store import Warehouse
+
+#: Tables that are laid out by vessel and month.
+BY_MONTH = ("readings", "rejected")
+#: What earlier versions pointed to the model with effects and to the pooled set, before there was one ``current``; they
+#: came first where a warehouse still had them.
+_BEFORE_CURRENT = ("model", "pooled")
+
+Look = Callable[[int, int, str], None]
+
+
+def to_do(warehouse: Warehouse) -> list[str]:
+    """Return what is to be done to a warehouse of layout 2, a phrase each."""
+    found = []
+    for name in BY_MONTH:
+        ingests = by_month.missing(warehouse, name)
+        if ingests:
+            rows = sum(one.rows for one in ingests)
+            found.append(f"{name} of {len(ingests)} ingests ({rows} rows) are laid out by vessel and month")
+        elif by_month.is_by_log(warehouse, name):
+            found.append(f"{name}, which has no rows, is laid out by vessel and month")
+    pointed = aliases.named(warehouse, _BEFORE_CURRENT)
+    if pointed:
+        found.append(f"{len(pointed)} aliases of before there was 'current' become 'current'")
+    commits = sum(len(seals.unsealed(folder)) for folder in _folders(warehouse))
+    if commits:
+        found.append(f"{commits} commits of tables are sealed")
+    logs = len(deposit.not_described(warehouse))
+    if logs:
+        found.append(f"{logs} raw logs are described beside their bytes")
+    return found
+
+
+def holds(warehouse: Warehouse) -> bool:
+    """Return whether a warehouse of which that is not known has layout 3, by the folders of its readings.
+
+    Every later version makes these; a table that cannot be opened tells nothing.
+    """
+    for name in BY_MONTH:
+        with suppress(KempfError):
+            if by_month.is_by_log(warehouse, name) or by_month.missing(warehouse, name):
+                return False
+    return True
+
+
+def carry_out(warehouse: Warehouse, look: Look) -> list[str]:
+    """Bring a warehouse of layout 2 to layout 3.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Opened to be brought forward.
+    look : callable
+        Takes how much of how much is done, and what is done next.
+
+    Returns
+    -------
+    list of str
+        What was compared in the end, a sentence each.
+
+    Raises
+    ------
+    KempfError
+        ``warehouse_busy``, ``migration_differs``, ``table_damaged``, ``disk_full``, ...
+    """
+    look(0, 1, "seals")
+    for folder in _folders(warehouse):
+        seals.seal_every(folder)
+    _one_current(warehouse)
+    said = []
+    for name in BY_MONTH:
+        total = len(by_month.missing(warehouse, name))
+        look(0, max(total, 1), name)
+        for done in by_month.lay_out(warehouse, name):
+            look(done, total, name)
+        look(0, 1, f"{name}, compared")
+        compared = by_month.require_same(warehouse, name)
+        if compared:
+            said.append(f"{name}: {compared} ingests have the same rows as before.")
+    look(0, 1, "raw logs")
+    deposit.describe_all(warehouse)
+    for folder in _folders(warehouse):
+        seals.seal_every(folder)
+    return said
+
+
+def _one_current(warehouse: Warehouse) -> None:
+    """Let ``current`` point to what commands took for it where aliases of before stand beside it, or alone."""
+    pointed = aliases.named(warehouse, _BEFORE_CURRENT)
+    wanted = {
+        vessel: name for alias in reversed(_BEFORE_CURRENT) for (vessel, a), name in pointed.items() if a == alias
+    }
+    aliases.point_all(warehouse, {(vessel, aliases.CURRENT): name for vessel, name in wanted.items()})
+    if pointed:
+        aliases.drop(warehouse, _BEFORE_CURRENT)
+
+
+def _folders(warehouse: Warehouse) -> list[Path]:
+    """Return the folders of the tables that were written; none in a bucket."""
+    root = warehouse.folder
+    return [root / name for name in TABLES if (root / name / "_delta_log").is_dir()] if root is not None else []
