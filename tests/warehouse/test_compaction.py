@@ -25,13 +25,11 @@ from kempf.warehouse import (
     readings,
     runs,
     segments,
-    table_cache,
 )
 from kempf.warehouse.deposit import deposit
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.provenance import collect
 from kempf.warehouse.store import Warehouse
-from kempf.warehouse.verify import verify
 from tests.warehouse.samples import START_NS, delivery, examination, inputs, parameter_set, segment
 from tests.warehouse.samples import readings as readings_of
 

@@ -10,7 +10,6 @@ from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import aliases, delta, parameter_sets, provenance
 from kempf.warehouse.agreement import content_digest, differences, verdict
 from kempf.warehouse.canonical import canonical_json
-from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue, parameter_set_id
 from kempf.warehouse.store import Warehouse
 from tests.warehouse.samples import START_NS, inputs, parameter_set
