@@ -36,7 +36,7 @@ def test_without_a_command_the_help_is_shown_and_it_is_a_usage_error():
         output = kempf(*arguments)
         assert (output.code, output.out) == (2, "")
         assert output.err.startswith("Usage: kempf")
-        assert "error" not in output.err.split("Commands:")[0].replace("internal error", "")
+        assert "error [" not in output.err
 
 
 def test_ingest_prints_every_log_with_its_ledger(logs: Path, tmp_path: Path):
