@@ -86,7 +86,7 @@ lock: $(VENV)/.uv
 		--no-emit-find-links --no-header --group build --group dev pyproject.toml -c requirements/runtime.txt \
 		-o requirements/develop.txt
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
-		--no-emit-find-links --no-header --group build --extra dask pyproject.toml -c requirements/develop.txt \
+		--no-emit-find-links --no-header --group build --extra dask --extra lineage pyproject.toml -c requirements/develop.txt \
 		-o requirements/deploy.txt
 	$(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 		--no-emit-find-links --no-header --group build --group rivals pyproject.toml -c requirements/develop.txt \

@@ -302,7 +302,7 @@ _ALL = (
             Column("stands_for", "text", "fingerprint under which it goes on"),
             Column("sets", "integer", "parameter sets that were compared and were the same, bit for bit", "1"),
             Column("vessels", "texts", "of which vessels these were"),
-            Column("git_commit", "text", "commit of the code, null where nothing tells it"),
+            Column("git_commit", "text", "commit of the code, null where it is not known"),
         ),
     ),
     Table(

@@ -173,7 +173,7 @@ def _processor() -> str:
 
 @cache
 def git_commit() -> str | None:
-    """Return the commit of the source, ``-dirty`` behind it where files differ from it; None where nothing tells it.
+    """Return the commit of the source, ``-dirty`` behind it where files differ from it; None where it is not known.
 
     Outside a checkout it is what was written into the package when that was built.
     """
