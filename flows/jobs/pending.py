@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
+from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.parameter_set import ParameterSet
@@ -38,13 +39,19 @@ class Waiting:
             parameter_sets.insert(self._warehouse, made)
 
     def standing(self, alias: str = aliases.CURRENT) -> ParameterSet | None:
-        """Return the set that an alias points to, or will, as it is stored."""
+        """Return the set that an alias points to, or will, as it is stored; None where that set is lost."""
         stored = aliases.of_vessel(self._warehouse, self._vessel).get(alias)
         name = self.aliases.get((self._vessel, alias), stored)
         if name is None:
             return None
         made = next((one for one in self.sets if one.parameter_set_id == name), None)
-        return made or parameter_sets.as_stored(self._warehouse, name, self._vessel)
+        if made is not None:
+            return made
+        try:
+            return parameter_sets.as_stored(self._warehouse, name, self._vessel)
+        except NotFound:
+            # taken out by a repair, with the file that held it
+            return None
 
     def may_move(self, spec: ModelSpec, *, adopt: bool) -> bool:
         """Return whether ``current`` may go to a set of this model: from a model with effects only to the like.

@@ -27,7 +27,7 @@ from kempf.flows.process.commit_batch import together_or_each
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.pipeline.estimate.names import NAMES
-from kempf.schemas.errors import KempfError
+from kempf.schemas.errors import KempfError, NotFound
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import aliases, history, parameter_sets, segments
 from kempf.warehouse.equivalents import code_of
@@ -238,7 +238,11 @@ class _Reprocessing:
 
     def _model(self, work: _Work) -> None:
         """Bring her current model with effects up to date; where that fails it stays as it was."""
-        now = standing(self.warehouse, work.vessel)
+        try:
+            now = standing(self.warehouse, work.vessel)
+        except NotFound:
+            # the set is lost: `_withdraw` says so
+            return
         if now is None:
             return
         spec, own = model_of(now)

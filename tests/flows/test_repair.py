@@ -15,11 +15,12 @@ from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, restore
 from kempf.flows.jobs.repair_warehouse import repair
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
-from kempf.warehouse import aliases, corrections, logs, raw, segments, table_cache, vessels
+from kempf.warehouse import aliases, corrections, logs, parameter_sets, raw, segments, table_cache, vessels
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import verify
 from tests.conftest import Ship
 from tests.flows.content import fresh, seen
+from tests.flows.test_brought_forward import take_in
 from tests.workbench.driving import kempf
 
 
@@ -109,6 +110,23 @@ def test_sets_and_aliases_come_with_the_next_run_and_what_people_said_is_named_a
     ids = [row["parameter_set_id"] for row in wanted["parameter_sets"]]
     assert [row["parameter_set_id"] for row in content(warehouse)["parameter_sets"]] == ids
     assert aliases.of_vessel(warehouse, "ferry") == pointed
+
+
+def test_sets_come_again_though_one_that_is_lost_was_the_current_one(tmp_path: Path) -> None:
+    warehouse = fresh(tmp_path / "w")
+    for day in range(2):
+        take_in(warehouse, day)
+    reprocess_vessel(warehouse, "ferry")
+    wanted, pointed = content(warehouse)["parameter_sets"], aliases.of_vessel(warehouse, "ferry")
+    # the pooled one, which is made behind the single ones
+    assert len(parameter_sets.get(warehouse, pointed["current"]).segment_ids) == 2
+    for path in files(warehouse, "parameter_sets"):
+        flipped(path)
+    repair(warehouse)
+    assert not reprocess_vessel(warehouse, "ferry").failures
+    assert aliases.of_vessel(warehouse, "ferry") == pointed and verify(warehouse) == []
+    again = content(warehouse)["parameter_sets"]
+    assert [row["parameter_set_id"] for row in again] == [row["parameter_set_id"] for row in wanted]
 
 
 def test_a_warehouse_is_built_again_from_its_raw_logs_alone(warehouse: Warehouse, tmp_path: Path) -> None:
