@@ -123,9 +123,10 @@ def move(
     with raw.opened(warehouse, row.log_id) as log, spooled(row.file_name, log, profile) as readings:
         said = corrections.of_logs(warehouse, [row.log_id]).get(row.log_id, ())
         read = look_through(whose, row.file_name, log, profile, readings, said, codes_of(warehouse))
+        # first: once the log is hers the same command has nothing to go on with
+        notes.carry(warehouse, "log", row.log_id, row.vessel, whose)
         found = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
         store(warehouse, [read])
-    notes.carry(warehouse, "log", row.log_id, row.vessel, whose)
     return found, logs.by_prefix(warehouse, row.log_id)
 
 

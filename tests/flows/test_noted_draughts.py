@@ -9,6 +9,7 @@ from shutil import copytree
 import pytest
 
 from kempf.flows.fleet.state import fleet_state
+from kempf.flows.jobs import remove_logs
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.ingest_logs import ingest_log
@@ -173,3 +174,21 @@ def test_notes_go_with_a_moved_log_and_a_renamed_vessel(ferry: Warehouse) -> Non
     (kept,) = (one for one in notes.of_vessel(ferry, "ro-ro") if one.subject == "vessel")
     assert (kept.subject_id, kept.event_utc_ns) == ("ro-ro", 1_000)
     assert kept.text == f"docked [ferry, note {docked.number}]"
+
+
+def test_notes_are_there_once_where_a_move_was_cut_off(ferry: Warehouse) -> None:
+    row = min(logs.current(ferry), key=lambda row: row.file_name)
+    notes.add(ferry, "ferry", "log", row.log_id, "read at the marks", draught_m=6.1)
+    vessels.register(ferry, "sister", vessels.current(ferry, "ferry").model_copy(update={"vessel": "sister"}))
+    for cut_off in ("remove", "store"):
+        with pytest.MonkeyPatch.context() as patch:
+            patch.setattr(remove_logs, cut_off, interrupted)
+            with pytest.raises(KeyboardInterrupt):
+                move(ferry, row.log_id, "sister", "wrong folder")
+    _, now = move(ferry, row.log_id, "sister", "wrong folder")
+    (moved,) = notes.of_vessel(ferry, "sister")
+    assert now.vessel == "sister" and (moved.subject_id, moved.draught_m) == (row.log_id, 6.1)
+
+
+def interrupted(*_: object) -> None:
+    raise KeyboardInterrupt
