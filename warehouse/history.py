@@ -19,7 +19,7 @@ from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.notes import Note
-from kempf.warehouse.parameter_set import UPDATES, update_in
+from kempf.warehouse.parameter_set import UPDATES, Bounds, update_in
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
 
@@ -369,10 +369,7 @@ def _inputs_with_draughts(sets: pl.DataFrame) -> list[str | None]:
 def _noted_otherwise(inputs: dict[str, Any], among: Sequence[Note]) -> bool:
     """Return whether other draughts are noted now than those that a set goes by."""
     held: dict[str, float] = inputs.get("draughts_m") or {}
-    began: dict[str, int] = {}
-    for one in inputs["segments"]:
-        began[one["log_id"]] = min(one["start_utc_ns"], began.get(one["log_id"], one["start_utc_ns"]))
-    return bool(held) and notes.draughts_m(among, began) != held
+    return bool(held) and notes.draughts_m(among, [Bounds(**one) for one in inputs["segments"]]) != held
 
 
 def _with_chains(sets: pl.DataFrame) -> pl.Series:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from datetime import datetime
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import delta, said
@@ -14,6 +14,18 @@ from kempf.warehouse.keys import vessel_key
 from kempf.warehouse.store import Warehouse
 
 Subject = Literal["vessel", "log", "segment", "set"]
+
+
+class Sailed(Protocol):
+    """A stretch of a log, such as a manoeuvre."""
+
+    @property
+    def log_id(self) -> str:
+        """Which log."""
+
+    @property
+    def start_utc_ns(self) -> int:
+        """Where it begins, UTC nanoseconds."""
 
 
 @dataclass(frozen=True)
@@ -146,24 +158,28 @@ def carry(warehouse: Warehouse, subject: Literal["vessel", "log"], subject_id: s
                 add(warehouse, to, subject, new_id, text, event_utc_ns=one.event_utc_ns, draught_m=one.draught_m)
 
 
-def draughts_m(among: Sequence[Note], began_utc_ns: Mapping[str, int]) -> dict[str, float]:
+def draughts_m(among: Sequence[Note], sailed: Iterable[Sailed]) -> dict[str, float]:
     """Return the draught of logs as notes have it.
 
     A note on a log is the log's, the newest one counts; else the last one on the vessel that is dated no later than the
-    log begins.
+    first stretch of the log begins.
 
     Parameters
     ----------
     among : sequence of Note
         Of one vessel, in the order in which they were written.
-    began_utc_ns : mapping of str to int
-        When each log begins, by its id.
+    sailed : iterable of Sailed
+        Stretches of the logs that are asked for.
 
     Returns
     -------
     dict of str to float
         m, by log; a log that no note speaks of is left out.
     """
+    began_utc_ns: dict[str, int] = {}
+    for stretch in sailed:
+        first = began_utc_ns.get(stretch.log_id, stretch.start_utc_ns)
+        began_utc_ns[stretch.log_id] = min(stretch.start_utc_ns, first)
     stating = [one for one in among if one.draught_m is not None]
     own = {one.subject_id: one.draught_m for one in stating if one.subject == "log"}
     dated = [

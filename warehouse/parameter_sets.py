@@ -8,10 +8,9 @@ from dataclasses import dataclass
 from functools import reduce
 from json import loads
 from typing import TYPE_CHECKING, Any
-from urllib.parse import unquote
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
-from kempf.warehouse import delta
+from kempf.warehouse import delta, seals
 from kempf.warehouse.agreement import content_digest, differences
 from kempf.warehouse.canonical import canonical_json
 from kempf.warehouse.keys import one_of, vessel_key
@@ -374,7 +373,8 @@ def stored_at_ms(warehouse: Warehouse) -> dict[str, int]:
     with delta.reading(warehouse, "parameter_sets") as table:
         times = delta.commit_times(table) if table is not None else []
     for version, milliseconds in enumerate(times):
-        for path in _files_added(warehouse, version):
+        commit = warehouse.read_bytes("parameter_sets", "_delta_log", f"{version:020d}.json") or b""
+        for path in seals.added(commit):
             for name in _ids_in(warehouse, path):
                 # compaction brings it again
                 found.setdefault(name, milliseconds)
@@ -389,10 +389,3 @@ def _ids_in(warehouse: Warehouse, path: str) -> list[str]:
             return [] if stream is None else pl.read_parquet(stream, columns=["parameter_set_id"]).to_series().to_list()
         except pl.exceptions.PolarsError:
             return []
-
-
-def _files_added(warehouse: Warehouse, version: int) -> list[str]:
-    """Return the paths of the data files that a commit added, below the table."""
-    commit = warehouse.read_bytes("parameter_sets", "_delta_log", f"{version:020d}.json") or b""
-    actions = [loads(line) for line in commit.splitlines() if line.strip()]
-    return [unquote(action["add"]["path"]) for action in actions if "add" in action]

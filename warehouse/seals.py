@@ -101,7 +101,7 @@ def seal_checkpoint(table: DeltaTable) -> None:
 
 def _seal_version(folder: Path, version: int) -> None:
     commit = _commit(folder, version).read_bytes()
-    for path in _added(commit):
+    for path in added(commit):
         _seal_file(folder, folder / path)
     _seal_file(folder, _checkpoint(folder, version))
     text = commit.decode("utf-8", "surrogateescape")
@@ -186,9 +186,9 @@ def _damage_of_commit(folder: Path, name: str, version: int) -> Iterator[Damage]
 
 def torn_commits(folder: Path, name: str) -> Iterator[Damage]:
     """Yield the commits of a table that were never sealed and are not whole: their writer was cut off."""
-    sealed = set(sealed_versions(folder))
-    for path in sorted((folder / "_delta_log").glob("*.json")):
-        if path.stem.isdigit() and int(path.stem) not in sealed and not _is_whole(path.read_bytes()):
+    for version in unsealed(folder):
+        path = _commit(folder, version)
+        if not _is_whole(path.read_bytes()):
             yield Damage(name, "commit", f"{name}/_delta_log/{path.name}", "it was cut off while it was written")
 
 
@@ -288,7 +288,7 @@ def _hash(path: Path) -> str:
         return hashlib.file_digest(stream, "sha256").hexdigest()
 
 
-def _added(commit: bytes) -> list[str]:
+def added(commit: bytes) -> list[str]:
     """Return the paths of the data files that a commit added, below the table."""
     actions = [json.loads(line) for line in commit.splitlines() if line.strip()]
     return [unquote(action["add"]["path"]) for action in actions if "add" in action]

@@ -26,9 +26,10 @@ from prefect.task_runners import ThreadPoolTaskRunner
 
 from kempf.flows.process.cores import usable
 from kempf.schemas.errors import UsageError
+from kempf.schemas.settings import VARIABLES
 
 #: Setting: address of a Dask scheduler whose workers share the batches, such as ``tcp://10.0.0.5:8786``.
-DASK_SETTING = "KEMPF_DASK"
+DASK_SETTING = VARIABLES["dask"]
 
 
 def task_runner(address: str | None = None) -> Any:

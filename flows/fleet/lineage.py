@@ -80,8 +80,7 @@ def _run_event(event: Event) -> Any:
     from openlineage.client.event_v2 import InputDataset, Job, OutputDataset, Run, RunEvent, RunState
     from openlineage.client.facet_v2 import error_message_run
 
-    address = str(event.parameters.get("warehouse") or "kempf-data")
-    warehouse = Warehouse(address)
+    warehouse = Warehouse(str(event.parameters["warehouse"]))
     versions = _versions(warehouse)
     read, written = TABLES[event.flow]
     facets: dict[str, Any] = {}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import re
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -52,24 +51,24 @@ def figures_of(flow: str, found: Any) -> Iterator[Figure]:
         if reports:
             yield "kempf_run_new_parameter_sets", (), float(sum(one["new_sets"] for one in reports))
     elif flow == "identify":
-        made = [one for one in _rows(rows, "rows") if one.get("parameter_set")]
+        made = [one for one in _rows(rows) if one.get("parameter_set")]
         yield "kempf_run_new_parameter_sets", (), float(len(made))
     elif flow == "diagnose":
-        said = {row["vessel"]: row for row in _rows(rows, "rows")}
+        said = {row["vessel"]: row for row in _rows(rows)}
         yield from _counted("kempf_run_vessels", [row["verdict"] for row in said.values()])
 
 
 def _outcomes(rows: Any) -> list[str]:
     """Return what became of every log, whether the run was of logs or of an inbox, and however it ended."""
-    found = [one["outcome"] for key in ("outcomes", "ingested") for one in _rows(rows, key)]
-    return found + ["quarantined" for _ in (_rows(rows, "quarantined") if isinstance(rows, Mapping) else ())]
+    found = [str(one["outcome"]) for one in _rows(rows, "outcomes", "ingested")]
+    return found + ["quarantined"] * (len(rows.get("quarantined", ())) if isinstance(rows, Mapping) else 0)
 
 
-def _rows(found: Any, key: str) -> Sequence[Any]:
-    """Return the rows of a result; of an error's details those under a key. Of neither there are none."""
+def _rows(found: Any, *keys: str) -> Sequence[Any]:
+    """Return the rows of a result; of an error's details those under some keys. Of neither there are none."""
     if isinstance(found, Mapping):
-        return list(found.get(key, ()))
-    return list(found) if isinstance(found, list) and key in ("rows", "reports", "outcomes") else []
+        return [one for key in keys for one in found.get(key, ())]
+    return found if isinstance(found, list) else []
 
 
 def _counted(name: str, values: Sequence[str]) -> Iterator[Figure]:
@@ -116,7 +115,7 @@ def publish(flow: str, registry: CollectorRegistry) -> list[str]:
     failed = []
     folder, gateway = setting("metrics.textfile"), setting("metrics.pushgateway")
     if folder:
-        path = Path(folder).expanduser() / f"kempf_{re.sub(r'[^a-z]', '_', flow)}.prom"
+        path = Path(folder).expanduser() / f"kempf_{flow}.prom"
         try:
             write_to_textfile(os.fspath(path), registry)
         except OSError as error:

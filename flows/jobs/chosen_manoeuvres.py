@@ -6,9 +6,9 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
+from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.flows.jobs.refresh_logs import Refreshed, refresh_logs
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.estimate.record.loads import loads
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import logs, notes, segments
 from kempf.warehouse.deduplicate import once, same
@@ -102,11 +102,9 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
 
 def _laden(warehouse: Warehouse, vessel: str, kept: Sequence[Segment]) -> tuple[dict[str, float], dict[str, float]]:
     """Return the draught of every log as it was noted, where it was for all of them, and how each is laden."""
-    began: dict[str, int] = {}
-    for segment in sorted(kept, key=lambda s: (s.start_utc_ns, s.segment_id)):
-        began.setdefault(segment.log_id, segment.start_utc_ns)
-    noted = notes.draughts_m(notes.of_vessel(warehouse, vessel), began)
-    return (noted if noted.keys() == began.keys() else {}), loads(list(began), noted)
+    noted = notes.draughts_m(notes.of_vessel(warehouse, vessel), kept)
+    laden = loads_of_logs([(s.segment_id, s) for s in kept], noted)
+    return (noted if noted.keys() == laden.keys() else {}), laden
 
 
 def choose_refreshed(warehouse: Warehouse, vessel: str, progress: Progress = silent) -> Chosen:

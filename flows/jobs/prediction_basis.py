@@ -8,14 +8,14 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.leg_fit import fitted_to_legs
+from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.ship_model import ShipOfSet
-from kempf.flows.jobs.vessel_runs import LENGTH_M, VesselRuns, assemble, logs_in_order
+from kempf.flows.jobs.vessel_runs import LENGTH_M, VesselRuns, assemble
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.record.left_out import left_out
-from kempf.pipeline.estimate.record.loads import loads
 from kempf.pipeline.manoeuvre.covered import covered
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.rudder_rate import RudderRate, rudder_rate
@@ -88,7 +88,7 @@ def basis_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silen
         progress(done, len(wanted), "reading the logs of the set")
         instruments[log_id] = channels_of(warehouse, rows[log_id])
     profile = vessels.get(warehouse, str(inputs["profile_sha256"]))
-    laden = loads(logs_in_order(bounds), inputs.get("draughts_m", {}))
+    laden = loads_of_logs(bounds, inputs.get("draughts_m", {}))
     runs = assemble(instruments, profile, bounds, ModelSpec.model_validate(dict(one.model_spec)), laden=laden)
     scale = profile.length_m or _scale_m(one)
     surge = surge_of(runs.runs, scale, runs.spec.rudder_speed_exponent)

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.record.loads import loads
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.steering.carried import carried, sentences
 from kempf.pipeline.steering.motion import ShipEffects
@@ -127,11 +127,9 @@ def _effects(one: ParameterSet, profile: VesselProfile) -> ShipEffects | None:
 
 def _last_load(one: ParameterSet) -> float:
     """Return how the ship was laden in the last log of a set, which she is taken to be still."""
-    from kempf.flows.jobs.vessel_runs import logs_in_order
-
     inputs = one.provenance["inputs"]
-    order = logs_in_order([("", Bounds(**bounds)) for bounds in inputs["segments"]])
-    return loads(order, inputs.get("draughts_m", {}))[order[-1]]
+    named = [("", Bounds(**bounds)) for bounds in inputs["segments"]]
+    return list(loads_of_logs(named, inputs.get("draughts_m", {})).values())[-1]
 
 
 def _covariance(one: ParameterSet, wanted: list[str]) -> Float:

@@ -15,9 +15,10 @@ import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.lasting_noise import lasting_noise_of
+from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, channel_warnings, described, stored, without_arm
 from kempf.flows.jobs.standing_model import SEARCH, SINGLE, Own, inputs_of, known_effects, named, stored_model
-from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled, logs_in_order
+from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
@@ -35,7 +36,6 @@ from kempf.pipeline.estimate.pooled_uncertainty import PooledUncertainty, uncert
 from kempf.pipeline.estimate.posterior import posterior_of
 from kempf.pipeline.estimate.record.grid_run import common_slip
 from kempf.pipeline.estimate.record.left_out import instants_left_out
-from kempf.pipeline.estimate.record.loads import loads
 from kempf.pipeline.estimate.result import discrete_values
 from kempf.pipeline.shooting.ahead import Ahead, ahead_of
 from kempf.schemas.errors import NotFound
@@ -202,7 +202,7 @@ def _single(fitted: Fitted, request: SetRequest) -> ParameterSet:
 def _fitted_request(instruments: Mapping[str, Instruments], request: SetRequest) -> Fitted:
     spec, settings = request.spec, request.inputs.settings
     bounds = list(zip(request.segment_ids, request.inputs.bounds, strict=True))
-    laden = loads(logs_in_order(bounds), request.inputs.draughts_m)
+    laden = loads_of_logs(bounds, request.inputs.draughts_m)
     runs = assemble(instruments, request.profile, bounds, spec, laden=laden)
     # the plain model of one manoeuvre has no settings but those of its search
     search = settings if request.inputs.estimator == SINGLE and not spec.effects else settings.get(SEARCH)

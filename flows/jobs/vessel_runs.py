@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.loads_of_logs import in_order, logs_in_order
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.parameter_set_of import arm_of
 from kempf.flows.process.progress import Progress, silent
@@ -92,7 +93,7 @@ def assemble(
         ``no_runs``.
     """
     records, skipped = [], {}
-    for name, one in _in_order(bounds):
+    for name, one in in_order(bounds):
         try:
             records.append((name, one, make_record(instruments[one.log_id], one.start_utc_ns, one.end_utc_ns)))
         except KempfError as error:
@@ -120,12 +121,3 @@ def assemble(
         like.slip_m if like else None,
     )
     return VesselRuns(ready, runs, tuple(record for _, _, record in records), skipped)
-
-
-def logs_in_order(bounds: Sequence[tuple[str, Bounds]]) -> list[str]:
-    """Return the logs of named segments in the order of time."""
-    return list(dict.fromkeys(one.log_id for _, one in _in_order(bounds)))
-
-
-def _in_order(bounds: Sequence[tuple[str, Bounds]]) -> list[tuple[str, Bounds]]:
-    return sorted(bounds, key=lambda entry: (entry[1].start_utc_ns, entry[0]))

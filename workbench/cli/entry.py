@@ -12,11 +12,14 @@ import threading
 import traceback
 from collections.abc import Sequence
 from io import TextIOWrapper
+from typing import get_args
 
 import click
 
+from kempf.flows.process import configuration
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError, UsageError
+from kempf.schemas.settings import LogLevel
 from kempf.workbench import log_lines
 from kempf.workbench.cli.lazy import LazyGroup
 from kempf.workbench.terminal import one_line
@@ -66,7 +69,7 @@ COMMANDS = {
 @click.version_option(package_name="kempf", prog_name="kempf")
 @click.option(
     "--log-level",
-    type=click.Choice(["debug", "info", "warning", "error"]),
+    type=click.Choice(get_args(LogLevel)),
     help="Say on stderr what a command does, from this level on. [default: KEMPF_LOG_LEVEL, else of kempf.toml]",
 )
 def cli(log_level: str | None) -> None:
@@ -76,15 +79,9 @@ def cli(log_level: str | None) -> None:
     ./kempf-data) and --json.
     Exit codes: 0 ok, 1 internal, 2 usage, 3 data rejected, 4 not found, 5 threshold exceeded.
     """
-    level = log_level or _configured_level()
+    level = log_level or configuration.log_level()
     if level is not None:
         log_lines.show(level)
-
-
-def _configured_level() -> str | None:
-    from kempf.flows.process.configuration import log_level
-
-    return log_level()
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
