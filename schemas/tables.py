@@ -2,7 +2,7 @@
 
 The unit stands in the metadata of each Parquet field, so that a file read without this project still says what it
 holds. Times are UTC nanoseconds as integers, because the timestamps of Delta Lake have only microseconds. A vessel's
-name never becomes a path: tables are partitioned by ``vessel_key``, a hash of the name.
+name never becomes a path: tables are partitioned by ``vessel_key``, made of its letters and a hash.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ class Table:
 
 
 _VESSEL = (
-    Column("vessel_key", "text", "first 16 hex digits of the SHA-256 of the vessel's name; partition"),
+    Column("vessel_key", "text", "letters and digits of the vessel's name and 8 hex digits of its SHA-256; partition"),
     Column("vessel", "text", "name of the vessel"),
 )
 _INGEST = Column("ingest_id", "text", "one log read with one profile by one version of the code")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 
 import polars as pl
 
@@ -92,22 +92,6 @@ def holders(warehouse: Warehouse, alias: str) -> dict[str, str]:
     frame = delta.read(warehouse, "aliases", {})
     pointed = {str(one["vessel"][0]): _pointed(one) for one in frame.sort("vessel").partition_by("vessel")}
     return {vessel: names[alias] for vessel, names in pointed.items() if alias in names}
-
-
-def named(warehouse: Warehouse, names: Sequence[str]) -> dict[tuple[str, str], str]:
-    """Return the parameter set id that each of some aliases points to, by vessel and alias."""
-    rows = delta.read(warehouse, "aliases", {"alias": list(names)}).rows(named=True)
-    return {(row["vessel"], row["alias"]): row["parameter_set_id"] for row in rows}
-
-
-def drop(warehouse: Warehouse, names: Sequence[str]) -> None:
-    """Take aliases of some names away from every vessel."""
-
-    def attempt() -> None:
-        with delta.ensured(warehouse, "aliases") as table:
-            delta.replace(table, "aliases", [], one_of("alias", names))
-
-    with_retry(attempt)
 
 
 def _pointed(rows: pl.DataFrame) -> dict[str, str]:

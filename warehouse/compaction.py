@@ -31,8 +31,6 @@ _SMALL = (
     *("diagnoses", "diagnosis_evidence", "aliases", "inbox"),
     *("runs", "run_history", "corrections", "notes", "equivalents", "purges"),
 )
-#: Rows that are read or skipped together.
-_ROW_GROUP = 8192
 #: Tables that ``history --as-of`` reads at any time there ever was: every version of them is kept.
 ALWAYS = ("logs", "segments", "parameter_sets")
 #: A writer that has not committed yet is at most so old, hours; its files must not be taken from under it.
@@ -91,7 +89,7 @@ def _one(warehouse: Warehouse, name: str, more_files_than: int) -> bool:
     table = delta.open_table(warehouse, name)
     if table is None or len(table.file_uris()) <= more_files_than:
         return False
-    written = WriterProperties(compression="ZSTD", max_row_group_size=_ROW_GROUP)
+    written = WriterProperties(compression="ZSTD", max_row_group_size=delta.ROW_GROUP)
     sortable = "vessel_key" in {c.name for c in TABLES[name].columns} - set(table.metadata().partition_columns)
     with delta.refusals_as_errors(warehouse.address(name)):
         removed = 0

@@ -37,6 +37,11 @@ _log = logging.getLogger("kempf.warehouse")
 #: Rows that are handed to the writer at once; it holds some ten such batches.
 _BATCH_ROWS = 16_384
 
+#: Rows that are skipped or read together, of tables in which one vessel is looked for among all.
+ROW_GROUP = 8192
+#: What commits that bring a table to a later layout say of themselves: the version before the first of them.
+BROUGHT = "kempf_brought_from"
+
 #: The past is kept: history as of a time and reruns read old versions.
 _CONFIGURATION = {
     "delta.logRetentionDuration": "interval 36500 days",
@@ -375,23 +380,83 @@ def append_alone(
     KempfError
         ``disk_full``, ``warehouse_not_writable``.
     """
-    import pyarrow as pa
-    from deltalake import CommitProperties, WriterProperties, write_deltalake
-
     schema = arrow_schema(TABLES[name])
     schema = schema if lay_out is not None else _as_described(table, schema)
     anew: dict[str, Any] = {"mode": "append"}
     if lay_out is not None:
         folders = list(TABLES[name].partition_by)
         anew = {"mode": "overwrite", "schema_mode": "overwrite", "partition_by": folders}
+    _write_alone(table, new, schema, lay_out, **anew)
+
+
+def exchange_alone(
+    table: DeltaTable, name: str, new: Iterator[pl.DataFrame], predicate: str | None, brought_from: int
+) -> None:
+    """Exchange rows in one commit on the very version that is open, or fail, as `append_alone` does.
+
+    Parameters
+    ----------
+    table : DeltaTable
+        From `open_table`.
+    name : str
+        Its name.
+    new : iterator of polars.DataFrame
+        New rows, with every column of the table. All satisfy the predicate.
+    predicate : str or None
+        Of the rows that go, as `replace` takes it; None stands for all of them.
+    brought_from : int
+        What the commit says under `BROUGHT`.
+
+    Raises
+    ------
+    deltalake.exceptions.CommitFailedError
+        Another process committed since the table was opened.
+    KempfError
+        ``disk_full``, ``warehouse_not_writable``.
+    """
+    schema = _as_described(table, arrow_schema(TABLES[name]))
+    said = {BROUGHT: str(brought_from)}
+    _write_alone(table, new, schema, said, mode="overwrite", predicate=predicate)
+
+
+def _write_alone(
+    table: DeltaTable, new: Iterator[pl.DataFrame], schema: pa.Schema, said: Mapping[str, Any] | None, **how: Any
+) -> None:
+    import pyarrow as pa
+    from deltalake import CommitProperties, WriterProperties, write_deltalake
+
+    # a table with a folder a vessel has groups as large as they come
+    groups = None if table.metadata().partition_columns else ROW_GROUP
     with refusals_as_errors(table.table_uri):
         write_deltalake(
             table,
             pa.RecordBatchReader.from_batches(schema, _batches(new, schema)),
-            writer_properties=WriterProperties(compression="ZSTD"),
-            commit_properties=CommitProperties(custom_metadata=dict(lay_out or {}) or None, max_commit_retries=0),
-            **anew,
+            writer_properties=WriterProperties(compression="ZSTD", max_row_group_size=groups),
+            commit_properties=CommitProperties(custom_metadata=dict(said or {}) or None, max_commit_retries=0),
+            **how,
         )
+        seals.seal(table)
+
+
+def describe_alone(table: DeltaTable, name: str, column: str, brought_from: int) -> None:
+    """Give a column the words that it has in `kempf.schemas.tables.TABLES`, as `exchange_alone` commits.
+
+    Who opened the table before cannot commit to it any more.
+
+    Raises
+    ------
+    deltalake.exceptions.CommitFailedError
+        Another process committed since the table was opened.
+    KempfError
+        ``disk_full``, ``warehouse_not_writable``.
+    """
+    from deltalake import CommitProperties
+
+    held = arrow_schema(TABLES[name]).field(column).metadata
+    said = CommitProperties(custom_metadata={BROUGHT: str(brought_from)}, max_commit_retries=0)
+    with refusals_as_errors(table.table_uri):
+        words = {key.decode(): value.decode() for key, value in held.items()}
+        table.alter.set_column_metadata(column, words, commit_properties=said)
         seals.seal(table)
 
 

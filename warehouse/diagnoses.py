@@ -124,6 +124,12 @@ def of_vessel(warehouse: Warehouse, vessel: str) -> list[StoredDiagnosis]:
     return [_stored(row) for row in frame.sort("start_utc_ns", "diagnosis_id").rows(named=True)]
 
 
+def newest(warehouse: Warehouse) -> dict[str, StoredDiagnosis]:
+    """Return the diagnosis of every vessel that has one: that of her newest manoeuvres, of several the last by id."""
+    frame = delta.read(warehouse, "diagnoses").sort("start_utc_ns", "diagnosis_id")
+    return {one.vessel: one for one in map(_stored, frame.rows(named=True))}
+
+
 def _stored(r: Mapping[str, Any]) -> StoredDiagnosis:
     return StoredDiagnosis(
         r["diagnosis_id"],

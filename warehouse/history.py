@@ -17,7 +17,7 @@ from kempf.warehouse import delta, examinations, notes, vessels
 from kempf.warehouse.canonical import canonical_json, plain
 from kempf.warehouse.equivalents import code_of
 from kempf.warehouse.instant import iso_utc
-from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.keys import earlier_key, vessel_key
 from kempf.warehouse.notes import Note
 from kempf.warehouse.parameter_set import UPDATES, Bounds, update_in
 from kempf.warehouse.scan import Where
@@ -120,7 +120,7 @@ def of_vessel(
     with _sets_as_of(warehouse, as_of) as table:
         if table is None and as_of is not None:
             vessels.require(warehouse, vessel)
-            nothing = _exploded(None, vessel, _Logs([], None, [], code_of(warehouse, "estimate")))
+            nothing = _exploded(None, vessel, _Logs([], None, [], code_of(warehouse, "estimate"), then=True))
             return History(nothing, None, f"No parameter set of any vessel was stored by {as_of.isoformat()}.")
         frame = _exploded(table, vessel, _logs_of(warehouse, vessel, as_of))
         version = table.version() if table is not None else None
@@ -275,21 +275,22 @@ class _Logs:
     notes: list[Note]
     #: Fingerprint under which the present code estimates.
     code: str
+    #: Whether it was so at a time that is past, of which earlier versions of tables tell.
+    then: bool
 
 
 def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs:
     """Return what is known of a vessel's logs, or was by a time."""
     version = None if as_of is None else delta.version_as_of(warehouse, "logs", as_of)
     if as_of is not None and version is None:
-        return _Logs([], None, [], code_of(warehouse, "estimate"))
+        return _Logs([], None, [], code_of(warehouse, "estimate"), then=True)
     columns = ("log_id", "ingest_id", "revision", "removed")
-    hers = {"vessel_key": vessel_key(vessel)}
-    rows = delta.read(warehouse, "logs", hers, columns, version).sort("log_id", "revision")
+    rows = _read(warehouse, "logs", vessel, {}, columns, version).sort("log_id", "revision")
     last = {row["log_id"]: row for row in rows.rows(named=True)}
     present = {log: row["ingest_id"] for log, row in last.items() if row["removed"] is None}
     past = [row["ingest_id"] for row in rows.rows(named=True) if present.get(row["log_id"]) != row["ingest_id"]]
     found = _segments_in(warehouse, vessel, sorted(present.values()), as_of)
-    return _Logs(past, found, _notes_of(warehouse, vessel, as_of), code_of(warehouse, "estimate"))
+    return _Logs(past, found, _notes_of(warehouse, vessel, as_of), code_of(warehouse, "estimate"), as_of is not None)
 
 
 def _notes_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> list[Note]:
@@ -302,15 +303,35 @@ def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: d
     version = None if as_of is None else delta.version_as_of(warehouse, "segments", as_of)
     if as_of is not None and version is None:
         return None
-    where: Where = {"vessel_key": vessel_key(vessel), "ingest_id": ingests}
     try:
-        rows = delta.read(warehouse, "segments", where, ("segment_id", "excluded"), version)
+        rows = _read(warehouse, "segments", vessel, {"ingest_id": ingests}, ("segment_id", "excluded"), version)
     except KempfError:
         if version is None:
             raise
         return None  # what was found then has been deleted since: earlier versions of kempf did not keep it
     found = rows.filter(rows["excluded"].is_null())["segment_id"].to_list()
     return found or ([] if examinations.codes(warehouse, ingests, [vessel]) else None)
+
+
+def _read(
+    warehouse: Warehouse, name: str, vessel: str, where: Where, columns: Sequence[str], version: int | None
+) -> pl.DataFrame:
+    """Return rows of a vessel in the newest version of a table, or in another one."""
+    if version is None:
+        return delta.read(warehouse, name, {"vessel_key": vessel_key(vessel), **where}, columns)
+    with delta.reading(warehouse, name, version) as table:
+        return _as_then(table, name, vessel, where, columns)
+
+
+def _as_then(table: DeltaTable | None, name: str, vessel: str, where: Where, columns: Sequence[str]) -> pl.DataFrame:
+    """Return rows of a vessel in some version of a table, which may have them under the key of before layout 4.
+
+    One that was written while the table was brought forward has some under either key, and each of them once.
+    """
+    import polars as pl
+
+    keys = (vessel_key(vessel), earlier_key(vessel))
+    return pl.concat([delta.rows(table, name, {"vessel_key": key, **where}, columns) for key in keys])
 
 
 def _exploded(table: DeltaTable | None, vessel: str, known: _Logs) -> pl.DataFrame:
@@ -335,7 +356,11 @@ def _marked(table: DeltaTable | None, vessel: str, known: _Logs, columns: Sequen
 
     needed = ("segment_ids", "provenance_json", "settings_json", "model_sha256", "estimator", "convergence_json")
     extra = [name for name in needed if name not in columns]
-    sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, (*columns, *extra))
+    wanted = (*columns, *extra)
+    if known.then:
+        sets = _as_then(table, "parameter_sets", vessel, {}, wanted)
+    else:
+        sets = delta.rows(table, "parameter_sets", {"vessel_key": vessel_key(vessel)}, wanted)
     provenance = pl.col("provenance_json").str
     at = provenance.json_path_match("$.table_versions.parameter_sets").cast(pl.Int64).fill_null(-1)
     sets = sets.with_columns(_code=provenance.json_path_match("$.code_version"), _at=at)

@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
+import re
+import unicodedata
 from collections.abc import Iterable
 
 from kempf.schemas.errors import UsageError
 from kempf.warehouse.canonical import canonical_json, sha256
 
+#: Characters of a name that a person reads in a key.
+_MOST_LETTERS = 24
+
 
 def vessel_key(vessel: str) -> str:
-    """Return the partition of a vessel: 16 hex digits of the SHA-256 of her name.
+    """Return the partition of a vessel: what can be read of her name, and 8 hex digits of the SHA-256 of all of it.
 
-    Names are not paths: ``../../etc``, ``CON`` and names that differ only in case all have a folder of their own.
+    Names are not paths: ``../../etc``, ``CON`` and names that differ only in case all have a folder of their own. A
+    name without a letter or digit of ASCII reads ``vessel``.
 
     Raises
     ------
@@ -20,12 +26,63 @@ def vessel_key(vessel: str) -> str:
 
     Examples
     --------
-    >>> vessel_key("../../etc")
+    >>> vessel_key("Ferry One"), vessel_key("../../etc")
+    ('ferry-one-cb9e2d73', 'etc-74ccf3c5')
+    """
+    return f"{_readable(vessel)}-{_hash(vessel)[:8]}"
+
+
+def earlier_key(vessel: str) -> str:
+    """Return the partition of a vessel in versions of tables from before layout 4: 16 hex digits, no hyphen.
+
+    Raises
+    ------
+    UsageError
+        ``vessel_name``.
+
+    Examples
+    --------
+    >>> earlier_key("../../etc")
     '74ccf3c5b4c19a81'
     """
+    return _hash(vessel)[:16]
+
+
+def require_apart(held: Iterable[tuple[str, str]]) -> None:
+    """Do nothing unless two names have one key: what can be read of them and 8 digits are the same, which is rare.
+
+    Parameters
+    ----------
+    held : iterable of (str, str)
+        Keys and names; the earlier name is told as the one that has the key.
+
+    Raises
+    ------
+    UsageError
+        ``vessel_key_taken``.
+    """
+    whose: dict[str, str] = {}
+    for key, vessel in held:
+        other = whose.setdefault(key, vessel)
+        if other != vessel:
+            raise UsageError(
+                "vessel_key_taken",
+                f"{vessel!r} would have the same folders as {other!r}: both names have the key {key}.",
+                "Spell one of them otherwise.",
+                {"vessel": vessel, "held_by": other, "vessel_key": key},
+            )
+
+
+def _readable(vessel: str) -> str:
+    """Return the letters and digits of a name in lower case, with a hyphen for what stands between them."""
+    plain = unicodedata.normalize("NFKD", vessel).encode("ascii", "ignore").decode().lower()
+    return re.sub(r"[^a-z0-9]+", "-", plain).strip("-")[:_MOST_LETTERS].rstrip("-") or "vessel"
+
+
+def _hash(vessel: str) -> str:
     try:
         if vessel.strip():
-            return sha256(vessel)[:16]
+            return sha256(vessel)
     except UnicodeEncodeError:
         pass
     raise UsageError(

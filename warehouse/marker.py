@@ -10,7 +10,7 @@ from typing import Any
 #: Name of the file.
 MARKER = "kempf-warehouse.json"
 #: How this version lays a warehouse out.
-LAYOUT = 3
+LAYOUT = 4
 #: Markers of this layout and later ones have a check.
 _CHECKED = 3
 

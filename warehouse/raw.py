@@ -124,10 +124,17 @@ def described(warehouse: Warehouse, name: str) -> dict[str, Any] | None:
     return facts if isinstance(facts, dict) and {"vessel", "file_name", "profile"} <= facts.keys() else None
 
 
+def is_half_described(warehouse: Warehouse, name: str) -> bool:
+    """Return whether something is kept beside a log that cannot be read."""
+    return described(warehouse, name) is None and warehouse.size_of(*_beside(name)) is not None
+
+
 def delete(warehouse: Warehouse, name: str) -> None:
-    """Delete a log, and what is kept beside it."""
-    warehouse.delete(*_place(name))
-    warehouse.delete(*_beside(name))
+    """Delete a log, what is kept beside it, and what writers of it that were killed left behind."""
+    folder = _place(name)[:-1]
+    for file in warehouse.files_below(*folder):
+        if name in file:
+            warehouse.delete(*folder, file)
 
 
 def kept(warehouse: Warehouse) -> list[str]:

@@ -54,5 +54,6 @@ def times(warehouse: Warehouse, name: str) -> dict[int, datetime]:
 
 
 def _writes(table: DeltaTable) -> list[dict[str, Any]]:
-    """Return the commits of a table that added rows, in order."""
-    return [entry for entry in table.history() if entry.get("operation") == "WRITE"][::-1]
+    """Return the commits of a table that added rows, in order; what brought it forward wrote rows again."""
+    every = table.history()[::-1]
+    return [entry for entry in every if entry.get("operation") == "WRITE" and delta.BROUGHT not in entry]

@@ -62,6 +62,23 @@ def scanned(table: DeltaTable | None, name: str, where: Where | None = None) -> 
     return lazy
 
 
+def by_file(table: DeltaTable, name: str, where: Mapping[str, str]) -> list[pl.LazyFrame]:
+    """Return the rows of one folder of a table, a frame a file: read one after the other, little is held at a time.
+
+    Parameters
+    ----------
+    table : DeltaTable
+        Open; one in a bucket gives one frame of all files.
+    name : str
+        Key of `kempf.schemas.tables.TABLES`.
+    where : mapping of str to str
+        The value of every column that the table has folders by.
+    """
+    if not _local(table):
+        return [scanned(table, name, where)]
+    return [_of_files(table, name, _empty(name), where, [file]) for file in _files(table, where)]
+
+
 def _local(table: DeltaTable) -> bool:
     # a bucket needs the credentials that polars takes from the table itself
     return table.table_uri.startswith(("file://", "/"))
@@ -69,11 +86,16 @@ def _local(table: DeltaTable) -> bool:
 
 def _of_few_files(table: DeltaTable, name: str, empty: pl.DataFrame, single: Mapping[str, str]) -> pl.LazyFrame:
     """Return the rows of the files that may hold these values, by their folder or their statistics."""
+    files = _files(table, single)
+    return _of_files(table, name, empty, single, files) if files else empty.lazy()
+
+
+def _of_files(
+    table: DeltaTable, name: str, empty: pl.DataFrame, single: Mapping[str, str], files: list[str]
+) -> pl.LazyFrame:
+    """Return the rows of some files."""
     import polars as pl
 
-    files = _files(table, single)
-    if not files:
-        return empty.lazy()
     folder = seals.folder_of(table)
     if folder is not None:
         seals.compare_files(folder, name, files)

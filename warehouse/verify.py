@@ -169,6 +169,9 @@ def _references(warehouse: Warehouse) -> Iterator[Problem]:
         if facts is not None and not facts.get("removed"):
             words = f"The raw log {log_id} ({facts['file_name']} of {facts['vessel']}) is in no table."
             yield Problem("reference", "logs", log_id, words)
+        if raw.is_half_described(warehouse, log_id):
+            words = f"The raw log {log_id} is in no table, and what is kept beside it is damaged."
+            yield Problem("raw log", "raw", f"{log_id}.json", words)
     yield from _descriptions(warehouse)
 
 

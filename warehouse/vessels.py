@@ -10,7 +10,7 @@ from typing import Any
 from kempf.schemas.errors import NotFound
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import delta
-from kempf.warehouse.keys import quoted, vessel_key
+from kempf.warehouse.keys import quoted, require_apart, vessel_key
 from kempf.warehouse.retry import with_retry
 from kempf.warehouse.scan import Where
 from kempf.warehouse.store import Warehouse
@@ -53,6 +53,11 @@ def register_all(
     -------
     tuple of (str, VesselProfile)
         Those that were not current when their turn came.
+
+    Raises
+    ------
+    UsageError
+        ``vessel_name``; ``vessel_key_taken``: another vessel has the folders that this name would have.
     """
     keys = {vessel: vessel_key(vessel) for vessel, _ in profiles}
     if not keys:
@@ -65,6 +70,7 @@ def register_all(
                 row["vessel"]: (row["revision"], row["profile_json"] if row["removed"] is None else None)
                 for row in known
             }  # the highest revision stays
+            require_apart([*((row["vessel_key"], row["vessel"]) for row in known), *((k, v) for v, k in keys.items())])
             rows: list[dict[str, Any]] = []
             changed = []
             for vessel, profile in profiles:

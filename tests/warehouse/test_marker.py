@@ -51,11 +51,13 @@ def test_a_bit_does_not_bring_a_warehouse_forward() -> None:
 @pytest.mark.parametrize(
     ("found", "code", "said", "next_step"),
     [
-        (b'{"layout": 2}', "warehouse_layout_old", "has layout 2; this version works with layout 3", "kempf migrate"),
+        (b'{"layout": 2}', "warehouse_layout_old", "has layout 2; this version works with layout 4", "kempf migrate"),
         (Marker(2).written(), "warehouse_layout_old", "has layout 2", "kempf migrate"),
+        (Marker(3).written(), "warehouse_layout_old", "has layout 3", "kempf migrate"),
+        (Marker(4, 3).written(), "warehouse_migrating", "from layout 3 to layout 4", "kempf migrate"),
         (Marker(3, 2).written(), "warehouse_migrating", "from layout 2 to layout 3", "kempf migrate"),
-        (Marker(9).written(), "warehouse_layout", "has layout 9; this version reads layout 3", "Update kempf"),
-        (Marker(9, 3).written(), "warehouse_layout", "has layout 9; this version reads layout 3", "Update kempf"),
+        (Marker(9).written(), "warehouse_layout", "has layout 9; this version reads layout 4", "Update kempf"),
+        (Marker(9, 3).written(), "warehouse_layout", "has layout 9; this version reads layout 4", "Update kempf"),
     ],
 )
 def test_each_says_which_way_to_go(tmp_path: Path, found: bytes, code: str, said: str, next_step: str) -> None:

@@ -2,7 +2,9 @@
 
 ``layout_2_warehouse.tar.xz`` was written by the last version of layout 2 (commit e4b330e): three short logs of a
 simulated ferry, of which one was removed, a correction, a note, her parameter sets; with it is what that version
-answered. ``earlier_warehouse.tar.xz`` is of the same layout and much older, see ``test_earlier_warehouse.py``.
+answered. ``layout_3_warehouse.tar.xz`` was written likewise by the last version of layout 3 (commit c0cc142): four
+short logs of two ferries, of which one was purged; one ferry was renamed, the other was identified twice.
+``earlier_warehouse.tar.xz`` is of layout 2 and much older, see ``test_earlier_warehouse.py``.
 """
 
 from __future__ import annotations
@@ -24,6 +26,7 @@ from kempf.flows.fleet import flows
 from kempf.flows.jobs.take_inbox import take_inbox
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import delta, logs, parameter_sets, seals
+from kempf.warehouse.keys import earlier_key, vessel_key
 from kempf.warehouse.marker import LAYOUT, Marker
 from kempf.warehouse.migrations.chain import forward
 from kempf.warehouse.source_folder import SourceFolder
@@ -32,8 +35,10 @@ from tests.flows.content import TOLD, seen
 from tests.workbench.driving import environment, kempf, refused, tree
 
 HERE = Path(__file__).parent
-PACKED = ("layout_2_warehouse", "earlier_warehouse")
-SET = "ps-0125542db53c6969"
+#: The layout of each.
+PACKED = {"layout_2_warehouse": 2, "earlier_warehouse": 2, "layout_3_warehouse": 3}
+#: Those that came with what their version answered, and a set of each.
+ANSWERED = {"layout_2_warehouse": "ps-0125542db53c6969", "layout_3_warehouse": "ps-e260d1a268aa6402"}
 
 
 def unpacked(name: str, folder: Path) -> Path:
@@ -44,7 +49,7 @@ def unpacked(name: str, folder: Path) -> Path:
 
 @pytest.fixture(scope="module", params=PACKED)
 def packed(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return unpacked(request.param, tmp_path_factory.mktemp(request.param)) / "warehouse"
+    return unpacked(request.param, tmp_path_factory.mktemp("packed") / request.param) / "warehouse"
 
 
 @pytest.fixture
@@ -52,23 +57,31 @@ def place(packed: Path, tmp_path: Path) -> Path:
     return copytree(packed, tmp_path / "w")
 
 
-@pytest.fixture(scope="module")
-def brought(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The last version's warehouse, brought forward, with what it answered in ``answers.json``."""
-    folder = unpacked("layout_2_warehouse", tmp_path_factory.mktemp("brought"))
+@pytest.fixture
+def since(packed: Path) -> int:
+    """The layout that the packed one has."""
+    return PACKED[packed.parent.name]
+
+
+@pytest.fixture(scope="module", params=ANSWERED)
+def brought(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The warehouse of the last version of a layout, brought forward, with what it answered in ``answers.json``."""
+    folder = unpacked(request.param, tmp_path_factory.mktemp("brought") / request.param)
     assert kempf("migrate", "--yes", "--warehouse", folder / "warehouse").code == 0
     return folder
 
 
 def content(warehouse: Warehouse) -> dict[str, list[str]]:
-    """What a warehouse says, but for the month that readings had not and for what aliases of before are called."""
+    """What a warehouse says, but for keys, the month that readings had not, and what aliases of before are called."""
     found = seen(warehouse)
+    for row in (row for rows in found.values() for row in rows):
+        row.pop("vessel_key", None)
     for name in ("readings", "rejected"):
         for row in found[name]:
             row.pop("month", None)
     del found["aliases"]
     found["raw"] = [row for row in found["raw"] if len(row["name"]) == 64]
-    return as_texts(found)
+    return {name: sorted(rows) for name, rows in as_texts(found).items()}
 
 
 def as_texts(found: dict[str, list[dict[str, Any]]]) -> dict[str, list[str]]:
@@ -79,47 +92,53 @@ def as_texts(found: dict[str, list[dict[str, Any]]]) -> dict[str, list[str]]:
 def end_state(place: Path) -> dict[str, Any]:
     """What there is in the end, but for names of files and numbers of versions."""
     warehouse = Warehouse(str(place))
-    table = delta.open_table(warehouse, "readings")
-    assert table is not None
+    tables = [delta.open_table(warehouse, name) for name in ("readings", "segments")]
+    uris = [uri for table in tables if table is not None for uri in table.file_uris()]
     said = as_texts(seen(warehouse))
     beside = {path.name: path.read_bytes() for path in (place / "raw").rglob("*.json")}
-    folders = sorted({uri.rpartition("/")[0].removeprefix(str(place)) for uri in table.file_uris()})
+    folders = sorted({uri.rpartition("/")[0].removeprefix(str(place)) for uri in uris})
     unsealed = {name: seals.unsealed(place / name) for name in delta.versions(warehouse)}
     return {"said": said, "beside": beside, "folders": folders, "unsealed": unsealed, "marker": warehouse.marker()}
 
 
-def test_it_says_first_what_it_will_do_and_asks(place: Path) -> None:
+def test_it_says_first_what_it_will_do_and_asks(place: Path, since: int) -> None:
     before = tree(place)
     error = refused(kempf("migrate", "--warehouse", place, "--json"), 2, "not_confirmed")
-    assert "from layout 2 to 3: " in error["message"]
+    assert f"from layout {since} to 4: " in error["message"]
+    assert "get keys that read as their vessels' names" in error["message"]
     old = refused(kempf("segments", "--warehouse", place, "--json"), 1, "warehouse_layout_old")
-    assert old["details"] == {"found": 2, "expected": 3} and "kempf migrate" in old["next_step"]
+    assert old["details"] == {"found": since, "expected": 4} and "kempf migrate" in old["next_step"]
     for command in ("verify", "repair", "compact", "reprocess"):
         refused(kempf(command, "--warehouse", place, "--json"), 1, old["code"])
     assert tree(place) == before
 
 
-def test_everything_is_there_after(place: Path) -> None:
+def test_everything_is_there_after(place: Path, since: int) -> None:
     warehouse = Warehouse(str(place))
     then = content(forward(warehouse))
     done = kempf("migrate", "--yes", "--warehouse", place, "--json")
-    assert done.code == 0 and (done.json["from"], done.json["to"]) == (2, LAYOUT), done
+    assert done.code == 0 and (done.json["from"], done.json["to"]) == (since, LAYOUT), done
     assert content(warehouse) == then and set(TOLD) - {"aliases"} <= then.keys()
     assert kempf("verify", "--warehouse", place).out.strip() == "all is well"
     assert warehouse.marker() == Marker(LAYOUT)
     after = tree(place)
     again = kempf("migrate", "--warehouse", place)
-    assert again.code == 0 and again.out.strip() == "nothing to do: the warehouse has layout 3"
+    assert again.code == 0 and again.out.strip() == "nothing to do: the warehouse has layout 4"
     assert tree(place) == after
     assert kempf("reprocess", "--warehouse", place).code == 0
 
 
 def test_every_command_answers_as_before(brought: Path) -> None:
     answers = json.loads((brought / "answers.json").read_text(encoding="utf-8"))
-    assert len(answers) > 20 and {"segments", "history --vessel ferry", "segments corrections"} <= answers.keys()
+    assert len(answers) > 20 and {"segments", "vessels list", "segments corrections"} <= answers.keys()
     for command, answer in answers.items():
-        done = kempf(*command.split(), "--warehouse", brought / "warehouse", "--json")
+        # a blank in a name is written as _ there
+        words = [word.replace("_", " ") for word in command.split()]
+        done = kempf(*words, "--warehouse", brought / "warehouse", "--json")
         assert done.code == 0, (command, done)
+        if command.startswith("vessels show"):
+            assert answer.pop("partition", None) in (None, f"vessel_key={earlier_key(words[2])}")
+            assert done.json["partition"] == f"vessel_key={vessel_key(words[2])}"
         same(done.json, answer, command)
 
 
@@ -141,9 +160,10 @@ def same(found: Any, wanted: Any, where: str) -> None:
 
 def test_a_set_is_built_again_with_the_same_values(brought: Path) -> None:
     warehouse = Warehouse(str(brought / "warehouse"))
-    stored = parameter_sets.get(warehouse, SET)
-    done = kempf("rerun", SET, "--warehouse", warehouse.uri, "--json")
-    assert done.json["parameter_set_id"] == SET == stored.parameter_set_id
+    name = ANSWERED[brought.name]
+    stored = parameter_sets.get(warehouse, name)
+    done = kempf("rerun", name, "--warehouse", warehouse.uri, "--json")
+    assert done.json["parameter_set_id"] == name == stored.parameter_set_id
     # other code or packages than those of then may move what follows from the bytes
     if not done.json["code_changed"] and not done.json["packages_changed"]:
         assert done.code == 0 and done.json["verdict"] == "bit-identical", done
@@ -181,10 +201,10 @@ DYING = """
 import os, signal, sys
 from kempf.flows.jobs.migrate_warehouse import migrate
 from kempf.warehouse import delta, seals
-from kempf.warehouse.migrations import by_month
+from kempf.warehouse.migrations import by_month, by_name
 from kempf.warehouse.store import Warehouse
 
-by_month.MOST_LOGS = 1
+by_month.MOST_LOGS = by_name.MOST_FOLDERS = 1
 count, last = 0, int(sys.argv[2])
 
 def dying(write):
@@ -196,7 +216,10 @@ def dying(write):
         return write(*arguments, **named)
     return wrapped
 
-for owner, name in ((delta, "append_alone"), (delta, "replace"), (seals, "_write"), (Warehouse, "write")):
+for owner, name in (
+    *((delta, name) for name in ("append_alone", "describe_alone", "exchange_alone", "replace")),
+    *((seals, "_write"), (Warehouse, "write")),
+):
     setattr(owner, name, dying(getattr(owner, name)))
 migrate(Warehouse(sys.argv[1]))
 print(count)
@@ -208,14 +231,21 @@ def dying(place: Path, number: int) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, env=environment(), check=False, timeout=120)
 
 
+#: Before the first write (0), before the last one (1), and between.
+KILLED = {
+    "layout_2_warehouse": (0.0, 0.3, 0.6, 1.0),
+    "earlier_warehouse": (0.5,),
+    "layout_3_warehouse": (0.3, 0.6, 1.0),
+}
+
+
 @pytest.mark.parametrize("name", PACKED)
 def test_one_that_is_killed_is_finished_by_the_next(name: str, tmp_path: Path) -> None:
     packed = unpacked(name, tmp_path) / "warehouse"
     whole = dying(copytree(packed, tmp_path / "whole"), 0)
     writes = int(whole.stdout)
     wanted = end_state(tmp_path / "whole")
-    # before the first write, behind it, and at moments all over
-    for number in sorted({1, 2, *(1 + k * (writes - 1) // 7 for k in range(1, 7)), writes}):
+    for number in (1 + round(part * (writes - 1)) for part in KILLED[name]):
         place = copytree(packed, tmp_path / f"killed-{number}")
         assert dying(place, number).returncode == -signal.SIGKILL
         if number > 1:

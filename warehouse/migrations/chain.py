@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
 from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import to_3
+from kempf.warehouse.migrations import by_name, to_3, to_4
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import damages, unfinished
 
@@ -23,7 +23,7 @@ class Step:
 
 
 #: By the layout that each begins with.
-STEPS = {2: Step(to_3.to_do, to_3.carry_out)}
+STEPS = {2: Step(to_3.to_do, to_3.carry_out), 3: Step(to_4.to_do, to_4.carry_out)}
 
 
 def standing(warehouse: Warehouse) -> int:
@@ -56,9 +56,9 @@ def forward(warehouse: Warehouse) -> Warehouse:
 
 
 def to_do(warehouse: Warehouse) -> list[str]:
-    """Return what the next step has to do, a phrase each."""
-    begun = standing(warehouse)
-    return [] if begun == LAYOUT else STEPS[begun].to_do(forward(warehouse))
+    """Return what the steps have to do, a phrase each."""
+    passing = forward(warehouse)
+    return [words for begun in range(standing(warehouse), LAYOUT) for words in STEPS[begun].to_do(passing)]
 
 
 def migrate(warehouse: Warehouse, look: to_3.Look) -> list[str]:
@@ -74,15 +74,20 @@ def migrate(warehouse: Warehouse, look: to_3.Look) -> list[str]:
     NotFound
         ``no_warehouse``.
     KempfError
-        ``warehouse_damaged``: something has to be repaired first, nothing was changed; ``warehouse_busy``,
-        ``migration_differs``.
+        ``warehouse_damaged``, ``vessel_key_unknown``: something has to be repaired first, nothing was changed;
+        ``warehouse_busy``, ``migration_differs``.
+    UsageError
+        ``vessel_key_taken``: two names would have one key; nothing was changed.
     """
     said: list[str] = []
     passing = forward(warehouse)
     while (begun := standing(warehouse)) != LAYOUT:
-        if passing.marker() == Marker(begun):
+        found = passing.marker()
+        if found == Marker(begun):
             _require_whole(passing, look)
-            # first, so that versions that would write as before find a newer layout from here on
+            by_name.require_known(passing)
+        if found != Marker(LAYOUT, migrating=begun):
+            # first, so that versions that would write as before, or had begun this, find a newer layout from here on
             passing.mark(Marker(LAYOUT, migrating=begun))
         said += STEPS[begun].carry_out(passing, look)
         passing.mark(Marker(LAYOUT) if begun + 1 == LAYOUT else Marker(LAYOUT, migrating=begun + 1))
@@ -119,9 +124,10 @@ def mend_marker(warehouse: Warehouse) -> bool:
         if found is not None or not _has_tables(warehouse):
             return False
     passing = forward(warehouse)
-    passing.mark(Marker(LAYOUT, migrating=LAYOUT - 1))
+    # the earliest first: to look into the tables it has to be there
+    passing.mark(Marker(LAYOUT, migrating=min(STEPS)))
     if to_3.holds(passing):
-        passing.mark(Marker(LAYOUT))
+        passing.mark(Marker(LAYOUT) if to_4.holds(passing) else Marker(LAYOUT, migrating=3))
     return True
 
 

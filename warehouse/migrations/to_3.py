@@ -7,12 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import suppress
-from pathlib import Path
+from typing import Any
 
 from kempf.schemas.errors import KempfError
-from kempf.schemas.tables import TABLES
-from kempf.warehouse import aliases, deposit, seals
-from kempf.warehouse.migrations import by_month
+from kempf.warehouse import aliases, delta, deposit
+from kempf.warehouse.keys import one_of
+from kempf.warehouse.migrations import by_month, sealing
 from kempf.warehouse.store import Warehouse
 
 #: Tables that are laid out by vessel and month.
@@ -34,10 +34,10 @@ def to_do(warehouse: Warehouse) -> list[str]:
             found.append(f"{name} of {len(ingests)} ingests ({rows} rows) are laid out by vessel and month")
         elif by_month.is_by_log(warehouse, name):
             found.append(f"{name}, which has no rows, is laid out by vessel and month")
-    pointed = aliases.named(warehouse, _BEFORE_CURRENT)
+    pointed = _pointed(warehouse)
     if pointed:
         found.append(f"{len(pointed)} aliases of before there was 'current' become 'current'")
-    commits = sum(len(seals.unsealed(folder)) for folder in _folders(warehouse))
+    commits = sealing.unsealed(warehouse)
     if commits:
         found.append(f"{commits} commits of tables are sealed")
     logs = len(deposit.not_described(warehouse))
@@ -79,8 +79,7 @@ def carry_out(warehouse: Warehouse, look: Look) -> list[str]:
         ``warehouse_busy``, ``migration_differs``, ``table_damaged``, ``disk_full``, ...
     """
     look(0, 1, "seals")
-    for folder in _folders(warehouse):
-        seals.seal_every(folder)
+    sealing.seal_all(warehouse)
     _one_current(warehouse)
     said = []
     for name in BY_MONTH:
@@ -94,23 +93,25 @@ def carry_out(warehouse: Warehouse, look: Look) -> list[str]:
             said.append(f"{name}: {compared} ingests have the same rows as before.")
     look(0, 1, "raw logs")
     deposit.describe_all(warehouse)
-    for folder in _folders(warehouse):
-        seals.seal_every(folder)
+    sealing.seal_all(warehouse)
     return said
 
 
 def _one_current(warehouse: Warehouse) -> None:
-    """Let ``current`` point to what commands took for it where aliases of before stand beside it, or alone."""
-    pointed = aliases.named(warehouse, _BEFORE_CURRENT)
-    wanted = {
-        vessel: name for alias in reversed(_BEFORE_CURRENT) for (vessel, a), name in pointed.items() if a == alias
-    }
-    aliases.point_all(warehouse, {(vessel, aliases.CURRENT): name for vessel, name in wanted.items()})
-    if pointed:
-        aliases.drop(warehouse, _BEFORE_CURRENT)
+    """Let ``current`` point to what commands took for it where aliases of before stand beside it, or alone.
+
+    In one commit. Rows keep the key that they have: it is that of layout 2.
+    """
+    pointed = _pointed(warehouse)
+    if not pointed:
+        return
+    with delta.ensured(warehouse, "aliases") as table:
+        chosen = {row["vessel"]: row for alias in reversed(_BEFORE_CURRENT) for row in pointed if row["alias"] == alias}
+        rows = [{**row, "alias": aliases.CURRENT} for row in chosen.values()]
+        hers = one_of("vessel_key", [row["vessel_key"] for row in rows])
+        delta.replace(table, "aliases", rows, f"{hers} AND {one_of('alias', (*_BEFORE_CURRENT, aliases.CURRENT))}")
 
 
-def _folders(warehouse: Warehouse) -> list[Path]:
-    """Return the folders of the tables that were written; none in a bucket."""
-    root = warehouse.folder
-    return [root / name for name in TABLES if (root / name / "_delta_log").is_dir()] if root is not None else []
+def _pointed(warehouse: Warehouse) -> list[dict[str, Any]]:
+    """Return the rows of the aliases of before."""
+    return delta.read(warehouse, "aliases", {"alias": list(_BEFORE_CURRENT)}).rows(named=True)

@@ -1,0 +1,289 @@
+"""Keeping the rows of a table under keys that a person can read: what `kempf.warehouse.keys.vessel_key` returns now.
+
+The first commit gives the column its new words and says which version is that of before; whoever opened the table
+earlier cannot commit to it any more. Rows under keys of before are then exchanged for the same rows under the new ones,
+some folders a commit, until none is left: a migration that was killed goes on with those that are. Each commit takes
+out and puts in at once, and rests on the very version that was read, so that every version has every row once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from kempf.schemas.errors import KempfError
+from kempf.schemas.tables import TABLES, arrow_schema
+from kempf.warehouse import delta
+from kempf.warehouse.keys import earlier_key, one_of, require_apart, vessel_key
+from kempf.warehouse.scan import by_file, scanned
+from kempf.warehouse.store import Warehouse
+
+if TYPE_CHECKING:
+    import polars as pl
+    from deltalake import DeltaTable
+
+#: Rows and folders of one commit: what a writer holds at a time.
+MOST_ROWS = 4_000_000
+MOST_FOLDERS = 256
+_KEY = "vessel_key"
+
+
+@dataclass(frozen=True)
+class Held:
+    """Rows that are under a key of before: those of one folder, or of a vessel in a table without folders."""
+
+    key: str
+    #: Of the folder; None in a table that has no folders by month.
+    month: str | None
+    rows: int
+
+
+def tables() -> list[str]:
+    """Return the names of the tables that have the column."""
+    return [name for name, table in TABLES.items() if any(column.name == _KEY for column in table.columns)]
+
+
+def missing(warehouse: Warehouse, name: str) -> list[Held]:
+    """Return what is still under keys of before, by key and month.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Opened to be brought forward.
+    name : str
+        One of `tables`.
+    """
+    found = [one for one in _held(delta.open_table(warehouse, name), name) if _is_earlier(one.key)]
+    return sorted(found, key=lambda one: (one.key, one.month or ""))
+
+
+def require_known(warehouse: Warehouse) -> None:
+    """Do nothing where every row is under the key of its own vessel, the one of before or of now.
+
+    Raises
+    ------
+    KempfError
+        ``vessel_key_unknown``: some are not.
+    UsageError
+        ``vessel_key_taken``: two names would have one key.
+    """
+    every: set[str] = set()
+    for name in tables():
+        every |= {vessel for _, vessel in _whose(warehouse, name)}
+    require_apart([(vessel_key(vessel), vessel) for vessel in sorted(every)])
+
+
+def key_anew(warehouse: Warehouse, name: str) -> Iterator[int]:
+    """Put rows under the new keys; yields how many folders are done after every commit.
+
+    Raises
+    ------
+    KempfError
+        ``warehouse_busy``: another process committed to the table meanwhile; ``vessel_key_unknown``,
+        ``table_damaged``, ``disk_full``, ...
+    """
+    table = delta.open_table(warehouse, name)
+    if table is None:
+        return
+    before = _version_before(table)
+    if before is None:
+        if _has_words(table, name) and not missing(warehouse, name):
+            return  # made by this version
+        before = table.version()
+        with _alone(name):
+            delta.describe_alone(table, name, _KEY, before)
+    todo = missing(warehouse, name)
+    # after: of what is to be done the name is known
+    names = {key: vessel for key, vessel in _whose(warehouse, name) if _is_earlier(key)}
+    done = 0
+    whole = not TABLES[name].partition_by
+    for batch in _batches(todo, whole=whole):
+        with delta.ensured(warehouse, name) as table:  # which has every column
+            # read by another handle: a table cannot be asked while the library writes to it
+            source = delta.open_table(warehouse, name, table.version())
+            assert source is not None
+            each = [where for one in batch for where in _wheres(one, names)]
+            parts = [scanned(source, name)] if whole else [p for where in each for p in by_file(source, name, where)]
+            predicate = None if whole else _predicate(batch, names)
+            with _alone(name):
+                delta.exchange_alone(table, name, _frames(parts, names, ordered=whole), predicate, before)
+        done += len(batch)
+        yield done
+    if missing(warehouse, name):  # of one that opened the table after its words were changed
+        raise _overtaken(name)
+
+
+def require_same(warehouse: Warehouse, name: str) -> int:
+    """Return how many vessels were compared: each has the same rows, but for the key, as before.
+
+    Where another process committed in between, what was there then counts as before for what came after.
+
+    Raises
+    ------
+    KempfError
+        ``migration_differs``.
+    """
+    table = delta.open_table(warehouse, name)
+    before = None if table is None else _version_before(table)
+    if table is None or before is None:
+        return 0
+    others = [entry["version"] for entry in table.history() if entry["version"] > before and delta.BROUGHT not in entry]
+    compared = 0
+    since = before
+    for until in (*(version - 1 for version in sorted(others)), table.version()):
+        compared = max(compared, _compare(warehouse, name, since, until))
+        since = until + 1
+    return compared
+
+
+def contents(warehouse: Warehouse, name: str, version: int) -> dict[str, tuple[int, int, int]]:
+    """Return of every vessel in a version of a table how many rows she has, and two sums of hashes of their content.
+
+    The sums depend neither on the order of the rows nor on the key.
+    """
+    import polars as pl
+
+    columns = [column.name for column in TABLES[name].columns if column.name != _KEY]
+    row = pl.struct(columns)
+    hashed = scanned(delta.open_table(warehouse, name, version), name).select(
+        "vessel", one=row.hash(1), other=row.hash(2)
+    )
+    found = hashed.group_by("vessel").agg(pl.len(), pl.col("one", "other").sum()).collect(engine="streaming")
+    return {vessel: (count, one, other) for vessel, count, one, other in found.iter_rows()}
+
+
+def _compare(warehouse: Warehouse, name: str, since: int, until: int) -> int:
+    if since == until:
+        return 0
+    then, now = contents(warehouse, name, since), contents(warehouse, name, until)
+    differ = sorted(vessel for vessel in then.keys() | now.keys() if then.get(vessel) != now.get(vessel))
+    if differ:
+        first = differ[0]
+        had, has = (found.get(first, (0, 0, 0))[0] for found in (then, now))
+        raise KempfError(
+            "migration_differs",
+            f"Of {len(then)} vessels in the table {name} {len(differ)} have other rows than before, the first "
+            f"{first!r}: {had} rows before, {has} now.",
+            f"Nothing of before was deleted: it is version {since} of the table. Report it, and leave the warehouse "
+            "as it is.",
+            {"table": name, "version": since, "vessels": differ},
+        )
+    return len(then)
+
+
+def _version_before(table: DeltaTable) -> int | None:
+    """Return the version of before the first commit; None where there was none yet."""
+    said = (entry.get(delta.BROUGHT) for entry in table.history())
+    return next((int(version) for version in said if version is not None), None)
+
+
+def _has_words(table: DeltaTable, name: str) -> bool:
+    held = next(field.metadata for field in table.schema().fields if field.name == _KEY)
+    return held == {k.decode(): v.decode() for k, v in arrow_schema(TABLES[name]).field(_KEY).metadata.items()}
+
+
+def _is_earlier(key: str) -> bool:
+    """Return whether a key is one of before: those of now have a hyphen before their hash."""
+    return "-" not in key
+
+
+def _held(table: DeltaTable | None, name: str) -> list[Held]:
+    """Return what an open table holds, by folder, or by key where it has no folders."""
+    import polars as pl
+
+    if table is None or not table.file_uris():
+        return []
+    folders = table.metadata().partition_columns
+    if _KEY not in folders:
+        rows = scanned(table, name).group_by(_KEY).agg(pl.len()).collect(engine="streaming").rows()
+        return [Held(str(key), None, count) for key, count in rows]
+    files = pl.DataFrame(table.get_add_actions(flatten=True))
+    month = pl.col("partition.month") if "month" in folders else pl.lit(None, dtype=pl.String)
+    by = [pl.col(f"partition.{_KEY}").alias(_KEY), month.alias("month")]
+    found = files.group_by(by).agg(pl.col("num_records").sum()).rows()
+    return [Held(str(key), month, int(count or 0)) for key, month, count in found]
+
+
+def _whose(warehouse: Warehouse, name: str) -> set[tuple[str, str]]:
+    """Return the keys of a table and the names of their vessels, as its rows have them.
+
+    Raises
+    ------
+    KempfError
+        ``vessel_key_unknown``.
+    """
+    rows = scanned(delta.open_table(warehouse, name), name).select(_KEY, "vessel").unique()
+    found = set(rows.collect(engine="streaming").rows())
+    for key, vessel in sorted(found, key=repr):
+        if not vessel or key not in (earlier_key(vessel), vessel_key(vessel)):
+            raise KempfError(
+                "vessel_key_unknown",
+                f"The table {name} has rows of {vessel!r} under the key {key}, which is not hers: no version of kempf "
+                "writes such rows.",
+                "Nothing was changed. Delete them by the version that wrote them, or report it.",
+                {"table": name, "vessel": vessel, "vessel_key": key},
+            )
+    return found
+
+
+def _batches(todo: Sequence[Held], *, whole: bool) -> Iterator[list[Held]]:
+    """Yield folders that are written together, in order; a table without folders is written as a whole."""
+    batch: list[Held] = []
+    for one in todo:
+        full = len(batch) == MOST_FOLDERS or sum(b.rows for b in batch) + one.rows > MOST_ROWS
+        if batch and full and not whole:
+            yield batch
+            batch = []
+        batch.append(one)
+    if batch:
+        yield batch
+
+
+def _wheres(one: Held, names: dict[str, str]) -> list[dict[str, str]]:
+    """Return what is read of a folder: also what is under the new key already, as it is put in place of both."""
+    month = {} if one.month is None else {"month": one.month}
+    return [{_KEY: key, **month} for key in (one.key, vessel_key(names[one.key]))]
+
+
+def _predicate(batch: Sequence[Held], names: dict[str, str]) -> str:
+    """Return what names the rows of some folders, under either key."""
+    months: dict[str, list[str]] = {}
+    for one in batch:
+        months.setdefault(one.key, []).extend([] if one.month is None else [one.month])
+    each = []
+    for key, held in months.items():
+        either = one_of(_KEY, (key, vessel_key(names[key])))
+        each.append(f"({either} AND {one_of('month', held)})" if held else either)
+    return " OR ".join(each)
+
+
+def _frames(parts: Sequence[pl.LazyFrame], names: dict[str, str], *, ordered: bool) -> Iterator[pl.DataFrame]:
+    import polars as pl
+
+    anew = pl.col(_KEY).replace({key: vessel_key(vessel) for key, vessel in names.items()})
+    for rows in parts:
+        keyed = rows.with_columns(anew)
+        # so that a reader of one vessel skips the others
+        keyed = keyed.sort(_KEY, maintain_order=True) if ordered else keyed
+        yield from keyed.collect_batches(maintain_order=True)
+
+
+@contextmanager
+def _alone(name: str) -> Iterator[None]:
+    from deltalake.exceptions import CommitFailedError
+
+    try:
+        yield
+    except CommitFailedError as error:
+        raise _overtaken(name) from error
+
+
+def _overtaken(name: str) -> KempfError:
+    return KempfError(
+        "warehouse_busy",
+        f"Another process committed to the table {name} meanwhile.",
+        "End whatever else works on the warehouse, then run `kempf migrate` again: it goes on, and nothing is lost.",
+        {"table": name},
+    )

@@ -1,0 +1,69 @@
+"""Layout 4: the key of a vessel, by which her folders are called, is made of her name.
+
+Each table is looked at for what is still to be done, so that a migration that was killed goes on.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import suppress
+
+from kempf.schemas.errors import KempfError
+from kempf.warehouse.migrations import by_name, sealing
+from kempf.warehouse.store import Warehouse
+
+Look = Callable[[int, int, str], None]
+
+
+def to_do(warehouse: Warehouse) -> list[str]:
+    """Return what is to be done to a warehouse of layout 3, or of an earlier one, a phrase each."""
+    held = {name: by_name.missing(warehouse, name) for name in by_name.tables()}
+    tables = [name for name, found in held.items() if found]
+    rows = sum(one.rows for found in held.values() for one in found)
+    return [f"{rows} rows of {len(tables)} tables get keys that read as their vessels' names"] if tables else []
+
+
+def holds(warehouse: Warehouse) -> bool:
+    """Return whether a warehouse of which that is not known has layout 4, by the keys in its tables.
+
+    A table that cannot be read tells nothing.
+    """
+    for name in by_name.tables():
+        with suppress(KempfError):
+            if by_name.missing(warehouse, name):
+                return False
+    return True
+
+
+def carry_out(warehouse: Warehouse, look: Look) -> list[str]:
+    """Bring a warehouse of layout 3 to layout 4.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+        Opened to be brought forward.
+    look : callable
+        Takes how much of how much is done, and what is done next.
+
+    Returns
+    -------
+    list of str
+        What was compared in the end, a sentence each.
+
+    Raises
+    ------
+    KempfError
+        ``warehouse_busy``, ``migration_differs``, ``vessel_key_unknown``, ``table_damaged``, ``disk_full``, ...
+    """
+    said = []
+    for name in by_name.tables():
+        total = len(by_name.missing(warehouse, name))
+        look(0, max(total, 1), name)
+        for done in by_name.key_anew(warehouse, name):
+            look(done, total, name)
+        look(0, 1, f"{name}, compared")
+        compared = by_name.require_same(warehouse, name)
+        if compared:
+            said.append(f"{name}: {compared} vessel{'s have' if compared > 1 else ' has'} the same rows as before.")
+    sealing.seal_all(warehouse)
+    return said
