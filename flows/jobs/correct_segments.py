@@ -18,7 +18,7 @@ from kempf.flows.jobs.search_log import SearchedLog, search_again
 from kempf.pipeline.segment.corrections import same
 from kempf.schemas.correction import Action, Bounds, Correction
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
-from kempf.warehouse import aliases, corrections, logs, segments
+from kempf.warehouse import aliases, corrections, examinations, logs, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.logs import LogRow
 from kempf.warehouse.segments import Segment
@@ -47,12 +47,13 @@ class Planned:
         before = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
         if _with(before, self.correction) != before:
             corrections.add(warehouse, self.log.log_id, self.segment_id, self.correction)
+        # before the manoeuvres: once they are otherwise it is not seen any more what rested on them
+        if self.following.current:
+            aliases.withdraw(warehouse, self.log.vessel)
         # another person may have corrected the same log meanwhile
         now = corrections.of_logs(warehouse, [self.log.log_id]).get(self.log.log_id, ())
         searched = self._searched if now == self._said else search_again(warehouse, self.log, now)
         search_log.store(warehouse, [searched])
-        if self.following.current:
-            aliases.withdraw(warehouse, self.log.vessel)
 
     def show(self) -> dict[str, Any]:
         """Return it as JSON content."""
@@ -102,7 +103,8 @@ def plan_for(
             {"segment_id": segment.segment_id, "kind": segment.kind},
         )
     last = by_hand["action"] if by_hand else None
-    if action == last and (action != "correct" or bounds_utc_ns == (segment.start_utc_ns, segment.end_utc_ns)):
+    same_again = action == last and (action != "correct" or bounds_utc_ns == (segment.start_utc_ns, segment.end_utc_ns))
+    if same_again and _is_looked_through(warehouse, log, segment):
         raise UsageError(
             "nothing_to_correct",
             f"{segment.segment_id} is {_DONE[action]} already: {by_hand['reason'] if by_hand else ''}",
@@ -138,7 +140,7 @@ def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason:
     log = logs.by_prefix(warehouse, log_name)
     known = [s for s in segments.found_in(warehouse, log.vessel) if s.ingest_id == log.ingest_id and s.is_zigzag]
     held = next((one for one in known if same((one.start_utc_ns, one.end_utc_ns), bounds_utc_ns)), None)
-    if held is not None:
+    if held is not None and (_subject(held) != bounds_utc_ns or _is_looked_through(warehouse, log, held)):
         raise UsageError(
             "bounds_overlap",
             f"There is a {held.kind.replace('_', ' ')} already: {held.segment_id}, {_span(held)}"
@@ -147,6 +149,13 @@ def plan_new(warehouse: Warehouse, log_name: str, bounds_utc_ns: Bounds, reason:
             {"segment_id": held.segment_id},
         )
     return _planned(warehouse, log, None, Correction("add", bounds_utc_ns, bounds_utc_ns, reason.strip()))
+
+
+def _is_looked_through(warehouse: Warehouse, log: LogRow, segment: Segment) -> bool:
+    """Return whether a log was looked through with all that was said of it; else a command was cut off, and goes on."""
+    said = corrections.of_logs(warehouse, [log.log_id]).get(log.log_id, ())
+    seen = examinations.of_ingests(warehouse, [log.ingest_id], [log.vessel]).get(log.ingest_id)
+    return seen is not None and seen.code_version == corrections.basis(segment.code_version, said)
 
 
 _DONE = {"correct": "corrected", "exclude": "excluded", "accept": "accepted"}

@@ -38,9 +38,10 @@ def remove(warehouse: Warehouse, rows: Sequence[LogRow], reason: str) -> Followi
     """
     require_reason(reason)
     found = of_logs(warehouse, rows)
-    _mark(warehouse, rows, reason)
+    # first: once the logs count no longer the same command has nothing to go on with
     if found.current:
         aliases.withdraw(warehouse, found.vessel)
+    _mark(warehouse, rows, reason)
     return found
 
 
@@ -130,6 +131,13 @@ def move(
     return found, logs.by_prefix(warehouse, row.log_id)
 
 
+def _on_their_way(warehouse: Warehouse, vessel: str, to: str) -> list[LogRow]:
+    """Return the logs of a vessel whose move to another one was cut off: they are nobody's."""
+    rows = [row for row in logs.removed(warehouse, vessel) if (row.removed or "").startswith(f"moved to {to!r}: ")]
+    last = logs.find(warehouse, [row.log_id for row in rows])
+    return [row for row in rows if last[row.log_id].ingest_id == row.ingest_id]
+
+
 def held_or_removed(warehouse: Warehouse, name: str) -> LogRow:
     """Return a log by a beginning of its id or by its file name, else one that was removed.
 
@@ -205,7 +213,7 @@ def rename_vessel(warehouse: Warehouse, vessel: str, name: str, reason: str) -> 
             {"vessel": name},
         )
     vessels.register(warehouse, name, renamed)
-    for row in logs.current(warehouse, vessel):
+    for row in [*logs.current(warehouse, vessel), *_on_their_way(warehouse, vessel, name)]:
         move(warehouse, row.log_id, name, reason)
     notes.carry(warehouse, "vessel", vessel, vessel, name)
     vessels.remove(warehouse, vessel, f"renamed to {name!r}: {reason}")

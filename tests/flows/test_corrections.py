@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from shutil import copytree
+from types import ModuleType
 
 import pytest
 
@@ -17,7 +18,7 @@ from kempf.flows.jobs.remove_logs import rename_vessel
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
-from kempf.warehouse import aliases, corrections, history, logs, notes, parameter_sets, segments
+from kempf.warehouse import aliases, corrections, examinations, history, logs, notes, parameter_sets, segments
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh
@@ -131,6 +132,49 @@ def test_a_correction_that_was_interrupted_is_found_by_the_next_run(warehouse: W
     assert plan(warehouse, None, changed_only=True).due
     reprocess_vessel(warehouse, "mariner")
     assert segments.current(warehouse, "mariner") == []
+
+
+def _end(*arguments: object, **named: object) -> None:
+    raise KeyboardInterrupt
+
+
+CUT_OFF_AT = ((aliases, "withdraw"), (segments, "replace"), (examinations, "replace"))
+
+
+@pytest.mark.parametrize("at", CUT_OFF_AT, ids=lambda at: f"{at[0].__name__}.{at[1]}")
+def test_a_correction_that_was_interrupted_is_finished_by_the_same_command(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch, at: tuple[ModuleType, str]
+) -> None:
+    (zigzag,) = segments.current(warehouse, "mariner")
+    assert aliases.of_vessel(warehouse, "mariner")
+    with monkeypatch.context() as cut_off:
+        cut_off.setattr(*at, _end)
+        with pytest.raises(KeyboardInterrupt):
+            plan_for(warehouse, zigzag.segment_id, "exclude", "the speed fell").store(warehouse)
+    plan_for(warehouse, zigzag.segment_id, "exclude", "the speed fell").store(warehouse)
+    assert segments.current(warehouse, "mariner") == [] and aliases.of_vessel(warehouse, "mariner") == {}
+    assert unsearched(warehouse, logs.current(warehouse)) == [] and len(corrections.all_of(warehouse)) == 1
+    with pytest.raises(UsageError, match="excluded already"):
+        plan_for(warehouse, zigzag.segment_id, "exclude", "the speed fell")
+
+
+def test_a_zigzag_whose_addition_was_interrupted_is_added_by_the_same_command(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (zigzag,) = segments.current(warehouse, "mariner")
+    (log,) = logs.current(warehouse)
+    half = (zigzag.start_utc_ns + zigzag.end_utc_ns) // 2
+    plan_for(warehouse, zigzag.segment_id, "correct", "short", (zigzag.start_utc_ns, half - SECOND_NS)).store(warehouse)
+    rest = (half, zigzag.end_utc_ns)
+    with monkeypatch.context() as cut_off:
+        cut_off.setattr(examinations, "replace", _end)
+        with pytest.raises(KeyboardInterrupt):
+            plan_new(warehouse, log.log_id, rest, "the rest of it").store(warehouse)
+    plan_new(warehouse, log.log_id, rest, "the rest of it").store(warehouse)
+    assert len(segments.current(warehouse, "mariner")) == 2 and len(corrections.all_of(warehouse)) == 2
+    assert unsearched(warehouse, logs.current(warehouse)) == []
+    with pytest.raises(UsageError, match="There is a zigzag"):
+        plan_new(warehouse, log.log_id, rest, "the rest of it")
 
 
 def test_bounds_that_are_none(warehouse: Warehouse) -> None:

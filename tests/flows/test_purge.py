@@ -164,3 +164,43 @@ def test_the_command_says_first_what_goes(warehouse: Warehouse) -> None:
     refused(kempf("purge", "nothing", "--reason", "by law", "--yes", "--json", *at), 4, "no_log")
     blank = kempf("purge", row.log_id, "--reason", " ", "--yes", "--json", *at)
     refused(blank, 2, "no_reason")
+
+
+def test_what_a_repair_kept_aside_goes_too(warehouse: Warehouse) -> None:
+    assert warehouse.folder is not None
+    first, second = logs.current(warehouse)
+    (mine,) = readings_files(warehouse, first)
+    data = bytearray(mine.read_bytes())
+    data[len(data) // 2] ^= 1
+    mine.write_bytes(data)
+    repair(warehouse)
+    assert list((warehouse.folder / "damaged" / "readings").iterdir())
+    purge(warehouse, first.log_id, "end of the charter")
+    assert not list((warehouse.folder / "damaged").rglob("*.parquet"))
+    assert logs.current(warehouse) == [second]
+
+
+def test_a_file_that_a_writer_left_half_written_stops_no_purge(warehouse: Warehouse) -> None:
+    first, second = logs.current(warehouse)
+    (mine,) = readings_files(warehouse, first)
+    # as where the power failed before the commit: no version of the table has it
+    torn = mine.with_name(f"part-00000-{'0' * 8}.parquet")
+    torn.write_bytes(mine.read_bytes()[: mine.stat().st_size // 2])
+    # and as a killed writer leaves it: a table file, and a raw log that has no name yet
+    unnamed = mine.with_name(f"part-00000-{'0' * 8}.parquet#1")
+    unnamed.write_bytes(torn.read_bytes())
+    assert warehouse.folder is not None
+    passing = warehouse.folder / "raw" / first.log_id[:2] / f".{first.log_id}.{'0' * 16}"
+    passing.write_bytes(b"the first lines of the log")
+    purge(warehouse, first.log_id, "end of the charter")
+    assert not torn.exists() and not unnamed.exists() and not passing.exists()
+    assert held(warehouse, ingests_of(warehouse, first)) == []
+    assert logs.current(warehouse) == [second]
+
+
+def readings_files(warehouse: Warehouse, row: LogRow) -> list[Path]:
+    """Files of the newest version of the readings that hold a log."""
+    table = delta.open_table(warehouse, "readings")
+    assert table is not None
+    paths = [Path(uri.removeprefix("file://")) for uri in table.file_uris()]
+    return [path for path in paths if row.ingest_id in set(pl.read_parquet(path)["ingest_id"])]

@@ -152,6 +152,22 @@ def test_a_warehouse_is_built_again_from_its_raw_logs_alone(warehouse: Warehouse
     assert [row["parameter_set_id"] for row in found["parameter_sets"]] == ids
 
 
+def test_a_raw_log_that_is_in_no_table_and_of_which_it_is_not_known_whose_it_is_is_named(
+    warehouse: Warehouse, tmp_path: Path
+) -> None:
+    (row,) = logs.current(warehouse, "ferry")
+    place = Warehouse(str(tmp_path / "again"))
+    place.create()
+    assert warehouse.folder is not None and place.folder is not None
+    copytree(warehouse.folder / "raw", place.folder / "raw")
+    beside = place.folder / "raw" / row.log_id[:2] / f"{row.log_id}.json"
+    beside.write_bytes(beside.read_bytes()[:100])
+    done = repair(place)
+    assert [(one.table, one.where) for one in done.left] == [("raw", f"{row.log_id}.json")]
+    assert any("Ingest the original file again" in words for words in done.gone)
+    assert [one.vessel for one in logs.current(place)] == ["mariner"]
+
+
 def test_a_table_that_is_gone_and_a_raw_log_that_is_damaged(warehouse: Warehouse) -> None:
     assert warehouse.folder is not None
     (row,) = logs.current(warehouse, "ferry")

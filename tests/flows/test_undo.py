@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from kempf.flows.fleet.plan import plan
+from kempf.flows.jobs import remove_logs
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.following import of_logs
 from kempf.flows.jobs.identify_vessel import identify_vessel
@@ -104,6 +105,39 @@ def test_a_move_that_was_cut_off_goes_on(warehouse: Warehouse) -> None:
     remove(warehouse, [first], "moved to 'second': wrong folder")
     found, now = move(warehouse, first.log_id, "second", "wrong folder", new_vessel=True)
     assert found is None and now.vessel == "second"
+
+
+def test_a_rename_that_was_cut_off_within_the_move_of_a_log_goes_on(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    held = {row.log_id for row in logs.current(warehouse)}
+    with monkeypatch.context() as cut_off:
+        cut_off.setattr(remove_logs, "store", _end)
+        with pytest.raises(KeyboardInterrupt):
+            rename_vessel(warehouse, "mariner", "sailor", "sold")
+    assert len(logs.removed(warehouse, "mariner")) == 1
+    rows = rename_vessel(warehouse, "mariner", "sailor", "sold")
+    assert {row.log_id for row in rows} == held and vessels.names(warehouse) == ["sailor"]
+
+
+def test_a_removal_that_was_cut_off_goes_on_with_what_follows_from_it(
+    warehouse: Warehouse, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    rows = logs.current(warehouse)
+    assert aliases.of_vessel(warehouse, "mariner")
+    for name in ("withdraw", "mark"):
+        with monkeypatch.context() as cut_off:
+            cut_off.setattr(aliases if name == "withdraw" else logs, name, _end)
+            with pytest.raises(KeyboardInterrupt):
+                remove(warehouse, rows, "another draught")
+        # as long as anything is left to do the logs are there to be removed
+        assert logs.current(warehouse) == rows
+    remove(warehouse, rows, "another draught")
+    assert logs.current(warehouse) == [] and aliases.of_vessel(warehouse, "mariner") == {}
+
+
+def _end(*arguments: object, **named: object) -> None:
+    raise KeyboardInterrupt
 
 
 def test_a_vessel_is_renamed_and_removed(warehouse: Warehouse) -> None:

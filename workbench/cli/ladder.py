@@ -8,7 +8,6 @@ from typing import Any
 
 import click
 
-from kempf.schemas.errors import NotFound
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
 from kempf.workbench.terminal import number, print_json, print_note, print_table, short_ids
@@ -25,21 +24,11 @@ FREE = ("free: fitted", "held out")
 def command(vessel: str, uri: str, as_json: bool) -> None:
     """Show the models that lead to a vessel's current one, and how the error fell from one to the next."""
     from kempf.flows.jobs.out_of_date import said_of_vessel
-    from kempf.flows.jobs.standing_model import rungs_to, standing
-    from kempf.warehouse import vessels
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.ladder import ladder_document
 
     warehouse = Warehouse(uri)
-    vessels.require(warehouse, vessel)
-    model = standing(warehouse, vessel)
-    if model is None:
-        raise NotFound(
-            "no_model",
-            f"{vessel!r} has no current model of several manoeuvres yet.",
-            f"Run `kempf identify --vessel {vessel}`, or `kempf diagnose --vessel {vessel}`.",
-            {"vessel": vessel},
-        )
-    rungs = rungs_to(warehouse, model)
+    rungs = ladder_document(warehouse, vessel)
     print_note(said_of_vessel(warehouse, vessel))
     if as_json:
         print_json(rungs)

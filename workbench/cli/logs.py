@@ -22,7 +22,6 @@ from kempf.workbench.terminal import one_line, print_json, print_note, print_tab
 
 if TYPE_CHECKING:
     from kempf.pipeline.ingest.decoded import LostStretch
-    from kempf.warehouse.examinations import StoredExamination
     from kempf.warehouse.logs import LogRow
 
 
@@ -43,30 +42,19 @@ def command() -> None:
 def list_logs(vessel: str | None, removed: bool, uri: str, as_json: bool) -> None:
     """List the logs with their ledgers, records read = kept + rejected, and what the channel doctor says of each."""
     from kempf.flows.jobs.out_of_date import said_of_logs
-    from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
-    from kempf.warehouse import examinations, logs, lost, vessels
+    from kempf.warehouse import logs, vessels
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.logs import listed_logs
 
     warehouse = Warehouse(uri)
-    warehouse.require()
-    if vessel is not None:
-        vessels.require(warehouse, vessel)
     if removed:
+        warehouse.require()
+        if vessel is not None:
+            vessels.require(warehouse, vessel)
         _list_removed(logs.removed(warehouse, vessel), as_json)
         return
-    rows_of_logs = logs.current(warehouse, vessel)
-    gone = lost.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
-    said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows_of_logs])
-    facts = [
-        {
-            **_facts(row),
-            "partial": row.ingest_id in gone,
-            "lost": lost_as_json(gone.get(row.ingest_id, ())),
-            "notes": _notes(row, said.get(row.ingest_id)),
-            "channels": _verdict(said.get(row.ingest_id)),
-        }
-        for row in rows_of_logs
-    ]
+    listed = listed_logs(warehouse, vessel)
+    facts, gone = listed.documents, listed.lost
     print_note(said_of_logs(warehouse, vessel))
     if as_json:
         print_json(facts)
@@ -81,13 +69,15 @@ def list_logs(vessel: str | None, removed: bool, uri: str, as_json: bool) -> Non
     head = ["log", "vessel", "file name", "start UTC", "records kept", "rejected", "channels"]
     if gone:
         head.append("damage")
-        rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, rows_of_logs, strict=True)]
+        rows = [[*row, _damage(gone.get(one.ingest_id, ()))] for row, one in zip(rows, listed.rows, strict=True)]
     print_table(head, rows)
 
 
 def _list_removed(rows: Sequence[LogRow], as_json: bool) -> None:
+    from kempf.workbench.documents.logs import facts_of
+
     if as_json:
-        print_json([{**_facts(row), "removed": row.removed} for row in rows])
+        print_json([{**facts_of(row), "removed": row.removed} for row in rows])
         return
     head = ["log", "vessel", "file name", "removed"]
     print_table(head, [[row.log_id[:12], row.vessel, _shortened(row.file_name), row.removed or ""] for row in rows])
@@ -97,38 +87,6 @@ def _shortened(name: str) -> str:
     """Leave out the middle of a long name, whose ends distinguish it."""
     head, tail = _ENDS
     return name if len(name) <= head + 3 + tail else f"{name[:head]}...{name[-tail:]}"
-
-
-def _facts(row: LogRow) -> dict[str, Any]:
-    """Return what is shown of every log."""
-    from kempf.warehouse.instant import iso_utc
-
-    return {
-        "log_id": row.log_id,
-        "ingest_id": row.ingest_id,
-        "vessel": row.vessel,
-        "file_name": row.file_name,
-        "format": row.format,
-        "start": iso_utc(row.start_utc_ns),
-        "end": iso_utc(row.end_utc_ns),
-        "records_read": row.tally.records_read,
-        "records_kept": row.tally.records_kept,
-        "records_rejected": row.tally.records_rejected,
-        "values_read": row.tally.values_read,
-        "values_kept": row.tally.values_kept,
-        "values_rejected": row.tally.values_rejected,
-        "rejected_by_reason": dict(row.tally.by_reason),
-    }
-
-
-def _notes(row: LogRow, examination: StoredExamination | None) -> list[str]:
-    return [*row.notes, *(examination.notes if examination else ())]
-
-
-def _verdict(examination: StoredExamination | None) -> dict[str, Any] | None:
-    if examination is None:
-        return None
-    return {"verdict": examination.verdict, "findings": list(examination.findings)}
 
 
 def _brief(channels: Any) -> str:
@@ -145,25 +103,25 @@ def _brief(channels: Any) -> str:
 @json_option
 def show(log_id: str, uri: str, as_json: bool) -> None:
     """Show one log: how it was read, and what the channel doctor found in it."""
-    from kempf.warehouse import examinations, logs
+    from kempf.warehouse import logs
     from kempf.warehouse.store import Warehouse
     from kempf.workbench.cli.doctor import print_examination
+    from kempf.workbench.documents.logs import log_document
 
     warehouse = Warehouse(uri)
-    row = logs.by_prefix(warehouse, log_id)
-    seen = examinations.of_ingests(warehouse, [row.ingest_id], [row.vessel]).get(row.ingest_id)
-    facts = {**_facts(row), "notes": _notes(row, seen)}
+    shown = log_document(warehouse, logs.by_prefix(warehouse, log_id))
     if as_json:
-        print_json({**facts, "channels": dict(seen.content) if seen else None})
+        print_json(shown)
         return
-    for name, value in facts.items():
+    channels = shown.pop("channels")
+    for name, value in shown.items():
         listed = value if isinstance(value, list) else [value]
         for one in listed:
             click.echo(f"{name.replace('_', ' ')}: {one_line(str(one))}")
-    if seen is None:
+    if channels is None:
         click.echo("channels: read before there was a channel doctor; `kempf reprocess` examines it")
     else:
-        print_examination("channels", dict(seen.content), everything=True)
+        print_examination("channels", channels, everything=True)
 
 
 def _damage(lost: Sequence[LostStretch]) -> str:
@@ -304,10 +262,11 @@ def restore_log(log_id: str, uri: str, as_json: bool) -> None:
     from kempf.flows.jobs.out_of_date import command_for
     from kempf.flows.jobs.remove_logs import restore
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.logs import facts_of
 
     row = restore(Warehouse(uri), log_id)
     if as_json:
-        print_json(_facts(row))
+        print_json(facts_of(row))
     else:
         click.echo(f"{one_line(row.file_name)}: counts again; next: {command_for([row.vessel])}")
 
@@ -327,6 +286,7 @@ def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool,
     from kempf.schemas.errors import NotFound
     from kempf.warehouse import logs
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.logs import facts_of
 
     warehouse = Warehouse(uri)
     try:
@@ -337,7 +297,7 @@ def move_log(log_id: str, vessel: str, new_vessel: bool, reason: str, yes: bool,
         confirm(what_goes(of_logs(warehouse, [row]), f"{row.file_name} is given to {vessel!r}"), yes=yes)
     found, now = move(warehouse, log_id, vessel, reason, new_vessel=new_vessel)
     if as_json:
-        print_json({**_facts(now), "following": found.show() if found else None})
+        print_json({**facts_of(now), "following": found.show() if found else None})
         return
     of = [vessel] if found is None else [found.vessel, vessel]
     again = " ".join(f"--vessel {name}" for name in of)

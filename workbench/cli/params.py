@@ -36,25 +36,13 @@ def command() -> None:
 def list_sets(vessel: str | None, uri: str, as_json: bool) -> None:
     """List parameter sets, of one vessel or of all."""
     from kempf.flows.jobs.out_of_date import said_of_vessel
-    from kempf.warehouse import aliases, parameter_sets, vessels
-    from kempf.warehouse.instant import iso_utc
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.parameter_sets import listed_sets
 
     warehouse = Warehouse(uri)
+    listed = listed_sets(warehouse, vessel)
     if vessel is not None:
-        vessels.require(warehouse, vessel)
         print_note(said_of_vessel(warehouse, vessel))
-    # a pooled set begins with its first manoeuvre: it comes behind that manoeuvre's own, whatever their ids
-    known = parameter_sets.summaries(warehouse, vessel)
-    found = known.sort("vessel", "start_utc_ns", "estimator", "parameter_set_id").rows(named=True)
-    pointed: dict[str, list[str]] = {}
-    for name in sorted({row["vessel"] for row in found}):
-        for alias, target in aliases.of_vessel(warehouse, name).items():
-            pointed.setdefault(target, []).append(alias)
-    listed = [
-        {**row, "start": iso_utc(row["start_utc_ns"]), "aliases": pointed.get(row["parameter_set_id"], [])}
-        for row in found
-    ]
     if as_json:
         print_json(listed)
         return

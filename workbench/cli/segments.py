@@ -44,45 +44,33 @@ for _one in correct_segments.COMMANDS:
 
 def _list(vessel: str | None, uri: str, as_json: bool) -> None:
     from kempf.flows.jobs.out_of_date import said_of_logs
-    from kempf.flows.jobs.vessel_quality import marks
-    from kempf.warehouse import examinations, logs, segments
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 
     warehouse = Warehouse(uri)
-    warehouse.require()
-    names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
-    # another process may read a log anew between the two questions
-    found = [segment for segment in segments.found_in(warehouse, vessel) if segment.ingest_id in names]
-    said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
-    contradictions = {name: list(one.findings) for name, one in said.items() if one.findings}
+    listed = listed_manoeuvres(warehouse, vessel)
     print_note(said_of_logs(warehouse, vessel))
-    against = marks(warehouse, vessel)
     if as_json:
-        shown = [segment.show(names[segment.ingest_id]) for segment in found]
-        print_json(
-            [
-                {**one, "channels": contradictions.get(s.ingest_id, []), "marks": against.get(s.segment_id, [])}
-                for one, s in zip(shown, found, strict=True)
-            ]
-        )
+        print_json(listed.documents)
         return
+    found = listed.found
     short = short_ids(segment.segment_id for segment in found)
     zigzags = [segment for segment in found if segment.is_zigzag]
     if zigzags:
         _print_zigzags(zigzags, short)
     else:
         click.echo("No zigzag found" + (f" in the logs of {vessel}." if vessel else "."))
-    for segment in found:
+    for segment, document in zip(found, listed.documents, strict=True):
         if segment.excluded is not None:
             click.echo(f"{short[segment.segment_id]} is excluded: {one_line(segment.excluded)}")
-        for words in against.get(segment.segment_id, ()):
+        for words in document["marks"]:
             click.echo(f"{short[segment.segment_id]}: {words}")
     for segment in found:
         if not segment.is_zigzag:
             _print_other(segment, short[segment.segment_id])
-    for ingest, findings in contradictions.items():
-        for words in findings:
-            click.echo(f"warning: {one_line(names[ingest])}: {one_line(words)}")
+    for one in {document["ingest_id"]: document for document in listed.documents}.values():
+        for words in one["channels"]:
+            click.echo(f"warning: {one_line(one['log'])}: {one_line(words)}")
 
 
 def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str]) -> None:

@@ -40,21 +40,17 @@ def show(name: str, uri: str, as_json: bool) -> None:
     """Show a vessel's current profile, how often it changed, and which folders of the tables are hers."""
     import yaml
 
-    from kempf.warehouse import vessels
-    from kempf.warehouse.keys import vessel_key
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.vessel import vessel_document
 
-    versions = vessels.versions(Warehouse(uri), name)
-    profile = versions[-1].profile.model_dump(mode="json", exclude_none=True)
-    partition = f"vessel_key={vessel_key(name)}"
-    hashes = [v.profile_sha256 for v in versions]
-    shown = {"vessel": name, "profile": profile, "versions": hashes, "partition": partition}
+    shown = vessel_document(Warehouse(uri), name)
     if as_json:
         print_json(shown)
         return
-    click.echo(yaml.safe_dump(profile, sort_keys=False, allow_unicode=True), nl=False)
-    click.echo(f"# version {number(len(versions))} of the profile, {versions[-1].profile_sha256}")
-    click.echo(f"# her rows are in the folders {partition} of the tables")
+    click.echo(yaml.safe_dump(shown["profile"], sort_keys=False, allow_unicode=True), nl=False)
+    versions = shown["versions"]
+    click.echo(f"# version {number(len(versions))} of the profile, {versions[-1]}")
+    click.echo(f"# her rows are in the folders {shown['partition']} of the tables")
 
 
 @command.command("set")
