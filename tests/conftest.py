@@ -18,6 +18,8 @@ from tests.made_once import made_once
 # the tests and all processes that they start read nobody's own settings
 _NO_SETTINGS = TemporaryDirectory(prefix="kempf-tests-")
 os.environ["XDG_CONFIG_HOME"] = _NO_SETTINGS.name
+# what one of hundreds of processes has compiled of its imports the next reads, also where none of it would be kept
+os.environ["PYTHONDONTWRITEBYTECODE"] = ""
 
 
 def pytest_xdist_auto_num_workers(config: pytest.Config) -> int:

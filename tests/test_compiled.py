@@ -43,7 +43,8 @@ def said(folder: Path, held: float, factor: float, before: str = "pass") -> tupl
     command = (
         f"import sys; sys.path[:0] = [{str(root)!r}, {str(folder)!r}]; sys.argv = ['outer']; {before}; import outer"
     )
-    run = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
+    # without bytecode: that of a file which was written anew within the same second would be taken for its own
+    run = subprocess.run([sys.executable, "-B", "-c", command], capture_output=True, text=True, check=True)
     value, hits = run.stdout.split()
     return float(value), int(hits)
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import sys
 from collections.abc import Iterable, Iterator, Sequence
@@ -15,6 +14,7 @@ from typing import Any
 import click
 
 from kempf.flows.process.progress import Progress, silent
+from kempf.workbench.documents.text import json_text
 
 #: Columns of the narrowest terminal that a table is not to overflow; how narrow a folded column may become.
 WIDEST, _NARROWEST = 100, 8
@@ -25,17 +25,7 @@ _log = logging.getLogger("kempf.progress")
 def print_json(content: Any) -> None:
     """Print one JSON document on stdout; NaN becomes null."""
     everywhere = "utf" in (sys.stdout.encoding or "").lower()  # else a letter beyond ASCII would not be JSON
-    click.echo(json.dumps(_finite(content), indent=2, ensure_ascii=not everywhere))
-
-
-def _finite(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {str(key): _finite(item) for key, item in value.items()}
-    if isinstance(value, list | tuple):
-        return [_finite(item) for item in value]
-    if isinstance(value, float) and not (abs(value) < float("inf")):
-        return None
-    return value
+    click.echo(json_text(content, ascii_only=not everywhere))
 
 
 def print_note(sentence: str | None) -> None:

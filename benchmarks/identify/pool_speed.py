@@ -1,7 +1,7 @@
 """How long one hull takes that is identified from eighteen zigzags at once, their logs at 50 Hz.
 
-A merchant ship of 160 m sails the standard trial of 900 s on eighteen days, the boat of 3 m 600 s, which in her own time
-is ten times as long. Beside it: the same zigzags one by one, which is what a user has without pooling.
+A merchant ship of 160 m sails the standard trial of 900 s on eighteen days, the boat of 3 m 600 s, ten times as long in
+her own time. Beside it: the same zigzags one by one, which is what a user has without pooling.
 """
 
 from __future__ import annotations

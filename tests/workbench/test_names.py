@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import re
 from io import BytesIO
 from pathlib import Path
 
@@ -48,7 +49,7 @@ def outside(folder: Path) -> set[str]:
 
 
 def check_names(place: Path) -> None:
-    """Every folder of a warehouse is named by the house alone."""
+    """Every folder of a warehouse is named by the house alone; of a vessel's name only letters and digits are left."""
     parts = {part for name in tree(place) for part in Path(name).parts}
     allowed = {"kempf-warehouse.json", "raw", "_delta_log", "_seals", "log", "data"}
     tables = {"vessels", "logs", "readings", "rejected", "segments", "examinations"} | {
@@ -59,7 +60,8 @@ def check_names(place: Path) -> None:
     }
     for part in parts - allowed - tables:
         hexadecimal = set(part.split("=")[-1].removesuffix(".json")) <= set("0123456789abcdef")
-        assert hexadecimal or part.startswith(("part-", "month=")) or part[:20].isdigit(), part
+        hers = re.fullmatch(r"vessel_key=[a-z0-9]+(-[a-z0-9]+)*-[0-9a-f]{8}", part)
+        assert hexadecimal or hers or part.startswith(("part-", "month=")) or part[:20].isdigit(), part
 
 
 @pytest.mark.parametrize("name", HOSTILE, ids=range(len(HOSTILE)))

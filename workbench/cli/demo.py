@@ -75,7 +75,8 @@ def _print_demonstration(shown: Demonstration) -> None:
     click.echo(f"Tables (Delta Lake, plain Parquet inside): {tables}")
     click.echo("\nnext:")
     click.echo(f"  export KEMPF_WAREHOUSE={tables}")
-    click.echo(f"  kempf segments\n  kempf history --vessel {shown.vessel} --parameter b2\n  kempf --help")
+    click.echo("  kempf workbench --open  (all of it in the browser)")
+    click.echo(f"  kempf segments\n  kempf history --vessel {shown.vessel} --parameter b2")
 
 
 def _compare(parameter_set: ParameterSet, truth: dict[str, float], title: str) -> None:

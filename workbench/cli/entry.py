@@ -36,6 +36,7 @@ COMMANDS = {
     "identify": "Identify a model from every manoeuvre of a vessel.",
     "params": "List, show, compare and export parameter sets; what they say of her steering.",
     "history": "Show a vessel's parameters over time, as known now or at an earlier time.",
+    "workbench": "Serve the warehouse as web pages.",
     "report": "Write one HTML file to send that says what a vessel's model lacks.",
     "export": "Write a parameter set, or manoeuvres with their predictions, as a file for other programs.",
     "predict": "Predict turning circle, zigzag, pull-out or spiral, every figure with its interval.",

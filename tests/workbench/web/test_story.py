@@ -1,0 +1,188 @@
+"""An engineer's way through the pages in a real browser, and every page on it by axe; skipped where there is none."""
+
+from __future__ import annotations
+
+import os
+import re
+import shutil
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from shutil import copytree
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.late import VESSEL, take_in
+from tests.made_once import made_once
+from tests.workbench.driving import START, environment
+
+BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
+BROWSER = os.environ.get("KEMPF_CHROMIUM") or next((found for name in BROWSERS if (found := shutil.which(name))), None)
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no Chromium on this machine; KEMPF_CHROMIUM names one")
+WAIT_MS = 120_000
+
+
+@dataclass
+class Server:
+    """`kempf workbench` in a process of its own."""
+
+    process: subprocess.Popen[str]
+    start: str
+    warehouse: Path
+    #: What the browser complained of.
+    complaints: list[str] = field(default_factory=list)
+
+    @property
+    def base(self) -> str:
+        return self.start.partition("/?")[0]
+
+    def json(self, path: str) -> Any:
+        return httpx.get(self.base + path).json()
+
+
+@pytest.fixture
+def server(tmp_path_factory: pytest.TempPathFactory, tmp_path: Path) -> Iterator[Server]:
+    """The pages of a ship whose rudder answers late, one log, nothing identified yet."""
+
+    def fill(folder: Path) -> None:
+        folder.mkdir()
+        take_in(folder)
+
+    place = copytree(made_once(tmp_path_factory, "late", fill) / "w", tmp_path / "w")
+    process = subprocess.Popen(
+        [sys.executable, "-c", START, "workbench", "--warehouse", place, "--state", tmp_path / "state", "--port", "0"],
+        stderr=subprocess.PIPE,
+        text=True,
+        env=environment(),
+    )
+    assert process.stderr is not None
+    line = process.stderr.readline()
+    found = re.search(r"http://\S+", line)
+    assert found, line
+    try:
+        yield Server(process, found.group(), place)
+    finally:
+        process.send_signal(signal.SIGINT)
+        process.wait(30)
+        process.stderr.close()
+
+
+@pytest.fixture
+def browser() -> Iterator[Any]:
+    from playwright.sync_api import sync_playwright
+
+    with sync_playwright() as playwright:
+        one = playwright.chromium.launch(executable_path=BROWSER, args=["--no-sandbox"])
+        yield one
+        one.close()
+
+
+def opened(browser: Any, server: Server, **options: Any) -> Any:
+    """A tab in which a complaint of the browser is one of the test's."""
+    tab = browser.new_context(**{"viewport": {"width": 1280, "height": 900}, **options}).new_page()
+    tab.set_default_timeout(WAIT_MS)
+    tab.on("console", lambda message: server.complaints.append(message.text))
+    tab.on("pageerror", lambda error: server.complaints.append(str(error)))
+    return tab
+
+
+def test_from_the_log_to_the_missing_effect_and_back(browser: Any, server: Server):
+    tab = opened(browser, server)
+    tab.goto(server.start)
+    assert "token" not in tab.url
+    tab.click(f"th a:has-text('{VESSEL}')")
+    tab.click("button:has-text('Identify')")
+    tab.wait_for_url(f"**/v/{VESSEL}")
+    tab.click("text=Model beside measurement")
+    tab.click("button:has-text('Predict')")
+    tab.wait_for_url("**/model?**")
+    # the worst stretch is one click away, and its window is in the address
+    tab.click("ol li a >> nth=0")
+    tab.wait_for_selector("body[data-ready=yes]")
+    assert re.search(r"/segments/seg-\w+\?from=20.*&to=20", tab.url)
+    tab.go_back()
+    tab.click("button:has-text('Diagnose')")
+    tab.wait_for_url("**/jobs/job-**")
+    tab.reload()  # in the middle of it
+    tab.wait_for_url("**/diagnoses/dx-**")
+    assert "rudder_lag" in tab.inner_text("main")
+    tab.click("button:has-text('Add rudder lag')")
+    tab.wait_for_url("**/ladder")
+    rungs = server.json(f"/v/{VESSEL}/ladder.json")
+    assert [rung["added"] for rung in rungs] == [None, "rudder_lag"]
+    assert rungs[1]["in_sample_error"] < 0.5 * rungs[0]["in_sample_error"]
+    assert len(tab.query_selector_all("tbody tr")) == 2
+    tab.click("button:has-text('Undo')")
+    tab.wait_for_url("**/ladder")
+    tab.wait_for_selector("text=Only the plain model so far")
+    assert [rung["added"] for rung in server.json(f"/v/{VESSEL}/ladder.json")] == [None]
+    # the address of the diagnosis, opened by somebody who may only read: no button
+    other = opened(browser, server)
+    other.goto(server.base + f"/v/{VESSEL}")
+    other.click("ul li a >> nth=0")
+    assert "rudder_lag" in other.inner_text("main") and other.query_selector("main button") is None
+    assert server.complaints == []
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
+def test_every_page_is_accessible_and_fits(browser: Any, server: Server, scheme: str, width: int):
+    from axe_playwright_python.sync_playwright import Axe
+
+    tab = opened(browser, server, color_scheme=scheme, viewport={"width": width, "height": 900})
+    log = server.json(f"/v/{VESSEL}/logs.json")[0]["log_id"]
+    segment = server.json(f"/v/{VESSEL}/segments.json")[0]["segment_id"]
+    for path in (
+        "/",
+        f"/v/{VESSEL}",
+        f"/logs/{log}",
+        f"/segments/{segment}",
+        "/effects",
+        "/effects/rudder_lag",
+        "/none",
+    ):
+        tab.goto(server.base + path)
+        if "log" in path or "segment" in path:
+            tab.wait_for_selector("body[data-ready=yes]")
+        violations = Axe().run(tab).response["violations"]
+        assert [(one["id"], one["nodes"][0]["html"]) for one in violations] == [], path
+        assert tab.evaluate("document.documentElement.scrollWidth") <= width, path
+    assert [words for words in server.complaints if "404" not in words] == []
+
+
+def test_a_chart_is_zoomed_and_the_window_is_in_the_address(browser: Any, server: Server):
+    tab = opened(browser, server)
+    log = server.json(f"/v/{VESSEL}/logs.json")[0]["log_id"]
+    asked: list[str] = []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.goto(server.base + f"/logs/{log}")
+    tab.wait_for_selector("body[data-ready=yes]")
+    assert len(asked) <= 12 and all(url.startswith(server.base) for url in asked)
+    tab.wait_for_timeout(500)
+    seen = len(asked)
+    tab.wait_for_timeout(1500)
+    assert len(asked) == seen  # at rest nothing is asked for
+    panel = tab.locator(".u-over").first.bounding_box()
+    tab.mouse.move(panel["x"] + 0.25 * panel["width"], panel["y"] + 40)
+    tab.mouse.down()
+    tab.mouse.move(panel["x"] + 0.5 * panel["width"], panel["y"] + 40, steps=4)
+    tab.mouse.up()
+    tab.wait_for_url("**from=**")
+    tab.wait_for_selector("body[data-ready=yes]")
+    zoomed = tab.inner_text(".state")
+    address = tab.url
+    tab.keyboard.press("0")
+    tab.wait_for_selector("body[data-ready=yes]")
+    tab.go_back()
+    assert tab.url == address
+    tab.wait_for_selector("body[data-ready=yes]")
+    assert tab.inner_text(".state") == zoomed
+    again = opened(browser, server)
+    again.goto(address)
+    again.wait_for_selector("body[data-ready=yes]")
+    assert again.inner_text(".state") == zoomed
+    assert server.complaints == []

@@ -1,0 +1,30 @@
+"""The ladder: the models that lead to a vessel's current one, with their errors."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kempf.flows.jobs.standing_model import rungs_to, standing
+from kempf.schemas.errors import NotFound
+from kempf.warehouse import vessels
+from kempf.warehouse.store import Warehouse
+
+
+def ladder_document(warehouse: Warehouse, vessel: str) -> list[dict[str, Any]]:
+    """Return the rungs of a vessel's ladder, the plain model's first, as JSON content.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``, ``no_model``.
+    """
+    vessels.require(warehouse, vessel)
+    model = standing(warehouse, vessel)
+    if model is None:
+        raise NotFound(
+            "no_model",
+            f"{vessel!r} has no current model of several manoeuvres yet.",
+            f"Run `kempf identify --vessel {vessel}`, or `kempf diagnose --vessel {vessel}`.",
+            {"vessel": vessel},
+        )
+    return rungs_to(warehouse, model)

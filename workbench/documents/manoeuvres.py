@@ -1,0 +1,45 @@
+"""The manoeuvres that were found, with what stands against them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from kempf.flows.jobs.vessel_quality import marks
+from kempf.warehouse import examinations, logs, segments
+from kempf.warehouse.segments import Segment
+from kempf.warehouse.store import Warehouse
+
+
+@dataclass(frozen=True)
+class ListedManoeuvres:
+    """The manoeuvres of the logs that count."""
+
+    found: list[Segment]
+    #: One a manoeuvre, JSON content.
+    documents: list[dict[str, Any]]
+
+
+def listed_manoeuvres(warehouse: Warehouse, vessel: str | None) -> ListedManoeuvres:
+    """Return the manoeuvres of one vessel or of all.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    warehouse.require()
+    names = {row.ingest_id: row.file_name for row in logs.current(warehouse)}
+    # another process may read a log anew between the two questions
+    found = [segment for segment in segments.found_in(warehouse, vessel) if segment.ingest_id in names]
+    said = examinations.of_ingests(warehouse, [segment.ingest_id for segment in found])
+    against = marks(warehouse, vessel)
+    documents = [
+        {
+            **one.show(names[one.ingest_id]),
+            "channels": list(said[one.ingest_id].findings) if one.ingest_id in said else [],
+            "marks": against.get(one.segment_id, []),
+        }
+        for one in found
+    ]
+    return ListedManoeuvres(found, documents)

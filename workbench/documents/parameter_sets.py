@@ -1,0 +1,32 @@
+"""Parameter sets, each with the names that point to it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kempf.warehouse import aliases, parameter_sets, vessels
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.store import Warehouse
+
+
+def listed_sets(warehouse: Warehouse, vessel: str | None) -> list[dict[str, Any]]:
+    """Return the parameter sets of one vessel or of all, in the order of time, as JSON content.
+
+    Raises
+    ------
+    NotFound
+        ``no_warehouse``, ``no_vessel``.
+    """
+    if vessel is not None:
+        vessels.require(warehouse, vessel)
+    # a pooled set begins with its first manoeuvre: it comes behind that manoeuvre's own, whatever their ids
+    known = parameter_sets.summaries(warehouse, vessel)
+    found = known.sort("vessel", "start_utc_ns", "estimator", "parameter_set_id").rows(named=True)
+    pointed: dict[str, list[str]] = {}
+    for name in sorted({row["vessel"] for row in found}):
+        for alias, target in aliases.of_vessel(warehouse, name).items():
+            pointed.setdefault(target, []).append(alias)
+    return [
+        {**row, "start": iso_utc(row["start_utc_ns"]), "aliases": pointed.get(row["parameter_set_id"], [])}
+        for row in found
+    ]

@@ -1,0 +1,198 @@
+"""The application: every address, and what an error becomes."""
+
+from __future__ import annotations
+
+import sys
+import traceback
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from urllib.parse import parse_qsl
+
+from fastapi import FastAPI
+from starlette.concurrency import run_in_threadpool
+from starlette.exceptions import HTTPException
+from starlette.requests import Request
+from starlette.responses import HTMLResponse, RedirectResponse, Response
+
+from kempf.flows.process.wrap_error import wrapped
+from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.warehouse.store import Warehouse
+from kempf.workbench.documents.text import json_text
+from kempf.workbench.web import static_files
+from kempf.workbench.web.addresses import address_of, vessel_at
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.guard import Guard
+from kempf.workbench.web.pages import (
+    diagnosis,
+    effects,
+    fleet,
+    job,
+    ladder,
+    log,
+    manoeuvre,
+    model,
+    parameter_set,
+    series,
+    vessel,
+)
+from kempf.workbench.web.pages.page import Page
+from kempf.workbench.web.settings import Settings
+from kempf.workbench.web.templating import rendered
+
+#: What an error's exit code is as the status of an answer.
+_STATUS = {1: 500, 2: 400, 3: 422, 4: 404, 5: 422}
+#: Of errors that may be gone in a moment.
+_BUSY = ("warehouse_busy", "warehouse_unreachable")
+#: Of requests that came too late.
+_MOVED = ("moved_meanwhile", "job_over")
+#: bytes that a form may have
+_MOST_FORM = 16_384
+
+
+def create_app(warehouse: Warehouse, settings: Settings, state: Path) -> FastAPI:
+    """Return the application over a warehouse.
+
+    Parameters
+    ----------
+    state : Path
+        Folder of the jobs and of what was computed for pages.
+    """
+    app = FastAPI(docs_url=None, redoc_url=None, openapi_url=None, redirect_slashes=False)
+    app.middleware("http")(Guard(settings))
+    static_files.serve(app)
+    desk = Desk(warehouse, state)
+    _serve_pages(app, desk)
+    _serve_jobs(app, desk)
+    for kind in (KempfError, HTTPException, Exception):
+        app.add_exception_handler(kind, _refused)
+    return app
+
+
+def _serve_pages(app: FastAPI, desk: Desk) -> None:
+    def hers(request: Request) -> str:
+        return vessel_at(desk.warehouse, request.path_params["vessel"])
+
+    def serve(
+        path: str, gather: Callable[[Request], Page] | None, document: Callable[[Request], Any] | None = None
+    ) -> None:
+        if document is not None:  # first: the page's pattern would take its address as well
+            app.add_route("/fleet.json" if path == "/" else f"{path}.json", lambda r: _json(document(r)))
+        if gather is not None:
+            app.add_route(path, lambda r: _shown(r, gather(r)))
+
+    def named(key: str) -> Callable[[Request], str]:
+        return lambda request: str(request.path_params[key])
+
+    log_id, segment_id, set_id = named("log_id"), named("segment_id"), named("set_id")
+    serve("/", lambda r: fleet.gather(desk), lambda r: fleet.document(desk))
+    serve("/v/{vessel}/ladder", lambda r: ladder.gather(desk, hers(r)), lambda r: ladder.document(desk, hers(r)))
+    serve("/v/{vessel}/segments", None, lambda r: vessel.manoeuvres_document(desk, hers(r)))
+    serve("/v/{vessel}/logs", None, lambda r: vessel.logs_document(desk, hers(r)))
+    serve("/v/{vessel}/sets", None, lambda r: vessel.sets_document(desk, hers(r)))
+    serve("/v/{vessel}", lambda r: vessel.gather(desk, hers(r)), lambda r: vessel.document(desk, hers(r)))
+    serve(
+        "/v/{vessel}/model",
+        lambda r: model.gather(desk, hers(r), *(r.query_params.get(name) for name in ("set", "h", "run"))),
+        lambda r: model.document(desk, hers(r), r.query_params.get("set"), r.query_params.get("h")),
+    )
+    app.add_route("/logs/{log_id}/series", lambda r: _series(desk, r))
+    serve("/logs/{log_id}", lambda r: log.gather(desk, log_id(r), *_window(r)), lambda r: log.document(desk, log_id(r)))
+    serve(
+        "/segments/{segment_id}",
+        lambda r: manoeuvre.gather(desk, segment_id(r), *_window(r)),
+        lambda r: manoeuvre.document(desk, segment_id(r)),
+    )
+    serve(
+        "/sets/{set_id}",
+        lambda r: parameter_set.gather(desk, set_id(r)),
+        lambda r: parameter_set.document(desk, set_id(r)),
+    )
+    serve(
+        "/diagnoses/{name}",
+        lambda r: diagnosis.gather(desk, named("name")(r)),
+        lambda r: diagnosis.document(desk, named("name")(r)),
+    )
+    serve("/effects", lambda r: effects.gather_list(), lambda r: effects.list_document())
+    serve(
+        "/effects/{name}",
+        lambda r: effects.gather(desk, named("name")(r)),
+        lambda r: effects.document(named("name")(r)),
+    )
+    app.add_route("/go", lambda r: RedirectResponse(address_of(desk.warehouse, r.query_params.get("q", "")), 303))
+
+
+def _serve_jobs(app: FastAPI, desk: Desk) -> None:
+    def shown(request: Request) -> Response:
+        return _shown(request, job.gather(desk, request.path_params["name"]))
+
+    def document(request: Request) -> Response:
+        after = request.query_params.get("after", "0")
+        return _json(job.document(desk, request.path_params["name"], int(after) if after.isdigit() else 0))
+
+    async def ask(request: Request) -> Response:
+        form = await _form(request)
+        asked = await run_in_threadpool(job.ask, desk, form)
+        return RedirectResponse(f"/jobs/{asked.id}", 303)
+
+    async def cancel(request: Request) -> Response:
+        asked = await run_in_threadpool(desk.queue.cancel, request.path_params["name"])
+        return RedirectResponse(f"/jobs/{asked.id}", 303)
+
+    app.add_route("/jobs/{name}.json", document)
+    app.add_route("/jobs/{name}", shown)
+    app.add_route("/jobs", ask, methods=["POST"])
+    app.add_route("/jobs/{name}/cancel", cancel, methods=["POST"])
+
+
+async def _form(request: Request) -> dict[str, str]:
+    """Return the fields of a form; of several of one name the last counts."""
+    body = b""
+    async for part in request.stream():
+        body += part
+        if len(body) > _MOST_FORM:
+            raise UsageError("form_too_long", f"The form has more than {_MOST_FORM} bytes.", "Send less.")
+    return dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
+
+
+def _window(request: Request) -> tuple[str | None, str | None]:
+    return request.query_params.get("from"), request.query_params.get("to")
+
+
+def _series(desk: Desk, request: Request) -> Response:
+    asked = request.query_params
+    bins = asked.get("bins", "1000")
+    if not (bins.isdigit() and len(bins) < 6):
+        raise UsageError("bins_unreadable", f"{bins[:40]!r} is no number of bins.", "Give a whole number.")
+    content = series.frame(desk, request.path_params["log_id"], asked.get("ch", ""), *_window(request), int(bins))
+    return Response(content, media_type="application/octet-stream")
+
+
+def _shown(request: Request, page: Page) -> Response:
+    return HTMLResponse(_html(request, page))
+
+
+def _html(request: Request, page: Page) -> str:
+    return rendered(page.template, page=page, may_write=getattr(request.state, "may_write", False), **page.content)
+
+
+def _json(content: Any) -> Response:
+    return Response(json_text(content) + "\n", media_type="application/json")
+
+
+def _refused(request: Request, error: Exception) -> Response:
+    """Answer with an error as a page in words, or as the command line's JSON where the address ends so."""
+    if isinstance(error, HTTPException):
+        error = NotFound(
+            "no_page",
+            f"There is nothing at the address {request.url.path[:200]!r}.",
+            "Go to the fleet's page, or type a name or an id into the field above.",
+        )
+    found = wrapped(error)
+    if found.code == "internal":
+        traceback.print_exception(found, file=sys.stderr)
+    status = 503 if found.code in _BUSY else 409 if found.code in _MOVED else _STATUS[found.exit_code]
+    if request.url.path.endswith((".json", "/series")):
+        return Response(json_text(found.to_json()) + "\n", status, media_type="application/json")
+    page = Page("error.html", "That did not work", {"error": found, "status": status})
+    return HTMLResponse(_html(request, page), status)

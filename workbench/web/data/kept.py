@@ -1,0 +1,47 @@
+"""The channels of logs that were looked at last, held in memory: an ingest never changes."""
+
+from __future__ import annotations
+
+from collections import OrderedDict
+from threading import Lock
+
+from kempf.flows.jobs.log_channels import channels_of
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.warehouse.store import Warehouse
+
+#: bytes that all together may take
+MOST_BYTES = 512 * 2**20
+
+
+class KeptChannels:
+    """Channels by ingest, the ones that were not asked for the longest go first.
+
+    Parameters
+    ----------
+    warehouse : Warehouse
+    most_bytes : int, optional
+        What they may take together; the one asked for last stays, however large.
+    """
+
+    def __init__(self, warehouse: Warehouse, most_bytes: int = MOST_BYTES) -> None:
+        self._warehouse, self._most = warehouse, most_bytes
+        self._held: OrderedDict[str, Instruments] = OrderedDict()
+        self._lock = Lock()
+
+    def of(self, ingest_id: str) -> Instruments:
+        """Return the channels of an ingest; errors are those of `channels_of`."""
+        with self._lock:
+            if ingest_id in self._held:
+                self._held.move_to_end(ingest_id)
+                return self._held[ingest_id]
+        found = channels_of(self._warehouse, ingest_id)
+        with self._lock:
+            self._held[ingest_id] = found
+            self._held.move_to_end(ingest_id)
+            while len(self._held) > 1 and sum(map(_bytes, self._held.values())) > self._most:
+                self._held.popitem(last=False)
+        return found
+
+
+def _bytes(one: Instruments) -> int:
+    return sum(series.time_utc_ns.nbytes + series.value.nbytes for series in one.series.values())

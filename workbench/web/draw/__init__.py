@@ -1,0 +1,1 @@
+"""Figures that the server draws, as SVG without script or inline style."""

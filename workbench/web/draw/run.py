@@ -1,0 +1,80 @@
+"""One manoeuvre measured and predicted: rudder, yaw rate, heading and lateral speed, and what is left."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from markupsafe import Markup
+
+from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.workbench.web.draw.scale import ticks
+from kempf.workbench.web.draw.svg import drawing, element
+
+_WIDTH, _PANEL, _LEFT, _GAP = 760.0, 78.0, 62.0, 20.0
+_POINTS = 400
+_DEG = 180.0 / np.pi
+#: column, words, factor to the unit shown
+_SHOWN = (
+    ("yaw_rate", "rad_s", "yaw rate, deg/s", _DEG),
+    ("heading", "rad", "heading, deg", _DEG),
+    ("lateral_speed", "m_s", "lateral speed, m/s", 1.0),
+)
+
+
+def draw_run(columns: Mapping[str, Float]) -> Markup:
+    """Return the figure of a run.
+
+    Parameters
+    ----------
+    columns : mapping of str to ndarray, shape (n,)
+        See `kempf.pipeline.compare.run_series.run_series`.
+    """
+    time = (columns["time_utc_ns"] - columns["time_utc_ns"][0]).astype(np.float64) / SECOND_NS
+    end = float(time[-1])
+    parts = _panel(0.0, "rudder, deg", time, end, [(_DEG * columns["rudder_angle_rad"], "rudder")])
+    top = _PANEL + _GAP
+    for name, unit, words, factor in _SHOWN:
+        measured, predicted = columns[f"{name}_{unit}"] * factor, columns[f"{name}_predicted_{unit}"] * factor
+        if not np.isfinite(measured).any():
+            continue
+        lines = [(measured, "measured"), (predicted, "predicted"), (measured - predicted, "left")]
+        if name == "heading":
+            # what is left beside a heading of 300 deg would lie off the panel
+            lines.pop()
+        parts += _panel(top, words, time, end, lines)
+        top += _PANEL + _GAP
+    for tick in ticks(0.0, end, 8):
+        parts.append(element("text", f"{tick:g}", x=_x(tick, end), y=top - 4.0, text_anchor="middle", class_="label"))
+    parts.append(element("text", "s", x=_WIDTH - 6.0, y=top - 4.0, text_anchor="end", class_="label"))
+    return drawing(_WIDTH, top + 4.0, "Measured (dots), predicted (line) and the difference (thin line)", *parts)
+
+
+def _x(second: float, end: float) -> float:
+    return _LEFT + (_WIDTH - _LEFT - 12.0) * second / max(end, 1e-9)
+
+
+def _panel(top: float, words: str, time: Float, end: float, lines: list[tuple[Float, str]]) -> list[Markup]:
+    every = np.concatenate([values[np.isfinite(values)] for values, _ in lines])
+    low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 1.0)
+    room = 0.06 * (high - low) or 1.0
+    low, high = low - room, high + room
+    parts = [element("rect", x=_LEFT, y=top, width=_WIDTH - _LEFT - 12.0, height=_PANEL, fill="none", class_="frame")]
+    for tick in ticks(low, high, 4):
+        y = top + _PANEL * (high - tick) / (high - low)
+        parts.append(element("line", x1=_LEFT, x2=_WIDTH - 12.0, y1=y, y2=y, class_="grid"))
+        parts.append(element("text", f"{tick:g}", x=_LEFT - 6.0, y=y + 3.5, text_anchor="end", class_="label"))
+    step = max(1, time.size // _POINTS)
+    for values, kind in lines:
+        at = np.flatnonzero(np.isfinite(values))[::step]
+        across = _LEFT + (_WIDTH - _LEFT - 12.0) * time[at] / max(end, 1e-9)
+        down = top + _PANEL * (high - values[at]) / (high - low)
+        places = list(zip(across.tolist(), down.tolist(), strict=True))
+        if kind == "measured":
+            path = " ".join(f"M{a:.1f} {b:.1f}h.01" for a, b in places)
+        else:
+            path = "M" + " ".join(f"{a:.1f} {b:.1f}" for a, b in places) if places else ""
+        if path:
+            parts.append(element("path", d=path, fill="none", class_=f"line-{kind}"))
+    parts.append(element("text", words, x=_LEFT + 6.0, y=top + 13.0, class_="label strong"))
+    return parts

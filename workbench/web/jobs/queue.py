@@ -1,0 +1,236 @@
+"""The jobs of a workbench in a SQLite file: what waits, what runs, what came of the others.
+
+It is beside the warehouse and never in it; deleting it costs time only. The id of a job is a hash of what is asked for
+and of the state that it is asked of, so that the same request is the same job.
+"""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterator, Mapping
+from contextlib import closing, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from kempf.schemas.errors import KempfError, NotFound, UsageError
+from kempf.warehouse.canonical import canonical_json, sha256
+
+QUEUED, RUNNING, DONE, FAILED, CANCELLED = "queued", "running", "done", "failed", "cancelled"
+#: states that a job leaves by itself
+ACTIVE = (QUEUED, RUNNING)
+#: jobs that may wait, and how often one is begun whose process dies
+MOST_WAITING, MOST_ATTEMPTS = 100, 2
+
+_TABLES = """
+CREATE TABLE IF NOT EXISTS jobs (
+    id TEXT PRIMARY KEY, number INTEGER NOT NULL, kind TEXT NOT NULL, arguments TEXT NOT NULL, state TEXT NOT NULL,
+    attempts INTEGER NOT NULL DEFAULT 0, result TEXT, error TEXT
+);
+CREATE TABLE IF NOT EXISTS ticks (
+    job TEXT NOT NULL, number INTEGER NOT NULL, done INTEGER NOT NULL, total INTEGER NOT NULL, what TEXT NOT NULL,
+    PRIMARY KEY (job, number)
+);
+"""
+
+
+@dataclass(frozen=True)
+class Job:
+    """One piece of work."""
+
+    id: str
+    kind: str
+    #: What it is done to, JSON content.
+    arguments: Mapping[str, Any]
+    state: str
+    #: How often it was begun.
+    attempts: int
+    #: What came of it, JSON content; None before it is done.
+    result: Any
+    #: The error's JSON where it failed.
+    error: Mapping[str, Any] | None
+
+    def show(self) -> dict[str, Any]:
+        """Return the job as JSON content."""
+        return dict(vars(self))
+
+
+@dataclass(frozen=True)
+class Tick:
+    """How far a job was at a time."""
+
+    number: int
+    done: int
+    total: int
+    what: str
+
+
+def job_id(kind: str, arguments: Mapping[str, Any], state: str) -> str:
+    """Return the id of a job: ``job-`` and 16 hex digits of the hash of what it does and to what.
+
+    Parameters
+    ----------
+    state : str
+        Digest of what it works on.
+    """
+    return "job-" + sha256(canonical_json([kind, dict(arguments), state]))[:16]
+
+
+class Queue:
+    """The jobs in a file.
+
+    Parameters
+    ----------
+    path : Path
+        Made where there is none.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with self._connected() as file:
+            file.executescript(_TABLES)
+
+    @contextmanager
+    def _connected(self) -> Iterator[sqlite3.Connection]:
+        # one a call: threads and processes share the file, never a connection
+        with closing(sqlite3.connect(self.path, timeout=10.0, isolation_level="IMMEDIATE")) as file:
+            file.row_factory = sqlite3.Row
+            with file:
+                yield file
+
+    def ask(self, kind: str, arguments: Mapping[str, Any], state: str) -> Job:
+        """Put a job into the queue; one that waits, runs or is done already is that one.
+
+        Raises
+        ------
+        KempfError
+            ``jobs_full``: too many wait.
+        """
+        name = job_id(kind, arguments, state)
+        with self._connected() as file:
+            there = file.execute("SELECT state FROM jobs WHERE id = ?", (name,)).fetchone()
+            if there is None or there["state"] in (FAILED, CANCELLED):
+                waiting = file.execute("SELECT count(*) FROM jobs WHERE state = ?", (QUEUED,)).fetchone()[0]
+                if waiting >= MOST_WAITING:
+                    raise KempfError("jobs_full", f"{waiting} jobs wait already.", "Wait, or cancel some.")
+                number = file.execute("SELECT coalesce(max(number), 0) + 1 FROM jobs").fetchone()[0]
+                file.execute("DELETE FROM ticks WHERE job = ?", (name,))
+                file.execute(
+                    "INSERT OR REPLACE INTO jobs (id, number, kind, arguments, state) VALUES (?, ?, ?, ?, ?)",
+                    (name, number, kind, json.dumps(dict(arguments)), QUEUED),
+                )
+        return self.get(name)
+
+    def get(self, name: str) -> Job:
+        """Return a job.
+
+        Raises
+        ------
+        NotFound
+            ``no_job``.
+        """
+        with self._connected() as file:
+            row = file.execute("SELECT * FROM jobs WHERE id = ?", (name,)).fetchone()
+        if row is None:
+            raise NotFound("no_job", f"There is no job {name[:40]!r}.", "Ask for it again.")
+        return _job(row)
+
+    def all(self) -> list[Job]:
+        """Return the jobs, the newest first."""
+        with self._connected() as file:
+            return [_job(row) for row in file.execute("SELECT * FROM jobs ORDER BY number DESC")]
+
+    def ticks(self, name: str, after: int = 0) -> list[Tick]:
+        """Return how far a job was, from a number on that is not among them."""
+        with self._connected() as file:
+            rows = file.execute("SELECT * FROM ticks WHERE job = ? AND number > ? ORDER BY number", (name, after))
+            return [Tick(row["number"], row["done"], row["total"], row["what"]) for row in rows]
+
+    def take(self) -> Job | None:
+        """Return the job that waits the longest, which runs from now on; None where none waits."""
+        with self._connected() as file:
+            row = file.execute("SELECT * FROM jobs WHERE state = ? ORDER BY number LIMIT 1", (QUEUED,)).fetchone()
+            if row is None:
+                return None
+            file.execute("UPDATE jobs SET state = ?, attempts = attempts + 1 WHERE id = ?", (RUNNING, row["id"]))
+        return self.get(row["id"])
+
+    def tick(self, name: str, done: int, total: int, what: str) -> None:
+        """Write down how far a job is."""
+        with self._connected() as file:
+            file.execute(
+                "INSERT INTO ticks SELECT ?, coalesce(max(number), 0) + 1, ?, ?, ? FROM ticks WHERE job = ?",
+                (name, done, total, what, name),
+            )
+
+    def finish(self, name: str, result: Any) -> None:
+        """Let a running job be done."""
+        self._leave(name, DONE, result=json.dumps(result))
+
+    def fail(self, name: str, error: KempfError) -> None:
+        """Let a running job have failed."""
+        self._leave(name, FAILED, error=json.dumps(error.to_json()["error"], default=str))
+
+    def cancel(self, name: str) -> Job:
+        """Let a job that waits or runs be cancelled.
+
+        Raises
+        ------
+        NotFound
+            ``no_job``.
+        UsageError
+            ``job_over``: it has ended already.
+        """
+        job = self.get(name)
+        if job.state not in ACTIVE:
+            raise UsageError("job_over", f"The job {name} is {job.state}.", "Nothing is left to cancel.")
+        with self._connected() as file:
+            file.execute("UPDATE jobs SET state = ? WHERE id = ? AND state IN (?, ?)", (CANCELLED, name, *ACTIVE))
+        return self.get(name)
+
+    def died(self, name: str) -> None:
+        """Put a job whose process is gone back into the queue, or let it have failed where that was so before."""
+        job = self.get(name)
+        if job.state != RUNNING:
+            return
+        if job.attempts >= MOST_ATTEMPTS:
+            self.fail(
+                name,
+                KempfError(
+                    "job_lost",
+                    f"Its process died {job.attempts} times.",
+                    "Nothing is half in the warehouse. Look at the memory of the machine, then ask for it again.",
+                ),
+            )
+            return
+        with self._connected() as file:
+            file.execute("UPDATE jobs SET state = ? WHERE id = ? AND state = ?", (QUEUED, name, RUNNING))
+
+    def running(self) -> list[str]:
+        """Return the ids of the jobs that are said to run."""
+        with self._connected() as file:
+            return [row["id"] for row in file.execute("SELECT id FROM jobs WHERE state = ?", (RUNNING,))]
+
+    def _leave(self, name: str, state: str, *, result: str | None = None, error: str | None = None) -> None:
+        with self._connected() as file:
+            file.execute(
+                "UPDATE jobs SET state = ?, result = ?, error = ? WHERE id = ? AND state = ?",
+                (state, result, error, name, RUNNING),
+            )
+
+
+def _job(row: sqlite3.Row) -> Job:
+    def content(text: str | None) -> Any:
+        return None if text is None else json.loads(text)
+
+    return Job(
+        row["id"],
+        row["kind"],
+        content(row["arguments"]),
+        row["state"],
+        row["attempts"],
+        content(row["result"]),
+        content(row["error"]),
+    )

@@ -1,0 +1,44 @@
+"""A diagnosis: its verdict in sentences, the effects ranked, and how the error fell."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kempf.schemas.errors import NotFound
+from kempf.warehouse import aliases, diagnoses
+from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.draw.ladder import draw_ladder
+from kempf.workbench.web.pages.page import Page
+
+
+def document(desk: Desk, diagnosis_id: str) -> dict[str, Any]:
+    """Return what `kempf diagnose --json` printed when it made the diagnosis.
+
+    Raises
+    ------
+    NotFound
+        ``no_diagnosis``.
+    """
+    one = diagnoses.find(desk.warehouse, diagnosis_id)
+    if one is None:
+        raise NotFound(
+            "no_diagnosis",
+            f"No diagnosis has the id {diagnosis_id[:40]!r}.",
+            "A vessel's page lists her diagnoses; `kempf diagnose --vessel NAME` makes one.",
+        )
+    return one.show()
+
+
+def gather(desk: Desk, diagnosis_id: str) -> Page:
+    """Return the page of a diagnosis."""
+    one = document(desk, diagnosis_id)
+    ranked = sorted(one["candidates"], key=lambda c: (c["score"] is None, -(c["score"] or 0.0)))
+    content = {
+        "one": one,
+        "ranked": [c for c in ranked if c["score"] is not None],
+        "untestable": [c for c in ranked if c["score"] is None],
+        "ladder": draw_ladder(one["ladder"]),
+        "standing": aliases.of_vessel(desk.warehouse, one["vessel"]).get(aliases.CURRENT, ""),
+    }
+    return Page("diagnosis.html", "Diagnosis", content, ((one["vessel"], of_vessel(one["vessel"])),))

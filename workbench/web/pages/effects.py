@@ -1,0 +1,35 @@
+"""The catalogue of physical effects, and each of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kempf.schemas.effects import catalogue, get
+from kempf.warehouse import diagnoses
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.pages.page import Page
+
+
+def list_document() -> list[dict[str, Any]]:
+    """Return what `kempf effects list --json` prints."""
+    return [effect.as_json() for effect in catalogue().values()]
+
+
+def document(name: str) -> dict[str, Any]:
+    """Return what `kempf effects show NAME --json` prints."""
+    return get(name).as_json()
+
+
+def gather_list() -> Page:
+    """Return the page of the catalogue."""
+    groups: dict[str, list[Any]] = {}
+    for effect in catalogue().values():
+        groups.setdefault(effect.group, []).append(effect)
+    return Page("effects.html", "Effects", {"groups": groups})
+
+
+def gather(desk: Desk, name: str) -> Page:
+    """Return the page of an effect."""
+    effect = get(name)
+    ships = sorted(vessel for vessel, one in diagnoses.newest(desk.warehouse).items() if name in one.effects)
+    return Page("effect.html", effect.title, {"effect": effect, "ships": ships}, (("Effects", "/effects"),))

@@ -1,0 +1,55 @@
+"""A log: its channels over time, the track, the manoeuvres found in it, and what speaks against its channels."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
+from kempf.warehouse import logs, lost, segments
+from kempf.warehouse.instant import iso_utc
+from kempf.workbench.documents.logs import log_document
+from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.draw.track import draw_track
+from kempf.workbench.web.pages.page import Page
+from kempf.workbench.web.pages.series import offered
+from kempf.workbench.web.window import window
+
+
+def document(desk: Desk, log_id: str) -> dict[str, Any]:
+    """Return what `kempf logs show ID --json` prints."""
+    return log_document(desk.warehouse, logs.by_prefix(desk.warehouse, log_id))
+
+
+def gather(desk: Desk, log_id: str, asked_from: str | None, asked_to: str | None) -> Page:
+    """Return the page of a log."""
+    row = logs.by_prefix(desk.warehouse, log_id)
+    begin, end = window(asked_from, asked_to, row.start_utc_ns, row.end_utc_ns)
+    channels = desk.channels.of(row.ingest_id)
+    found = [one for one in segments.found_in(desk.warehouse, row.vessel) if one.ingest_id == row.ingest_id]
+    gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
+    shown = log_document(desk.warehouse, row)
+    content = {
+        "log": shown,
+        "channels": offered(channels),
+        "notes": dict.fromkeys((*shown["notes"], *channels.notes)),
+        "manoeuvres": [one.show(row.file_name) for one in found],
+        "spans": [span_of(one) for one in found],
+        "lost": lost_as_json(gone),
+        "track": draw_track(channels, [(one.start_utc_ns, one.end_utc_ns) for one in found]),
+        "window": (iso_utc(begin), iso_utc(end)),
+        "whole": (iso_utc(row.start_utc_ns), iso_utc(row.end_utc_ns)),
+    }
+    return Page("log.html", row.file_name, content, ((row.vessel, of_vessel(row.vessel)),))
+
+
+def span_of(one: segments.Segment) -> dict[str, Any]:
+    """Return what a chart draws of a manoeuvre: its span and its executes."""
+    name = (f"{one.psi0_deg:g}/{one.delta0_deg:g} " if one.is_zigzag else "") + one.kind.replace("_", " ")
+    return {
+        "id": one.segment_id,
+        "words": name + (" (excluded)" if one.excluded is not None else ""),
+        "from": iso_utc(one.start_utc_ns),
+        "to": iso_utc(one.end_utc_ns),
+        "executes": [iso_utc(t) for t in one.executes_utc_ns],
+    }

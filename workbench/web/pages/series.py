@@ -1,0 +1,76 @@
+"""The series of a log that a chart asks for."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kempf.pipeline.channels.instruments import Instruments
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.errors import UsageError
+from kempf.warehouse import logs
+from kempf.workbench.web.data.bins import reduced
+from kempf.workbench.web.data.frames import encoded
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.window import window
+
+#: stretches that a chart may tell apart, channels that an answer may have
+MOST_BINS, MOST_CHANNELS = 1500, 12
+#: those that a page begins with, as far as the log has them
+FIRST = ("rudder_angle", "rudder_order", "heading", "yaw_rate", "speed_through_water", "speed_over_ground")
+#: in a track and not in a chart
+_PLACES = ("latitude", "longitude")
+
+
+def frame(desk: Desk, log_id: str, channels: str, asked_from: str | None, asked_to: str | None, bins: int) -> bytes:
+    """Return channels of a log over a window; see `kempf.workbench.web.data.frames`.
+
+    Parameters
+    ----------
+    log_id : str
+        Or the beginning of one.
+    channels : str
+        Names, separated by commas.
+    asked_from, asked_to : str or None
+        Ends of the window; None for those of the log.
+
+    Raises
+    ------
+    NotFound
+        ``no_log``.
+    UsageError
+        ``channel_unknown``, ``too_many_channels``, ``instant_unreadable``, ``window_empty``.
+    """
+    row = logs.by_prefix(desk.warehouse, log_id)
+    begin, end = window(asked_from, asked_to, row.start_utc_ns, row.end_utc_ns)
+    found = desk.channels.of(row.ingest_id)
+    names = list(dict.fromkeys(channels.split(",")))
+    if len(names) > MOST_CHANNELS:
+        raise UsageError(
+            "too_many_channels", f"{len(names)} channels at once; at most {MOST_CHANNELS}.", "Ask for fewer at a time."
+        )
+    unknown = [name for name in names if name not in found.series]
+    if unknown:
+        raise UsageError(
+            "channel_unknown",
+            f"The log has no channel {', '.join(unknown)[:200]}; it has {', '.join(found.series)}.",
+            "Choose among these.",
+        )
+    few = max(1, min(bins, MOST_BINS))
+    return encoded(begin, end, {name: reduced(found.series[name], begin, end, few) for name in names})
+
+
+def offered(found: Instruments) -> list[dict[str, Any]]:
+    """Return the channels of a log that a chart can show, those that a page begins with first."""
+    names = [name for name in FIRST if name in found.series]
+    names += [name for name in CHANNELS if name in found.series and name not in (*FIRST, *_PLACES)]
+    return [
+        {
+            "name": name,
+            "unit": CHANNELS[name].unit,
+            "words": CHANNELS[name].words,
+            "source": found.sources[name],
+            "count": len(found.series[name]),
+            "shown": name in FIRST,
+        }
+        for name in names
+    ]

@@ -1,0 +1,68 @@
+"""A vessel: her logs, manoeuvres, parameter sets, diagnoses and notes, and how her parameters went over time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from kempf.flows.jobs.out_of_date import said_of_vessel
+from kempf.warehouse import diagnoses, history, notes
+from kempf.workbench.documents.logs import listed_logs
+from kempf.workbench.documents.manoeuvres import listed_manoeuvres
+from kempf.workbench.documents.parameter_sets import listed_sets
+from kempf.workbench.documents.vessel import vessel_document
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.draw.history import draw_history
+from kempf.workbench.web.pages.page import Page
+
+#: entries of a list that the page shows
+MOST = 60
+
+
+def document(desk: Desk, vessel: str) -> dict[str, Any]:
+    """Return what `kempf vessels show NAME --json` prints."""
+    return vessel_document(desk.warehouse, vessel)
+
+
+def gather(desk: Desk, vessel: str) -> Page:
+    """Return the page of a vessel."""
+    warehouse = desk.warehouse
+    sets = listed_sets(warehouse, vessel)
+    standing = set(history.standing(warehouse, vessel))
+    content = {
+        "vessel": vessel,
+        "profile": document(desk, vessel)["profile"],
+        "lists": _newest(
+            logs=listed_logs(warehouse, vessel).documents,
+            manoeuvres=listed_manoeuvres(warehouse, vessel).documents,
+            sets=[{**one, "standing": one["parameter_set_id"] in standing} for one in sets],
+        ),
+        "diagnoses": [one.show() for one in diagnoses.of_vessel(warehouse, vessel)],
+        "notes": [one.show() for one in notes.of_vessel(warehouse, vessel)],
+        "current": any("current" in one["aliases"] for one in sets),
+        "stale": said_of_vessel(warehouse, vessel),
+        "history": draw_history(history.of_vessel(warehouse, vessel).rows()) if sets else None,
+    }
+    return Page("vessel.html", vessel, content)
+
+
+def _newest(**lists: list[dict[str, Any]]) -> dict[str, dict[str, Any]]:
+    """Return of each list the entries that are shown, the newest ones, and how many there are."""
+    return {
+        name: {"shown": sorted(every, key=lambda one: str(one["start"]))[-MOST:], "count": len(every)}
+        for name, every in lists.items()
+    }
+
+
+def manoeuvres_document(desk: Desk, vessel: str) -> list[dict[str, Any]]:
+    """Return what `kempf segments --vessel NAME --json` prints."""
+    return listed_manoeuvres(desk.warehouse, vessel).documents
+
+
+def logs_document(desk: Desk, vessel: str) -> list[dict[str, Any]]:
+    """Return what `kempf logs list --vessel NAME --json` prints."""
+    return listed_logs(desk.warehouse, vessel).documents
+
+
+def sets_document(desk: Desk, vessel: str) -> list[dict[str, Any]]:
+    """Return what `kempf params list --vessel NAME --json` prints."""
+    return listed_sets(desk.warehouse, vessel)

@@ -1,0 +1,231 @@
+"use strict";
+// Linked charts of a log: one window and one cursor for all panels, the window in the address.
+(() => {
+  const SHIP = { "rad": [180 / Math.PI, "deg"], "rad/s": [180 / Math.PI, "deg/s"], "m/s": [3600 / 1852, "kn"], "1/s": [60, "rpm"] };
+  const SMALLEST_S = 0.05;
+  const colour = name => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
+  const seconds = iso => Date.parse(iso) / 1000;
+  // to the millisecond: an address is read by people
+  const iso = s => new Date(Math.round(s * 1000)).toISOString();
+  const short = v => v === null || v === undefined ? "-" : Number(v.toPrecision(5)).toString();
+
+  function decoded(buffer) {
+    const bytes = new Uint8Array(buffer), end = bytes.indexOf(10);
+    const head = JSON.parse(new TextDecoder().decode(bytes.subarray(0, end)));
+    let at = end + 1;
+    // nanoseconds do not fit into a number: milliseconds of them do
+    const origin = Number(BigInt(head.from_utc_ns) / 1000n) / 1e6;
+    for (const one of head.series) {
+      const t = new Float32Array(buffer, at, one.count), v = new Float32Array(buffer, at + 4 * one.count, one.count);
+      at += 8 * one.count;
+      one.x = Array.from(t, s => origin + s);
+      one.y = Array.from(v, value => Number.isNaN(value) ? null : value);
+    }
+    return head.series;
+  }
+
+  class Chart {
+    constructor(node) {
+      this.node = node;
+      this.panels = node.querySelector(".panels");
+      this.state = node.querySelector(".state");
+      this.readout = node.querySelector(".readout");
+      this.whole = [seconds(node.dataset.first), seconds(node.dataset.last)];
+      this.span = [seconds(node.dataset.from), seconds(node.dataset.to)];
+      this.plots = [];
+      this.series = [];
+      this.asked = 0;
+      this.spans = Array.from(node.querySelectorAll(".spans li"), li => ({
+        from: seconds(li.dataset.from), to: seconds(li.dataset.to), words: li.textContent,
+        executes: li.dataset.executes ? li.dataset.executes.split(" ").map(seconds) : [],
+      }));
+      this.boxes = Array.from(node.querySelectorAll("input[name=ch]"));
+      this.fromAddress();
+      for (const box of this.boxes) box.addEventListener("change", () => this.moved());
+      for (const button of node.querySelectorAll("button[data-do]")) button.addEventListener("click", () => this.do(button.dataset.do));
+      document.addEventListener("keydown", event => this.key(event));
+      addEventListener("popstate", () => { this.fromAddress(); this.load(); });
+      this.width = this.panels.clientWidth;
+      new ResizeObserver(() => {
+        if (this.panels.clientWidth !== this.width) { this.width = this.panels.clientWidth; this.draw(); }
+      }).observe(this.panels);
+      matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => this.draw());
+      this.load();
+    }
+
+    fromAddress() {
+      const asked = new URLSearchParams(location.search);
+      this.span = [asked.get("from") ? seconds(asked.get("from")) : seconds(this.node.dataset.from), asked.get("to") ? seconds(asked.get("to")) : seconds(this.node.dataset.to)];
+      if (asked.has("ch")) {
+        const wanted = asked.get("ch").split(",");
+        for (const box of this.boxes) box.checked = wanted.includes(box.value);
+      }
+      this.si = asked.get("units") === "si";
+    }
+
+    moved(replace = false) {
+      const asked = new URLSearchParams(location.search);
+      asked.set("from", iso(this.span[0]));
+      asked.set("to", iso(this.span[1]));
+      asked.set("ch", this.channels().join(","));
+      if (this.si) asked.set("units", "si"); else asked.delete("units");
+      history[replace ? "replaceState" : "pushState"](null, "", "?" + asked.toString().replaceAll("%2C", ",").replaceAll("%3A", ":"));
+      this.load();
+    }
+
+    channels() { return this.boxes.filter(box => box.checked).map(box => box.value); }
+
+    async load() {
+      const number = ++this.asked, channels = this.channels();
+      if (channels.length === 0) { this.series = []; this.draw(); return; }
+      const asked = new URLSearchParams({ ch: channels.join(","), from: iso(this.span[0]), to: iso(this.span[1]), bins: String(Math.min(1500, Math.max(100, this.panels.clientWidth))) });
+      document.body.removeAttribute("data-ready");
+      try {
+        const answer = await fetch(`/logs/${this.node.dataset.log}/series?${asked}`);
+        if (!answer.ok) throw new Error((await answer.json()).error.message);
+        const buffer = await answer.arrayBuffer();
+        if (number !== this.asked) return;
+        this.series = decoded(buffer);
+        this.draw();
+      } catch (error) {
+        if (number === this.asked) { this.state.textContent = `The channels cannot be shown: ${error.message}`; document.body.dataset.ready = "error"; }
+      }
+    }
+
+    unit(name) {
+      const unit = this.boxes.find(box => box.value === name).dataset.unit;
+      return this.si ? [1, unit] : SHIP[unit] || [1, unit];
+    }
+
+    draw() {
+      for (const plot of this.plots) plot.destroy();
+      this.plots = [];
+      this.panels.replaceChildren();
+      for (const one of this.series) this.panel(one, one === this.series[this.series.length - 1]);
+      const reduced = this.series.filter(one => one.total >= 1.5 * one.drawn).map(one => `1 of ${Math.round(one.total / one.drawn)} of ${one.name.replaceAll("_", " ")}`);
+      this.state.textContent = `${iso(this.span[0]).replace("T", " ")} to ${iso(this.span[1]).slice(11)}: ${this.series.length} channels` + (reduced.length ? `; shown: ${reduced.join(", ")} (smallest and largest of each stretch)` : "");
+      this.node.querySelector("[data-do=units]").textContent = this.si ? "Units: SI" : "Units: deg, kn";
+      if (!this.readout.hidden && this.readout.hasChildNodes()) this.table();
+      document.body.dataset.ready = "yes";
+    }
+
+    panel(one, last) {
+      const [factor, unit] = this.unit(one.name), y = one.y.map(v => v === null ? null : v * factor);
+      const words = one.name.replaceAll("_", " "), label = unit === "1" ? words : `${words}, ${unit}`;
+      const known = y.filter(v => v !== null);
+      const holder = document.createElement("div");
+      holder.className = "panel";
+      holder.tabIndex = 0;
+      holder.setAttribute("role", "img");
+      holder.setAttribute("aria-label", known.length ? `${label}: from ${short(Math.min(...known))} to ${short(Math.max(...known))}, ${one.total} values` : `${label}: no values here`);
+      this.panels.append(holder);
+      const ink = colour("--ink"), faint = colour("--line");
+      const axis = { stroke: ink, grid: { stroke: faint, width: 1 }, ticks: { stroke: faint, width: 1 }, font: "12px system-ui, sans-serif" };
+      const clock = (u, splits, _, __, step) => splits.map(s => iso(s).slice(11, step < 1 ? 22 : step < 60 ? 19 : 16));
+      const time = last ? { ...axis, values: clock, space: 80 } : { ...axis, values: (u, splits) => splits.map(() => ""), size: 8, space: 80 };
+      const plot = new uPlot({
+        width: Math.max(200, this.panels.clientWidth), height: last ? 150 : 124, tzDate: s => uPlot.tzDate(new Date(s * 1000), "Etc/UTC"),
+        scales: { x: { time: true, range: () => this.span } },
+        axes: [time, { ...axis, size: 64, space: 24 }],
+        series: [{ label: "UTC", value: (_, s) => s === null || s === undefined ? "-" : iso(s).slice(11, 23) }, { label, stroke: colour("--full"), width: 1.25, points: { show: one.total <= 60 }, value: (_, v) => short(v) }],
+        cursor: { sync: { key: "all" }, drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => this.do("all") } },
+        hooks: {
+          setSelect: [u => { if (u.select.width > 3) this.zoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")); }],
+          drawClear: [u => this.shade(u)],
+        },
+      }, [one.x, y], holder);
+      plot.over.addEventListener("wheel", event => {
+        event.preventDefault();
+        const at = plot.posToVal(event.offsetX, "x"), by = event.deltaY < 0 ? 0.8 : 1.25;
+        this.span = [at - (at - this.span[0]) * by, at + (this.span[1] - at) * by];
+        this.clip();
+        for (const other of this.plots) other.setScale("x", { min: this.span[0], max: this.span[1] });
+        clearTimeout(this.later);
+        this.later = setTimeout(() => this.moved(true), 150);
+      }, { passive: false });
+      this.plots.push(plot);
+    }
+
+    shade(u) {
+      const context = u.ctx, { left, top, width, height } = u.bbox;
+      context.save();
+      context.beginPath();
+      context.rect(left, top, width, height);
+      context.clip();
+      for (const one of this.spans) {
+        const a = u.valToPos(one.from, "x", true), b = u.valToPos(one.to, "x", true);
+        if (b < left || a > left + width) continue;
+        context.fillStyle = colour("--band");
+        context.fillRect(a, top, b - a, height);
+        context.fillStyle = colour("--ink");
+        context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+        if (u === this.plots[0] || this.plots.length === 0) context.fillText(one.words, Math.max(a, left) + 4, top + 13 * devicePixelRatio);
+        context.strokeStyle = colour("--plain");
+        context.setLineDash([4, 4]);
+        for (const execute of one.executes) {
+          const x = Math.round(u.valToPos(execute, "x", true)) + 0.5;
+          context.beginPath();
+          context.moveTo(x, top);
+          context.lineTo(x, top + height);
+          context.stroke();
+        }
+      }
+      context.restore();
+    }
+
+    clip() {
+      const [first, last] = this.whole, most = last - first;
+      let width = Math.min(most, Math.max(SMALLEST_S, this.span[1] - this.span[0]));
+      const begin = Math.min(Math.max(first, this.span[0]), last - width);
+      this.span = [begin, begin + width];
+    }
+
+    zoom(from, to) { this.span = [from, to]; this.clip(); this.moved(); }
+
+    do(what) {
+      const [from, to] = this.span, width = to - from, middle = (from + to) / 2;
+      if (what === "all") this.zoom(...this.whole);
+      else if (what === "in") this.zoom(middle - width / 4, middle + width / 4);
+      else if (what === "out") this.zoom(middle - width, middle + width);
+      else if (what === "earlier") this.zoom(from - width / 2, to - width / 2);
+      else if (what === "later") this.zoom(from + width / 2, to + width / 2);
+      else if (what === "units") { this.si = !this.si; this.moved(true); }
+      else if (what === "table") { if (this.readout.hasChildNodes()) this.readout.replaceChildren(); else this.table(); }
+    }
+
+    table() {
+      const table = document.createElement("table"), head = table.createTHead().insertRow(), body = table.createTBody();
+      const at = this.plots[0] && this.plots[0].cursor.idx !== null && this.plots[0].cursor.idx !== undefined ? this.plots[0].data[0][this.plots[0].cursor.idx] : null;
+      const titles = ["channel", "unit", at === null ? "first value" : `at ${iso(at).slice(11, 23)}`, "smallest", "largest", "values"];
+      for (const words of titles) { const th = document.createElement("th"); th.scope = "col"; th.textContent = words; head.append(th); }
+      for (const one of this.series) {
+        const [factor, unit] = this.unit(one.name), row = body.insertRow(), inside = one.y.filter((v, k) => v !== null && one.x[k] >= this.span[0] && one.x[k] <= this.span[1]).map(v => v * factor);
+        let k = at === null ? 0 : one.x.findIndex(x => x >= at);
+        if (k < 0) k = one.x.length - 1;
+        const name = document.createElement("th");
+        name.scope = "row";
+        name.textContent = one.name.replaceAll("_", " ");
+        row.append(name);
+        for (const words of [unit, one.y[k] === null || one.y[k] === undefined ? "-" : short(one.y[k] * factor), inside.length ? short(Math.min(...inside)) : "-", inside.length ? short(Math.max(...inside)) : "-", String(one.total)]) row.insertCell().textContent = words;
+      }
+      this.readout.replaceChildren(table);
+    }
+
+    step(by) {
+      const plot = this.plots[0];
+      if (!plot) return;
+      const x = plot.data[0], now = plot.cursor.idx === null || plot.cursor.idx === undefined ? 0 : plot.cursor.idx;
+      const next = Math.min(x.length - 1, Math.max(0, now + by));
+      plot.setCursor({ left: plot.valToPos(x[next], "x"), top: 10 }, true, true);
+    }
+
+    key(event) {
+      if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName) && event.target.type !== "checkbox") return;
+      const body = document.body.dataset;
+      const does = { "+": () => this.do("in"), "-": () => this.do("out"), "0": () => this.do("all"), "u": () => this.do("units"), "ArrowLeft": () => this.step(event.shiftKey ? -10 : -1), "ArrowRight": () => this.step(event.shiftKey ? 10 : 1), "[": () => { if (body.before) location.assign(body.before); }, "]": () => { if (body.after) location.assign(body.after); }, "/": () => document.getElementById("go").focus() }[event.key];
+      if (does) { event.preventDefault(); does(); }
+    }
+  }
+
+  for (const node of document.querySelectorAll(".chart")) new Chart(node);
+})();

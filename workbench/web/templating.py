@@ -1,0 +1,35 @@
+"""Templates: everything that comes from data is shown as text."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from jinja2 import Environment, PackageLoader, StrictUndefined
+
+from kempf.workbench.terminal import number
+from kempf.workbench.web.addresses import of_vessel
+
+
+def rendered(template: str, **content: Any) -> str:
+    """Return a page as HTML; a name that is not given is an error."""
+    return _templates().get_template(template).render(**content)
+
+
+@cache
+def _templates() -> Environment:
+    made = Environment(
+        loader=PackageLoader("kempf.workbench.web", "templates"),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+    )
+    made.filters |= {
+        "number": number,
+        "minute": lambda iso: iso[:16].replace("T", " "),
+        "words": lambda name: name.replace("_", " "),
+        "percent": lambda share: "-" if share is None else number(100.0 * share, 3),
+        "vessel_address": of_vessel,
+    }
+    return made
