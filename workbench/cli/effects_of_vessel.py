@@ -27,27 +27,15 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
 
     Beside the vessel's current model; nothing is stored.
     """
-    from kempf.flows.jobs.chosen_manoeuvres import choose
-    from kempf.flows.jobs.diagnose_vessel import examine
     from kempf.flows.jobs.out_of_date import said_of_vessel
-    from kempf.flows.jobs.standing_model import Own, standing_model
-    from kempf.pipeline.diagnose.diagnosis_json import as_json as diagnosis_as_json
-    from kempf.pipeline.diagnose.settings import DiagnosisSettings
-    from kempf.warehouse.canonical import plain
+    from kempf.flows.jobs.try_formula import formula_of_ones_own, tried
     from kempf.warehouse.store import Warehouse
 
-    mine = Own(formulas={name: (formula,)})
-    mine.effects()  # a slip of the pen is reported before anything is read
+    formula_of_ones_own(name, formula)
     warehouse = Warehouse(uri)
-    spec, own = standing_model(warehouse, vessel)
-    own = own.beside(mine)
     with progress_bar() as progress:
-        chosen = choose(warehouse, vessel)
-        settings = DiagnosisSettings(level=1.0, refits=1, certain_std=0.0, most_steps=1)
-        examined = examine(warehouse, chosen, spec, own, settings, progress, only=(name,))
+        document = tried(warehouse, vessel, formula, name, progress)
     print_note(said_of_vessel(warehouse, vessel))
-    document = diagnosis_as_json(examined.diagnosis)
-    document = plain({"vessel": vessel, "formula": formula, "beside": list(spec.effects), **document})
     if as_json:
         print_json(document)
         return

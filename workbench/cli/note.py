@@ -13,8 +13,7 @@ from kempf.workbench.cli.options import json_option, vessel_option, warehouse_op
 from kempf.workbench.terminal import one_line, print_json
 
 if TYPE_CHECKING:
-    from kempf.warehouse.notes import Note, Subject
-    from kempf.warehouse.store import Warehouse
+    from kempf.warehouse.notes import Note
 
 
 @click.command("note", cls=GivenOnce)
@@ -43,6 +42,7 @@ def command(
     Notes are only ever added; `kempf history` shows them. Where a draught is noted for every log of a vessel, the
     effect load_condition goes by it.
     """
+    from kempf.flows.jobs.subject_of_note import subject_of
     from kempf.warehouse import notes, vessels
     from kempf.warehouse.store import Warehouse
 
@@ -64,44 +64,13 @@ def command(
         for one in [] if as_json else listed:
             click.echo(words_of(one))
         return
-    whose, subject, subject_id = _subject(warehouse, vessel, log, segment, set_id)
+    whose, subject, subject_id = subject_of(warehouse, vessel, log, segment, set_id)
     event = utc_ns_of(at, "--at") if at is not None else None
     note = notes.add(warehouse, whose, subject, subject_id, text, event_utc_ns=event, draught_m=draught_m)
     if as_json:
         print_json(note.show())
     else:
         click.echo(words_of(note))
-
-
-def _subject(
-    warehouse: Warehouse, vessel: str | None, log: str | None, segment: str | None, set_id: str | None
-) -> tuple[str, Subject, str]:
-    """Return whose the subject of a note is, what it is, and its whole id."""
-    from kempf.warehouse import logs, parameter_sets, segments, vessels
-
-    subject: Subject
-    if log is not None:
-        row = logs.by_prefix(warehouse, log)
-        whose, subject, subject_id = row.vessel, "log", row.log_id
-    elif segment is not None:
-        found = segments.by_prefix(warehouse, segment)
-        whose, subject, subject_id = found.vessel, "segment", found.segment_id
-    elif set_id is not None:
-        stored = parameter_sets.get(warehouse, set_id)
-        whose, subject, subject_id = stored.vessel, "set", stored.parameter_set_id
-    elif vessel is not None:
-        vessels.require(warehouse, vessel)
-        return vessel, "vessel", vessel
-    else:
-        raise UsageError("no_subject", "What is the note on?", "Give --vessel, --log, --segment or --set.")
-    if vessel is not None and vessel != whose:
-        raise UsageError(
-            "subject_of_another_vessel",
-            f"That {subject} is of {whose!r}, not of {vessel!r}.",
-            "Leave --vessel out, or give the id of one of hers.",
-            {"subject_id": subject_id, "vessel": whose},
-        )
-    return whose, subject, subject_id
 
 
 def words_of(note: Note) -> str:

@@ -100,19 +100,19 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
     """
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
-    from kempf.warehouse.parameter_set import compare
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.compared_sets import compared_sets
 
     warehouse = Warehouse(uri)
     one, other = named_set(warehouse, first, vessel), named_set(warehouse, second, vessel)
-    found = compare(one, other)
+    document = compared_sets(one, other)
     print_note(said_of_sets(warehouse, [one, other]))
     if as_json:
-        print_json({"first": one.parameter_set_id, "second": other.parameter_set_id, "parameters": found})
+        print_json(document)
         return
     rows = [
         [name, number(d["first"]), number(d["second"]), number(d["difference"]), number(d["in_std"], 3), d["unit"]]
-        for name, d in found.items()
+        for name, d in document["parameters"].items()
     ]
     print_table(["", "first", "second", "difference", "in std errors", "unit"], rows)
 

@@ -12,6 +12,7 @@ import click
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.options import figure_option, json_option, vessel_option, warehouse_option
+from kempf.workbench.manoeuvre_figures import FIGURES, in_words
 from kempf.workbench.new_file import require_figures, writing
 from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
 
@@ -123,32 +124,6 @@ def _title(made: Predicted) -> str:
     return f"{made.vessel}, {made.parameter_set.parameter_set_id}: {what}{side} at {number(made.speed_m_s, 3)} m/s"
 
 
-#: name and unit of a figure in the table
-_ROWS = {
-    "advance_m": ("advance", "m"),
-    "transfer_m": ("transfer", "m"),
-    "tactical_diameter_m": ("tactical diameter", "m"),
-    "steady_diameter_m": ("steady diameter", "m"),
-    "steady_yaw_rate_deg_s": ("steady yaw rate", "deg/s"),
-    "steady_drift_deg": ("steady drift angle", "deg"),
-    "speed_loss_percent": ("speed loss", "%"),
-    "time_to_90_s": ("time to 90 deg", "s"),
-    "time_to_180_s": ("time to 180 deg", "s"),
-    "overshoots_deg": ("overshoot", "deg"),
-    "initial_turning_m": ("distance to the second execute", "m"),
-    "time_to_second_execute_s": ("time to the second execute", "s"),
-    "period_s": ("period", "s"),
-    "residual_yaw_rate_deg_s": ("yaw rate that is left", "deg/s"),
-    "residual_share_percent": ("share of the rate that is left", "%"),
-    "time_to_half_s": ("time to half the rate", "s"),
-    "loop_width_deg": ("width of the loop", "deg"),
-    "loop_height_deg_s": ("height of the loop", "deg/s"),
-    "neutral_rudder_deg": ("rudder of a straight course", "deg"),
-    "from_starboard_deg_s": ("yaw rate from starboard at", "deg/s"),
-    "from_port_deg_s": ("yaw rate from port at", "deg/s"),
-}
-
-
 def _print_predicted(made: Predicted, figure: Path | None) -> None:
     shown = made.show()
     manoeuvre = shown["manoeuvre"]
@@ -178,11 +153,7 @@ def _print_predicted(made: Predicted, figure: Path | None) -> None:
 
 def _row(name: str, figure: Figure, manoeuvre: dict[str, Any]) -> list[str]:
     base, _, place = name.partition(".")
-    words, unit = _ROWS[base]
-    if base == "overshoots_deg":
-        words = f"{words} {int(place) + 1}"
-    elif place:
-        words = f"{words} {manoeuvre['orders_deg'][int(place)]:g} deg"
+    words, unit = in_words(base, int(place) if place else None, manoeuvre), FIGURES[base][1]
     if figure.value is None:
         return [words, "-", "too few ships have it", unit]
     return [words, number(figure.value), f"{number(figure.low)} to {number(figure.high)}", unit]
@@ -190,7 +161,7 @@ def _row(name: str, figure: Figure, manoeuvre: dict[str, Any]) -> list[str]:
 
 def _print_models(made: Predicted) -> None:
     first = next(iter(made.prediction.figures))
-    words, unit = _ROWS[first.partition(".")[0]]
+    words, unit = FIGURES[first.partition(".")[0]]
     rows = []
     for one in made.prediction.models:
         figure = one.figures[first]
@@ -207,7 +178,7 @@ def _print_measured(measured: Sequence[MeasuredManoeuvre]) -> None:
         for beside in one.figures:
             figure, inside = beside.predicted, beside.show()["inside"]
             base, _, place = beside.name.partition(".")
-            words = f"{_ROWS[base][0]} {int(place) + 1}" if place else _ROWS[base][0]
+            words = in_words(base, int(place) if place else None, {})
             if figure.value is not None:
                 interval = f"{number(figure.low)} to {number(figure.high)}"
                 about = (one.segment_id[:12], one.side, one.sample.replace("_", " "), words)

@@ -24,15 +24,19 @@ from kempf.workbench.web.addresses import address_of, vessel_at
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.guard import Guard
 from kempf.workbench.web.pages import (
+    compare,
     diagnosis,
     effects,
     fleet,
+    ingest,
     job,
     ladder,
     log,
     manoeuvre,
     model,
+    notes,
     parameter_set,
+    predict,
     series,
     vessel,
 )
@@ -42,10 +46,16 @@ from kempf.workbench.web.templating import rendered
 
 #: What an error's exit code is as the status of an answer.
 _STATUS = {1: 500, 2: 400, 3: 422, 4: 404, 5: 422}
-#: Of errors that may be gone in a moment.
-_BUSY = ("warehouse_busy", "warehouse_unreachable")
-#: Of requests that came too late.
-_MOVED = ("moved_meanwhile", "job_over")
+#: What some errors are: gone in a moment, too late, too large.
+_STATUS_OF_CODE = {
+    "warehouse_busy": 503,
+    "warehouse_unreachable": 503,
+    "uploads_busy": 503,
+    "jobs_full": 503,
+    "moved_meanwhile": 409,
+    "job_over": 409,
+    "upload_too_large": 413,
+}
 #: bytes that a form may have
 _MOST_FORM = 16_384
 
@@ -93,9 +103,15 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
     serve("/v/{vessel}", lambda r: vessel.gather(desk, hers(r)), lambda r: vessel.document(desk, hers(r)))
     serve(
         "/v/{vessel}/model",
-        lambda r: model.gather(desk, hers(r), *(r.query_params.get(name) for name in ("set", "h", "run"))),
+        lambda r: model.gather(desk, hers(r), *(r.query_params.get(name) for name in ("set", "h", "run", "beside"))),
         lambda r: model.document(desk, hers(r), r.query_params.get("set"), r.query_params.get("h")),
     )
+    serve(
+        "/v/{vessel}/predict",
+        lambda r: predict.gather(desk, hers(r), r.query_params),
+        lambda r: predict.document(desk, hers(r), r.query_params),
+    )
+    serve("/compare", lambda r: compare.gather(desk, *_both(r)), lambda r: compare.document(desk, *_both(r)))
     app.add_route("/logs/{log_id}/series", lambda r: _series(desk, r))
     serve("/logs/{log_id}", lambda r: log.gather(desk, log_id(r), *_window(r)), lambda r: log.document(desk, log_id(r)))
     serve(
@@ -135,6 +151,19 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
         asked = await run_in_threadpool(job.ask, desk, form)
         return RedirectResponse(f"/jobs/{asked.id}", 303)
 
+    async def again(request: Request) -> Response:
+        asked = await run_in_threadpool(desk.queue.again, request.path_params["name"])
+        return RedirectResponse(f"/jobs/{asked.id}", 303)
+
+    async def take_in(request: Request) -> Response:
+        received = await desk.uploads.receive(request)
+        asked = await run_in_threadpool(ingest.ask, desk, received)
+        return RedirectResponse(f"/jobs/{asked.id}", 303)
+
+    async def note(request: Request) -> Response:
+        form = await _form(request)
+        return RedirectResponse(await run_in_threadpool(notes.write, desk, form), 303)
+
     async def cancel(request: Request) -> Response:
         asked = await run_in_threadpool(desk.queue.cancel, request.path_params["name"])
         return RedirectResponse(f"/jobs/{asked.id}", 303)
@@ -143,6 +172,10 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
     app.add_route("/jobs/{name}", shown)
     app.add_route("/jobs", ask, methods=["POST"])
     app.add_route("/jobs/{name}/cancel", cancel, methods=["POST"])
+    app.add_route("/jobs/{name}/again", again, methods=["POST"])
+    app.add_route("/ingest", lambda r: _shown(r, ingest.gather(desk)))
+    app.add_route("/ingest", take_in, methods=["POST"])
+    app.add_route("/notes", note, methods=["POST"])
 
 
 async def _form(request: Request) -> dict[str, str]:
@@ -153,6 +186,10 @@ async def _form(request: Request) -> dict[str, str]:
         if len(body) > _MOST_FORM:
             raise UsageError("form_too_long", f"The form has more than {_MOST_FORM} bytes.", "Send less.")
     return dict(parse_qsl(body.decode("utf-8", "replace"), keep_blank_values=True))
+
+
+def _both(request: Request) -> tuple[str, str]:
+    return request.query_params.get("a", ""), request.query_params.get("b", "")
 
 
 def _window(request: Request) -> tuple[str | None, str | None]:
@@ -191,7 +228,7 @@ def _refused(request: Request, error: Exception) -> Response:
     found = wrapped(error)
     if found.code == "internal":
         traceback.print_exception(found, file=sys.stderr)
-    status = 503 if found.code in _BUSY else 409 if found.code in _MOVED else _STATUS[found.exit_code]
+    status = _STATUS_OF_CODE.get(found.code, _STATUS[found.exit_code])
     if request.url.path.endswith((".json", "/series")):
         return Response(json_text(found.to_json()) + "\n", status, media_type="application/json")
     page = Page("error.html", "That did not work", {"error": found, "status": status})

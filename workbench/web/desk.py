@@ -8,6 +8,7 @@ from pathlib import Path
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.data.kept import KeptChannels
 from kempf.workbench.web.jobs.queue import Queue
+from kempf.workbench.web.uploads import Uploads
 
 
 @dataclass(frozen=True)
@@ -19,7 +20,9 @@ class Desk:
     state: Path
     channels: KeptChannels = field(init=False)
     queue: Queue = field(init=False)
+    uploads: Uploads = field(init=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "channels", KeptChannels(self.warehouse))
         object.__setattr__(self, "queue", Queue(self.state / "jobs.sqlite"))
+        object.__setattr__(self, "uploads", Uploads(self.state / "uploads"))

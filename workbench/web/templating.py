@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -9,6 +10,8 @@ from jinja2 import Environment, PackageLoader, StrictUndefined
 
 from kempf.workbench.terminal import number
 from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.pages.corrections import as_asked, undoing
+from kempf.workbench.web.pages.tried import refits
 
 
 def rendered(template: str, **content: Any) -> str:
@@ -25,11 +28,15 @@ def _templates() -> Environment:
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.filters |= {
+    filters: dict[str, Callable[..., Any]] = {
         "number": number,
         "minute": lambda iso: iso[:16].replace("T", " "),
         "words": lambda name: name.replace("_", " "),
         "percent": lambda share: "-" if share is None else number(100.0 * share, 3),
         "vessel_address": of_vessel,
+        "as_asked": as_asked,
+        "undoing": undoing,
+        "refits": refits,
     }
+    made.filters |= filters
     return made

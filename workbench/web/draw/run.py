@@ -22,14 +22,18 @@ _SHOWN = (
 )
 
 
-def draw_run(columns: Mapping[str, Float]) -> Markup:
+def draw_run(columns: Mapping[str, Float], before: Mapping[str, Float] | None = None) -> Markup:
     """Return the figure of a run.
 
     Parameters
     ----------
     columns : mapping of str to ndarray, shape (n,)
         See `kempf.pipeline.compare.run_series.run_series`.
+    before : mapping, optional
+        The same run predicted with another set; left out where its instants are other ones.
     """
+    if before is not None and not np.array_equal(before["time_utc_ns"], columns["time_utc_ns"]):
+        before = None
     time = (columns["time_utc_ns"] - columns["time_utc_ns"][0]).astype(np.float64) / SECOND_NS
     end = float(time[-1])
     parts = _panel(0.0, "rudder, deg", time, end, [(_DEG * columns["rudder_angle_rad"], "rudder")])
@@ -39,6 +43,8 @@ def draw_run(columns: Mapping[str, Float]) -> Markup:
         if not np.isfinite(measured).any():
             continue
         lines = [(measured, "measured"), (predicted, "predicted"), (measured - predicted, "left")]
+        if before is not None:
+            lines.insert(1, (before[f"{name}_predicted_{unit}"] * factor, "before"))
         if name == "heading":
             # what is left beside a heading of 300 deg would lie off the panel
             lines.pop()
@@ -47,7 +53,9 @@ def draw_run(columns: Mapping[str, Float]) -> Markup:
     for tick in ticks(0.0, end, 8):
         parts.append(element("text", f"{tick:g}", x=_x(tick, end), y=top - 4.0, text_anchor="middle", class_="label"))
     parts.append(element("text", "s", x=_WIDTH - 6.0, y=top - 4.0, text_anchor="end", class_="label"))
-    return drawing(_WIDTH, top + 4.0, "Measured (dots), predicted (line) and the difference (thin line)", *parts)
+    beside = ", predicted by the other set (dashed)" if before is not None else ""
+    words = f"Measured (dots), predicted (line){beside} and the difference (thin line)"
+    return drawing(_WIDTH, top + 4.0, words, *parts)
 
 
 def _x(second: float, end: float) -> float:

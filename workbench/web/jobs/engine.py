@@ -22,7 +22,7 @@ from kempf.workbench.web.jobs.queue import RUNNING, Job, Queue
 
 _PAUSE_S = 0.1
 #: what a fit needs, and takes seconds to load
-_HEAVY = ("compare_vessel", "diagnose_vessel", "vessel_model", "reprocess_vessel")
+_HEAVY = ("compare_vessel", "diagnose_vessel", "vessel_model", "reprocess_vessel", "checked_prediction")
 
 
 def run(state: Path, warehouse: Warehouse) -> None:
@@ -71,7 +71,7 @@ def _work(state: Path, warehouse: Warehouse, job: Job) -> None:
         queue.tick(job.id, done, total, what)
 
     try:
-        result = KINDS[job.kind][0](warehouse, state, job.arguments, progress)
+        result = KINDS[job.kind].work(warehouse, state, job.arguments, progress)
     except Exception as error:  # noqa: BLE001 - the last place where it can be reported
         found = wrapped(error)
         if found.code == "internal":

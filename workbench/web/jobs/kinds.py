@@ -1,18 +1,22 @@
 """What the jobs do: each is the job that the command line runs.
 
-Each takes the warehouse, the folder of what is kept, its arguments and a `Progress`, and returns JSON content, of which
-``to`` is the address of what it made.
+Each takes the warehouse, the folder of what is kept, its arguments and a `Progress`, and returns JSON content. Of it
+``to`` is the address of what it made; a job without one is its own page, which shows the result.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from kempf.flows.process.progress import Progress
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.uploads import paths_of
+
+if TYPE_CHECKING:
+    from kempf.flows.jobs.correct_segments import Planned
 
 Work = Callable[[Warehouse, Path, Mapping[str, Any], Progress], dict[str, Any]]
 
@@ -40,8 +44,12 @@ def diagnose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pr
 def add(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     """Add an effect to a vessel's current model."""
     from kempf.flows.jobs.add_effect import add_effect
+    from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN
+    from kempf.flows.jobs.try_formula import formula_of_ones_own
 
-    made = add_effect(warehouse, arguments["vessel"], arguments["effect"], progress=progress)
+    name, formula = arguments["effect"], arguments["formula"]
+    own = formula_of_ones_own(name, formula) if formula else NONE_OF_ONES_OWN
+    made = add_effect(warehouse, arguments["vessel"], name, own, progress=progress)
     return {"to": f"{of_vessel(arguments['vessel'])}/ladder", "parameter_set_id": made.parameter_set_id}
 
 
@@ -61,11 +69,86 @@ def reprocess(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], p
     return {"to": of_vessel(arguments["vessel"]), "report": report.show()}
 
 
-#: By the name that a form gives; what each is called, and what it needs besides the vessel.
-KINDS: Mapping[str, tuple[Work, str, tuple[str, ...]]] = {
-    "predict": (predict, "Predict", ("set", "horizon")),
-    "diagnose": (diagnose, "Diagnose", ()),
-    "add": (add, "Add the effect", ("effect",)),
-    "undo": (undo, "Undo the last effect", ()),
-    "reprocess": (reprocess, "Bring up to date", ()),
+def ingest(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Take the logs in that a browser sent; the result is what `kempf ingest --json` prints of each."""
+    from kempf.flows.jobs.files import read_profiles
+    from kempf.flows.jobs.ingest_logs import ingest as take_in
+
+    paths = paths_of(state, arguments["files"])
+    given = read_profiles(paths_of(state, arguments["profile"])) if arguments["profile"] else None
+    new = bool(arguments["new_vessel"])
+    outcomes = take_in(warehouse, paths, arguments["vessel"], given, progress, new_vessel=new)
+    failed = [one.error for one in outcomes if one.error is not None]
+    if len(failed) == len(outcomes):
+        raise failed[0]
+    return {"outcomes": [{**one.show(), "path": Path(one.path).name} for one in outcomes]}
+
+
+def preview(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Look what a correction of a manoeuvre would change; the result is what `kempf segments` prints of it."""
+    progress(0, 1, "looking through the log with the correction")
+    return {"planned": _planned(warehouse, arguments).show()}
+
+
+def correct(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Correct, exclude, accept or add a manoeuvre, and supersede what rests on what it was."""
+    progress(0, 1, "looking through the log with the correction")
+    planned = _planned(warehouse, arguments)
+    planned.store(warehouse)
+    return {"to": f"/segments/{planned.after.segment_id}", "planned": planned.show()}
+
+
+def _planned(warehouse: Warehouse, arguments: Mapping[str, Any]) -> Planned:
+    from kempf.flows.jobs.correct_segments import plan_for, plan_new
+
+    given = arguments["bounds_utc_ns"]
+    bounds = (int(given[0]), int(given[1])) if given else None
+    if bounds is not None and arguments["action"] == "add":
+        return plan_new(warehouse, arguments["log"], bounds, arguments["reason"])
+    return plan_for(warehouse, arguments["segment"], arguments["action"], arguments["reason"], bounds)
+
+
+def sail(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Predict a standard manoeuvre; the result is what `kempf predict --compare --json` prints, with what is drawn."""
+    from kempf.flows.jobs.checked_prediction import predict_checked
+    from kempf.flows.jobs.compare_predicted import measured_beside
+    from kempf.workbench.web.data.sailed import curves_of, request_of
+
+    made = predict_checked(warehouse, arguments["vessel"], request_of(arguments), progress)
+    measured = measured_beside(warehouse, made, progress)
+    document = {**made.show(), "measured": [one.show() for one in measured], "figure": None}
+    return {"document": document, "curves": curves_of(made.prediction)}
+
+
+def try_formula(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Try an effect of one's own; the result is what `kempf effects try --json` prints."""
+    from kempf.flows.jobs.try_formula import tried
+
+    return {"document": tried(warehouse, arguments["vessel"], arguments["formula"], arguments["name"], progress)}
+
+
+class Kind(NamedTuple):
+    """What a form may ask for."""
+
+    work: Work
+    #: What it is called.
+    title: str
+    #: Fields of the form besides the vessel's; one that is not sent is blank.
+    fields: tuple[str, ...]
+    #: Whether it changes the warehouse: asked for again in a state that was there before, it is done again.
+    changes: bool = False
+
+
+#: By the name that a form gives.
+KINDS: Mapping[str, Kind] = {
+    "ingest": Kind(ingest, "Take logs in", ("files", "profile", "new_vessel"), changes=True),
+    "predict": Kind(predict, "Predict", ("set", "horizon")),
+    "sail": Kind(sail, "Predict a manoeuvre", ("set", "manoeuvre", "rudder", "angles", "side", "speed")),
+    "diagnose": Kind(diagnose, "Diagnose", ()),
+    "try": Kind(try_formula, "Try a formula", ("formula", "name")),
+    "add": Kind(add, "Add the effect", ("effect", "formula"), changes=True),
+    "undo": Kind(undo, "Undo the last effect", (), changes=True),
+    "reprocess": Kind(reprocess, "Bring up to date", (), changes=True),
+    "preview": Kind(preview, "Preview a correction", ("action", "segment", "log", "from", "to", "reason")),
+    "correct": Kind(correct, "Correct a manoeuvre", ("action", "segment", "log", "from", "to", "reason"), changes=True),
 }

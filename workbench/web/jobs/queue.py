@@ -100,8 +100,13 @@ class Queue:
             with file:
                 yield file
 
-    def ask(self, kind: str, arguments: Mapping[str, Any], state: str) -> Job:
+    def ask(self, kind: str, arguments: Mapping[str, Any], state: str, *, again: bool = False) -> Job:
         """Put a job into the queue; one that waits, runs or is done already is that one.
+
+        Parameters
+        ----------
+        again : bool, optional
+            Whether one that is done is begun anew: it changed what it works on, which was changed back since.
 
         Raises
         ------
@@ -111,16 +116,24 @@ class Queue:
         name = job_id(kind, arguments, state)
         with self._connected() as file:
             there = file.execute("SELECT state FROM jobs WHERE id = ?", (name,)).fetchone()
-            if there is None or there["state"] in (FAILED, CANCELLED):
-                waiting = file.execute("SELECT count(*) FROM jobs WHERE state = ?", (QUEUED,)).fetchone()[0]
-                if waiting >= MOST_WAITING:
-                    raise KempfError("jobs_full", f"{waiting} jobs wait already.", "Wait, or cancel some.")
-                number = file.execute("SELECT coalesce(max(number), 0) + 1 FROM jobs").fetchone()[0]
-                file.execute("DELETE FROM ticks WHERE job = ?", (name,))
-                file.execute(
-                    "INSERT OR REPLACE INTO jobs (id, number, kind, arguments, state) VALUES (?, ?, ?, ?, ?)",
-                    (name, number, kind, json.dumps(dict(arguments)), QUEUED),
-                )
+            if there is None or there["state"] in ((DONE, FAILED, CANCELLED) if again else (FAILED, CANCELLED)):
+                _put(file, name, kind, json.dumps(dict(arguments)))
+        return self.get(name)
+
+    def again(self, name: str) -> Job:
+        """Put a job that failed or was cancelled into the queue once more; one that waits, runs or is done stays.
+
+        Raises
+        ------
+        NotFound
+            ``no_job``.
+        KempfError
+            ``jobs_full``.
+        """
+        job = self.get(name)
+        if job.state in (FAILED, CANCELLED):
+            with self._connected() as file:
+                _put(file, name, job.kind, json.dumps(dict(job.arguments)))
         return self.get(name)
 
     def get(self, name: str) -> Job:
@@ -136,6 +149,13 @@ class Queue:
         if row is None:
             raise NotFound("no_job", f"There is no job {name[:40]!r}.", "Ask for it again.")
         return _job(row)
+
+    def known(self, kind: str, arguments: Mapping[str, Any], state: str) -> Job | None:
+        """Return the job of a request; None where nobody asked."""
+        try:
+            return self.get(job_id(kind, arguments, state))
+        except NotFound:
+            return None
 
     def all(self) -> list[Job]:
         """Return the jobs, the newest first."""
@@ -219,6 +239,19 @@ class Queue:
                 "UPDATE jobs SET state = ?, result = ?, error = ? WHERE id = ? AND state = ?",
                 (state, result, error, name, RUNNING),
             )
+
+
+def _put(file: sqlite3.Connection, name: str, kind: str, arguments: str) -> None:
+    """Let a job wait behind the others, with nothing of what it was before."""
+    waiting = file.execute("SELECT count(*) FROM jobs WHERE state = ?", (QUEUED,)).fetchone()[0]
+    if waiting >= MOST_WAITING:
+        raise KempfError("jobs_full", f"{waiting} jobs wait already.", "Wait, or cancel some.")
+    number = file.execute("SELECT coalesce(max(number), 0) + 1 FROM jobs").fetchone()[0]
+    file.execute("DELETE FROM ticks WHERE job = ?", (name,))
+    file.execute(
+        "INSERT OR REPLACE INTO jobs (id, number, kind, arguments, state) VALUES (?, ?, ?, ?, ?)",
+        (name, number, kind, arguments, QUEUED),
+    )
 
 
 def _job(row: sqlite3.Row) -> Job:

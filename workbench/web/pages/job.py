@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from kempf.flows.fleet.state import fleet_state
@@ -10,19 +10,29 @@ from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.effects import get
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import vessels
+from kempf.warehouse import aliases, vessels
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import key_of
+from kempf.workbench.web.data.sailed import request_of
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import ACTIVE, Job
 from kempf.workbench.web.pages.page import Page
+from kempf.workbench.web.window import instant
+
+Arguments = dict[str, Any]
+_ACTIONS = ("correct", "exclude", "accept", "add")
+#: letters of a reason
+_MOST_REASON = 2000
 
 
 def document(desk: Desk, name: str, after: int = 0) -> dict[str, Any]:
     """Return a job and how far it was, from a tick on that is not among them."""
     job = desk.queue.get(name)
-    return {**job.show(), "ticks": [vars(tick) for tick in desk.queue.ticks(name, after)]}
+    shown = {**job.show(), "ticks": [vars(tick) for tick in desk.queue.ticks(name, after)]}
+    if shown["result"] is not None:
+        shown["result"] = {"to": f"/jobs/{job.id}", **shown["result"]}
+    return shown
 
 
 def gather(desk: Desk, name: str) -> Page:
@@ -31,7 +41,7 @@ def gather(desk: Desk, name: str) -> Page:
     ticks = desk.queue.ticks(name)
     content = {"job": job, "active": job.state in ACTIVE, "ticks": ticks}
     vessel = job.arguments["vessel"]
-    return Page("job.html", f"{KINDS[job.kind][1]}: {vessel}", content, ((vessel, of_vessel(vessel)),))
+    return Page("job.html", f"{KINDS[job.kind].title}: {vessel}", content, ((vessel, of_vessel(vessel)),))
 
 
 def ask(desk: Desk, form: Mapping[str, str]) -> Job:
@@ -40,30 +50,86 @@ def ask(desk: Desk, form: Mapping[str, str]) -> Job:
     Raises
     ------
     UsageError
-        ``job_unknown``, ``moved_meanwhile``: the vessel's model is another than the page showed.
+        ``job_unknown``, ``moved_meanwhile``: the vessel's model is another than the page showed; and what is wrong with
+        the fields of the form.
     NotFound
         ``no_vessel``, ``no_parameter_set``, ``effect_unknown``.
     """
     kind, vessel = form.get("kind", ""), form.get("vessel", "")
-    if kind not in KINDS:
+    if kind not in KINDS or kind == "ingest":
         raise UsageError("job_unknown", f"There is no job {kind[:40]!r}.", f"Ask for one of {', '.join(KINDS)}.")
     vessels.require(desk.warehouse, vessel)
-    arguments = {"vessel": vessel, **{name: form.get(name, "") for name in KINDS[kind][2]}}
-    state = fleet_state(desk.warehouse, [vessel])[vessel]
-    _require_standing(dict(state.aliases), vessel, form.get("standing"))
-    digest = state.digest
-    if kind == "predict":
-        arguments["horizon"] = horizon_of(arguments["horizon"]).name
-        arguments["set"] = chosen_set(desk.warehouse, vessel, arguments["set"] or None)[0].parameter_set_id
-        arguments["key"] = digest = key_of(desk.warehouse, vessel, arguments["set"], arguments["horizon"])
-    elif kind == "add":
+    _require_standing(desk, vessel, form.get("standing"))
+    arguments, digest = settled(desk, kind, vessel, form)
+    return desk.queue.ask(kind, arguments, digest, again=KINDS[kind].changes)
+
+
+def settled(desk: Desk, kind: str, vessel: str, form: Mapping[str, str]) -> tuple[Arguments, str]:
+    """Return the arguments of a job, with what the form leaves open, and the digest of what it works on."""
+    arguments: Arguments = {"vessel": vessel, **{name: form.get(name, "") for name in KINDS[kind].fields}}
+    digest = fleet_state(desk.warehouse, [vessel])[vessel].digest
+    settle = _SETTLE.get(kind)
+    return arguments, digest if settle is None else settle(desk, arguments) or digest
+
+
+def _predict(desk: Desk, arguments: Arguments) -> str:
+    arguments["horizon"] = horizon_of(arguments["horizon"]).name
+    _name_the_set(desk, arguments)
+    # a set that came since moves no prediction with another one
+    arguments["key"] = key_of(desk.warehouse, arguments["vessel"], arguments["set"], arguments["horizon"])
+    return str(arguments["key"])
+
+
+def _sail(desk: Desk, arguments: Arguments) -> None:
+    _name_the_set(desk, arguments)
+    request_of(arguments)  # what cannot be sailed is said at once
+
+
+def _name_the_set(desk: Desk, arguments: Arguments) -> None:
+    asked = arguments["set"] or None
+    arguments["set"] = chosen_set(desk.warehouse, arguments["vessel"], asked)[0].parameter_set_id
+
+
+def _formula(desk: Desk, arguments: Arguments) -> None:
+    from kempf.flows.jobs.try_formula import formula_of_ones_own
+
+    arguments["name"] = arguments["name"].strip() or "own"
+    formula_of_ones_own(arguments["name"], arguments["formula"])
+
+
+def _add(desk: Desk, arguments: Arguments) -> None:
+    if not arguments["formula"]:
         get(arguments["effect"])
-    return desk.queue.ask(kind, arguments, digest)
 
 
-def _require_standing(pointed: Mapping[str, str], vessel: str, shown: str | None) -> None:
+def _correction(desk: Desk, arguments: Arguments) -> None:
+    if arguments["action"] not in _ACTIONS:
+        raise UsageError(
+            "action_unknown",
+            f"A manoeuvre is not {arguments['action'][:40]!r}.",
+            f"Choose one of {', '.join(_ACTIONS)}.",
+        )
+    if len(arguments["reason"]) > _MOST_REASON:
+        raise UsageError("reason_too_long", f"The reason has more than {_MOST_REASON} letters.", "Write it shorter.")
+    begin, end = arguments.pop("from"), arguments.pop("to")
+    wanted = arguments["action"] in ("correct", "add")
+    arguments["bounds_utc_ns"] = [instant(begin), instant(end)] if wanted else None
+
+
+#: What a job needs looked at before it waits; it may return a digest of its own.
+_SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
+    "predict": _predict,
+    "sail": _sail,
+    "try": _formula,
+    "add": _add,
+    "preview": _correction,
+    "correct": _correction,
+}
+
+
+def _require_standing(desk: Desk, vessel: str, shown: str | None) -> None:
     """Refuse what is asked for on a page that showed another model than the vessel has now."""
-    now = pointed.get("current", "")
+    now = aliases.of_vessel(desk.warehouse, vessel).get(aliases.CURRENT, "")
     if shown is not None and shown != now:
         raise UsageError(
             "moved_meanwhile",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from kempf.flows.jobs.unreadable_stretches import as_json as lost_as_json
-from kempf.warehouse import logs, lost, segments
+from kempf.warehouse import logs, lost, notes, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.workbench.documents.logs import log_document
 from kempf.workbench.web.addresses import of_vessel
@@ -33,6 +33,7 @@ def gather(desk: Desk, log_id: str, asked_from: str | None, asked_to: str | None
         "log": shown,
         "channels": offered(channels),
         "notes": dict.fromkeys((*shown["notes"], *channels.notes)),
+        "remarks": [n.show() for n in notes.of_vessel(desk.warehouse, row.vessel) if n.subject_id == row.log_id],
         "manoeuvres": [one.show(row.file_name) for one in found],
         "spans": [span_of(one) for one in found],
         "lost": lost_as_json(gone),

@@ -28,9 +28,19 @@ def document(desk: Desk, vessel: str, asked_set: str | None, asked_horizon: str 
 
 
 def gather(
-    desk: Desk, vessel: str, asked_set: str | None, asked_horizon: str | None, asked_run: str | None = None
+    desk: Desk,
+    vessel: str,
+    asked_set: str | None,
+    asked_horizon: str | None,
+    asked_run: str | None = None,
+    beside: str | None = None,
 ) -> Page:
     """Return the page of a vessel's model, one that is named or her current one, with one run drawn.
+
+    Parameters
+    ----------
+    beside : str, optional
+        Another set, whose prediction of the run is drawn too.
 
     Raises
     ------
@@ -38,20 +48,27 @@ def gather(
         ``no_run``, ``no_parameter_set``.
     """
     set_id, horizon, made = _kept(desk, vessel, asked_set, asked_horizon)
+    made_before: KeptPrediction | None = None
     content: dict[str, Any] = {
         "vessel": vessel,
         "set_id": set_id,
         "horizon": horizon,
         "horizons": HORIZONS,
         "made": None if made is None else made.document,
+        "beside": None,
     }
+    if beside:
+        other, _, made_before = _kept(desk, vessel, beside, horizon)
+        content |= {"beside": other, "before": None if made_before is None else made_before.document}
     if made is not None:
         runs = sorted(made.document["runs"], key=lambda run: (not run["held_out"], run["start"]))
         shown = _shown(runs, asked_run)
         content |= {
             "runs": runs,
             "shown": shown,
-            "drawn": draw_run(made.columns[shown["segment_id"]]),
+            "drawn": draw_run(
+                made.columns[shown["segment_id"]], made_before.columns.get(shown["segment_id"]) if made_before else None
+            ),
             "evidence": evidence_in(made.document["where"], _SAMPLES),
             "worst": _worst(made.document["where"]),
             "samples": [(key, words) for key, words in _SAMPLES if made.document["summary"][key]],

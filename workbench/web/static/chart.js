@@ -42,6 +42,9 @@
       this.boxes = Array.from(node.querySelectorAll("input[name=ch]"));
       this.fromAddress();
       for (const box of this.boxes) box.addEventListener("change", () => this.moved());
+      for (const form of document.querySelectorAll("form[data-window]")) {
+        form.querySelector("[data-take]").addEventListener("click", () => { form.elements.from.value = iso(this.span[0]); form.elements.to.value = iso(this.span[1]); });
+      }
       for (const button of node.querySelectorAll("button[data-do]")) button.addEventListener("click", () => this.do(button.dataset.do));
       document.addEventListener("keydown", event => this.key(event));
       addEventListener("popstate", () => { this.fromAddress(); this.load(); });

@@ -1,0 +1,56 @@
+"""Figures of a predicted manoeuvre in words, as the command line and the pages have them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+#: What a figure is called and its unit, by name.
+FIGURES = {
+    "advance_m": ("advance", "m"),
+    "transfer_m": ("transfer", "m"),
+    "tactical_diameter_m": ("tactical diameter", "m"),
+    "steady_diameter_m": ("steady diameter", "m"),
+    "steady_yaw_rate_deg_s": ("steady yaw rate", "deg/s"),
+    "steady_drift_deg": ("steady drift angle", "deg"),
+    "speed_loss_percent": ("speed loss", "%"),
+    "time_to_90_s": ("time to 90 deg", "s"),
+    "time_to_180_s": ("time to 180 deg", "s"),
+    "overshoots_deg": ("overshoot", "deg"),
+    "initial_turning_m": ("distance to the second execute", "m"),
+    "time_to_second_execute_s": ("time to the second execute", "s"),
+    "period_s": ("period", "s"),
+    "residual_yaw_rate_deg_s": ("yaw rate that is left", "deg/s"),
+    "residual_share_percent": ("share of the rate that is left", "%"),
+    "time_to_half_s": ("time to half the rate", "s"),
+    "loop_width_deg": ("width of the loop", "deg"),
+    "loop_height_deg_s": ("height of the loop", "deg/s"),
+    "neutral_rudder_deg": ("rudder of a straight course", "deg"),
+    "from_starboard_deg_s": ("yaw rate from starboard at", "deg/s"),
+    "from_port_deg_s": ("yaw rate from port at", "deg/s"),
+}
+
+
+def in_words(name: str, place: int | None, manoeuvre: Mapping[str, Any]) -> str:
+    """Return what a figure is called, one of a list by its place.
+
+    Parameters
+    ----------
+    name : str
+        Such as ``overshoots_deg``.
+    place : int or None
+        Of a list, from 0.
+    manoeuvre : mapping
+        JSON content of the manoeuvre; a spiral has ``orders_deg``.
+
+    Examples
+    --------
+    >>> in_words("overshoots_deg", 0, {}), in_words("advance_m", None, {})
+    ('overshoot 1', 'advance')
+    """
+    words = FIGURES[name][0]
+    if place is None:
+        return words
+    if "orders_deg" in manoeuvre:
+        return f"{words} {manoeuvre['orders_deg'][place]:g} deg"
+    return f"{words} {place + 1}"

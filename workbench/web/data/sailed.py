@@ -1,0 +1,99 @@
+"""A standard manoeuvre as a form asks for it, and what of its prediction is drawn."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, cast, get_args
+
+from kempf.flows.jobs.predict_request import Kind, PredictRequest, required
+from kempf.schemas.errors import UsageError
+
+if TYPE_CHECKING:
+    from kempf.pipeline.manoeuvre.prediction import Prediction
+
+#: Manoeuvres that can be predicted.
+MANOEUVRES: tuple[Kind, ...] = get_args(Kind)
+#: ships of all models that are drawn one by one, and points of each
+_SHIPS, _POINTS = 24, 120
+
+
+def request_of(asked: Mapping[str, Any]) -> PredictRequest:
+    """Return what the fields of a form ask for; one that is blank takes what is usual.
+
+    Parameters
+    ----------
+    asked : mapping of str to str
+        ``manoeuvre``, ``set``, ``rudder``, ``angles``, ``side``, ``speed``.
+
+    Raises
+    ------
+    UsageError
+        ``manoeuvre_unknown``, ``side_unknown``, ``number_unreadable``, ``angles_unreadable``; and what
+        `kempf.flows.jobs.predict_request.required` raises.
+    """
+    kind, side = asked["manoeuvre"] or MANOEUVRES[0], asked["side"] or "starboard"
+    if kind not in MANOEUVRES:
+        raise UsageError(
+            "manoeuvre_unknown", f"{kind[:40]!r} cannot be predicted.", f"Choose one of {', '.join(MANOEUVRES)}."
+        )
+    if side not in ("starboard", "port"):
+        raise UsageError("side_unknown", f"{side[:40]!r} is no side.", "Choose starboard or port.")
+    rudder, speed = _number(asked["rudder"], "rudder"), _number(asked["speed"], "speed")
+    angles = angles_of(asked["angles"] or "20/20")
+    request = PredictRequest(cast(Kind, kind), asked["set"] or None, rudder, angles, cast(Any, side), speed)
+    required(request)
+    return request
+
+
+def angles_of(text: str) -> tuple[float, float]:
+    """Return heading and rudder of a zigzag, deg.
+
+    Raises
+    ------
+    UsageError
+        ``angles_unreadable``.
+
+    Examples
+    --------
+    >>> angles_of("20/10")
+    (20.0, 10.0)
+    """
+    found = re.fullmatch(r"\s*(\d{1,3}(?:\.\d{1,9})?)\s*/\s*(\d{1,3}(?:\.\d{1,9})?)\s*", text)
+    if found is None:
+        raise UsageError(
+            "angles_unreadable", f"{text[:60]!r} is no pair of angles.", "Give heading and rudder, such as 20/20."
+        )
+    return float(found[1]), float(found[2])
+
+
+def _number(text: str, of: str) -> float | None:
+    if not text.strip():
+        return None
+    try:
+        return float(text[:40])
+    except ValueError:
+        raise UsageError(
+            "number_unreadable", f"{text[:40]!r} is no {of}.", "Give a number, or leave the field blank."
+        ) from None
+
+
+def curves_of(made: Prediction) -> dict[str, list[list[list[float]]]]:
+    """Return what ships do as JSON content: points of each, columns as `kempf.pipeline.manoeuvre.sailed` has them.
+
+    Returns
+    -------
+    dict
+        ``estimates``: one curve a model, the one asked for first; ``ships``: some that the data allow.
+    """
+    drawn = made.drawn
+    chosen = drawn[:: max(1, -(-len(drawn) // _SHIPS))]
+    return {
+        "estimates": [_thinned(one.sailed.curve) for one in made.models if one.sailed is not None],
+        "ships": [_thinned(one.curve) for one in chosen],
+    }
+
+
+def _thinned(curve: Any) -> list[list[float]]:
+    step = max(1, -(-len(curve) // _POINTS))
+    return [[float(f"{value:.6g}") for value in row] for row in curve[::step]]

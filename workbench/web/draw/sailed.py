@@ -1,0 +1,74 @@
+"""A predicted manoeuvre: the ship of the estimates over the ships that the data allow."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from math import degrees
+from typing import Any
+
+from markupsafe import Markup
+
+from kempf.workbench.web.draw.frame import BOTTOM, LEFT, RIGHT, TOP, Frame
+from kempf.workbench.web.draw.svg import drawing, element
+
+_WIDTH, _HEIGHT = 760.0, 340.0
+#: by kind: columns across and up with their factors, and what the axes are
+_AXES = {
+    "turning-circle": ((1, 1.0), (0, 1.0), "across the approach, m", "along the approach, m"),
+    "zigzag": ((0, 1.0), (1, degrees(1.0)), "time from the first execute, s", "heading and rudder, deg"),
+    "pull-out": ((0, 1.0), (1, degrees(1.0)), "time from the order amidships, s", "yaw rate, deg/s"),
+    "spiral": ((0, degrees(1.0)), (1, degrees(1.0)), "rudder, deg", "steady yaw rate, deg/s"),
+}
+_RUDDER_COLUMN = 2
+Points = list[tuple[float, float]]
+
+
+def draw_sailed(manoeuvre: Mapping[str, Any], curves: Mapping[str, Sequence[Any]]) -> Markup:
+    """Return the figure of a predicted manoeuvre.
+
+    Parameters
+    ----------
+    manoeuvre : mapping
+        JSON content of what was sailed.
+    curves : mapping
+        See `kempf.workbench.web.data.sailed.curves_of`.
+    """
+    (column, factor), (row, scale), across, up = _AXES[manoeuvre["kind"]]
+
+    def points(curve: Sequence[Sequence[float]], of: int = row) -> Points:
+        return [(factor * one[column], scale * one[of]) for one in curve]
+
+    first = curves["estimates"][0]
+    rudder = points(first, _RUDDER_COLUMN) if manoeuvre["kind"] == "zigzag" else []
+    every = [p for curve in (*curves["estimates"], *curves["ships"]) for p in points(curve)]
+    # a ship that is slow to finish would press the others together
+    if manoeuvre["kind"] == "zigzag":
+        every = [p for p in every if p[0] <= 1.1 * rudder[-1][0]]
+    left, right = _ends([x for x, _ in every])
+    low, high = _ends([y for _, y in (*every, *rudder)])
+    height = _HEIGHT
+    if manoeuvre["kind"] == "turning-circle":
+        height = TOP + BOTTOM + (_WIDTH - LEFT - RIGHT) * (high - low) / (right - left)
+        if height > 1.2 * _WIDTH:  # equally long metres both ways
+            room = (right - left) * (height / (1.2 * _WIDTH) - 1.0) / 2.0
+            left, right, height = left - room, right + room, 1.2 * _WIDTH
+    frame = Frame(_WIDTH, height, (left, right), (low, high))
+    parts = frame.grid(across, up)
+    parts += [frame.line([p for p in points(one) if left <= p[0] <= right], "line-ship") for one in curves["ships"]]
+    if rudder:
+        parts.append(frame.line(rudder, "line-rudder"))
+    for place, one in enumerate(curves["estimates"]):
+        shown = [p for p in points(one) if left <= p[0] <= right]
+        parts.append(frame.line(shown, "line-other" if place else "line-predicted"))
+    if low < 0.0 < high:
+        zero = frame.y(0.0)
+        parts.append(element("line", x1=LEFT, x2=_WIDTH - RIGHT, y1=zero, y2=zero, class_="axis"))
+    return drawing(
+        _WIDTH, height, "The manoeuvre as the estimates have it, and as other ships that the data allow", *parts
+    )
+
+
+def _ends(values: Sequence[float]) -> tuple[float, float]:
+    low, high = min(values), max(values)
+    room = 0.05 * (high - low) or 1.0
+    return low - room, high + room

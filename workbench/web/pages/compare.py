@@ -1,0 +1,97 @@
+"""Two parameter sets: what differs, in standard errors, which of their inputs differ, and how both predict."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from kempf.flows.jobs.chosen_set import named_set
+from kempf.flows.jobs.out_of_date import said_of_sets
+from kempf.warehouse import aliases, vessels
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.workbench.documents.compared_sets import compared_sets
+from kempf.workbench.web.data.predictions import KeptPrediction, kept, key_of
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.draw.differences import draw_differences
+from kempf.workbench.web.pages.page import Page
+
+_HORIZON = "free"
+
+
+def document(desk: Desk, a: str, b: str) -> dict[str, Any]:
+    """Return what `kempf params diff A B --json` prints."""
+    return compared_sets(*_both(desk, a, b))
+
+
+def gather(desk: Desk, a: str, b: str) -> Page:
+    """Return the page of two sets; without both, the form that asks for them."""
+    if not (a and b):
+        held = ((name, aliases.of_vessel(desk.warehouse, name)) for name in vessels.names(desk.warehouse))
+        known = [(name, pointed[aliases.CURRENT]) for name, pointed in held if aliases.CURRENT in pointed]
+        return Page("compare.html", "Compare", {"a": a, "b": b, "known": known, "made": None})
+    one, other = _both(desk, a, b)
+    made = compared_sets(one, other)
+    rows = [{"name": name, **row} for name, row in made["parameters"].items()]
+    rows.sort(key=lambda row: -abs(row["in_std"]) if row["in_std"] is not None else 0.0)
+    same_vessel = one.vessel == other.vessel
+    content = {
+        "a": one.parameter_set_id,
+        "b": other.parameter_set_id,
+        "known": [],
+        "made": made,
+        "sets": (one, other),
+        "rows": rows,
+        "drawn": draw_differences(rows),
+        "stale": said_of_sets(desk.warehouse, [one, other]),
+        "inputs": list(_inputs(one, other)),
+        "same_vessel": same_vessel,
+        "runs": _runs(desk, one, other) if same_vessel else None,
+    }
+    return Page("compare.html", "Compare", content)
+
+
+def _both(desk: Desk, a: str, b: str) -> tuple[ParameterSet, ParameterSet]:
+    return named_set(desk.warehouse, a or None), named_set(desk.warehouse, b or None)
+
+
+def _inputs(one: ParameterSet, other: ParameterSet) -> Iterator[tuple[str, Any, Any]]:
+    """Name every input of the two that differs."""
+
+    def listed(values: Any) -> str:
+        return ", ".join(map(str, values)) or "none"
+
+    def of(each: ParameterSet) -> dict[str, Any]:
+        origin = each.provenance
+        return {
+            "vessel": each.vessel,
+            "model": each.model_name,
+            "effects": listed(each.model_spec.get("effects", ())),
+            "estimator": each.estimator,
+            "manoeuvres": listed(each.segment_ids),
+            "logs": listed(name[:12] for name in each.log_ids),
+            "profile": str(origin.get("profile_sha256"))[:12],
+            "code": str(origin.get("code_version"))[:12],
+        }
+
+    first, second = of(one), of(other)
+    yield from ((name, first[name], second[name]) for name in first if first[name] != second[name])
+
+
+def _runs(desk: Desk, one: ParameterSet, other: ParameterSet) -> dict[str, Any]:
+    """Return how both predict the same manoeuvres freely, and which of the two predictions are not made yet."""
+    found = {each.parameter_set_id: _kept(desk, each) for each in (one, other)}
+    lacking = [name for name, made in found.items() if made is None]
+    if lacking:
+        return {"lacking": lacking, "rows": []}
+    first, second = (
+        {run["segment_id"]: run for run in made.document["runs"]} for made in found.values() if made is not None
+    )
+    rows = [
+        {"first": first[name], "second": second[name], "segment_id": name, "start": first[name]["start"]}
+        for name in sorted(first.keys() & second.keys(), key=lambda name: str(first[name]["start"]))
+    ]
+    return {"lacking": [], "rows": rows}
+
+
+def _kept(desk: Desk, each: ParameterSet) -> KeptPrediction | None:
+    return kept(desk.state, key_of(desk.warehouse, each.vessel, each.parameter_set_id, _HORIZON))

@@ -1,0 +1,44 @@
+"""Raw logs that a browser sends."""
+
+from __future__ import annotations
+
+from kempf.flows.fleet.state import fleet_state
+from kempf.flows.jobs.ingest_logs import settle_vessel
+from kempf.schemas.errors import UsageError
+from kempf.warehouse import vessels
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.jobs.queue import Job
+from kempf.workbench.web.pages.page import Page
+from kempf.workbench.web.uploads import MOST_BYTES, MOST_FILES, Received, paths_of
+
+
+def gather(desk: Desk) -> Page:
+    """Return the page that takes logs in."""
+    content = {"names": vessels.names(desk.warehouse), "most_bytes": MOST_BYTES, "most_files": MOST_FILES}
+    return Page("ingest.html", "Take logs in", content)
+
+
+def ask(desk: Desk, received: Received) -> Job:
+    """Put what a browser sent into the queue.
+
+    Raises
+    ------
+    UsageError
+        ``no_file``, ``no_vessel_named``, ``vessel_name``, ``profiles_disagree``.
+    NotFound
+        ``no_vessel``.
+    """
+    from kempf.flows.jobs.files import read_profiles
+
+    files, profile = received.files.get("log", []), received.files.get("profile", [])
+    if not files:
+        raise UsageError("no_file", "No log was sent.", "Choose one or several files, then send the form again.")
+    given = read_profiles(paths_of(desk.state, profile)) if profile else None
+    new = received.fields.get("new_vessel", "")
+    # a slip of the hand in the name is said at once
+    name, _ = settle_vessel(
+        desk.warehouse, received.fields.get("vessel", "").strip() or None, given, new_vessel=bool(new)
+    )
+    arguments = {"vessel": name, "files": files, "profile": profile, "new_vessel": new}
+    state = fleet_state(desk.warehouse, [name])[name]
+    return desk.queue.ask("ingest", arguments, state.digest, again=True)

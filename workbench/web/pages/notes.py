@@ -1,0 +1,58 @@
+"""A note that a form writes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from kempf.flows.jobs.subject_of_note import subject_of
+from kempf.schemas.errors import UsageError
+from kempf.warehouse import notes
+from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.window import instant
+
+#: letters that a note may have
+MOST = 2000
+_PAGES = {"log": "/logs/", "segment": "/segments/", "set": "/sets/"}
+
+
+def write(desk: Desk, form: Mapping[str, str]) -> str:
+    """Store a note, and return the address of what it is on.
+
+    Parameters
+    ----------
+    form : mapping of str to str
+        ``vessel``, or ``log``, ``segment`` or ``set``; ``text``, ``at``, ``draught``.
+
+    Raises
+    ------
+    UsageError
+        ``note_too_long``, ``instant_unreadable``, ``number_unreadable``; and what `kempf.warehouse.notes.add` raises.
+    """
+    text = form.get("text", "")
+    if len(text) > MOST:
+        raise UsageError(
+            "note_too_long", f"The note has {len(text)} letters; at most {MOST} are kept.", "Write it shorter."
+        )
+    named = (form.get(name) or None for name in ("vessel", "log", "segment", "set"))
+    whose, subject, subject_id = subject_of(desk.warehouse, *named)
+    at, draught = form.get("at", "").strip(), form.get("draught", "").strip()
+    notes.add(
+        desk.warehouse,
+        whose,
+        subject,
+        subject_id,
+        text,
+        event_utc_ns=instant(at) if at else None,
+        draught_m=_metres(draught) if draught else None,
+    )
+    return of_vessel(whose) + "#notes" if subject == "vessel" else _PAGES[subject] + subject_id
+
+
+def _metres(text: str) -> float:
+    try:
+        return float(text[:40])
+    except ValueError:
+        raise UsageError(
+            "number_unreadable", f"{text[:40]!r} is no draught.", "Give it in metres, or leave the field blank."
+        ) from None
