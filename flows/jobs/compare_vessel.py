@@ -2,36 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.chosen_set import chosen_set
-from kempf.flows.jobs.lasting_noise import with_lasting_noise
-from kempf.flows.jobs.leg_fit import fitted_to_legs
-from kempf.flows.jobs.standing_model import Own, known_effects, named
-from kempf.flows.jobs.vessel_runs import assembled
+from kempf.flows.jobs.bound_runs import BoundRuns, bound
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.compare.compared_run import compare_run
 from kempf.pipeline.compare.comparison import ComparedRun, judged, summary
 from kempf.pipeline.compare.misfit import where
 from kempf.pipeline.compare.overshoot import Turn, turns_of
-from kempf.pipeline.estimate.filtered import RunFilter
-from kempf.pipeline.estimate.levels import first_levels, fit_levels
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.estimate.record.left_out import left_out
 from kempf.pipeline.estimate.sensitivity import Point
-from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
 from kempf.pipeline.predict.run_residuals import phases_s
 from kempf.schemas.errors import DataRejected
-from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
-from kempf.warehouse import segments
-from kempf.warehouse.deduplicate import once, same
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
@@ -114,141 +99,39 @@ def compare_vessel(
         ``set_without_parameters``, ``nothing_to_compare``.
     """
     asked = horizon_of(horizon)
-    chosen, alias = chosen_set(warehouse, vessel, set_id)
-    hull, values, model = _parameters(chosen)
-    usable = choose(warehouse, vessel)
-    data = assembled(warehouse, usable, ModelSpec.model_validate(dict(chosen.model_spec)), progress)
-    by_name = {segment.segment_id: segment for segment in usable.segments}
-    ordered = [by_name[run.name] for run in data.runs]
-    seen = _seen(warehouse, vessel, chosen)
-    held = [not _is_seen(segment, seen) for segment in ordered]
-    gross: Mapping[str, Any] = chosen.convergence.get("gross_error_instants_s") or {}
-    filtered = [RunFilter(left_out(run, gross.get(run.name, {})), model, data.spec) for run in data.runs]
-    progress(0, len(filtered), "predicting")
-    levels = _levels(filtered, held, hull, values, chosen)
-    legs = fitted_to_legs(chosen)
-    if legs is not None:
-        # the likelihood's lasting noise beside them: it moves no ship
-        _, values = with_lasting_noise(chosen, model.ship, legs[1])
-        legs = (legs[0], values, *legs[2:])
-    runs, found, skipped = [], [], dict(data.skipped)
-    for k, (one, segment) in enumerate(zip(filtered, ordered, strict=True)):
-        progress(k, len(filtered), f"predicting {segment.segment_id}")
+    return compared(bound(warehouse, vessel, set_id, progress), asked, progress)
+
+
+def compared(hers: BoundRuns, horizon: Horizon, progress: Progress = silent) -> Comparison:
+    """Predict every run at a horizon; errors are those of `compare_vessel`."""
+    runs, found, skipped = [], [], dict(hers.skipped)
+    for k, one in enumerate(hers.runs):
+        progress(k, len(hers.runs), f"predicting {one.segment.segment_id}")
         try:
-            compared = compare_run(
-                *(one, Point(hull, values, levels[k].foreseen), asked),
-                held_out=held[k],
-                legs=None if legs is None else legs[:2],
-                levels_from=levels[k].source,
-                own_levels=levels[k].own,
-                phases=phases_s(segment.detail.get("phases", ()), one.run.start_utc_ns),
-                turns=_turns(segment, one.run),
+            run = compare_run(
+                *(one.filtered, Point(hers.hull, hers.values, one.levels.foreseen), horizon),
+                held_out=one.held_out,
+                legs=hers.legs,
+                levels_from=one.levels.source,
+                own_levels=one.levels.own,
+                phases=phases_s(one.segment.detail.get("phases", ()), one.filtered.run.start_utc_ns),
+                turns=_turns(one.segment, one.filtered.run),
             )
         except DataRejected as error:
-            skipped[segment.segment_id] = error.message
+            skipped[one.segment.segment_id] = error.message
             continue
-        runs.append(compared)
-        found.append(segment)
-    progress(len(filtered), len(filtered), "predicted")
+        runs.append(run)
+        found.append(one.segment)
+    progress(len(hers.runs), len(hers.runs), "predicted")
     if not runs:
         raise DataRejected(
             "nothing_to_compare",
-            f"{chosen.parameter_set_id} predicts none of the {len(filtered)} manoeuvres of {vessel!r}: "
-            + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:3]),
+            f"{hers.parameter_set.parameter_set_id} predicts none of the {len(hers.runs)} manoeuvres of "
+            f"{hers.vessel!r}: " + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:3]),
             "Ask for another horizon, or compare another parameter set with --set.",
             {"skipped": skipped},
         )
-    return Comparison(vessel, chosen, alias, asked, tuple(runs), tuple(found), skipped)
-
-
-def _parameters(chosen: ParameterSet) -> tuple[Float, Float, EffectModel]:
-    """Return hull, parameters of effects and lasting noise, and the model that they belong to."""
-    known = known_effects(Own.from_json(chosen.settings.get("own") or {}))
-    model = EffectModel(named(chosen.model_spec.get("effects", ()), known))
-    found = {p.name: p.value for p in chosen.parameters}
-    names = (*HULL_PARAMETERS, *model.names)
-    lacking = [name for name in names if not np.isfinite(found.get(name, np.nan))]
-    if lacking:
-        raise DataRejected(
-            "set_without_parameters",
-            f"{chosen.parameter_set_id} has no value for {', '.join(lacking)}, which a prediction needs.",
-            "Compare a set with all six parameters; `kempf params list` names them.",
-            {"lacking": lacking},
-        )
-    values = np.array([found[name] for name in names])
-    model, effects = with_lasting_noise(chosen, model, values[len(HULL_PARAMETERS) :])
-    return values[: len(HULL_PARAMETERS)], effects, model
-
-
-@dataclass(frozen=True)
-class _Seen:
-    """What a set was identified from: ids, bounds by log, and those of its segments that are still found."""
-
-    ids: frozenset[str]
-    bounds: tuple[tuple[str, int, int], ...]
-    found: tuple[Segment, ...]
-
-
-def _seen(warehouse: Warehouse, vessel: str, chosen: ParameterSet) -> _Seen:
-    inputs: Mapping[str, Any] = chosen.provenance.get("inputs") or {}
-    fit = chosen.convergence
-    unseen = {*(fit.get("held_out") or ()), *(fit.get("left_out") or ())}
-    bounds = list(inputs.get("segments", ()))
-    # a model with effects names its held-out runs among its segments, in the order of the bounds
-    names = chosen.settings.get("segments") or [""] * len(bounds)
-    kept = [b for name, b in zip(names, bounds, strict=True) if name not in unseen]
-    ids = frozenset(chosen.segment_ids) - unseen
-    found = tuple(s for s in segments.current(warehouse, vessel) if s.segment_id in ids)
-    return _Seen(ids, tuple((b["log_id"], b["start_utc_ns"], b["end_utc_ns"]) for b in kept), found)
-
-
-def _is_seen(segment: Segment, seen: _Seen) -> bool:
-    """Return whether a set was made from a segment, under this id, with other bounds, or from another log of it."""
-    return (
-        segment.segment_id in seen.ids
-        or any(
-            log_id == segment.log_id and start < segment.end_utc_ns and segment.start_utc_ns < end
-            for log_id, start, end in seen.bounds
-        )
-        or any(len(once([segment, other], same)[0]) == 1 for other in seen.found)
-    )
-
-
-@dataclass(frozen=True, eq=False)
-class _Levels:
-    """Noise levels of one run, logarithms, shape (6,): to predict with, and fitted to the run itself."""
-
-    foreseen: Float
-    own: Float
-    source: str
-
-
-def _levels(
-    filtered: list[RunFilter], held: list[bool], hull: Float, values: Float, chosen: ParameterSet
-) -> list[_Levels]:
-    """Return the noise levels of each run; a held-out run is predicted with the mean of the fitted ones' logarithms."""
-    kept: Mapping[str, Any] = chosen.convergence.get("levels") or {}
-    own, sources = [], []
-    for k, one in enumerate(filtered):
-        if one.run.name in kept and not held[k]:
-            own.append(np.array(kept[one.run.name], dtype=np.float64))
-            sources.append("fitted with the parameters")
-        else:
-            found = fit_levels(one, hull, values, first_levels(one))
-            own.append(found.levels)
-            sources.append("fitted to this manoeuvre, parameters held" + ("" if found.converged else "; not converged"))
-    seen = [levels for levels, out in zip(own, held, strict=True) if not out]
-    mean = np.mean(seen, axis=0) if seen else None
-    return [
-        _Levels(levels, levels, words)
-        if mean is None or not out
-        else _Levels(
-            mean,
-            levels,
-            "mean of the fitted ones' logarithms; in where: fitted to this manoeuvre, parameters held",
-        )
-        for levels, out, words in zip(own, held, sources, strict=True)
-    ]
+    return Comparison(hers.vessel, hers.parameter_set, hers.alias, horizon, tuple(runs), tuple(found), skipped)
 
 
 def _turns(segment: Segment, run: GridRun) -> tuple[Turn, ...]:

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import isfinite, radians
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
-from kempf.pipeline.manoeuvre.pull_out import PullOut
-from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
-from kempf.pipeline.manoeuvre.sailed import Manoeuvre
-from kempf.pipeline.manoeuvre.spiral import Spiral
-from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
-from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.schemas.errors import UsageError
+
+if TYPE_CHECKING:
+    from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
+    from kempf.pipeline.manoeuvre.sailed import Manoeuvre
 
 Kind = Literal["turning-circle", "zigzag", "pull-out", "spiral"]
 #: rudder of a manoeuvre where none is asked for, deg
@@ -40,38 +38,33 @@ class PredictRequest:
     @property
     def rudder_rate(self) -> RudderRate | None:
         """Of another steering gear, as that of the logs is given; None where there is none."""
+        from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
+
         rate = self.rudder_rate_deg_s
         return None if rate is None else RudderRate(radians(rate), 0.0, 0, "")
 
 
 def manoeuvre_of(request: PredictRequest) -> Manoeuvre:
-    """Return the manoeuvre that is asked for.
+    """Return the manoeuvre that is asked for; errors are those of `required`."""
+    # the kernels that sail them take a while to load, and whoever only asks does not need them
+    from kempf.pipeline.manoeuvre.pull_out import PullOut
+    from kempf.pipeline.manoeuvre.spiral import Spiral
+    from kempf.pipeline.manoeuvre.turning_circle import TurningCircle
+    from kempf.pipeline.manoeuvre.zigzag import Zigzag
 
-    Raises
-    ------
-    UsageError
-        ``rudder_out_of_range``, ``angles_out_of_range``.
-    """
+    required(request)
     side = 1 if request.side == "starboard" else -1
     if request.kind == "zigzag":
         heading, rudder = request.angles_deg
-        if not (0.0 < heading <= 90.0 and 0.0 < rudder <= 60.0):
-            raise UsageError(
-                "angles_out_of_range",
-                f"The zigzag is {heading:g}/{rudder:g}, expected a heading above 0 up to 90 deg and a rudder up to 60.",
-                "Give heading and rudder in degrees, such as --angles 10/10.",
-            )
         return Zigzag(radians(heading), radians(rudder), side)
-    angle = USUAL_RUDDER_DEG[request.kind] if request.rudder_deg is None else request.rudder_deg
-    if not 0.0 < angle <= 60.0:
-        raise UsageError(
-            "rudder_out_of_range",
-            f"The rudder is {angle:g} deg, expected more than 0 and up to 60.",
-            "Give its magnitude in degrees with --rudder; --side says to which side.",
-        )
+    angle = _rudder_deg(request)
     if request.kind == "turning-circle":
         return TurningCircle(radians(angle), side)
     return PullOut(radians(angle), side) if request.kind == "pull-out" else Spiral(radians(angle))
+
+
+def _rudder_deg(request: PredictRequest) -> float:
+    return USUAL_RUDDER_DEG[request.kind] if request.rudder_deg is None else request.rudder_deg
 
 
 def required(request: PredictRequest) -> None:
@@ -80,9 +73,22 @@ def required(request: PredictRequest) -> None:
     Raises
     ------
     UsageError
-        ``speed_out_of_range``, ``rudder_rate_out_of_range``, and what `manoeuvre_of` raises.
+        ``speed_out_of_range``, ``rudder_rate_out_of_range``, ``rudder_out_of_range``, ``angles_out_of_range``.
     """
-    manoeuvre_of(request)
+    if request.kind == "zigzag":
+        heading, rudder = request.angles_deg
+        if not (0.0 < heading <= 90.0 and 0.0 < rudder <= 60.0):
+            raise UsageError(
+                "angles_out_of_range",
+                f"The zigzag is {heading:g}/{rudder:g}, expected a heading above 0 up to 90 deg and a rudder up to 60.",
+                "Give heading and rudder in degrees, such as --angles 10/10.",
+            )
+    elif not 0.0 < (angle := _rudder_deg(request)) <= 60.0:
+        raise UsageError(
+            "rudder_out_of_range",
+            f"The rudder is {angle:g} deg, expected more than 0 and up to 60.",
+            "Give its magnitude in degrees with --rudder; --side says to which side.",
+        )
     if request.speed_m_s is not None and not (isfinite(request.speed_m_s) and request.speed_m_s > 0.0):
         raise UsageError(
             "speed_out_of_range",

@@ -10,6 +10,15 @@ Format = Literal["delimited", "mcap", "nmea"]
 
 MCAP_MAGIC = b"\x89MCAP0\r\n"
 
+#: Documents and pictures that are handed over for a log now and then, by how they begin.
+_NO_LOGS = (
+    (b"%PDF-", "a PDF document"),
+    (b"\x89PNG\r\n", "a PNG picture"),
+    (b"\xff\xd8\xff", "a JPEG picture"),
+    (b"\xd0\xcf\x11\xe0", "an old Office document"),
+    (b"{\\rtf", "an RTF document"),
+)
+
 #: Bytes of the file that are looked at.
 SAMPLE = 1 << 16
 
@@ -40,6 +49,17 @@ def sniff(data: bytes) -> Format | None:
     if lines and (wide or odd <= len(sample) // 1000):
         return "delimited"
     return None
+
+
+def no_log(data: bytes) -> str | None:
+    """Return what a file is that is known and no log; None for any other.
+
+    Examples
+    --------
+    >>> no_log(b"%PDF-1.7 trial report")
+    'a PDF document'
+    """
+    return next((words for begin, words in _NO_LOGS if data.startswith(begin)), None)
 
 
 def is_json(data: bytes) -> bool:

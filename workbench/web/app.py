@@ -39,6 +39,7 @@ from kempf.workbench.web.pages import (
     predict,
     series,
     vessel,
+    what_if,
 )
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.settings import Settings
@@ -110,6 +111,11 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
         "/v/{vessel}/predict",
         lambda r: predict.gather(desk, hers(r), r.query_params),
         lambda r: predict.document(desk, hers(r), r.query_params),
+    )
+    serve(
+        "/v/{vessel}/what-if",
+        lambda r: what_if.gather(desk, hers(r), r.query_params),
+        lambda r: what_if.document(desk, hers(r), r.query_params),
     )
     serve("/compare", lambda r: compare.gather(desk, *_both(r)), lambda r: compare.document(desk, *_both(r)))
     app.add_route("/logs/{log_id}/series", lambda r: _series(desk, r))

@@ -18,6 +18,8 @@ from kempf.warehouse.store import Warehouse
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
 
+#: Horizons that the pages offer: as asked for, and in words.
+HORIZONS = (("1", "one step"), ("10s", "10 s ahead"), ("60s", "60 s ahead"), ("free", "free run"))
 #: predictions kept: the ones made longest ago go first
 _MOST = 200
 _CHANNELS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from markupsafe import Markup
@@ -50,12 +50,45 @@ def draw_run(columns: Mapping[str, Float], before: Mapping[str, Float] | None = 
             lines.pop()
         parts += _panel(top, words, time, end, lines)
         top += _PANEL + _GAP
-    for tick in ticks(0.0, end, 8):
-        parts.append(element("text", f"{tick:g}", x=_x(tick, end), y=top - 4.0, text_anchor="middle", class_="label"))
-    parts.append(element("text", "s", x=_WIDTH - 6.0, y=top - 4.0, text_anchor="end", class_="label"))
     beside = ", predicted by the other set (dashed)" if before is not None else ""
     words = f"Measured (dots), predicted (line){beside} and the difference (thin line)"
-    return drawing(_WIDTH, top + 4.0, words, *parts)
+    return drawing(_WIDTH, top + 4.0, words, *parts, *_seconds(top, end))
+
+
+def draw_panels(
+    time_s: Float, measured: Mapping[str, Float], tried: Sequence[tuple[Mapping[str, Float], str]], words: str
+) -> Markup:
+    """Return a figure of what was measured of a run and of several predictions of it.
+
+    Parameters
+    ----------
+    time_s : ndarray, shape (n,)
+    measured : mapping of str to ndarray, shape (n,)
+        ``rudder_angle_rad`` and, as far as they were measured, ``yaw_rate_rad_s``, ``heading_rad``,
+        ``lateral_speed_m_s``; NaN where nothing was.
+    tried : sequence of (mapping, str)
+        Predictions, columns as those of ``measured``, each with its class.
+    words : str
+        What the figure is called when it is read aloud.
+    """
+    end = float(time_s[-1])
+    parts = _panel(0.0, "rudder, deg", time_s, end, [(_DEG * measured["rudder_angle_rad"], "rudder")])
+    top = _PANEL + _GAP
+    for name, unit, said, factor in _SHOWN:
+        column = f"{name}_{unit}"
+        if np.isfinite(measured[column]).any():
+            lines = [(factor * one[column], kind) for one, kind in tried]
+            parts += _panel(top, said, time_s, end, [(factor * measured[column], "measured"), *lines])
+            top += _PANEL + _GAP
+    return drawing(_WIDTH, top + 4.0, words, *parts, *_seconds(top, end))
+
+
+def _seconds(top: float, end: float) -> list[Markup]:
+    parts = [
+        element("text", f"{tick:g}", x=_x(tick, end), y=top - 4.0, text_anchor="middle", class_="label")
+        for tick in ticks(0.0, end, 8)
+    ]
+    return [*parts, element("text", "s", x=_WIDTH - 6.0, y=top - 4.0, text_anchor="end", class_="label")]
 
 
 def _x(second: float, end: float) -> float:

@@ -9,8 +9,10 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
+from urllib.parse import urlencode
 
 from kempf.flows.process.progress import Progress
+from kempf.schemas.errors import DataRejected
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.uploads import paths_of
@@ -18,16 +20,27 @@ from kempf.workbench.web.uploads import paths_of
 if TYPE_CHECKING:
     from kempf.flows.jobs.correct_segments import Planned
 
+#: instants of a moved parameter's curves
+MOST_INSTANTS = 150
 Work = Callable[[Warehouse, Path, Mapping[str, Any], Progress], dict[str, Any]]
 
 
 def predict(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
-    """Put a vessel's manoeuvres beside what a parameter set predicts, and keep it for the page."""
-    from kempf.flows.jobs.compare_vessel import compare_vessel
-    from kempf.workbench.web.data.predictions import keep
+    """Put a vessel's manoeuvres beside what a parameter set predicts of them, at every horizon, and keep it."""
+    from kempf.flows.jobs.bound_runs import bound
+    from kempf.flows.jobs.compare_vessel import compared
+    from kempf.pipeline.predict.horizon import horizon_of
+    from kempf.workbench.web.data.predictions import HORIZONS, keep, key_of
 
-    found = compare_vessel(warehouse, arguments["vessel"], arguments["set"], arguments["horizon"], progress)
-    keep(state, arguments["key"], found)
+    vessel, name, asked = arguments["vessel"], arguments["set"], arguments["horizon"]
+    hers = bound(warehouse, vessel, name, progress)
+    # the one that was asked for first: it alone may fail, as a run may be too short for another
+    for horizon in dict.fromkeys((asked, *(horizon_of(short).name for short, _ in HORIZONS))):
+        try:
+            keep(state, key_of(warehouse, vessel, name, horizon), compared(hers, horizon_of(horizon), progress))
+        except DataRejected:
+            if horizon == asked:
+                raise
     return {"to": f"{of_vessel(arguments['vessel'])}/model?set={arguments['set']}&h={arguments['horizon']}"}
 
 
@@ -117,7 +130,9 @@ def sail(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progre
     made = predict_checked(warehouse, arguments["vessel"], request_of(arguments), progress)
     measured = measured_beside(warehouse, made, progress)
     document = {**made.show(), "measured": [one.show() for one in measured], "figure": None}
-    return {"document": document, "curves": curves_of(made.prediction)}
+    asked = {name: arguments[name] for name in ("manoeuvre", "rudder", "angles", "side", "speed", "set")}
+    to = f"{of_vessel(arguments['vessel'])}/predict?{urlencode(asked)}"
+    return {"to": to, "document": document, "curves": curves_of(made.prediction)}
 
 
 def try_formula(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -125,6 +140,16 @@ def try_formula(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any],
     from kempf.flows.jobs.try_formula import tried
 
     return {"document": tried(warehouse, arguments["vessel"], arguments["formula"], arguments["name"], progress)}
+
+
+def move(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Move one parameter of a set; the result is what `kempf what-if --json` prints, with what is drawn."""
+    from kempf.flows.jobs.what_if import series_of, what_if
+
+    vessel, parameter = arguments["vessel"], arguments["parameter"]
+    found = what_if(warehouse, vessel, parameter, arguments["set"], arguments["segment"] or None, progress)
+    to = f"{of_vessel(vessel)}/what-if?" + urlencode({n: arguments[n] for n in ("parameter", "set", "segment")})
+    return {"to": to, "document": found.show(), "series": series_of(found, MOST_INSTANTS)}
 
 
 class Kind(NamedTuple):
@@ -143,6 +168,7 @@ class Kind(NamedTuple):
 KINDS: Mapping[str, Kind] = {
     "ingest": Kind(ingest, "Take logs in", ("files", "profile", "new_vessel"), changes=True),
     "predict": Kind(predict, "Predict", ("set", "horizon")),
+    "what_if": Kind(move, "Move a parameter", ("parameter", "set", "segment")),
     "sail": Kind(sail, "Predict a manoeuvre", ("set", "manoeuvre", "rudder", "angles", "side", "speed")),
     "diagnose": Kind(diagnose, "Diagnose", ()),
     "try": Kind(try_formula, "Try a formula", ("formula", "name")),

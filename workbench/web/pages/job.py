@@ -119,6 +119,7 @@ def _correction(desk: Desk, arguments: Arguments) -> None:
 #: What a job needs looked at before it waits; it may return a digest of its own.
 _SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
     "predict": _predict,
+    "what_if": _name_the_set,
     "sail": _sail,
     "try": _formula,
     "add": _add,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from kempf.warehouse import logs, notes, segments
+from kempf.warehouse import aliases, logs, notes, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel
@@ -42,6 +42,7 @@ def gather(desk: Desk, segment_id: str, asked_from: str | None, asked_to: str | 
         "spans": [span_of(one)],
         "window": (iso_utc(begin), iso_utc(end)),
         "whole": (iso_utc(first), iso_utc(last)),
+        "current": aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel),
         "notes": [n.show() for n in notes.of_vessel(desk.warehouse, row.vessel) if n.subject_id == one.segment_id],
         "before": listed[place - 1].segment_id if place else None,
         "after": listed[place + 1].segment_id if place + 1 < len(listed) else None,

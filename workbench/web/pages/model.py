@@ -8,14 +8,12 @@ from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.errors import NotFound
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.data.predictions import KeptPrediction, kept, key_of
+from kempf.workbench.web.data.predictions import HORIZONS, KeptPrediction, kept, key_of
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.run import draw_run
 from kempf.workbench.web.pages.evidence import evidence_in
 from kempf.workbench.web.pages.page import Page
 
-#: horizons that the page offers: as asked for, and in words
-HORIZONS = (("1", "one step"), ("10s", "10 s ahead"), ("60s", "60 s ahead"), ("free", "free run"))
 #: stretches shown
 _MOST = 12
 _SAMPLES = (("held_out", "held out"), ("fitted", "fitted"))

@@ -1,0 +1,214 @@
+"""The job that moves one parameter of a set, the others held: what a free run does, and what the likelihood says to it.
+
+Nothing is stored. The other parameters and the noise levels stay as they are, so that the fall of the likelihood is the
+most that a value costs: where others are fitted anew beside it, it costs less.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from kempf.flows.jobs.bound_runs import BoundRun, BoundRuns, bound
+from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.compare.run_series import first_heading
+from kempf.pipeline.predict.free_run import CHANNELS, free_run_of
+from kempf.schemas.errors import DataRejected, NotFound
+from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+#: values tried to each side of the estimate, and standard errors between two of them
+_SIDE, _STEP = 4, 1.0
+#: of the estimate, between two values, where it has no standard error
+_SHARE = 0.1
+_UNITS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
+
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """One value of the parameter."""
+
+    value: float
+    #: In standard errors from the estimate; None where it has none.
+    in_std: float | None
+    #: By how much the log-likelihood of the fitted manoeuvres is lower than at the estimate.
+    log_likelihood_falls_by: float
+    #: Of the manoeuvre; see `kempf.pipeline.predict.free_run.FreeRun.relative_error`. None where it runs away.
+    free_run_error_percent: float | None
+    #: Shape (n, 3). Predicted, columns `kempf.pipeline.predict.free_run.CHANNELS`; NaN where it runs away.
+    predicted: Float
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content, without the series."""
+        return {name: value for name, value in vars(self).items() if name != "predicted"}
+
+
+@dataclass(frozen=True, eq=False)
+class WhatIf:
+    """A parameter moved."""
+
+    vessel: str
+    parameter_set: ParameterSet
+    parameter: str
+    unit: str
+    value: float
+    std: float | None
+    run: BoundRun
+    #: In ascending order of the value; the estimate is among them.
+    tried: tuple[Tried, ...]
+
+    def show(self) -> dict[str, Any]:
+        """Return it as the command line's JSON object."""
+        return {
+            "vessel": self.vessel,
+            "parameter_set_id": self.parameter_set.parameter_set_id,
+            "segment_id": self.run.segment.segment_id,
+            "held_out": self.run.held_out,
+            "parameter": self.parameter,
+            "unit": self.unit,
+            "value": self.value,
+            "std": self.std,
+            "others": "held as they are: fitted anew beside it, a value costs less",
+            "tried": [one.show() for one in self.tried],
+        }
+
+    def measured(self) -> dict[str, Float]:
+        """Return what was measured, each of shape (n,): seconds, rudder, rad, and `CHANNELS` in SI."""
+        run = self.run.filtered.run
+        zero = first_heading(run)
+        shown = {
+            f"{name}_{_UNITS[name]}": run.measured[:, i] + (zero if name == "heading" else 0.0)
+            for i, name in enumerate(CHANNELS)
+        }
+        return {"time_s": run.time_s, "rudder_angle_rad": run.rudder_rad, **shown}
+
+    def predicted(self, one: Tried) -> dict[str, Float]:
+        """Return what one value predicts of it, each of shape (n,), as `measured` does."""
+        zero = first_heading(self.run.filtered.run)
+        return {
+            f"{name}_{_UNITS[name]}": one.predicted[:, i] + (zero if name == "heading" else 0.0)
+            for i, name in enumerate(CHANNELS)
+        }
+
+
+def what_if(
+    warehouse: Warehouse,
+    vessel: str,
+    parameter: str,
+    set_id: str | None = None,
+    segment_id: str | None = None,
+    progress: Progress = silent,
+) -> WhatIf:
+    """Move one parameter of a set by up to four standard errors to each side.
+
+    Parameters
+    ----------
+    parameter : str
+        Of the hull, or of an effect, such as ``rudder_lag.tau``.
+    set_id : str, optional
+        By default the vessel's current set.
+    segment_id : str, optional
+        Manoeuvre that is run freely, or the beginning of its id; by default the one that is predicted worst of those
+        held out, of all where none is.
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter``, ``no_run``; and what `kempf.flows.jobs.bound_runs.bound` raises.
+    DataRejected
+        ``prediction_diverges``: the estimate itself runs away.
+    """
+    hers = bound(warehouse, vessel, set_id, progress)
+    known = {p.name: p for p in hers.parameter_set.parameters if p.name in hers.names}
+    if parameter not in known:
+        raise NotFound(
+            "no_parameter",
+            f"{hers.parameter_set.parameter_set_id} has no parameter {parameter[:60]!r}.",
+            f"Choose one of {', '.join(known)}.",
+            {"parameters": list(known)},
+        )
+    run = _run(hers, segment_id)
+    one, place = known[parameter], hers.names.index(parameter)
+    std = one.std if one.std is not None and np.isfinite(one.std) and one.std > 0.0 else None
+    step = _STEP * std if std is not None else _SHARE * abs(one.value) or 1e-6
+    moves = np.arange(-_SIDE, _SIDE + 1)
+    here = _log_likelihood(hers, place, 0.0)
+    tried = []
+    for done, move in enumerate(moves.tolist()):
+        progress(done, moves.size, f"{parameter} at {one.value + move * step:.4g}")
+        moved = _moved(hers, place, move * step)
+        free = free_run_of(run.filtered, *moved)
+        error = 100.0 * free.relative_error
+        tried.append(
+            Tried(
+                one.value + move * step,
+                move * _STEP if std is not None else None,
+                here - _log_likelihood(hers, place, move * step),
+                float(error) if np.isfinite(error) else None,
+                free.predicted,
+            )
+        )
+    progress(moves.size, moves.size, "tried")
+    if not np.isfinite(here):
+        raise DataRejected(
+            "prediction_diverges",
+            f"{hers.parameter_set.parameter_set_id} itself runs away on the manoeuvres of {vessel!r}.",
+            "Choose another set with --set.",
+        )
+    return WhatIf(vessel, hers.parameter_set, parameter, one.unit, one.value, std, run, tuple(tried))
+
+
+def _run(hers: BoundRuns, segment_id: str | None) -> BoundRun:
+    if segment_id:
+        found = [one for one in hers.runs if one.segment.segment_id.startswith(segment_id)]
+        if len(found) != 1:
+            raise NotFound(
+                "no_run",
+                f"{segment_id[:40]!r} is {'several' if found else 'none'} of the manoeuvres that can be predicted.",
+                "Choose one of " + ", ".join(one.segment.segment_id for one in hers.runs) + ".",
+            )
+        return found[0]
+    among = [one for one in hers.runs if one.held_out] or list(hers.runs)
+    return max(among, key=lambda one: free_run_of(one.filtered, hers.hull, hers.values).relative_error)
+
+
+def _moved(hers: BoundRuns, place: int, by: float) -> tuple[Float, Float]:
+    both = np.concatenate([hers.hull, hers.values])
+    both[place] += by
+    return both[: len(HULL_PARAMETERS)], both[len(HULL_PARAMETERS) :]
+
+
+def _log_likelihood(hers: BoundRuns, place: int, by: float) -> float:
+    """Return that of the manoeuvres that the set was fitted to; of all where none of them is left."""
+    hull, values = _moved(hers, place, by)
+    fitted = [one for one in hers.runs if not one.held_out] or list(hers.runs)
+    return float(sum(one.filtered.run_filter(hull, one.levels.own, values).log_likelihood for one in fitted))
+
+
+def series_of(found: WhatIf, most: int) -> Mapping[str, Any]:
+    """Return what is drawn of it as JSON content, at most so many instants.
+
+    Returns
+    -------
+    mapping
+        ``measured``: lists by column, see `WhatIf.measured`; ``predicted``: one such
+        mapping for each value tried.
+    """
+    measured = found.measured()
+    step = max(1, -(-measured["time_s"].size // most))
+
+    def thinned(columns: Mapping[str, Float]) -> dict[str, list[float | None]]:
+        return {
+            name: [float(f"{x:.6g}") if np.isfinite(x) else None for x in values[::step].tolist()]
+            for name, values in columns.items()
+        }
+
+    return {
+        "measured": thinned(measured),
+        "predicted": [thinned(found.predicted(one)) for one in found.tried],
+    }
