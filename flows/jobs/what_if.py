@@ -16,6 +16,7 @@ from kempf.flows.jobs.bound_runs import BoundRun, BoundRuns, bound
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.run_series import first_heading
+from kempf.pipeline.estimate.sensitivity import Point, passed
 from kempf.pipeline.predict.free_run import CHANNELS, free_run_of
 from kempf.schemas.errors import DataRejected, NotFound
 from kempf.schemas.model_spec import HULL_PARAMETERS
@@ -187,7 +188,7 @@ def _log_likelihood(hers: BoundRuns, place: int, by: float) -> float:
     """Return that of the manoeuvres that the set was fitted to; of all where none of them is left."""
     hull, values = _moved(hers, place, by)
     fitted = [one for one in hers.runs if not one.held_out] or list(hers.runs)
-    return float(sum(one.filtered.run_filter(hull, one.levels.own, values).log_likelihood for one in fitted))
+    return float(sum(passed(one.filtered, Point(hull, values, one.levels.own)).log_likelihood for one in fitted))
 
 
 def series_of(found: WhatIf, most: int) -> Mapping[str, Any]:

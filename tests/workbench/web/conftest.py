@@ -1,17 +1,31 @@
 from __future__ import annotations
 
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.app import create_app
+from kempf.workbench.web.jobs.keeper import Keeper
+from kempf.workbench.web.jobs.queue import Queue
 from kempf.workbench.web.settings import Settings
 from tests.workbench.conftest import _filled, filled, logs, own  # noqa: F401
 
 TOKEN = "of-this-test"  # noqa: S105
+OURS = {"origin": "http://127.0.0.1"}
+
+
+def until(true: Callable[[], Any], seconds: float = 90.0) -> Any:
+    """Wait for a condition."""
+    end = time.monotonic() + seconds
+    while not (found := true()):
+        assert time.monotonic() < end, "it never came true"
+        time.sleep(0.05)
+    return found
 
 
 def client_of(place: Path, state: Path) -> TestClient:
@@ -28,3 +42,23 @@ def client_of(place: Path, state: Path) -> TestClient:
 def client(filled: Path, tmp_path: Path) -> Iterator[TestClient]:  # noqa: F811
     with client_of(filled, tmp_path / "state") as one:
         yield one
+
+
+@pytest.fixture
+def writing(client: TestClient) -> TestClient:
+    client.get(f"/?token={TOKEN}")
+    return client
+
+
+@pytest.fixture
+def working(own: Path, tmp_path: Path) -> Iterator[tuple[TestClient, Keeper, Queue]]:  # noqa: F811
+    """A browser that may write, and an engine at work."""
+    state = tmp_path / "state"
+    keeper = Keeper(state, Warehouse(str(own)))
+    keeper.start()
+    try:
+        with client_of(own, state) as client:
+            client.get(f"/?token={TOKEN}")
+            yield client, keeper, Queue(state / "jobs.sqlite")
+    finally:
+        keeper.stop()

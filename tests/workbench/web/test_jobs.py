@@ -4,31 +4,16 @@ from __future__ import annotations
 
 import os
 import signal
-import time
-from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from starlette.testclient import TestClient
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
-from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.jobs.keeper import Keeper
 from kempf.workbench.web.jobs.queue import DONE, FAILED, MOST_WAITING, QUEUED, RUNNING, Queue
 from tests.workbench.driving import kempf, tree
-from tests.workbench.web.conftest import TOKEN, client_of
-
-OURS = {"origin": "http://127.0.0.1"}
-
-
-def until(true: Callable[[], Any], seconds: float = 90.0) -> Any:
-    """Wait for a condition."""
-    end = time.monotonic() + seconds
-    while not (found := true()):
-        assert time.monotonic() < end, "it never came true"
-        time.sleep(0.05)
-    return found
+from tests.workbench.web.conftest import OURS, TOKEN, until
 
 
 @pytest.fixture
@@ -41,6 +26,15 @@ def test_the_same_request_is_the_same_job(queue: Queue):
     assert queue.ask("undo", {"vessel": "a"}, "state") == first
     assert queue.ask("undo", {"vessel": "a"}, "another state").id != first.id
     assert [job.id for job in queue.all()][-1] == first.id
+
+
+def test_what_was_changed_back_since_is_done_again(queue: Queue):
+    name = queue.ask("undo", {"vessel": "a"}, "state", again=True).id
+    queue.take()
+    assert queue.ask("undo", {"vessel": "a"}, "state", again=True).state == RUNNING  # a second click
+    queue.finish(name, {})
+    assert queue.ask("undo", {"vessel": "a"}, "state").state == DONE
+    assert queue.ask("undo", {"vessel": "a"}, "state", again=True).state == QUEUED
 
 
 def test_jobs_are_taken_in_order_and_end_once(queue: Queue):
@@ -100,12 +94,6 @@ def test_only_a_page_of_ours_in_the_browser_of_one_who_may_writes(client: TestCl
     assert client.post("/jobs", data=form, headers=OURS).status_code == 303
 
 
-@pytest.fixture
-def writing(client: TestClient) -> TestClient:
-    client.get(f"/?token={TOKEN}")
-    return client
-
-
 @pytest.mark.parametrize(
     ("form", "status", "code"),
     [
@@ -113,7 +101,7 @@ def writing(client: TestClient) -> TestClient:
         ({}, 400, "job_unknown"),
         ({"kind": "diagnose", "vessel": "nobody"}, 404, "no_vessel"),
         ({"kind": "add", "vessel": "mariner", "effect": "nothing"}, 404, "effect_unknown"),
-        ({"kind": "predict", "vessel": "mariner", "set": "ps-0", "horizon": "free"}, 404, "no_parameter_set"),
+        ({"kind": "predict", "vessel": "mariner", "set": "ps-nothing", "horizon": "free"}, 404, "no_parameter_set"),
         ({"kind": "predict", "vessel": "mariner", "set": "", "horizon": "soon"}, 400, "horizon_unknown"),
         ({"kind": "undo", "vessel": "mariner", "standing": "ps-1234"}, 409, "moved_meanwhile"),
         ({"kind": "undo", "vessel": "v" * 20_000}, 400, "form_too_long"),
@@ -123,20 +111,6 @@ def test_a_form_that_cannot_be_done_says_why(writing: TestClient, form: dict[str
     answer = writing.post("/jobs", data=form, headers=OURS)
     assert answer.status_code == status
     assert code in answer.text and "<strong>" in answer.text
-
-
-@pytest.fixture
-def working(own: Path, tmp_path: Path) -> Iterator[tuple[TestClient, Keeper, Queue]]:
-    """A browser that may write, and an engine at work."""
-    state = tmp_path / "state"
-    keeper = Keeper(state, Warehouse(str(own)))
-    keeper.start()
-    try:
-        with client_of(own, state) as client:
-            client.get(f"/?token={TOKEN}")
-            yield client, keeper, Queue(state / "jobs.sqlite")
-    finally:
-        keeper.stop()
 
 
 def test_a_prediction_is_made_once_and_shown_as_the_command_prints_it(

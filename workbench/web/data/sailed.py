@@ -14,6 +14,8 @@ if TYPE_CHECKING:
 
 #: Manoeuvres that can be predicted.
 MANOEUVRES: tuple[Kind, ...] = get_args(Kind)
+#: Sides of a turn, the usual one first.
+SIDES = ("starboard", "port")
 #: ships of all models that are drawn one by one, and points of each
 _SHIPS, _POINTS = 24, 120
 
@@ -32,12 +34,12 @@ def request_of(asked: Mapping[str, Any]) -> PredictRequest:
         ``manoeuvre_unknown``, ``side_unknown``, ``number_unreadable``, ``angles_unreadable``; and what
         `kempf.flows.jobs.predict_request.required` raises.
     """
-    kind, side = asked["manoeuvre"] or MANOEUVRES[0], asked["side"] or "starboard"
+    kind, side = asked["manoeuvre"] or MANOEUVRES[0], asked["side"] or SIDES[0]
     if kind not in MANOEUVRES:
         raise UsageError(
             "manoeuvre_unknown", f"{kind[:40]!r} cannot be predicted.", f"Choose one of {', '.join(MANOEUVRES)}."
         )
-    if side not in ("starboard", "port"):
+    if side not in SIDES:
         raise UsageError("side_unknown", f"{side[:40]!r} is no side.", "Choose starboard or port.")
     rudder, speed = _number(asked["rudder"], "rudder"), _number(asked["speed"], "speed")
     angles = angles_of(asked["angles"] or "20/20")

@@ -12,7 +12,7 @@ from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.svg import drawing, element
 
 _WIDTH, _PANEL, _LEFT, _GAP = 760.0, 78.0, 62.0, 20.0
-_POINTS = 400
+_POINTS = 260
 _DEG = 180.0 / np.pi
 #: column, words, factor to the unit shown
 _SHOWN = (

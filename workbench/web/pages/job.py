@@ -13,7 +13,7 @@ from kempf.schemas.errors import UsageError
 from kempf.warehouse import aliases, vessels
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import key_of
-from kempf.workbench.web.data.sailed import request_of
+from kempf.workbench.web.data.sailed import MANOEUVRES, SIDES, request_of
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import ACTIVE, Job
@@ -82,6 +82,8 @@ def _predict(desk: Desk, arguments: Arguments) -> str:
 
 def _sail(desk: Desk, arguments: Arguments) -> None:
     _name_the_set(desk, arguments)
+    arguments["manoeuvre"] = arguments["manoeuvre"] or MANOEUVRES[0]
+    arguments["side"] = arguments["side"] or SIDES[0]
     request_of(arguments)  # what cannot be sailed is said at once
 
 

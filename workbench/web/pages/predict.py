@@ -53,8 +53,6 @@ def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
 
 def _asked_for(desk: Desk, vessel: str, asked: Mapping[str, str]) -> tuple[dict[str, Any], Job | None]:
     given = {name: asked.get(name, "") for name in KINDS[_KIND].fields}
-    given["manoeuvre"] = given["manoeuvre"] or MANOEUVRES[0]
-    given["side"] = given["side"] or "starboard"
     arguments, digest = settled(desk, _KIND, vessel, given)
     return arguments, desk.queue.known(_KIND, arguments, digest)
 
