@@ -124,10 +124,18 @@ def of_vessel(warehouse: Warehouse, vessel: str) -> list[StoredDiagnosis]:
     return [_stored(row) for row in frame.sort("start_utc_ns", "diagnosis_id").rows(named=True)]
 
 
+def by_vessel(warehouse: Warehouse) -> dict[str, list[StoredDiagnosis]]:
+    """Return all diagnoses of every vessel that has any, in the order of her manoeuvres, of equal ones by id."""
+    frame = delta.read(warehouse, "diagnoses").sort("start_utc_ns", "diagnosis_id")
+    found: dict[str, list[StoredDiagnosis]] = {}
+    for one in map(_stored, frame.rows(named=True)):
+        found.setdefault(one.vessel, []).append(one)
+    return found
+
+
 def newest(warehouse: Warehouse) -> dict[str, StoredDiagnosis]:
     """Return the diagnosis of every vessel that has one: that of her newest manoeuvres, of several the last by id."""
-    frame = delta.read(warehouse, "diagnoses").sort("start_utc_ns", "diagnosis_id")
-    return {one.vessel: one for one in map(_stored, frame.rows(named=True))}
+    return {vessel: every[-1] for vessel, every in by_vessel(warehouse).items()}
 
 
 def _stored(r: Mapping[str, Any]) -> StoredDiagnosis:

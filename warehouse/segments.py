@@ -212,9 +212,13 @@ def found_in(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
 
 
 def _found_in(warehouse: Warehouse, vessel: str | None) -> list[Segment]:
-    ingests = [row.ingest_id for row in logs.current(warehouse, vessel)]
+    return of_ingests(warehouse, [row.ingest_id for row in logs.current(warehouse, vessel)], vessel)
+
+
+def of_ingests(warehouse: Warehouse, ingests: Sequence[str], vessel: str | None = None) -> list[Segment]:
+    """Return the manoeuvres of every kind found in some ingests, of one vessel or of any, sorted by start, then id."""
     hers = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
-    frame = delta.read(warehouse, "segments", {**hers, "ingest_id": ingests})
+    frame = delta.read(warehouse, "segments", {**hers, "ingest_id": list(ingests)})
     return _sorted([_segment(row) for row in frame.rows(named=True)])
 
 

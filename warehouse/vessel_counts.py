@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from typing import Any
 
 from kempf.warehouse import logs, parameter_sets, segments, vessels
@@ -17,10 +18,12 @@ def vessel_counts(warehouse: Warehouse) -> list[dict[str, Any]]:
         ``no_warehouse``.
     """
     warehouse.require()
-    held = [row.vessel for row in logs.current(warehouse)]
-    found = [segment.vessel for segment in segments.current(warehouse)]
-    sets = parameter_sets.summaries(warehouse)["vessel"].to_list()
+    rows = logs.current(warehouse)
+    held = Counter(row.vessel for row in rows)
+    every = segments.of_ingests(warehouse, [row.ingest_id for row in rows])
+    found = Counter(one.vessel for one in every if one.is_zigzag and one.excluded is None)
+    sets = Counter(parameter_sets.summaries(warehouse)["vessel"].to_list())
     return [
-        {"vessel": name, "logs": held.count(name), "segments": found.count(name), "parameter_sets": sets.count(name)}
+        {"vessel": name, "logs": held[name], "segments": found[name], "parameter_sets": sets[name]}
         for name in vessels.names(warehouse)
     ]

@@ -27,10 +27,18 @@ from kempf.workbench.cli.options import warehouse_option
     type=click.Path(path_type=Path, file_okay=False),
     help="Folder for jobs and predictions; deleting it costs time only. [default: in the user's cache]",
 )
+@click.option("--new", is_flag=True, help="Make the warehouse where there is none: logs are then sent from the page.")
 @click.option("--open", "open_browser", is_flag=True, help="Open the browser.")
 @warehouse_option
 def command(
-    host: str, port: int, allowed: tuple[str, ...], read_only: bool, state: Path | None, open_browser: bool, uri: str
+    host: str,
+    port: int,
+    allowed: tuple[str, ...],
+    read_only: bool,
+    state: Path | None,
+    new: bool,
+    open_browser: bool,
+    uri: str,
 ) -> None:
     """Serve the warehouse as web pages: fleet, logs, manoeuvres, models, diagnoses and ladders.
 
@@ -42,6 +50,8 @@ def command(
     from kempf.workbench.web.settings import LOOPBACK, Settings
 
     warehouse = Warehouse(uri)
+    if new and not read_only:
+        warehouse.create()
     warehouse.require()
     if host not in (*LOOPBACK, "::1") and not allowed:
         raise UsageError(

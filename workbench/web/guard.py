@@ -52,7 +52,7 @@ class Guard:
     """
 
     def __init__(self, settings: Settings) -> None:
-        self._names, self._token = settings.names, settings.token
+        self._names, self._token, self._anybody_reads = settings.names, settings.token, settings.anybody_reads
 
     async def __call__(self, request: Request, answer: Callable[[Request], Awaitable[Response]]) -> Response:
         """Answer a request, or refuse it."""
@@ -75,6 +75,10 @@ class Guard:
             return self._no_writer(request)
         if request.method not in _READS:
             return PlainTextResponse("Pages are read and forms are sent.\n", 405, {"Allow": "GET, HEAD, POST"})
+        if not self._anybody_reads and not request.state.may_write and "token" not in request.query_params:
+            return PlainTextResponse(
+                "Open the address that `kempf workbench` printed when it started: it lets this browser in.\n", 403
+            )
         site, mode = request.headers.get("sec-fetch-site"), request.headers.get("sec-fetch-mode")
         return PlainTextResponse(_FOREIGN, 403) if site == "cross-site" and mode != "navigate" else None
 

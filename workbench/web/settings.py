@@ -28,6 +28,11 @@ class Settings:
     token: str | None = None
 
     @property
+    def anybody_reads(self) -> bool:
+        """Whether pages are shown without the token: on this machine alone, or where nobody may write anyway."""
+        return self.token is None or self.host in (*LOOPBACK, "::1")
+
+    @property
     def names(self) -> frozenset[str]:
         """The names that a request may be addressed to, in lower case."""
         return frozenset(name.lower() for name in (*LOOPBACK, *self.allowed_hosts))

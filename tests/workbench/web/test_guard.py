@@ -2,10 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from starlette.testclient import TestClient
 
+from kempf.warehouse.store import Warehouse
+from kempf.workbench.web.app import create_app
 from kempf.workbench.web.guard import HEADERS
+from kempf.workbench.web.settings import Settings
 
 
 @pytest.mark.parametrize("host", ["evil.example", "evil.example:8765", "127.0.0.1.evil.example", "", "[::2]:80"])
@@ -59,3 +64,21 @@ def test_no_address_becomes_the_path_of_a_file(client: TestClient, path: str):
     answer = client.get(path)
     assert answer.status_code in (400, 404)
     assert "root:" not in answer.text and "import" not in answer.text
+
+
+def test_on_another_address_nobody_reads_without_the_token(filled: Path, tmp_path: Path):
+    def client(token: str | None) -> TestClient:
+        settings = Settings("0.0.0.0", allowed_hosts=("ship.example",), token=token)  # noqa: S104
+        app = create_app(Warehouse(str(filled)), settings, tmp_path / "state")
+        return TestClient(app, base_url="http://ship.example", follow_redirects=False)
+
+    with client("secret") as one:
+        for path in ("/", "/fleet.json", "/static/chart.js"):
+            refused = one.get(path)
+            assert refused.status_code == 403 and "printed when it started" in refused.text
+        assert one.get("/?token=wrong").status_code == 303 and one.get("/").status_code == 403
+        one.get("/?token=secret")
+        assert one.get("/").status_code == 200
+    with client(None) as one:  # read-only: shown to whoever may come here
+        assert one.get("/").status_code == 200
+        assert one.post("/jobs", data={}, headers={"origin": "http://ship.example"}).status_code == 403

@@ -1,17 +1,23 @@
-"""The fleet: a row a vessel."""
+"""The fleet: a row a vessel, what the last run said of her, who lacks what since when, what is in quarantine."""
 
 from __future__ import annotations
 
+import os
+from collections import Counter
+from collections.abc import Sequence
 from typing import Any
 
-from kempf.warehouse import diagnoses, inbox, runs
+from kempf.schemas.quality import in_words
+from kempf.warehouse import diagnoses, inbox, runs, views
+from kempf.warehouse.diagnoses import StoredDiagnosis
+from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.vessel_counts import vessel_counts
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.pages.page import Page
 
 FLOW = "reprocess"
-#: vessels that a page shows
-MOST = 200
+#: vessels, and files in quarantine, that a page shows
+MOST, MOST_FILES = 200, 20
 
 
 def document(desk: Desk) -> list[dict[str, Any]]:
@@ -21,28 +27,52 @@ def document(desk: Desk) -> list[dict[str, Any]]:
 
 def gather(desk: Desk) -> Page:
     """Return the page of the fleet, vessels that need somebody first."""
-    newest = diagnoses.newest(desk.warehouse)
-    findings: dict[str, int] = {}
-    failures: dict[str, int] = {}
-    for run in runs.all_runs(desk.warehouse, FLOW):
-        if run.vessel is not None:
-            findings[run.vessel] = len(run.message.get("findings", ()))
-            failures[run.vessel] = len(run.message.get("failures", ()))
-    rows = [
-        {
-            **row,
-            "diagnosis": newest.get(row["vessel"]),
-            "findings": findings.get(row["vessel"], 0),
-            "failures": failures.get(row["vessel"], 0),
-        }
-        for row in document(desk)
-    ]
-    rows.sort(key=lambda row: (-row["failures"], -row["findings"], row["vessel"]))
-    lacking = sorted({effect for one in newest.values() for effect in one.effects})
+    known = diagnoses.by_vessel(desk.warehouse)
+    said = {run.vessel: run.message for run in runs.all_runs(desk.warehouse, FLOW) if run.vessel is not None}
+    last = {row["vessel"]: row for row in views.run_history(desk.warehouse).rows(named=True)}
+    rows = []
+    for row in document(desk):
+        message, ran = said.get(row["vessel"], {}), last.get(row["vessel"])
+        every = known.get(row["vessel"], [])
+        rows.append(
+            {
+                **row,
+                "diagnosis": every[-1] if every else None,
+                "since": {effect: _since(every, effect) for effect in every[-1].effects} if every else {},
+                "failures": [f"{one['what']}: {one['error']['message']}" for one in message.get("failures", ())],
+                "findings": _findings(message.get("findings", ())),
+                "ran_at": f"{ran['run_at']:%Y-%m-%d %H:%M}" if ran and ran["run_at"] else None,
+                "ran": _address_of_run(ran["flow_run"]) if ran else None,
+            }
+        )
+    rows.sort(key=lambda row: (-len(row["failures"]), -len(row["findings"]), row["vessel"]))
+    quarantined = inbox.quarantined(desk.warehouse)
     content = {
         "rows": rows[:MOST],
         "count": len(rows),
-        "effects": lacking,
-        "quarantined": len(inbox.quarantined(desk.warehouse)),
+        "effects": sorted({effect for row in rows for effect in row["since"]}),
+        "quarantined": quarantined[:MOST_FILES],
+        "in_quarantine": len(quarantined),
     }
     return Page("fleet.html", "Fleet", content)
+
+
+def _findings(found: Sequence[dict[str, Any]]) -> list[str]:
+    return [in_words(kind, count) for kind, count in sorted(Counter(one["kind"] for one in found).items())]
+
+
+def _since(every: Sequence[StoredDiagnosis], effect: str) -> str:
+    """Return the day of the first manoeuvre from which on every diagnosis names an effect."""
+    first = every[-1]
+    for one in reversed(every):
+        if effect not in one.effects:
+            break
+        first = one
+    return iso_utc(first.start_utc_ns)[:10]
+
+
+def _address_of_run(flow_run: str | None) -> str | None:
+    """Return the page of a run on the Prefect server that the environment names; None where it names none."""
+    server = os.environ.get("PREFECT_UI_URL") or os.environ.get("PREFECT_API_URL", "").removesuffix("/api")
+    safe = server.startswith(("http://", "https://"))
+    return f"{server.rstrip('/')}/runs/flow-run/{flow_run}" if safe and flow_run else None
