@@ -7,12 +7,13 @@ Each takes the warehouse, the folder of what is kept, its arguments and a `Progr
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 from urllib.parse import urlencode
 
 from kempf.flows.process.progress import Progress
-from kempf.schemas.errors import DataRejected
+from kempf.schemas.errors import DataRejected, KempfError
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.uploads import paths_of
@@ -27,21 +28,38 @@ Work = Callable[[Warehouse, Path, Mapping[str, Any], Progress], dict[str, Any]]
 
 def predict(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
     """Put a vessel's manoeuvres beside what a parameter set predicts of them, at every horizon, and keep it."""
+    vessel, name, asked = arguments["vessel"], arguments["set"], arguments["horizon"]
+    _keep_predictions(warehouse, state, vessel, name, progress, asked)
+    return {"to": f"{of_vessel(vessel)}/model?set={name}&h={asked}"}
+
+
+def _keep_predictions(
+    warehouse: Warehouse, state: Path, vessel: str, name: str, progress: Progress, asked: str | None = None
+) -> None:
+    """Keep what a set predicts at every horizon; one that is too long for the runs is left out, unless asked for."""
     from kempf.flows.jobs.bound_runs import bound
     from kempf.flows.jobs.compare_vessel import compared
     from kempf.pipeline.predict.horizon import horizon_of
     from kempf.workbench.web.data.predictions import HORIZONS, keep, key_of
 
-    vessel, name, asked = arguments["vessel"], arguments["set"], arguments["horizon"]
     hers = bound(warehouse, vessel, name, progress)
-    # the one that was asked for first: it alone may fail, as a run may be too short for another
-    for horizon in dict.fromkeys((asked, *(horizon_of(short).name for short, _ in HORIZONS))):
+    every = dict.fromkeys((*([asked] if asked else []), *(horizon_of(short).name for short, _ in HORIZONS)))
+    for horizon in every:
         try:
             keep(state, key_of(warehouse, vessel, name, horizon), compared(hers, horizon_of(horizon), progress))
         except DataRejected:
             if horizon == asked:
                 raise
-    return {"to": f"{of_vessel(arguments['vessel'])}/model?set={arguments['set']}&h={arguments['horizon']}"}
+
+
+def _keep_those_of_current(warehouse: Warehouse, state: Path, vessel: str, progress: Progress) -> None:
+    """Keep what a vessel's current set predicts, so that the page of her model need not wait."""
+    from kempf.warehouse import aliases
+
+    current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    if current is not None:
+        with suppress(KempfError):  # the page says why when it is asked for
+            _keep_predictions(warehouse, state, vessel, current, progress)
 
 
 def diagnose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -63,6 +81,7 @@ def add(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progres
     name, formula = arguments["effect"], arguments["formula"]
     own = formula_of_ones_own(name, formula) if formula else NONE_OF_ONES_OWN
     made = add_effect(warehouse, arguments["vessel"], name, own, progress=progress)
+    _keep_those_of_current(warehouse, state, arguments["vessel"], progress)
     return {"to": f"{of_vessel(arguments['vessel'])}/ladder", "parameter_set_id": made.parameter_set_id}
 
 
@@ -79,6 +98,7 @@ def reprocess(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], p
     from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 
     report = reprocess_vessel(warehouse, arguments["vessel"], progress=progress)
+    _keep_those_of_current(warehouse, state, arguments["vessel"], progress)
     return {"to": of_vessel(arguments["vessel"]), "report": report.show()}
 
 
