@@ -42,6 +42,7 @@ COMMANDS = {
     "predict": "Predict turning circle, zigzag, pull-out or spiral, every figure with its interval.",
     "steer": "Make a course-keeping law from a parameter set and try it on the simulated ship.",
     "compare": "Put what was measured beside what a parameter set predicts; say where it fails.",
+    "explain": "Rank the effects by what they would explain of one stretch of a manoeuvre.",
     "what-if": "Move one parameter of a set: what a free run does, and what it costs in likelihood.",
     "effects": "List and show the physical effects that a model can be given.",
     "diagnose": "Find which physical effect a vessel's model lacks.",

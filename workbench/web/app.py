@@ -27,6 +27,7 @@ from kempf.workbench.web.pages import (
     compare,
     diagnosis,
     effects,
+    explain,
     fleet,
     ingest,
     job,
@@ -111,6 +112,11 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
         "/v/{vessel}/predict",
         lambda r: predict.gather(desk, hers(r), r.query_params),
         lambda r: predict.document(desk, hers(r), r.query_params),
+    )
+    serve(
+        "/v/{vessel}/explain",
+        lambda r: explain.gather(desk, hers(r), r.query_params),
+        lambda r: explain.document(desk, hers(r), r.query_params),
     )
     serve(
         "/v/{vessel}/what-if",

@@ -115,6 +115,8 @@ def test_a_correction_is_previewed_stored_and_taken_back(working: Working, own: 
         ({"kind": "sail", "rudder": "90"}, 400, "rudder_out_of_range"),
         ({"kind": "sail", "manoeuvre": "zigzag", "angles": "20"}, 400, "angles_unreadable"),
         ({"kind": "sail", "speed": "0"}, 400, "speed_out_of_range"),
+        ({"kind": "explain", "from": "2025-05-03T06:00:00Z", "to": "2025-05-03T05:00:00Z"}, 400, "window_empty"),
+        ({"kind": "explain", "from": "", "to": ""}, 400, "instant_unreadable"),
         ({"kind": "what_if", "set": "ps-nothing"}, 404, "no_parameter_set"),
     ],
 )

@@ -14,6 +14,7 @@ from urllib.parse import urlencode
 
 from kempf.flows.process.progress import Progress
 from kempf.schemas.errors import DataRejected, KempfError
+from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.uploads import paths_of
@@ -172,6 +173,16 @@ def move(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progre
     return {"to": to, "document": found.show(), "series": series_of(found, MOST_INSTANTS)}
 
 
+def explain(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Score every effect on a stretch of a manoeuvre; the result is what `kempf explain --json` prints."""
+    from kempf.flows.jobs.explain_stretch import explain_stretch
+
+    vessel, (begin, end) = arguments["vessel"], arguments["window_utc_ns"]
+    found = explain_stretch(warehouse, vessel, begin, end, arguments["set"], progress)
+    asked = {"set": arguments["set"], "from": iso_utc(begin), "to": iso_utc(end)}
+    return {"to": f"{of_vessel(vessel)}/explain?{urlencode(asked)}", "document": found.show()}
+
+
 class Kind(NamedTuple):
     """What a form may ask for."""
 
@@ -188,6 +199,7 @@ class Kind(NamedTuple):
 KINDS: Mapping[str, Kind] = {
     "ingest": Kind(ingest, "Take logs in", ("files", "profile", "new_vessel"), changes=True),
     "predict": Kind(predict, "Predict", ("set", "horizon")),
+    "explain": Kind(explain, "Explain a stretch", ("from", "to", "set")),
     "what_if": Kind(move, "Move a parameter", ("parameter", "set", "segment")),
     "sail": Kind(sail, "Predict a manoeuvre", ("set", "manoeuvre", "rudder", "angles", "side", "speed")),
     "diagnose": Kind(diagnose, "Diagnose", ()),

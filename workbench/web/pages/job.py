@@ -104,6 +104,14 @@ def _add(desk: Desk, arguments: Arguments) -> None:
         get(arguments["effect"])
 
 
+def _stretch(desk: Desk, arguments: Arguments) -> None:
+    _name_the_set(desk, arguments)
+    begin, end = instant(arguments.pop("from")), instant(arguments.pop("to"))
+    if end <= begin:
+        raise UsageError("window_empty", "The stretch ends before it begins.", "Give a later end.")
+    arguments["window_utc_ns"] = [begin, end]
+
+
 def _correction(desk: Desk, arguments: Arguments) -> None:
     if arguments["action"] not in _ACTIONS:
         raise UsageError(
@@ -121,6 +129,7 @@ def _correction(desk: Desk, arguments: Arguments) -> None:
 #: What a job needs looked at before it waits; it may return a digest of its own.
 _SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
     "predict": _predict,
+    "explain": _stretch,
     "what_if": _name_the_set,
     "sail": _sail,
     "try": _formula,
