@@ -8,6 +8,7 @@ Models and the Kalman Filter, sect. 4.5).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.search.block_arrow import Arrow, ArrowSteps
-from kempf.pipeline.estimate.search.climb import Search, climb_by
+from kempf.pipeline.estimate.search.climb import Pass, Search, climb_by, nobody
 from kempf.pipeline.estimate.search.scoring import Mask
 
 _HULL = 6
@@ -38,16 +39,23 @@ class Pool(Protocol):
 
 
 def climb_in_variances(
-    pool: Pool, start: Float, max_iterations: int, decrement: float, wanted: float = -np.inf
+    pool: Pool,
+    start: Float,
+    max_iterations: int,
+    decrement: float,
+    wanted: float = -np.inf,
+    told: Callable[[Pass], None] = nobody,
 ) -> Search[Arrow]:
-    """Climb from one start; see `kempf.pipeline.estimate.search.climb.climb_by`. All that is given is by logarithms.
+    """Climb from one start; see `kempf.pipeline.estimate.search.climb.climb_by`.
+
+    All that is given is by logarithms, but for the steps that ``told`` is called with.
 
     Parameters
     ----------
     start : ndarray, shape (n_theta,)
     """
     inside = _InVariances(pool)
-    found = climb_by(ArrowSteps(), inside, inside.variances(start), max_iterations, decrement, wanted)
+    found = climb_by(ArrowSteps(), inside, inside.variances(start), max_iterations, decrement, wanted, told)
     factors = 1.0 / inside.factors(found.theta)
     return replace(
         found,
