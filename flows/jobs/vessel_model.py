@@ -136,11 +136,20 @@ def store_model(
             )
             ids = tuple(segment.segment_id for segment in chosen.segments)
             made.append(_model_set(fit, fitted, SetRequest(inputs, profile, chosen.vessel, ids, origin, parent)))
+            progress(len(way) + 1, len(way) + 1, _errors_in_words(made[-1]))
     if keep is None:
         parameter_sets.insert(warehouse, made)
     else:
         keep(made)
     return made[-1], True
+
+
+def _errors_in_words(made: ParameterSet) -> str:
+    found = made.fit["rung"]
+    held = "" if found["held_out_error"] is None else f", {100.0 * found['held_out_error']:.3g} % held out"
+    return (
+        f"{found['added'] or 'the plain model'}: free-run error {100.0 * found['in_sample_error']:.3g} % fitted{held}"
+    )
 
 
 def build_model(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet:

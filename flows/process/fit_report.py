@@ -37,7 +37,7 @@ class FitReport:
         self._progress, self._pieces = progress, pieces
         self._begun, self._what = 0, "fitting"
         self._runs = 0
-        self._last = Figures(0, 0, np.nan, np.nan)
+        self._iteration = self._climb = 0
 
     @property
     def _far(self) -> tuple[int, int]:
@@ -57,19 +57,21 @@ class FitReport:
     def iterated(self, iteration: Iteration) -> None:
         """Hand on an iteration; of one over a part of the runs no figures, for they cannot be compared."""
         self._runs = max(self._runs, iteration.runs)
-        if iteration.runs < self._runs or not np.isfinite(iteration.log_likelihood):
-            return
-        self._show(iteration, another=iteration.number == 0)
+        if iteration.runs == self._runs:
+            self._climb += iteration.number == 0
+            self._show(iteration, fitted=False)
 
     def fitted(self, last: Iteration) -> None:
         """Hand on where the climbs of a model came to."""
-        self._show(last, another=True)
+        self._climb += 1
+        self._show(last, fitted=True)
 
-    def _show(self, one: Iteration, *, another: bool) -> None:
-        last = self._last
-        self._last = figures = Figures(
-            last.iteration + 1, last.climb + another, float(one.log_likelihood), float(one.error)
-        )
+    def _show(self, one: Iteration, *, fitted: bool) -> None:
+        if not np.isfinite(one.log_likelihood):
+            return
+        self._iteration += 1
+        error = float(one.error) if np.isfinite(one.error) else None
+        figures = Figures(self._iteration, self._climb, float(one.log_likelihood), error, fitted)
         if isinstance(self._progress, FitProgress):
             self._progress.iterated(*self._far, self._what, figures)
         else:
@@ -84,5 +86,5 @@ def in_words(what: str, figures: Figures) -> str:
     >>> in_words("fitting rudder_lag", Figures(7, 2, 1234.52, 0.0314))
     'fitting rudder_lag, iteration 7: log-likelihood 1234.5, error one step ahead 3.14 %'
     """
-    error = f", error one step ahead {100.0 * figures.error:.3g} %" if np.isfinite(figures.error) else ""
+    error = "" if figures.error is None else f", error one step ahead {100.0 * figures.error:.3g} %"
     return f"{what}, iteration {figures.iteration}: log-likelihood {figures.log_likelihood:.1f}{error}"

@@ -19,12 +19,14 @@ class Figures:
 
     #: Counted on from one climb and one model to the next, from 1.
     iteration: int
-    #: Which climb it belongs to, from 1; where a model's climbs came to is one by itself.
+    #: Which climb of the likelihood it belongs to, from 1.
     climb: int
     log_likelihood: float
-    #: Of predictions one step ahead, as a share of the motion; see
-    #: `kempf.pipeline.estimate.pooled_fit.one_step_error`.
-    error: float
+    #: Of predictions one step ahead, as a share of the motion, see
+    #: `kempf.pipeline.estimate.pooled_fit.one_step_error`; None where it is no number.
+    error: float | None
+    #: Whether this is where the climbs of a model came to; it counts as a climb by itself.
+    fitted: bool = False
 
 
 @runtime_checkable

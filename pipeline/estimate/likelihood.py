@@ -118,13 +118,6 @@ class Likelihood:
         value, score, information = likelihood(theta, True, *self._fixed, no_trace())  # noqa: FBT003 - the same
         return float(value), score, information
 
-    def full_with_innovations(self, theta: Float) -> tuple[float, Float, Float, Float]:
-        """Return what `full` does, and the one-step prediction errors, shape (n, 3), NaN where not measured."""
-        n = self.record.time_s.size
-        kept = (np.full((n, 3), np.nan), np.full((n, 3), np.nan), *no_trace()[2:])
-        value, score, information = likelihood(theta, True, *self._fixed, kept)  # noqa: FBT003 - the same
-        return float(value), score, information, kept[0]
-
     def trace(self, theta: Float, *, scores: bool = False) -> Trace:
         """Run the filter once more and keep what it did; ``scores`` asks for those of the single measurements."""
         n = self.record.time_s.size

@@ -206,7 +206,7 @@ def climbed(
     def told(one: Pass) -> None:
         nonlocal number
         number += 1
-        listener.iterated(Iteration(number, one.log_likelihood, layout.error, len(layout.filtered)))
+        listener.iterated(Iteration(number, one.log_likelihood, layout.error_at(one.theta), len(layout.filtered)))
 
     return climb_in_variances(layout, theta, max_iterations, DECREMENT, wanted, nobody if listener is SILENT else told)
 
@@ -290,14 +290,6 @@ class CommonLikelihood:
         self.before = None if before is None else before.scaled(self.scale)
         self.highest, self.top = -np.inf, np.zeros(0)
         self.lines: tuple[Linearised, ...] = ()
-        #: of the linear filter at the highest point so far
-        self.innovations: tuple[Float, ...] = ()
-
-    @property
-    def error(self) -> float:
-        """One step ahead at the highest point so far, see `one_step_error`."""
-        found = self.innovations or tuple(line.passed.innovation for line in self.lines)
-        return one_step_error([one.run for one in self.filtered], found) if found else np.nan
 
     def point(self, theta: Float, run: int) -> Point:
         """Return what of the vector one run has."""
@@ -310,6 +302,16 @@ class CommonLikelihood:
         if np.array_equal(theta, self.top):
             return self.lines
         return self._linearised(theta, self._passed(theta))
+
+    def error_at(self, theta: Float) -> float:
+        """Return the error one step ahead, see `one_step_error`.
+
+        By the extended filter also where the linear one climbs, so that models with and without effects can be
+        compared; at the highest point so far of the former it costs nothing.
+        """
+        there = np.array_equal(theta, self.top)
+        passes = [line.passed for line in self.lines] if there else self._passed(theta)
+        return one_step_error([one.run for one in self.filtered], [one.innovation for one in passes])
 
     def full(self, theta: Float) -> tuple[float, Float, Arrow]:
         """Log-likelihood, score and expected information, summed in the order of the runs."""
@@ -332,16 +334,15 @@ class CommonLikelihood:
     def _linear(self, theta: Float) -> tuple[float, list[tuple[Float, Float]]]:
         """Ask the linear filter of every run."""
 
-        def one(run: int) -> tuple[float, Float, Float, Float]:
+        def one(run: int) -> tuple[float, Float, Float]:
             point, linear = self.point(theta, run), self.linear[run]
             own = np.concatenate([point.hull, point.levels - to_intensities(linear.spec)])
-            return linear.full_with_innovations(np.clip(own, linear.low, linear.high))
+            return linear.full(np.clip(own, linear.low, linear.high))
 
         made = list(self.workers.map(one, range(len(self.linear))))
-        value = sum(value for value, _, _, _ in made) - self._loss(theta)
-        if value > self.highest:
-            self.highest, self.innovations = value, tuple(innovation for _, _, _, innovation in made)
-        return value, [(score, information) for _, score, information, _ in made]
+        return sum(value for value, _, _ in made) - self._loss(theta), [
+            (score, information) for _, score, information in made
+        ]
 
     def _extended(self, theta: Float) -> tuple[float, list[tuple[Float, Float]]]:
         """Ask the extended filter of every run.

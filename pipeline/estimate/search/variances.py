@@ -46,23 +46,33 @@ def climb_in_variances(
     wanted: float = -np.inf,
     told: Callable[[Pass], None] = nobody,
 ) -> Search[Arrow]:
-    """Climb from one start; see `kempf.pipeline.estimate.search.climb.climb_by`.
-
-    All that is given is by logarithms, but for the steps that ``told`` is called with.
+    """Climb from one start; see `kempf.pipeline.estimate.search.climb.climb_by`. All that is given is by logarithms.
 
     Parameters
     ----------
     start : ndarray, shape (n_theta,)
     """
     inside = _InVariances(pool)
-    found = climb_by(ArrowSteps(), inside, inside.variances(start), max_iterations, decrement, wanted, told)
+
+    def by_logarithms(one: Pass) -> Pass:
+        return replace(one, theta=inside.logarithms_of(one.theta))
+
+    found = climb_by(
+        ArrowSteps(),
+        inside,
+        inside.variances(start),
+        max_iterations,
+        decrement,
+        wanted,
+        lambda one: told(by_logarithms(one)),
+    )
     factors = 1.0 / inside.factors(found.theta)
     return replace(
         found,
         theta=inside.logarithms_of(found.theta),
         score=found.score * factors,
         information=found.information.scaled(factors),
-        passes=tuple(replace(one, theta=inside.logarithms_of(one.theta)) for one in found.passes),
+        passes=tuple(by_logarithms(one) for one in found.passes),
     )
 
 

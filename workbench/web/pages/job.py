@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from itertools import groupby
 from typing import Any
 
 from kempf.flows.fleet.state import fleet_state
@@ -14,22 +15,34 @@ from kempf.warehouse import vessels
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import key_of
 from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.draw.climb import draw_climb, in_words
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import ACTIVE, Job
 from kempf.workbench.web.pages.page import Page
+
+#: iterations that the page shows, the last ones
+_MOST = 200
 
 
 def document(desk: Desk, name: str, after: int = 0) -> dict[str, Any]:
     """Return a job and how far it was, from a tick on that is not among them."""
     job = desk.queue.get(name)
-    return {**job.show(), "ticks": [vars(tick) for tick in desk.queue.ticks(name, after)]}
+    return {**job.show(), "ticks": [tick.show() for tick in desk.queue.ticks(name, after)]}
 
 
 def gather(desk: Desk, name: str) -> Page:
     """Return the page of a job."""
     job = desk.queue.get(name)
     ticks = desk.queue.ticks(name)
-    content = {"job": job, "active": job.state in ACTIVE, "ticks": ticks}
+    # one piece of work ticks many times
+    pieces = [what for what, _ in groupby(tick.what for tick in ticks)]
+    iterations = [(tick.what, tick.figures) for tick in ticks if tick.figures is not None]
+    shown = iterations[-_MOST:]
+    figures = [one for _, one in shown]
+    content = {
+        **{"job": job, "active": job.state in ACTIVE, "ticks": ticks, "pieces": pieces, "iterations": shown},
+        **{"drawn": draw_climb(figures), "sentence": in_words(figures), "most": _MOST},
+    }
     vessel = job.arguments["vessel"]
     return Page("job.html", f"{KINDS[job.kind][1]}: {vessel}", content, ((vessel, of_vessel(vessel)),))
 
