@@ -110,8 +110,8 @@ def page(found: Sequence[Counted], ships: int) -> list[str]:
         for one in found
     ]
     return [
-        f"{ships} ships, stretches of {_STRETCH_S:g} s. With nothing hidden at most 5 % of the scores should have p below "
-        "0.05, and no effect should stand out in more than 1 % of the stretches.",
+        f"{ships} ships, stretches of {_STRETCH_S:g} s. With nothing hidden at most 5 % of the scores should have p "
+        "below 0.05, and no effect should stand out in more than 1 % of the stretches.",
         "",
         *result_page.table(head, rows),
     ]

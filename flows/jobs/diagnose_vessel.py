@@ -11,6 +11,7 @@ from kempf.flows.jobs.stored_diagnosis import inputs_of_diagnosis
 from kempf.flows.jobs.vessel_model import Fitted, store_model
 from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
 from kempf.flows.process.cores import usable
+from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.diagnose.diagnosis_json import as_json
@@ -116,21 +117,13 @@ def examine(
     runs = assembled(warehouse, chosen, spec, progress)
     known = known_effects(own)
     screened = {name: known[name] for name in only} if only else known
-    count = 0
-
-    def step(what: str) -> None:
-        nonlocal count
-        count += 1
-        # how many steps it takes is not known beforehand
-        progress(count, count + 5, what)
-
     with ThreadPoolExecutor(max_workers=usable()) as workers:
         made = diagnose(
             *(runs.runs, runs.spec, screened, workers, settings),
             given=named(spec.effects, known),
-            announce=step,
+            listener=reported_to(progress),
         )
-    progress(count, count, "done")
+    progress(1, 1, "done")
     return FullDiagnosis(chosen, runs, made)
 
 

@@ -20,6 +20,7 @@ from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, channel_warnin
 from kempf.flows.jobs.standing_model import SEARCH, SINGLE, Own, inputs_of, known_effects, named, stored_model
 from kempf.flows.jobs.vessel_runs import VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
+from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Float
@@ -28,6 +29,7 @@ from kempf.pipeline.diagnose.late_velocity import covariance_of_lateness
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
 from kempf.pipeline.estimate.plain_fit import Alone, PlainFit, off_in_std
 from kempf.pipeline.estimate.plausibility import plausibility_warnings
@@ -67,12 +69,19 @@ class Fitted:
             return ahead_of(self.fits, [self.runs.runs[i] for i in left], workers)
 
 
-def _fitted_model(runs: VesselRuns, spec: ModelSpec, own: Own, search: Mapping[str, Any] | None = None) -> Fitted:
+def _fitted_model(
+    runs: VesselRuns,
+    spec: ModelSpec,
+    own: Own,
+    search: Mapping[str, Any] | None = None,
+    listener: Listener = SILENT,
+) -> Fitted:
     """Fit a model and every model on the way to it."""
     used = named(spec.effects, known_effects(own))
     chosen, _ = split(runs.runs)
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        plain, fits = staged([runs.runs[i] for i in chosen], runs.spec, used, workers, settings_of(search or {}))
+        fitted = [runs.runs[i] for i in chosen]
+        plain, fits = staged(fitted, runs.spec, used, workers, settings_of(search or {}), listener)
     return Fitted(runs, plain, tuple(fits))
 
 
@@ -114,8 +123,10 @@ def store_model(
     there = set(parameter_sets.summaries(warehouse, chosen.vessel)["parameter_set_id"].to_list())
     if fitted is None:
         runs = assembled(warehouse, chosen, spec, progress)
-        progress(0, 1, f"fitting {spec.effects[-1] if spec.effects else 'the plain model'}")
-        fitted = _fitted_model(runs, spec, own, search)
+        # the models one after the other, then all of them one leg ahead
+        pieces = len(way) + 1
+        fitted = _fitted_model(runs, spec, own, search, reported_to(progress, pieces))
+        progress(len(way), pieces, "predicting one leg ahead")
     profile = vessels.get(warehouse, chosen.profile_sha256)
     made = []
     for inputs, name, parent, fit in zip(wanted, names, [None, *names[:-1]], fitted.fits, strict=True):
@@ -125,11 +136,20 @@ def store_model(
             )
             ids = tuple(segment.segment_id for segment in chosen.segments)
             made.append(_model_set(fit, fitted, SetRequest(inputs, profile, chosen.vessel, ids, origin, parent)))
+            progress(len(way) + 1, len(way) + 1, _errors_in_words(made[-1]))
     if keep is None:
         parameter_sets.insert(warehouse, made)
     else:
         keep(made)
     return made[-1], True
+
+
+def _errors_in_words(made: ParameterSet) -> str:
+    found = made.fit["rung"]
+    held = "" if found["held_out_error"] is None else f", {100.0 * found['held_out_error']:.3g} % held out"
+    return (
+        f"{found['added'] or 'the plain model'}: free-run error {100.0 * found['in_sample_error']:.3g} % fitted{held}"
+    )
 
 
 def build_model(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet:

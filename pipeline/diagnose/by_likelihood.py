@@ -87,7 +87,10 @@ def _refitted(ladder: Ladder, found: Certain) -> list[tuple[Candidate, Confirmat
     if fit is last.fit:
         alone = ladder.unseen(last)
     else:
-        screened, alone = screen(fit, ladder.effects, ladder.workers), unseen(fit, ladder.held, ladder.workers)
+        screened, alone = (
+            screen(fit, ladder.effects, ladder.workers, ladder.listener),
+            unseen(fit, ladder.held, ladder.workers),
+        )
     tried: list[tuple[Candidate, Confirmation]] = []
     for candidate in shortlist(screened, ladder.settings.level, ladder.settings.refits):
         if ladder.shooting is not None:

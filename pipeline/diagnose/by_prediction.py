@@ -35,7 +35,7 @@ def predicting_better(ladder: Ladder, steps: list[Step]) -> list[Step]:
     if len(steps[0].fit.runs) + len(ladder.held) < _FEWEST:
         return steps
     while ladder.shooting is not None and len(steps) <= ladder.settings.most_steps:
-        ladder.announce(f"step {len(steps)}: predicting one leg ahead")
+        ladder.listener.begins(f"step {len(steps)}: predicting one leg ahead")
         more = _one_more(ladder, ladder.shooting, steps) or _several_more(ladder, ladder.shooting, steps)
         if not more:
             break

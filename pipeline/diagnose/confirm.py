@@ -12,6 +12,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.forward_selection import added
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate import sensitivity
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import N_HULL, Point
@@ -88,6 +89,7 @@ def confirm(
     held: Sequence[GridRun],
     workers: Executor,
     most_bic: float = np.inf,
+    listener: Listener = SILENT,
 ) -> Confirmation:
     """Refit a model with one effect more.
 
@@ -101,10 +103,12 @@ def confirm(
         Held out.
     most_bic : float, optional
         The change of the information criterion without which it is of no use: another one did better.
+    listener : Listener, optional
+        Told of every iteration.
     """
     price = len(candidate.effect.parameters) * float(np.log(base.count))
     wanted = base.log_likelihood + 0.5 * (price - most_bic)
-    fit = added(base, candidate, workers, wanted)
+    fit = added(base, candidate, workers, wanted, listener)
     ratio = 2.0 * (fit.log_likelihood - base.log_likelihood)
     last = slice(base.values.size, None)
     lowest, highest = (ended[last] for ended in fit.model.at_bounds(fit.values))

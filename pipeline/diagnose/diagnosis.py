@@ -18,7 +18,7 @@ import numpy as np
 from kempf.pipeline.diagnose.by_likelihood import certain_ones
 from kempf.pipeline.diagnose.by_prediction import predicting_better
 from kempf.pipeline.diagnose.immaterial import Immaterial
-from kempf.pipeline.diagnose.ladder import Announce, Ladder, silent
+from kempf.pipeline.diagnose.ladder import Ladder
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
 from kempf.pipeline.diagnose.remainder import something_left
 from kempf.pipeline.diagnose.remaining_misfit import RemainingMisfit, remaining_misfit
@@ -27,6 +27,7 @@ from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.diagnose.settings import STANDARD, DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.plain_fit import PlainFit
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
@@ -71,7 +72,7 @@ def diagnose(
     workers: Executor,
     settings: DiagnosisSettings = STANDARD,
     given: Sequence[Effect] = (),
-    announce: Announce = silent,
+    listener: Listener = SILENT,
 ) -> Diagnosis:
     """Find what a vessel's model lacks.
 
@@ -85,26 +86,27 @@ def diagnose(
         Catalogue.
     given : sequence of Effect, optional
         Effects that the model has already.
-    announce : callable, optional
-        Called with what is being done, for a progress line.
+    listener : Listener, optional
+        Told of what is being done and of every iteration.
     """
     chosen, apart = split(runs)
-    announce(f"fitting the model to {len(chosen)} manoeuvres, {len(apart)} held out")
-    plain, fits = staged([runs[i] for i in chosen], spec, given, workers)
+    listener.begins(f"fitting the model to {len(chosen)} manoeuvres, {len(apart)} held out")
+    plain, fits = staged([runs[i] for i in chosen], spec, given, workers, listener=listener)
     base = fits[-1]
     held = [runs[i] for i in apart]
     shooting = None
     if len(chosen) > 1:
-        announce("predicting one leg ahead")
+        listener.begins("predicting one leg ahead")
         shooting = shooting_range([filtered.run for filtered in base.runs], held, base.runs[0].spec, workers)
-    announce(f"screening {len(effects)} effects")
-    first = make_step(base, None, (), (), held, screen(base, effects, workers), workers, _begun(shooting, base))
+    listener.begins(f"screening {len(effects)} effects")
+    screened = screen(base, effects, workers, listener)
+    first = make_step(base, None, (), (), held, screened, workers, _begun(shooting, base))
     before = ridge_reference_of(base, workers) if len(chosen) > 1 else None
-    ladder = Ladder(shooting, effects, held, workers, settings, announce, base)
+    ladder = Ladder(shooting, effects, held, workers, settings, listener, base)
     steps = predicting_better(ladder, [first])
     found = certain_ones(ladder, steps)
     steps = found.steps
-    announce("measuring what is left")
+    listener.begins("measuring what is left")
     after = before
     if before is not None and ladder.probe is not base:
         after = ridge_reference_of(ladder.probe, workers)

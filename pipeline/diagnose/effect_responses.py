@@ -15,6 +15,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.batch import MOST
 from kempf.schemas.effect import Effect
@@ -33,7 +34,9 @@ class EffectTrial:
         return tuple(k for k, p in enumerate(self.effect.parameters) if not p.shapes)
 
 
-def responses(base: PooledFit, trials: Sequence[EffectTrial], workers: Executor) -> list[Float | None]:
+def responses(
+    base: PooledFit, trials: Sequence[EffectTrial], workers: Executor, listener: Listener = SILENT
+) -> list[Float | None]:
     """Return what each trial does to the whitened innovations of all runs.
 
     Parameters
@@ -42,6 +45,8 @@ def responses(base: PooledFit, trials: Sequence[EffectTrial], workers: Executor)
         The fitted model; it has none of the effects.
     workers : Executor
         Share the passes; nothing depends on it.
+    listener : Listener, optional
+        Told of the trials that are done.
 
     Returns
     -------
@@ -50,10 +55,13 @@ def responses(base: PooledFit, trials: Sequence[EffectTrial], workers: Executor)
     """
     bundles = _bundles(trials)
     result: list[Float | None] = [None] * len(trials)
+    done = 0
     passed = workers.map(lambda bundle: _passed(base, [trials[i] for i in bundle]), bundles)
     for bundle, made in zip(bundles, passed, strict=True):
         for i, columns in zip(bundle, made, strict=True):
             result[i] = columns
+        done += len(bundle)
+        listener.counted(done, len(trials))
     # what one effect makes of a state may be no number for another one that is not there: it is passed again, alone
     astray = [i for bundle in bundles if len(bundle) > 1 for i in bundle if result[i] is None]
     for i, (columns,) in zip(astray, workers.map(lambda i: _passed(base, [trials[i]]), astray), strict=True):

@@ -10,6 +10,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.level_bounds import level_bounds
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.effect_model import EffectModel
@@ -26,7 +27,9 @@ _RUNS_OF_RACE = 3
 _CALM = (1e-4, 1e-6, 1e-3)
 
 
-def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: float = -np.inf) -> PooledFit:
+def added(
+    base: PooledFit, candidate: Candidate, workers: Executor, wanted: float = -np.inf, listener: Listener = SILENT
+) -> PooledFit:
     """Fit a model with one effect more.
 
     A hull fitted without a lag of the rudder has been bent to imitate it, and from there the way to the true
@@ -39,6 +42,8 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
         Of the screen beside ``base``.
     wanted : float, optional
         Log-likelihood without which the fit is of no use: climbs that cannot reach it are given up, not converged.
+    listener : Listener, optional
+        Told of every iteration, of the race too.
     """
     model = base.model.with_effect(candidate.effect)
     begin = _begin(candidate)
@@ -50,12 +55,12 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
         entries += [(hull, size) for hull in (base.hull, ordinary) for size in sizes]
     if len(entries) > 1:
         few = slice(0, _RUNS_OF_RACE)
-        race = [_climbed(base, model, hull, size, workers, _RACE, few) for hull, size in entries]
+        race = [_climbed(base, model, hull, size, workers, _RACE, few, listener=listener) for hull, size in entries]
         best = max(race, key=lambda fit: fit.log_likelihood)
         hull, begin = best.hull, best.values[base.values.size :]
     else:
         hull = base.hull
-    fitted = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted)
+    fitted = _climbed(base, model, hull, begin, workers, _TO_THE_END, wanted=wanted, listener=listener)
     if is_ship(base.hull) and is_ship(fitted.hull):
         return fitted
     # what the score predicts beside such a hull says little, and the disturbances beside it have eaten the effect
@@ -63,7 +68,7 @@ def added(base: PooledFit, candidate: Candidate, workers: Executor, wanted: floa
     for size in _sizes(candidate.effect):
         # a lower hill need not be climbed to its top
         least = max(wanted, fitted.log_likelihood)
-        other = _climbed(calm, model, ordinary, size, workers, _TO_THE_END, wanted=least)
+        other = _climbed(calm, model, ordinary, size, workers, _TO_THE_END, wanted=least, listener=listener)
         fitted = max(fitted, other, key=lambda fit: fit.log_likelihood)
     return fitted
 
@@ -108,10 +113,11 @@ def _climbed(
     iterations: int,
     chosen: slice = slice(None),
     wanted: float = -np.inf,
+    listener: Listener = SILENT,
 ) -> PooledFit:
     filtered = tuple(replace(run, model=model) for run in base.runs[chosen])
     values = np.concatenate([base.values, begin])
-    return pooled_fit.fit(filtered, hull, base.levels[chosen], values, workers, iterations, wanted)
+    return pooled_fit.fit(filtered, hull, base.levels[chosen], values, workers, iterations, wanted, listener)
 
 
 def _begin(candidate: Candidate) -> Float:

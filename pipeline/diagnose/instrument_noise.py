@@ -17,6 +17,7 @@ from kempf.pipeline.diagnose.forward_selection import added
 from kempf.pipeline.diagnose.joint_noise import with_joint_noise
 from kempf.pipeline.diagnose.screen import screen
 from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effects import catalogue
 from kempf.schemas.instrument_noise import lasting_noise
@@ -27,7 +28,7 @@ _LEAST_SCORE, _LEAST_GAIN = 30.0, 15.0
 _FEWEST, _ENOUGH = 3, 60_000
 
 
-def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
+def with_instrument_noise(fit: PooledFit, workers: Executor, listener: Listener = SILENT) -> PooledFit:
     """Return a fit with what its innovations show of lasting noise.
 
     Noise follows no manoeuvre and could imitate a little of everything. It is taken where it says more of the
@@ -40,13 +41,15 @@ def with_instrument_noise(fit: PooledFit, workers: Executor) -> PooledFit:
         Of any model.
     workers : Executor
         Share the work; nothing depends on it.
+    listener : Listener, optional
+        Told of every iteration.
     """
     some = _some_of(fit)
-    found = _one_by_one(some, workers)
+    found = _one_by_one(some, workers, listener)
     if found is some:
         return fit
-    found = with_joint_noise(found, _LEAST_GAIN, workers)
-    return found if some is fit else _of_all(fit, some, found, workers)
+    found = with_joint_noise(found, _LEAST_GAIN, workers, listener)
+    return found if some is fit else _of_all(fit, some, found, workers, listener)
 
 
 def _some_of(fit: PooledFit) -> PooledFit:
@@ -69,25 +72,25 @@ def _some_of(fit: PooledFit) -> PooledFit:
     )
 
 
-def _of_all(fit: PooledFit, some: PooledFit, found: PooledFit, workers: Executor) -> PooledFit:
+def _of_all(fit: PooledFit, some: PooledFit, found: PooledFit, workers: Executor, listener: Listener) -> PooledFit:
     """Fit all runs with the lasting noise that some of them show."""
     levels = fit.levels + np.mean(found.levels - some.levels, axis=0)
     runs = [replace(run, model=found.model) for run in fit.runs]
-    made = pooled_fit.fit(runs, found.hull, levels, found.values, workers)
+    made = pooled_fit.fit(runs, found.hull, levels, found.values, workers, listener=listener)
     return made if made.log_likelihood > fit.log_likelihood + _LEAST_GAIN else fit
 
 
-def _one_by_one(fit: PooledFit, workers: Executor) -> PooledFit:
+def _one_by_one(fit: PooledFit, workers: Executor, listener: Listener) -> PooledFit:
     effects = catalogue()
     while True:
         there = {effect.name for effect in fit.model.effects}
         left = {name: noise for name, noise in lasting_noise().items() if name not in there}
-        best = max(screen(fit, left, workers), key=lambda one: np.nan_to_num(one.score), default=None)
+        best = max(screen(fit, left, workers, listener), key=lambda one: np.nan_to_num(one.score), default=None)
         if best is None or not best.score > _LEAST_SCORE:
             return fit
-        if any(one.score > best.score for one in screen(fit, effects, workers)):
+        if any(one.score > best.score for one in screen(fit, effects, workers, listener)):
             return fit
-        made = added(fit, best, workers)
+        made = added(fit, best, workers, listener=listener)
         if not made.log_likelihood > fit.log_likelihood + _LEAST_GAIN:
             return fit
         fit = made

@@ -15,6 +15,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.forward_selection import calm_levels
 from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
@@ -22,7 +23,7 @@ from kempf.schemas.effect import Effect
 from kempf.schemas.instrument_noise import lasting_noise
 
 
-def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor) -> PooledFit:
+def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, listener: Listener = SILENT) -> PooledFit:
     """Return a fit with lasting noise, or the higher one that all lasting noise together has beside another hull.
 
     The search begins beside a hull of the ship's length (`kempf.pipeline.model.ship.mariner_like`) and quiet weather.
@@ -35,6 +36,8 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor) -> Po
         Log-likelihood by which each noise must gain.
     workers : Executor
         Share the work; nothing depends on it.
+    listener : Listener, optional
+        Told of every iteration.
 
     Returns
     -------
@@ -47,18 +50,20 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor) -> Po
     values = np.concatenate([fit.values, *([p.steps[0] for p in noise.parameters] for noise in missing)])
     wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
     hull = mariner_like(fit.runs[0].run.ship.length_m).array()
-    made = _fitted(fit, model, hull, calm_levels(fit), values, workers, wanted)
+    made = _fitted(fit, model, hull, calm_levels(fit), values, workers, wanted, listener)
     if not (made.converged and made.log_likelihood > wanted):
         return fit
-    return _without_idle(made, missing, least_gain, workers)
+    return _without_idle(made, missing, least_gain, workers, listener)
 
 
-def _without_idle(fit: PooledFit, noises: Sequence[Effect], least_gain: float, workers: Executor) -> PooledFit:
+def _without_idle(
+    fit: PooledFit, noises: Sequence[Effect], least_gain: float, workers: Executor, listener: Listener
+) -> PooledFit:
     """Leave out the noises that gain nothing beside the others."""
     for noise in noises:
         model = EffectModel(tuple(effect for effect in fit.model.effects if effect.name != noise.name))
         kept = np.array([effect.name != noise.name for effect, _ in fit.model.parameters])
-        fewer = _fitted(fit, model, fit.hull, fit.levels, fit.values[kept], workers)
+        fewer = _fitted(fit, model, fit.hull, fit.levels, fit.values[kept], workers, listener=listener)
         if fit.log_likelihood <= fewer.log_likelihood + least_gain:
             fit = fewer
     return fit
@@ -72,6 +77,7 @@ def _fitted(
     values: Float,
     workers: Executor,
     wanted: float = -np.inf,
+    listener: Listener = SILENT,
 ) -> PooledFit:
     runs = [replace(run, model=model) for run in fit.runs]
-    return pooled_fit.fit(runs, hull, levels, values, workers, wanted=wanted)
+    return pooled_fit.fit(runs, hull, levels, values, workers, wanted=wanted, listener=listener)

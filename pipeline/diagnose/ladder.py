@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 
@@ -11,17 +11,13 @@ from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
 from kempf.pipeline.diagnose.screen import Candidate, score, screen
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
+from kempf.pipeline.estimate.iteration import Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.shooting.ahead import Ahead, ShootingRange
 from kempf.schemas.effect import Effect
 
-Announce = Callable[[str], None]
 Pairs = tuple[tuple[Candidate, Confirmation], ...]
-
-
-def silent(_: str) -> None:
-    """Say nothing of the progress."""
 
 
 @dataclass(eq=False)
@@ -34,7 +30,7 @@ class Ladder:
     held: Sequence[GridRun]
     workers: Executor
     settings: DiagnosisSettings
-    announce: Announce
+    listener: Listener
     #: The model with everything that was found, immaterial or not: what is left is looked for beside it.
     probe: PooledFit
     #: Refits that were climbed to the end: who predicts and who asks the likelihood ask for the same ones.
@@ -47,8 +43,8 @@ class Ladder:
         known = self.refits.get((base, candidate.effect.name))
         if known is not None:
             return known
-        self.announce(f"refitting with {candidate.effect.title}")
-        made = confirm(base, alone, candidate, self.held, self.workers, most_bic)
+        self.listener.begins(f"refitting with {candidate.effect.title}")
+        made = confirm(base, alone, candidate, self.held, self.workers, most_bic, self.listener)
         if not made.outdone:
             self.refits[base, candidate.effect.name] = made
         return made
@@ -74,9 +70,9 @@ class Ladder:
             Chosen from, and refused.
         """
         candidate, best = close[0]
-        self.announce(f"screening beside {candidate.effect.title}")
-        fit = with_instrument_noise(best.fit, self.workers)
-        screened = screen(fit, self.effects, self.workers)
+        self.listener.begins(f"screening beside {candidate.effect.title}")
+        fit = with_instrument_noise(best.fit, self.workers, self.listener)
+        screened = screen(fit, self.effects, self.workers, self.listener)
         if self.shooting is not None and ahead is not None:
             ahead = self.shooting.beside(ahead, fit)
         made = make_step(fit, candidate.effect, close, others, self.held, screened, self.workers, ahead)
@@ -84,7 +80,7 @@ class Ladder:
 
     def without(self, idle: Effect, steps: Sequence[Step]) -> list[Step]:
         """Climb the ladder again without an effect; what was refused on the way stays listed."""
-        self.announce(f"{idle.title} is no longer needed")
+        self.listener.begins(f"{idle.title} is no longer needed")
         made = [steps[0]]
         refused = [pair for old in steps[1:] for pair in (*old.chosen_from, *old.refused)]
         for step in steps[1:]:

@@ -20,6 +20,7 @@ from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect
@@ -100,7 +101,9 @@ def _orthonormal(columns: Float) -> Float:
     return basis
 
 
-def screen(base: PooledFit, effects: Mapping[str, Effect], workers: Executor) -> list[Candidate]:
+def screen(
+    base: PooledFit, effects: Mapping[str, Effect], workers: Executor, listener: Listener = SILENT
+) -> list[Candidate]:
     """Score every effect that the model does not have yet, the highest first.
 
     Parameters
@@ -111,11 +114,13 @@ def screen(base: PooledFit, effects: Mapping[str, Effect], workers: Executor) ->
         Catalogue.
     workers : Executor
         Effects share it; nothing depends on it.
+    listener : Listener, optional
+        Told of what has been tried.
     """
     present = {effect.name for effect in base.model.effects}
     chosen = [effect for effect in effects.values() if effect.name not in present]
     known = nuisance(base.linearised, N_HULL + len(base.model.names))
-    scored = _scored(base, known, chosen, workers)
+    scored = _scored(base, known, chosen, workers, listener)
     adjusted = _adjusted([candidate.p_value for candidate in scored])
     scored = [replace(candidate, p_adjusted=p) for candidate, p in zip(scored, adjusted, strict=True)]
     return sorted(scored, key=lambda candidate: (-np.nan_to_num(candidate.score, nan=-1.0), candidate.effect.name))
@@ -137,12 +142,14 @@ def score(base: PooledFit, effect: Effect, workers: Executor) -> Candidate:
     return replace(candidate, p_adjusted=candidate.p_value)
 
 
-def _scored(base: PooledFit, known: Nuisance, effects: Sequence[Effect], workers: Executor) -> list[Candidate]:
+def _scored(
+    base: PooledFit, known: Nuisance, effects: Sequence[Effect], workers: Executor, listener: Listener = SILENT
+) -> list[Candidate]:
     nothing = [_untested(base, effect) for effect in effects]
     # what a channel shows already is in the inputs: scored beside them it would imitate something else
     tried = [candidate.effect for candidate in nothing if not (candidate.missing or candidate.measured_by)]
     trials = [EffectTrial(effect, steps) for effect in tried for steps in _grid(effect)]
-    columns = responses(base, trials, workers)
+    columns = responses(base, trials, workers, listener)
     moved = {(trial.effect.name, trial.steps): column for trial, column in zip(trials, columns, strict=True)}
     return list(workers.map(lambda candidate: _best(known, candidate, moved), nothing))
 

@@ -14,6 +14,7 @@ import numpy as np
 from kempf.pipeline.diagnose.forward_selection import added
 from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
 from kempf.pipeline.diagnose.screen import score
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
 from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -29,6 +30,7 @@ def staged(
     effects: Sequence[Effect],
     workers: Executor,
     settings: MaximumLikelihoodSettings = STANDARD,
+    listener: Listener = SILENT,
 ) -> tuple[PlainFit, list[PooledFit]]:
     """Fit the plain ship, then with one effect more after the other; each with the noise that the data show.
 
@@ -38,6 +40,8 @@ def staged(
         In the order in which they were added.
     settings : MaximumLikelihoodSettings, optional
         Of the search of single runs.
+    listener : Listener, optional
+        Told of every model that is fitted, of its iterations and where they ended.
 
     Returns
     -------
@@ -51,8 +55,10 @@ def staged(
         ``effect_not_testable``: these runs say nothing of an effect, or a channel measures it already; the
         message says which.
     """
-    plain = fit_plain(runs, spec, workers, settings)
-    fits = [with_instrument_noise(plain.fit, workers)]
+    listener.begins("fitting the plain model")
+    plain = fit_plain(runs, spec, workers, settings, listener)
+    fits = [with_instrument_noise(plain.fit, workers, listener)]
+    listener.fitted(fits[-1].last)
     for effect in effects:
         candidate = score(fits[-1], effect, workers)
         if candidate.missing:
@@ -77,5 +83,8 @@ def staged(
                 effect.separated_by or "Sail another kind of manoeuvre.",
                 {"effect": effect.name, "absorption": candidate.absorption},
             )
-        fits.append(with_instrument_noise(added(fits[-1], candidate, workers), workers))
+        listener.begins(f"fitting {effect.name}")
+        more = added(fits[-1], candidate, workers, listener=listener)
+        fits.append(with_instrument_noise(more, workers, listener))
+        listener.fitted(fits[-1].last)
     return plain, fits

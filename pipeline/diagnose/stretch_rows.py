@@ -115,10 +115,10 @@ def rows_of(base: PooledFit, fitted: Sequence[bool], number: int, inside: Mask) 
 def _apart(lines: Sequence[Linearised], line: Linearised, known: Nuisance, shared: int) -> Apart:
     """Return what the fitted manoeuvres say of the parameters that another one shares with them."""
     common, levels = _columns(line, shared)
-    told = np.concatenate([_columns(one, shared)[0] - _spanned(*_columns(one, shared)) for one in lines])
-    norm = np.linalg.norm(told, axis=0)
+    others = np.concatenate([_columns(one, shared)[0] - _spanned(*_columns(one, shared)) for one in lines])
+    norm = np.linalg.norm(others, axis=0)
     used = norm > 0.0
-    left, singular, right = np.linalg.svd(told[:, used] / norm[used], full_matrices=False)
+    left, singular, right = np.linalg.svd(others[:, used] / norm[used], full_matrices=False)
     kept = singular > _NOTHING * singular[0]
     factor = (right[kept].T / singular[kept]) / norm[used][:, None]
     return Apart(common[:, used] @ factor, left[:, kept], _basis(levels))

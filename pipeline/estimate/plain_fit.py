@@ -16,13 +16,13 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement
 from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.level_bounds import to_intensities
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, MaximumLikelihoodSettings
-from kempf.pipeline.estimate.pooled_fit import DECREMENT, MAX_ITERATIONS, CommonLikelihood, PooledFit, ended
+from kempf.pipeline.estimate.pooled_fit import CommonLikelihood, PooledFit, climbed, ended
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.search.block_arrow import Arrow
 from kempf.pipeline.estimate.search.climb import Search
-from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.uncertainty import from_information
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
@@ -89,6 +89,7 @@ def fit_plain(
     spec: ModelSpec,
     workers: Executor,
     settings: MaximumLikelihoodSettings = STANDARD,
+    listener: Listener = SILENT,
 ) -> PlainFit:
     """Fit eq. (16) to every run, gross errors taken out, then one hull to all of them.
 
@@ -98,13 +99,18 @@ def fit_plain(
         Disturbances.
     workers : Executor
         Runs share it; the sums do not depend on it.
+    listener : Listener, optional
+        Told of every run that is fitted by itself, then of every iteration of the common fit.
 
     Raises
     ------
     DataRejected
         ``no_ship_explains_it``: none of the runs can be identified by itself, or they have no ship in common.
     """
-    made = list(workers.map(lambda run: fitted_alone(run, spec, settings), runs))
+    made = []
+    for one in workers.map(lambda run: fitted_alone(run, spec, settings), runs):
+        made.append(one)
+        listener.counted(len(made), len(runs))
     alone = tuple(single for single in made if isinstance(single, Alone))
     left_out = {run.name: why for run, why in zip(runs, made, strict=True) if isinstance(why, str)}
     if not alone:
@@ -118,24 +124,25 @@ def fit_plain(
     layout = CommonLikelihood([RunFilter(single.run, EffectModel(), spec) for single in alone], workers)
     levels = _first_levels(np.array([single.search.theta[_HULL:] + to_intensities(spec) for single in alone])).ravel()
     mean = alone[0].hull if len(alone) == 1 else _weighted_mean(alone)
-    climbed = _climbed(layout, mean, levels) if np.all(np.isfinite(mean)) else None
-    if climbed is None or not np.isfinite(climbed.log_likelihood):
+    found = climbed(layout, np.concatenate([mean, levels]), listener=listener) if np.all(np.isfinite(mean)) else None
+    if found is None or not np.isfinite(found.log_likelihood):
         # the mean is no ship: from the best of a few runs' own, then
         hulls = [single.hull for single in alone[:_ENTRIES]]
         best = max(hulls, key=lambda hull: layout.full(np.concatenate([hull, levels]))[0])
-        climbed = _climbed(layout, best, levels)
+        found = climbed(layout, np.concatenate([best, levels]), listener=listener)
     separate = sum(single.search.log_likelihood for single in alone)
-    if not (climbed.converged and _agreement(alone, separate, climbed).p_value >= LEVEL):
+    if not (found.converged and _agreement(alone, separate, found).p_value >= LEVEL):
         # runs that seem to be of two ships may have been climbed on a lower hill
-        other = _climbed(layout, mariner_like(runs[0].ship.length_m).array(), levels)
-        if other.converged and other.log_likelihood > climbed.log_likelihood + _HIGHER:
-            climbed = other
-    return PlainFit(ended(layout, climbed), alone, left_out, _agreement(alone, separate, climbed))
+        hull = mariner_like(runs[0].ship.length_m).array()
+        other = climbed(layout, np.concatenate([hull, levels]), listener=listener)
+        if other.converged and other.log_likelihood > found.log_likelihood + _HIGHER:
+            found = other
+    return PlainFit(ended(layout, found), alone, left_out, _agreement(alone, separate, found))
 
 
-def _agreement(alone: Sequence[Alone], separate: float, climbed: Search[Arrow]) -> Agreement:
+def _agreement(alone: Sequence[Alone], separate: float, found: Search[Arrow]) -> Agreement:
     """Return whether the runs share one hull, six degrees of freedom a run beyond the first."""
-    return Agreement(max(2.0 * (separate - climbed.log_likelihood), 0.0), _HULL * (len(alone) - 1))
+    return Agreement(max(2.0 * (separate - found.log_likelihood), 0.0), _HULL * (len(alone) - 1))
 
 
 def fitted_alone(run: GridRun, spec: ModelSpec, settings: MaximumLikelihoodSettings) -> Alone | str:
@@ -160,10 +167,6 @@ def _first_levels(levels: Float) -> Float:
     strange[:, :_DISTURBANCES] = (levels < usual - _SUNK)[:, :_DISTURBANCES]
     begin: Float = np.where(strange, usual, levels)
     return begin
-
-
-def _climbed(layout: CommonLikelihood, hull: Float, levels: Float) -> Search[Arrow]:
-    return climb_in_variances(layout, np.concatenate([hull, levels]), MAX_ITERATIONS, DECREMENT)
 
 
 def _weighted_mean(alone: Sequence[Alone]) -> Float:

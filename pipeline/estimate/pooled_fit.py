@@ -11,9 +11,11 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.estimate.iteration import SILENT, Iteration, Listener
 from kempf.pipeline.estimate.level_bounds import level_bounds, to_intensities
+from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 from kempf.pipeline.estimate.search.block_arrow import Arrow, inverse
-from kempf.pipeline.estimate.search.climb import Search, free
+from kempf.pipeline.estimate.search.climb import Pass, Search, free, nobody
 from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.sensitivity import N_HULL, N_LEVELS, Point
@@ -140,6 +142,12 @@ class PooledFit:
         """Measurements."""
         return sum(one.u.size // 2 for one in self.linearised)
 
+    @property
+    def last(self) -> Iteration:
+        """Where it ended, as a listener hears it."""
+        error = one_step_error([one.run for one in self.runs], [one.passed.innovation for one in self.linearised])
+        return Iteration(self.iterations, self.log_likelihood, error, len(self.runs))
+
     def point(self, number: int) -> Point:
         """Where one run stands."""
         return Point(self.hull, self.values, self.levels[number])
@@ -159,6 +167,7 @@ def fit(
     workers: Executor,
     max_iterations: int = MAX_ITERATIONS,
     wanted: float = -np.inf,
+    listener: Listener = SILENT,
 ) -> PooledFit:
     """Climb to the maximum of the likelihood of several runs.
 
@@ -172,6 +181,8 @@ def fit(
         Runs share it; sums are in the order of the runs.
     wanted : float, optional
         Log-likelihood without which the fit is of no use: where it is out of reach the climb is given up.
+    listener : Listener, optional
+        Told of every iteration.
     """
     layout = CommonLikelihood(filtered, workers)
     model = layout.model
@@ -179,7 +190,45 @@ def fit(
     least = 0.05 * np.abs(mariner_like(filtered[0].run.ship.length_m).array())
     begin = np.where(np.abs(hull) < least, np.copysign(least, hull), hull)
     theta = np.concatenate([begin, np.clip(values, model.low, model.high) / layout.unit, levels.ravel()])
-    return ended(layout, climb_in_variances(layout, theta, max_iterations, DECREMENT, wanted))
+    return ended(layout, climbed(layout, theta, max_iterations, wanted, listener))
+
+
+def climbed(
+    layout: CommonLikelihood,
+    theta: Float,
+    max_iterations: int = MAX_ITERATIONS,
+    wanted: float = -np.inf,
+    listener: Listener = SILENT,
+) -> Search[Arrow]:
+    """Climb a common likelihood from one start and tell of every iteration; see `fit`."""
+    number = -1
+
+    def report(one: Pass) -> None:
+        nonlocal number
+        number += 1
+        listener.iterated(Iteration(number, one.log_likelihood, layout.error_at(one.theta), len(layout.filtered)))
+
+    return climb_in_variances(
+        layout, theta, max_iterations, DECREMENT, wanted, nobody if listener is SILENT else report
+    )
+
+
+def one_step_error(runs: Sequence[GridRun], innovations: Sequence[Float]) -> float:
+    """Return the error of predictions one step ahead, as a share of the motion.
+
+    Of each run and measurement the root mean square by the spread of what was measured; their mean.
+
+    Parameters
+    ----------
+    innovations : sequence of ndarray of shape (n, 3)
+        Of each run, NaN where not measured.
+    """
+    shares = []
+    for run, innovation in zip(runs, innovations, strict=True):
+        made = np.isfinite(innovation).any(axis=0)
+        shares.append(np.sqrt(np.nanmean(innovation[:, made] ** 2, axis=0)) / spread(run.measured)[made])
+    every = np.concatenate(shares)
+    return float(np.mean(every)) if every.size else np.nan
 
 
 def ended(layout: CommonLikelihood, found: Search[Arrow]) -> PooledFit:
@@ -255,6 +304,16 @@ class CommonLikelihood:
         if np.array_equal(theta, self.top):
             return self.lines
         return self._linearised(theta, self._passed(theta))
+
+    def error_at(self, theta: Float) -> float:
+        """Return the error one step ahead, see `one_step_error`.
+
+        By the extended filter also where the linear one climbs, so that models with and without effects can be
+        compared; at the highest point so far of the former it costs nothing.
+        """
+        there = np.array_equal(theta, self.top)
+        passes = [line.passed for line in self.lines] if there else self._passed(theta)
+        return one_step_error([one.run for one in self.filtered], [one.innovation for one in passes])
 
     def full(self, theta: Float) -> tuple[float, Float, Arrow]:
         """Log-likelihood, score and expected information, summed in the order of the runs."""

@@ -6,6 +6,7 @@ climbed by logarithms of its noise levels, several together by variances (decisi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
@@ -88,6 +89,10 @@ class Pass:
     damping: float
 
 
+def nobody(_: Pass) -> None:
+    """Take no notice of a step."""
+
+
 @dataclass(frozen=True, eq=False)
 class Search(Generic[C]):
     """Where a search ended and how it got there."""
@@ -127,6 +132,7 @@ def climb_by(
     max_iterations: int,
     decrement: float,
     wanted: float = -np.inf,
+    report: Callable[[Pass], None] = nobody,
 ) -> Search[C]:
     """Climb from one start.
 
@@ -137,6 +143,8 @@ def climb_by(
         Converged when half the squared Newton decrement, the log-likelihood still to be gained, falls below this.
     wanted : float, optional
         Log-likelihood without which the end is of no use: where it is out of reach the climb is given up.
+    report : callable, optional
+        Called with the start and every step as soon as it is made.
 
     Returns
     -------
@@ -151,6 +159,7 @@ def climb_by(
     curvature, damping, scale = information, 1e-3, np.abs(theta[:_HULL])
     converged, reason = False, "the iterations allowed ran out"
     passes = [Pass(theta, value, np.nan, damping)]
+    report(passes[0])
     for _ in range(max_iterations):
         movable = free(objective, theta, score)
         # the log-likelihood that the quadratic model still promises
@@ -183,6 +192,7 @@ def climb_by(
             curvature = steps.corrected(made, information, there[2], found - theta, score - there[1], movable)
         theta, (value, score, information) = found, there
         passes.append(Pass(theta, value, gain, damping))
+        report(passes[-1])
     return Search(theta, value, score, information, converged, reason, tuple(passes))
 
 

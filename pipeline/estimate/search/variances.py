@@ -8,6 +8,7 @@ Models and the Kalman Filter, sect. 4.5).
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
@@ -15,7 +16,7 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.search.block_arrow import Arrow, ArrowSteps
-from kempf.pipeline.estimate.search.climb import Search, climb_by
+from kempf.pipeline.estimate.search.climb import Pass, Search, climb_by, nobody
 from kempf.pipeline.estimate.search.scoring import Mask
 
 _HULL = 6
@@ -38,7 +39,12 @@ class Pool(Protocol):
 
 
 def climb_in_variances(
-    pool: Pool, start: Float, max_iterations: int, decrement: float, wanted: float = -np.inf
+    pool: Pool,
+    start: Float,
+    max_iterations: int,
+    decrement: float,
+    wanted: float = -np.inf,
+    report: Callable[[Pass], None] = nobody,
 ) -> Search[Arrow]:
     """Climb from one start; see `kempf.pipeline.estimate.search.climb.climb_by`. All that is given is by logarithms.
 
@@ -47,14 +53,26 @@ def climb_in_variances(
     start : ndarray, shape (n_theta,)
     """
     inside = _InVariances(pool)
-    found = climb_by(ArrowSteps(), inside, inside.variances(start), max_iterations, decrement, wanted)
+
+    def by_logarithms(one: Pass) -> Pass:
+        return replace(one, theta=inside.logarithms_of(one.theta))
+
+    found = climb_by(
+        ArrowSteps(),
+        inside,
+        inside.variances(start),
+        max_iterations,
+        decrement,
+        wanted,
+        lambda one: report(by_logarithms(one)),
+    )
     factors = 1.0 / inside.factors(found.theta)
     return replace(
         found,
         theta=inside.logarithms_of(found.theta),
         score=found.score * factors,
         information=found.information.scaled(factors),
-        passes=tuple(replace(one, theta=inside.logarithms_of(one.theta)) for one in found.passes),
+        passes=tuple(by_logarithms(one) for one in found.passes),
     )
 
 

@@ -11,7 +11,7 @@ from starlette.testclient import TestClient
 
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.workbench.web.jobs.keeper import Keeper
-from kempf.workbench.web.jobs.queue import DONE, FAILED, MOST_WAITING, QUEUED, RUNNING, Queue
+from kempf.workbench.web.jobs.queue import DONE, FAILED, MOST_WAITING, QUEUED, RUNNING, Queue, Tick
 from tests.workbench.driving import kempf, tree
 from tests.workbench.web.conftest import OURS, TOKEN, until
 
@@ -41,8 +41,8 @@ def test_jobs_are_taken_in_order_and_end_once(queue: Queue):
     asked = [queue.ask("undo", {"vessel": name}, "") for name in "ab"]
     first = queue.take()
     assert first is not None and (first.id, first.state, first.attempts) == (asked[0].id, RUNNING, 1)
-    queue.tick(first.id, 0, 2, "reading")
-    queue.tick(first.id, 1, 2, "fitting")
+    queue.tick(first.id, [Tick(0, 0, 2, "reading")])
+    queue.tick(first.id, [Tick(0, 1, 2, "fitting")])
     assert [(t.number, t.what) for t in queue.ticks(first.id)] == [(1, "reading"), (2, "fitting")]
     assert [t.number for t in queue.ticks(first.id, after=1)] == [2]
     queue.finish(first.id, {"to": "/"})

@@ -19,6 +19,7 @@ from kempf.flows.process.wrap_error import wrapped
 from kempf.warehouse.store import Warehouse
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import RUNNING, Job, Queue
+from kempf.workbench.web.jobs.ticking import Ticking
 
 _PAUSE_S = 0.1
 #: what a fit needs, and takes seconds to load
@@ -66,14 +67,13 @@ def _work(state: Path, warehouse: Warehouse, job: Job) -> None:
     queue, engine = Queue(state / "jobs.sqlite"), os.getppid()
     # a job outlives no engine: the next one begins it anew, and two would do it at once
     threading.Thread(target=_end_with, args=(engine,), daemon=True).start()
-
-    def progress(done: int, total: int, what: str) -> None:
-        queue.tick(job.id, done, total, what)
-
+    progress = Ticking(queue, job.id)
     try:
         result = KINDS[job.kind].work(warehouse, state, job.arguments, progress)
+        progress.write()
     except Exception as error:  # noqa: BLE001 - the last place where it can be reported
         found = wrapped(error)
+        progress.write()
         if found.code == "internal":
             traceback.print_exception(found, file=sys.stderr)
         queue.fail(job.id, found)

@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from kempf.flows.process.progress import Figures
 from kempf.schemas.errors import KempfError, NotFound, UsageError
 from kempf.warehouse.canonical import canonical_json, sha256
 
@@ -23,16 +24,18 @@ ACTIVE = (QUEUED, RUNNING)
 #: jobs that may wait, and how often one is begun whose process dies
 MOST_WAITING, MOST_ATTEMPTS = 100, 2
 
-_TABLES = """
-CREATE TABLE IF NOT EXISTS jobs (
-    id TEXT PRIMARY KEY, number INTEGER NOT NULL, kind TEXT NOT NULL, arguments TEXT NOT NULL, state TEXT NOT NULL,
-    attempts INTEGER NOT NULL DEFAULT 0, result TEXT, error TEXT
-);
-CREATE TABLE IF NOT EXISTS ticks (
-    job TEXT NOT NULL, number INTEGER NOT NULL, done INTEGER NOT NULL, total INTEGER NOT NULL, what TEXT NOT NULL,
-    PRIMARY KEY (job, number)
-);
-"""
+#: By name, with their columns.
+_TABLES = {
+    "jobs": """(
+        id TEXT PRIMARY KEY, number INTEGER NOT NULL, kind TEXT NOT NULL, arguments TEXT NOT NULL, state TEXT NOT NULL,
+        attempts INTEGER NOT NULL DEFAULT 0, result TEXT, error TEXT
+    )""",
+    "ticks": """(
+        job TEXT NOT NULL, number INTEGER NOT NULL, done INTEGER NOT NULL, total INTEGER NOT NULL, what TEXT NOT NULL,
+        iteration INTEGER, climb INTEGER, log_likelihood REAL, error REAL, fitted INTEGER,
+        PRIMARY KEY (job, number)
+    )""",
+}
 
 
 @dataclass(frozen=True)
@@ -64,6 +67,12 @@ class Tick:
     done: int
     total: int
     what: str
+    #: Of an iteration of a fit; None for anything else.
+    figures: Figures | None = None
+
+    def show(self) -> dict[str, Any]:
+        """Return it as JSON content."""
+        return asdict(self)
 
 
 def job_id(kind: str, arguments: Mapping[str, Any], state: str) -> str:
@@ -90,7 +99,9 @@ class Queue:
         self.path = path
         path.parent.mkdir(parents=True, exist_ok=True)
         with self._connected() as file:
-            file.executescript(_TABLES)
+            file.execute("BEGIN IMMEDIATE")
+            for name, columns in _TABLES.items():
+                _made(file, name, columns)
 
     @contextmanager
     def _connected(self) -> Iterator[sqlite3.Connection]:
@@ -166,7 +177,7 @@ class Queue:
         """Return how far a job was, from a number on that is not among them."""
         with self._connected() as file:
             rows = file.execute("SELECT * FROM ticks WHERE job = ? AND number > ? ORDER BY number", (name, after))
-            return [Tick(row["number"], row["done"], row["total"], row["what"]) for row in rows]
+            return [_tick(row) for row in rows]
 
     def take(self) -> Job | None:
         """Return the job that waits the longest, which runs from now on; None where none waits."""
@@ -177,12 +188,15 @@ class Queue:
             file.execute("UPDATE jobs SET state = ?, attempts = attempts + 1 WHERE id = ?", (RUNNING, row["id"]))
         return self.get(row["id"])
 
-    def tick(self, name: str, done: int, total: int, what: str) -> None:
-        """Write down how far a job is."""
+    def tick(self, name: str, ticks: Sequence[Tick]) -> None:
+        """Write down how far a job is; the ticks are numbered on from those that are there."""
         with self._connected() as file:
-            file.execute(
-                "INSERT INTO ticks SELECT ?, coalesce(max(number), 0) + 1, ?, ?, ? FROM ticks WHERE job = ?",
-                (name, done, total, what, name),
+            file.execute("BEGIN IMMEDIATE")
+            last = file.execute("SELECT coalesce(max(number), 0) FROM ticks WHERE job = ?", (name,)).fetchone()[0]
+            file.executemany(
+                "INSERT INTO ticks (job, number, done, total, what, iteration, climb, log_likelihood, error, fitted) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                [(name, last + k, *_row(tick)) for k, tick in enumerate(ticks, 1)],
             )
 
     def finish(self, name: str, result: Any) -> None:
@@ -252,6 +266,32 @@ def _put(file: sqlite3.Connection, name: str, kind: str, arguments: str) -> None
         "INSERT OR REPLACE INTO jobs (id, number, kind, arguments, state) VALUES (?, ?, ?, ?, ?)",
         (name, number, kind, arguments, QUEUED),
     )
+
+
+def _made(file: sqlite3.Connection, name: str, columns: str) -> None:
+    """Make a table; one of another version goes: what it holds costs time only."""
+    file.execute(f"CREATE TEMP TABLE wanted {columns}")
+    known = "SELECT name FROM pragma_table_info(?)"
+    wanted, there = (file.execute(known, (one,)).fetchall() for one in ("wanted", name))
+    file.execute("DROP TABLE temp.wanted")
+    if [tuple(row) for row in there] != [tuple(row) for row in wanted]:
+        file.execute(f"DROP TABLE IF EXISTS {name}")
+        file.execute(f"CREATE TABLE {name} {columns}")
+
+
+def _row(tick: Tick) -> tuple[Any, ...]:
+    one = tick.figures
+    figures = (None,) * 5 if one is None else (one.iteration, one.climb, one.log_likelihood, one.error, one.fitted)
+    return (tick.done, tick.total, tick.what, *figures)
+
+
+def _tick(row: sqlite3.Row) -> Tick:
+    figures = None
+    if row["iteration"] is not None:
+        figures = Figures(
+            row["iteration"], row["climb"], row["log_likelihood"], row["error"], fitted=bool(row["fitted"])
+        )
+    return Tick(row["number"], row["done"], row["total"], row["what"], figures)
 
 
 def _job(row: sqlite3.Row) -> Job:

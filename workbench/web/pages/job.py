@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import groupby
 from typing import Any
 
 from kempf.flows.fleet.state import fleet_state
@@ -15,6 +16,7 @@ from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import key_of
 from kempf.workbench.web.data.sailed import MANOEUVRES, SIDES, request_of
 from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.draw.climb import draw_climb, in_words
 from kempf.workbench.web.jobs.kinds import KINDS
 from kempf.workbench.web.jobs.queue import ACTIVE, Job
 from kempf.workbench.web.pages.page import Page
@@ -25,11 +27,14 @@ _ACTIONS = ("correct", "exclude", "accept", "add")
 #: letters of a reason
 _MOST_REASON = 2000
 
+#: iterations that the page shows, the last ones
+_MOST = 200
+
 
 def document(desk: Desk, name: str, after: int = 0) -> dict[str, Any]:
     """Return a job and how far it was, from a tick on that is not among them."""
     job = desk.queue.get(name)
-    shown = {**job.show(), "ticks": [vars(tick) for tick in desk.queue.ticks(name, after)]}
+    shown = {**job.show(), "ticks": [tick.show() for tick in desk.queue.ticks(name, after)]}
     if shown["result"] is not None:
         shown["result"] = {"to": f"/jobs/{job.id}", **shown["result"]}
     return shown
@@ -39,7 +44,15 @@ def gather(desk: Desk, name: str) -> Page:
     """Return the page of a job."""
     job = desk.queue.get(name)
     ticks = desk.queue.ticks(name)
-    content = {"job": job, "active": job.state in ACTIVE, "ticks": ticks}
+    # one piece of work ticks many times
+    pieces = [what for what, _ in groupby(tick.what for tick in ticks)]
+    iterations = [(tick.what, tick.figures) for tick in ticks if tick.figures is not None]
+    shown = iterations[-_MOST:]
+    figures = [one for _, one in shown]
+    content = {
+        **{"job": job, "active": job.state in ACTIVE, "ticks": ticks, "pieces": pieces, "iterations": shown},
+        **{"drawn": draw_climb(figures), "sentence": in_words(figures), "most": _MOST},
+    }
     vessel = job.arguments["vessel"]
     return Page("job.html", f"{KINDS[job.kind].title}: {vessel}", content, ((vessel, of_vessel(vessel)),))
 
