@@ -225,8 +225,10 @@ def one_step_error(runs: Sequence[GridRun], innovations: Sequence[Float]) -> flo
     """
     shares = []
     for run, innovation in zip(runs, innovations, strict=True):
-        made = np.isfinite(innovation).any(axis=0)
-        shares.append(np.sqrt(np.nanmean(innovation[:, made] ** 2, axis=0)) / spread(run.measured)[made])
+        motion = spread(run.measured)
+        made = np.isfinite(innovation).any(axis=0) & (motion > 0.0)
+        with np.errstate(over="ignore"):  # of a filter that runs away
+            shares.append(np.sqrt(np.nanmean(innovation[:, made] ** 2, axis=0)) / motion[made])
     every = np.concatenate(shares)
     return float(np.mean(every)) if every.size else np.nan
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tests.late import VESSEL, run, take_in
+from tests.late import VESSEL, run
 from tests.made_once import made_once
 from tests.workbench.driving import kempf
 
@@ -18,15 +18,11 @@ LATE = {"rudder_lag", "dead_time", "rate_limit", "backlash"}
 
 
 @pytest.fixture(scope="module")
-def identified(tmp_path_factory: pytest.TempPathFactory) -> Path:
+def identified(late_ingested: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A ship whose rudder answers late, simulated by a program of its own, with the plain model."""
 
-    def fill(folder: Path) -> None:
-        folder.mkdir()
-        take_in(folder)
-
     def identify(folder: Path) -> None:
-        copytree(made_once(tmp_path_factory, "late", fill), folder)
+        copytree(late_ingested, folder)
         run(folder, "identify", "--vessel", VESSEL)
 
     return made_once(tmp_path_factory, "late_identified", identify)

@@ -17,8 +17,7 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.late import VESSEL, take_in
-from tests.made_once import made_once
+from tests.late import VESSEL
 from tests.workbench.driving import START, environment
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -46,20 +45,9 @@ class Server:
 
 
 @pytest.fixture
-def late(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The log and profile of a ship whose rudder answers late, and a warehouse that holds them, nothing identified."""
-
-    def fill(folder: Path) -> None:
-        folder.mkdir()
-        take_in(folder)
-
-    return made_once(tmp_path_factory, "late", fill)
-
-
-@pytest.fixture
-def server(late: Path, tmp_path: Path) -> Iterator[Server]:
-    """The pages of that ship."""
-    yield from served(copytree(late / "w", tmp_path / "w"), tmp_path / "state")
+def server(late_ingested: Path, tmp_path: Path) -> Iterator[Server]:
+    """The pages of a ship whose rudder answers late, one log, nothing identified yet."""
+    yield from served(copytree(late_ingested / "w", tmp_path / "w"), tmp_path / "state")
 
 
 @pytest.fixture
@@ -106,14 +94,14 @@ def opened(browser: Any, server: Server, **options: Any) -> Any:
     return tab
 
 
-def test_from_the_log_to_the_missing_effect_and_back(browser: Any, empty: Server, late: Path):
+def test_from_the_log_to_the_missing_effect_and_back(browser: Any, empty: Server, late_ingested: Path):
     server = empty
     tab = opened(browser, server)
     tab.goto(server.start)
     assert "token" not in tab.url
     tab.click("main a:has-text('take logs in')")
-    tab.set_input_files("[name=log]", late / "day.mcap")
-    tab.set_input_files("[name=profile]", late / "late.yaml")
+    tab.set_input_files("[name=log]", late_ingested / "day.mcap")
+    tab.set_input_files("[name=profile]", late_ingested / "late.yaml")
     tab.check("[name=new_vessel]")
     tab.click("button:has-text('Take them in')")
     tab.click(f"main a:has-text('Go to {VESSEL}')")
