@@ -141,6 +141,26 @@ def compared(late: Late, tau: dict[str, Any]) -> None:
     assert errors[0] < 0.8 * errors[1]
 
 
+def moved(late: Late, tau: dict[str, Any]) -> None:
+    found = late.json("what-if", NAME, "--vessel", VESSEL, "--set", late.lag)
+    assert (found["value"], found["std"], found["unit"]) == (tau["value"], tau["std"], "s")
+    errors = [one["free_run_error_percent"] for one in found["tried"]]
+    assert len(set(errors)) == len(errors), "each lag is another ship"
+    refused = late.run("what-if", NAME, "--vessel", VESSEL, "--set", late.plain, "--json")
+    assert refused.code == 4 and refused.json["error"]["code"] == "no_parameter"
+
+
+def explained(late: Late, tau: dict[str, Any]) -> None:
+    where = late.json("compare", "--vessel", VESSEL, "--where", "--set", late.plain)["where"]
+    worst = next(one for one in (where["held_out"] or where["fitted"])["worst"] if one["channel"] == "yaw_rate")
+    stretch = ("explain", "--vessel", VESSEL, "--from", worst["start"], "--to", worst["end"])
+    lag, plain = (late.json(*stretch, "--set", one) for one in (late.lag, late.plain))
+    assert lag["beside"] == ["rudder_lag"] and plain["beside"] == []
+    # what the model has is not looked for, and with it the stretch is as a right model leaves it
+    assert "rudder_lag" not in {one["effect"] for one in lag["effects"]}
+    assert lag["times_a_right_model"] < plain["times_a_right_model"]
+
+
 def predicted(late: Late, tau: dict[str, Any]) -> None:
     lag, plain = (
         late.json("predict", "zigzag", "--vessel", VESSEL, "--set", one, "--angles", "15/15")
@@ -178,6 +198,8 @@ CHECKS: dict[tuple[str, ...], Callable[[Late, dict[str, Any]], None]] = {
     ("export", "mcap"): as_mcap,
     ("steer",): steered,
     ("compare",): compared,
+    ("explain",): explained,
+    ("what-if",): moved,
     ("predict",): predicted,
     ("rerun",): built_again,
 }
