@@ -12,7 +12,8 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
-from kempf.pipeline.diagnose.screen import Candidate, nuisance
+from kempf.pipeline.diagnose.nuisance import nuisance
+from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.diagnosis_evidence import AddedVariable

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from kempf.pipeline.diagnose.confirm import Confirmation
+from kempf.pipeline.diagnose.effect_score import cosine_squared
 from kempf.pipeline.diagnose.screen import Candidate
 
 #: share of what one effect explains that another would explain alike, above which they are put to the same test
@@ -15,11 +16,7 @@ WINDOW = 6.0
 
 def alike(candidate: Candidate, other: Candidate) -> float:
     """Return the squared cosine between what two effects would explain, 0 to 1."""
-    a, b = candidate.direction, other.direction
-    if a.size != b.size or not a.size:
-        return 0.0
-    both = float(a @ a) * float(b @ b)
-    return float(a @ b) ** 2 / both if both > 0.0 else 0.0
+    return cosine_squared(candidate.direction, other.direction)
 
 
 def shortlist(candidates: Sequence[Candidate], level: float, count: int) -> list[Candidate]:

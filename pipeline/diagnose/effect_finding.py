@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -88,12 +89,24 @@ def changes(one: Immaterial) -> str:
     )
 
 
+def channels_say(missing: Sequence[str], measured_by: Sequence[str]) -> str:
+    """Say which channels leave an effect out of question; empty where none do.
+
+    Parameters
+    ----------
+    missing, measured_by : sequence of str
+        Channels that it needs and the logs lack, and those that show it already.
+    """
+    if missing:
+        return f"not in the logs: {listed(list(missing))}"
+    return f"the logs have {listed(list(measured_by))}, which measures it already" if measured_by else ""
+
+
 def _untestable(candidate: Candidate) -> str:
     """Say why these data do not determine an effect; empty where they do."""
-    if candidate.missing:
-        return f"not in the logs: {listed(list(candidate.missing))}"
-    if candidate.measured_by:
-        return f"the logs have {listed(list(candidate.measured_by))}, which measures it already"
+    by_channels = channels_say(candidate.missing, candidate.measured_by)
+    if by_channels:
+        return by_channels
     if np.isnan(candidate.score):
         share = _percent(candidate.absorption)
         return f"the model as it is absorbs {share} of it. {candidate.effect.separated_by}"

@@ -17,7 +17,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
 from kempf.pipeline.diagnose.formula_search import Term, search
-from kempf.pipeline.diagnose.screen import Nuisance, nuisance
+from kempf.pipeline.diagnose.nuisance import Nuisance, nuisance
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect, Parameter

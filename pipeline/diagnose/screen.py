@@ -13,20 +13,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
-from itertools import product
 
 import numpy as np
 from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
+from kempf.pipeline.diagnose.effect_score import (
+    NOT_TESTABLE,
+    adjusted,
+    grid,
+    measuring_channels,
+    missing_channels,
+    plausible,
+    solved,
+)
+from kempf.pipeline.diagnose.nuisance import Nuisance, nuisance
 from kempf.pipeline.estimate.iteration import SILENT, Listener
-from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
 from kempf.schemas.effect import Effect
-
-#: share of an effect that the fitted parameters imitate, above which it cannot be tested
-NOT_TESTABLE = 0.999
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,53 +60,6 @@ class Candidate:
     measured_by: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Nuisance:
-    """The innovations of all runs in one column, and an orthonormal basis of what the fitted parameters span."""
-
-    #: Shape (N,).
-    u: Float
-    #: Shape (N, q).
-    basis: Float
-
-    def clean(self, columns: Float) -> Float:
-        """Return columns without what the fitted parameters can imitate, shape (N, c)."""
-        result: Float = columns - self.basis @ (self.basis.T @ columns)
-        return result
-
-
-def nuisance(lines: Sequence[Linearised], shared: int) -> Nuisance:
-    """Return the basis of hull, effects and noise levels of all runs.
-
-    Parameters
-    ----------
-    shared : int
-        How many parameters the runs share; the others are each run's own.
-    """
-    own = [line.J[:, [k for k, i in enumerate(line.index) if i >= shared]] for line in lines]
-    common = [line.J[:, [k for k, i in enumerate(line.index) if i < shared]] for line in lines]
-    # the levels of one run touch no other: their bases stand below each other, and only what is shared meets them all
-    q_own = [_orthonormal(columns) for columns in own]
-    rest = np.concatenate([c - q @ (q.T @ c) for c, q in zip(common, q_own, strict=True)])
-    u = np.concatenate([line.u for line in lines])
-    blocks = np.zeros((u.size, sum(q.shape[1] for q in q_own)))
-    row = column = 0
-    for q in q_own:
-        blocks[row : row + q.shape[0], column : column + q.shape[1]] = q
-        row, column = row + q.shape[0], column + q.shape[1]
-    return Nuisance(u, np.column_stack([blocks, _orthonormal(rest)]))
-
-
-def _orthonormal(columns: Float) -> Float:
-    norm = np.linalg.norm(columns, axis=0)
-    kept = columns[:, norm > 0.0] / norm[norm > 0.0]
-    if not kept.shape[1]:
-        return np.zeros((columns.shape[0], 0))
-    left, singular, _ = np.linalg.svd(kept, full_matrices=False)
-    basis: Float = left[:, singular > 1e-9 * singular[0]]
-    return basis
-
-
 def screen(
     base: PooledFit, effects: Mapping[str, Effect], workers: Executor, listener: Listener = SILENT
 ) -> list[Candidate]:
@@ -121,19 +80,9 @@ def screen(
     chosen = [effect for effect in effects.values() if effect.name not in present]
     known = nuisance(base.linearised, N_HULL + len(base.model.names))
     scored = _scored(base, known, chosen, workers, listener)
-    adjusted = _adjusted([candidate.p_value for candidate in scored])
-    scored = [replace(candidate, p_adjusted=p) for candidate, p in zip(scored, adjusted, strict=True)]
+    raised = adjusted([candidate.p_value for candidate in scored])
+    scored = [replace(candidate, p_adjusted=p) for candidate, p in zip(scored, raised, strict=True)]
     return sorted(scored, key=lambda candidate: (-np.nan_to_num(candidate.score, nan=-1.0), candidate.effect.name))
-
-
-def _missing_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
-    """Return the channels that an effect needs and some of the runs lack."""
-    return tuple(c for c in effect.needs if any(c not in filtered.run.channels for filtered in base.runs))
-
-
-def _measuring_channels(base: PooledFit, effect: Effect) -> tuple[str, ...]:
-    """Return the channels that show an effect already in every run."""
-    return tuple(c for c in effect.measured_by if all(c in filtered.run.channels for filtered in base.runs))
 
 
 def score(base: PooledFit, effect: Effect, workers: Executor) -> Candidate:
@@ -148,7 +97,7 @@ def _scored(
     nothing = [_untested(base, effect) for effect in effects]
     # what a channel shows already is in the inputs: scored beside them it would imitate something else
     tried = [candidate.effect for candidate in nothing if not (candidate.missing or candidate.measured_by)]
-    trials = [EffectTrial(effect, steps) for effect in tried for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in tried for steps in grid(effect)]
     columns = responses(base, trials, workers, listener)
     moved = {(trial.effect.name, trial.steps): column for trial, column in zip(trials, columns, strict=True)}
     return list(workers.map(lambda candidate: _best(known, candidate, moved), nothing))
@@ -156,7 +105,7 @@ def _scored(
 
 def _untested(base: PooledFit, effect: Effect) -> Candidate:
     unknown = np.full(len(effect.parameters), np.nan)
-    missing, measured_by = _missing_channels(base, effect), _measuring_channels(base, effect)
+    missing, measured_by = missing_channels(base, effect), measuring_channels(base, effect)
     return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, np.nan, missing, np.zeros(0), (), measured_by)
 
 
@@ -165,7 +114,7 @@ def _best(
 ) -> Candidate:
     """Return an effect at the point of its grid where it explains most, or untested where there is none."""
     best, tries = nothing, 0
-    for steps in _grid(nothing.effect):
+    for steps in grid(nothing.effect):
         columns = moved.get((nothing.effect.name, steps))
         if columns is None:
             continue
@@ -177,12 +126,6 @@ def _best(
     return replace(best, p_value=min(1.0, max(tries, 1) * best.p_value))
 
 
-def _grid(effect: Effect) -> list[tuple[float, ...]]:
-    """Return the points at which an effect is tried: its first parameter and those of shape over all their steps."""
-    choices = [p.steps if k == 0 or p.shapes else p.steps[:1] for k, p in enumerate(effect.parameters)]
-    return list(product(*choices))
-
-
 def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float, ...]) -> Candidate:
     clean = known.clean(columns)
     before, after = float(np.sum(columns**2)), float(np.sum(clean**2))
@@ -190,45 +133,16 @@ def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float,
     unknown = np.full(len(effect.parameters), np.nan)
     if absorption > NOT_TESTABLE or before == 0.0 or np.any(np.sum(clean**2, axis=0) == 0.0):
         return Candidate(effect, np.nan, 1.0, 1.0, unknown, unknown, absorption, (), np.zeros(0), steps)
-    information = clean.T @ clean
-    scale = np.sqrt(np.diag(information))
-    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-9, hermitian=True) / np.outer(scale, scale)
-    gradient = clean.T @ known.u
-    estimate = inverse @ gradient
-    score = float(gradient @ estimate)
-    made = np.array([not p.shapes for p in effect.parameters])
-    change, std = np.array(steps, dtype=np.float64), unknown.copy()
-    change[made], std[made] = estimate, np.sqrt(np.diag(inverse))
+    found = solved(clean, known.u, effect, steps)
     return Candidate(
         effect=effect,
-        score=score,
-        p_value=float(chi2.sf(score, estimate.size)) if _plausible(effect, change) else 1.0,
+        score=found.score,
+        p_value=float(chi2.sf(found.score, found.estimate.size)) if plausible(effect, found.change) else 1.0,
         p_adjusted=1.0,
-        change=change,
-        std=std,
+        change=found.change,
+        std=found.std,
         absorption=absorption,
         missing=(),
-        direction=clean @ estimate,
+        direction=clean @ found.estimate,
         steps=steps,
     )
-
-
-def _plausible(effect: Effect, change: Float) -> bool:
-    """Tell whether the change goes where the effect can be at all: a rudder cannot answer before it moves."""
-    inside = [np.clip(x, p.low, p.high) for x, p in zip(change, effect.parameters, strict=True)]
-    return any(x != 0.0 for x, p in zip(inside, effect.parameters, strict=True) if not p.shapes)
-
-
-def _adjusted(p_values: Sequence[float]) -> list[float]:
-    """Adjust p-values for their number under any dependence (Benjamini & Yekutieli 2001, Annals of Statistics 29)."""
-    p = np.asarray(p_values)
-    if not p.size:
-        return []
-    order = np.argsort(p, kind="stable")
-    m = p.size
-    harmonic = float(np.sum(1.0 / np.arange(1, m + 1)))
-    raised = p[order] * m * harmonic / np.arange(1, m + 1)
-    smallest = np.minimum(1.0, np.minimum.accumulate(raised[::-1])[::-1])
-    result = np.empty(m)
-    result[order] = smallest
-    return [float(x) for x in result]

@@ -13,16 +13,25 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
-from itertools import product
+from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2, false_discovery_control
+from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confusion_sets import ALIKE
 from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
-from kempf.pipeline.diagnose.screen import NOT_TESTABLE
+from kempf.pipeline.diagnose.effect_score import (
+    NOT_TESTABLE,
+    Solved,
+    adjusted,
+    cosine_squared,
+    grid,
+    measuring_channels,
+    missing_channels,
+    plausible,
+    solved,
+)
 from kempf.pipeline.diagnose.stretch_rows import Rows, rows_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.search.scoring import Mask
@@ -33,24 +42,14 @@ FEWEST = 20
 
 
 @dataclass(frozen=True, eq=False)
-class Sized:
-    """Score of an effect and its size after one step of the search."""
-
-    #: NaN where the rows say nothing of it.
-    score: float
-    #: change, std: Shape (p,). In the units of the parameters; of a shape the value at which it was tried, std NaN.
-    change: Float
-    std: Float
-
-
-@dataclass(frozen=True, eq=False)
 class StretchEffect:
     """One effect against a stretch."""
 
     effect: Effect
-    here: Sized
+    #: Of the stretch; NaN where its rows say nothing of it.
+    here: Solved
     #: By all fitted manoeuvres.
-    everywhere: Sized
+    everywhere: Solved
     #: p_value, p_adjusted: Of the score here; the second by Benjamini & Yekutieli (2001) over all that were tested.
     p_value: float
     p_adjusted: float
@@ -62,7 +61,7 @@ class StretchEffect:
     missing: tuple[str, ...] = ()
     measured_by: tuple[str, ...] = ()
     #: Shape (2 m,). What it would explain of the rows, free of correlation.
-    direction: Float | None = None
+    direction: Float = field(default_factory=lambda: np.zeros(0))
     #: Names of effects that would explain the stretch in the same way.
     alike: tuple[str, ...] = ()
 
@@ -116,8 +115,8 @@ def explain(
         Effects share it; nothing depends on it.
     """
     rows = rows_of(base, fitted, number, inside)
-    left = rows.left(rows.all_rows(base))
-    about_mean = left[: left.size // 2]
+    errors = rows.left(rows.all_rows(base))
+    about_mean = errors[: errors.size // 2]
     square, count = float(about_mean @ about_mean), about_mean.size
     whole = sum(int(np.isfinite(one.run.measured).any(axis=1).sum()) for one in base.runs)
     nothing = Explained(
@@ -133,34 +132,34 @@ def explain(
     present = {effect.name for effect in base.model.effects}
     untested = [_untested(base, effect) for effect in effects.values() if effect.name not in present]
     tried = [one.effect for one in untested if not (one.missing or one.measured_by)]
-    trials = [EffectTrial(effect, steps) for effect in tried for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in tried for steps in grid(effect)]
     moved: dict[str, list[tuple[EffectTrial, Float]]] = {}
     for trial, columns in zip(trials, responses(base, trials, workers), strict=True):
         if columns is not None:
             moved.setdefault(trial.effect.name, []).append((trial, columns))
-    u = rows.all_rows(base)
-    found = list(workers.map(lambda one: _best(rows, u, one, moved.get(one.effect.name, [])), untested))
+    free = rows.whitened(errors)
+
+    def tested(one: StretchEffect) -> StretchEffect:
+        every = moved.get(one.effect.name, [])
+        return _best(one, [_tested(rows, errors, free, trial, columns) for trial, columns in every])
+
+    found = list(workers.map(tested, untested))
     return replace(nothing, effects=_ranked(found))
 
 
 def _untested(base: PooledFit, effect: Effect) -> StretchEffect:
-    have = [filtered.run.channels for filtered in base.runs]
-    unknown = np.full(len(effect.parameters), np.nan)
-    none = Sized(np.nan, unknown, unknown)
-    missing = tuple(c for c in effect.needs if any(c not in channels for channels in have))
-    shown = tuple(c for c in effect.measured_by if all(c in channels for channels in have))
+    none = _unknown(effect)
+    missing, shown = missing_channels(base, effect), measuring_channels(base, effect)
     return StretchEffect(effect, none, none, 1.0, 1.0, 0.0, np.nan, missing, shown)
 
 
-def _grid(effect: Effect) -> list[tuple[float, ...]]:
-    """Return the points at which an effect is tried, as the screen of a diagnosis does."""
-    choices = [p.steps if k == 0 or p.shapes else p.steps[:1] for k, p in enumerate(effect.parameters)]
-    return list(product(*choices))
+def _unknown(effect: Effect) -> Solved:
+    unknown = np.full(len(effect.parameters), np.nan)
+    return Solved(np.nan, np.zeros(0), unknown, unknown)
 
 
-def _best(rows: Rows, u: Float, nothing: StretchEffect, moved: Sequence[tuple[EffectTrial, Float]]) -> StretchEffect:
+def _best(nothing: StretchEffect, tested: Sequence[StretchEffect]) -> StretchEffect:
     """Return an effect at the point of its grid where it explains most of the stretch."""
-    tested = [_tested(rows, u, trial, columns) for trial, columns in moved]
     if not tested:
         return nothing
     best = min(tested, key=lambda one: (one.p_value, -np.nan_to_num(one.here.score, nan=-1.0)))
@@ -168,70 +167,54 @@ def _best(rows: Rows, u: Float, nothing: StretchEffect, moved: Sequence[tuple[Ef
     return replace(best, p_value=min(1.0, len(tested) * best.p_value))
 
 
-def _tested(rows: Rows, u: Float, trial: EffectTrial, columns: Float) -> StretchEffect:
+def _tested(rows: Rows, errors: Float, free: Float, trial: EffectTrial, columns: Float) -> StretchEffect:
+    """Score one trial.
+
+    Parameters
+    ----------
+    errors, free : ndarray, shape (2 m,)
+        Innovations of the stretch without what the fitted parameters imitate, and these free of correlation.
+    columns : ndarray, shape (N, c)
+        What the effect does to all manoeuvres.
+    """
     effect, steps = trial.effect, trial.steps
-    left, errors = rows.left(columns), rows.left(u)
-    own, free = rows.of_stretch(columns), rows.whitened(left)
-    before, after = float(np.sum(own**2)), float(np.sum(free**2))
+    left = rows.left(columns)
+    own, seen = rows.of_stretch(columns), rows.whitened(left)
+    before, after = float(np.sum(own**2)), float(np.sum(seen**2))
     absorption = 1.0 - min(1.0, after / before) if before > 0.0 else 1.0
-    everywhere, _ = _sized(rows.known.clean(columns[: rows.known.u.size]), rows.known.u, effect, steps)
-    if absorption > NOT_TESTABLE or np.any(np.sum(free**2, axis=0) == 0.0):
-        unknown = np.full(len(effect.parameters), np.nan)
-        return StretchEffect(effect, Sized(np.nan, unknown, unknown), everywhere, 1.0, 1.0, 0.0, absorption)
-    here, estimate = _sized(free, rows.whitened(errors), effect, steps)
+    fitted = rows.known.clean(columns[: rows.known.u.size])
+    everywhere = solved(fitted, rows.known.u, effect, steps) if _is_all_seen(fitted) else _unknown(effect)
+    if absorption > NOT_TESTABLE or not _is_all_seen(seen):
+        return StretchEffect(effect, _unknown(effect), everywhere, 1.0, 1.0, 0.0, absorption)
+    here = solved(seen, free, effect, steps)
     half = errors.size // 2
-    rest = errors[:half] - (left @ estimate)[:half]
+    rest = errors[:half] - (left @ here.estimate)[:half]
     square = float(errors[:half] @ errors[:half])
     return StretchEffect(
         effect=effect,
         here=here,
         everywhere=everywhere,
-        p_value=float(chi2.sf(here.score, estimate.size)) if _plausible(effect, here.change) else 1.0,
+        p_value=float(chi2.sf(here.score, here.estimate.size)) if plausible(effect, here.change) else 1.0,
         p_adjusted=1.0,
         explained=1.0 - float(rest @ rest) / square if square > 0.0 else 0.0,
         absorption=absorption,
-        direction=free @ estimate,
+        direction=seen @ here.estimate,
     )
 
 
-def _sized(columns: Float, errors: Float, effect: Effect, steps: tuple[float, ...]) -> tuple[Sized, Float]:
-    """Return score and size by least squares, and the estimate of what makes the effect."""
-    change, std = np.array(steps, dtype=np.float64), np.full(len(steps), np.nan)
-    information = columns.T @ columns
-    scale = np.sqrt(np.diag(information))
-    if np.any(scale == 0.0):
-        return Sized(np.nan, np.full(len(steps), np.nan), std), np.zeros(columns.shape[1])
-    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-9, hermitian=True) / np.outer(scale, scale)
-    gradient = columns.T @ errors
-    estimate: Float = inverse @ gradient
-    made = np.array([not p.shapes for p in effect.parameters])
-    change[made], std[made] = estimate, np.sqrt(np.diag(inverse))
-    return Sized(float(gradient @ estimate), change, std), estimate
-
-
-def _plausible(effect: Effect, change: Float) -> bool:
-    """Tell whether the change goes where the effect can be at all: a rudder cannot answer before it moves."""
-    inside = [np.clip(x, p.low, p.high) for x, p in zip(change, effect.parameters, strict=True)]
-    return any(x != 0.0 for x, p in zip(inside, effect.parameters, strict=True) if not p.shapes)
+def _is_all_seen(columns: Float) -> bool:
+    return bool(np.all(np.sum(columns**2, axis=0) > 0.0))
 
 
 def _ranked(found: Sequence[StretchEffect]) -> tuple[StretchEffect, ...]:
     """Return effects with their p-values adjusted for their number, the least likely to be nothing first."""
     tested = [one for one in found if np.isfinite(one.here.score)]
-    adjusted = false_discovery_control([one.p_value for one in tested], method="by") if tested else []
-    tested = [replace(one, p_adjusted=float(p)) for one, p in zip(tested, adjusted, strict=True)]
+    raised = adjusted([one.p_value for one in tested])
+    tested = [replace(one, p_adjusted=p) for one, p in zip(tested, raised, strict=True)]
     tested.sort(key=lambda one: (one.p_value == 1.0, -one.here.score, one.effect.name))
     rest = sorted((one for one in found if not np.isfinite(one.here.score)), key=lambda one: one.effect.name)
     return (*(replace(one, alike=_alike(one, tested)) for one in tested), *rest)
 
 
 def _alike(one: StretchEffect, others: Sequence[StretchEffect]) -> tuple[str, ...]:
-    return tuple(o.effect.name for o in others if o is not one and _cosine_squared(one, o) > ALIKE)
-
-
-def _cosine_squared(one: StretchEffect, other: StretchEffect) -> float:
-    a, b = one.direction, other.direction
-    if a is None or b is None:
-        return 0.0
-    both = float(a @ a) * float(b @ b)
-    return float(a @ b) ** 2 / both if both > 0.0 else 0.0
+    return tuple(o.effect.name for o in others if o is not one and cosine_squared(one.direction, o.direction) > ALIKE)

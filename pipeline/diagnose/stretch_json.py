@@ -6,9 +6,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from kempf.pipeline.diagnose.effect_finding import POWER
+from kempf.pipeline.diagnose.effect_finding import POWER, channels_say
+from kempf.pipeline.diagnose.effect_score import Solved
 from kempf.pipeline.diagnose.settings import STANDARD
-from kempf.pipeline.diagnose.stretch import FEWEST, Explained, Sized, StretchEffect
+from kempf.pipeline.diagnose.stretch import FEWEST, Explained, StretchEffect
 from kempf.schemas.enumeration import listed
 
 #: p-value below which the stretch as a whole is worse than a right model leaves it
@@ -47,10 +48,9 @@ def _standing_out(found: Explained) -> list[StretchEffect]:
 
 def why_not_testable(one: StretchEffect) -> str:
     """Say why a stretch tells nothing of an effect; empty where it does."""
-    if one.missing:
-        return f"not in the logs: {listed(list(one.missing))}"
-    if one.measured_by:
-        return f"the logs have {listed(list(one.measured_by))}, which measures it already"
+    by_channels = channels_say(one.missing, one.measured_by)
+    if by_channels:
+        return by_channels
     if not np.isfinite(one.here.score):
         share = "" if np.isnan(one.absorption) else f", which absorbs {100.0 * one.absorption:.4g} % of it"
         return f"the stretch does not distinguish it from the model as it is{share}"
@@ -93,7 +93,7 @@ def _of_misfit(found: Explained, one: StretchEffect) -> float | None:
     return float(np.clip(one.explained / found.beyond, 0.0, 1.0))
 
 
-def _size(one: StretchEffect, sized: Sized) -> dict[str, dict[str, Any]]:
+def _size(one: StretchEffect, sized: Solved) -> dict[str, dict[str, Any]]:
     return {
         p.name: {"value": _number(value), "std": _number(std), "unit": p.unit}
         for p, value, std in zip(one.effect.parameters, sized.change, sized.std, strict=True)

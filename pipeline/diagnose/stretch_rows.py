@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.screen import Nuisance, nuisance
+from kempf.pipeline.diagnose.nuisance import Nuisance, columns_of, nuisance, orthonormal, without_levels
 from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
 from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.estimate.sensitivity import N_HULL
@@ -106,41 +106,22 @@ def rows_of(base: PooledFit, fitted: Sequence[bool], number: int, inside: Mask) 
     if fitted[number]:
         basis = known.basis[at]
         return Rows(known, at, instants, None, *_whitening(basis, -np.ones(basis.shape[1])))
-    apart = _apart(lines, line, known, shared)
+    apart = _apart(lines, line, shared)
     parts = [part[at - first] for part in (apart.levels, apart.without_levels(apart.shared))]
     signs = np.concatenate([-np.ones(parts[0].shape[1]), np.ones(parts[1].shape[1])])
     return Rows(known, at, instants, apart, *_whitening(np.column_stack(parts), signs))
 
 
-def _apart(lines: Sequence[Linearised], line: Linearised, known: Nuisance, shared: int) -> Apart:
+def _apart(lines: Sequence[Linearised], line: Linearised, shared: int) -> Apart:
     """Return what the fitted manoeuvres say of the parameters that another one shares with them."""
-    common, levels = _columns(line, shared)
-    others = np.concatenate([_columns(one, shared)[0] - _spanned(*_columns(one, shared)) for one in lines])
+    common, levels = columns_of(line, shared)
+    _, others = without_levels(lines, shared)
     norm = np.linalg.norm(others, axis=0)
     used = norm > 0.0
     left, singular, right = np.linalg.svd(others[:, used] / norm[used], full_matrices=False)
     kept = singular > _NOTHING * singular[0]
     factor = (right[kept].T / singular[kept]) / norm[used][:, None]
-    return Apart(common[:, used] @ factor, left[:, kept], _basis(levels))
-
-
-def _columns(line: Linearised, shared: int) -> tuple[Float, Float]:
-    """Return the columns of the shared parameters and of a run's own."""
-    place = np.array(line.index)
-    return line.J[:, place < shared], line.J[:, place >= shared]
-
-
-def _spanned(common: Float, own: Float) -> Float:
-    basis = _basis(own)
-    result: Float = basis @ (basis.T @ common)
-    return result
-
-
-def _basis(columns: Float) -> Float:
-    """Return an orthonormal basis of what columns span."""
-    norm = np.linalg.norm(columns, axis=0)
-    basis: Float = np.linalg.qr(columns[:, norm > 0.0] / norm[norm > 0.0])[0]
-    return basis
+    return Apart(common[:, used] @ factor, left[:, kept], orthonormal(levels))
 
 
 def _whitening(parts: Float, signs: Float) -> tuple[Float, Float]:

@@ -7,8 +7,8 @@ import pytest
 
 from kempf.pipeline.diagnose import effect_responses
 from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
+from kempf.pipeline.diagnose.effect_score import grid
 from kempf.pipeline.diagnose.ridge_reference import TERMS
-from kempf.pipeline.diagnose.screen import _grid
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise
 from kempf.pipeline.estimate.sensitivity import Point, passed
@@ -42,7 +42,7 @@ def alone(base: PooledFit, trial: EffectTrial) -> np.ndarray | None:
 
 def test_together_is_as_alone(base: PooledFit) -> None:
     chosen = [effect for effect in catalogue().values() if effect.name != "sway_quadratic"]
-    trials = [EffectTrial(effect, steps) for effect in [*chosen[::3], *TERMS[:9]] for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in [*chosen[::3], *TERMS[:9]] for steps in grid(effect)]
     found = responses(base, trials, WORKERS)
     assert max(map(len, effect_responses._bundles(trials))) > 5
     for trial, together in zip(trials, found, strict=True):
@@ -61,7 +61,7 @@ def test_together_is_as_alone(base: PooledFit) -> None:
 
 
 def test_no_bundle_is_wider_than_the_lanes_and_none_is_lost() -> None:
-    trials = [EffectTrial(effect, steps) for effect in catalogue().values() for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in catalogue().values() for steps in grid(effect)]
     bundles = effect_responses._bundles(trials)
     assert sorted(i for bundle in bundles for i in bundle) == list(range(len(trials)))
     for bundle in bundles:
@@ -72,6 +72,6 @@ def test_one_that_is_no_number_takes_no_other_with_it(base: PooledFit) -> None:
     size = Parameter(name="c", unit="1", low=-1.0, high=1.0, steps=(0.01,), meaning="size")
     wild = Effect(name="wild", plain="wild", reference="none", parameters=(size,), terms={"yaw": "c/(r-r)"})
     tame = catalogue()["yaw_quadratic"]
-    trials = [EffectTrial(effect, steps) for effect in (wild, tame) for steps in _grid(effect)]
+    trials = [EffectTrial(effect, steps) for effect in (wild, tame) for steps in grid(effect)]
     first, *others = responses(base, trials, WORKERS)
     assert first is None and all(one is not None for one in others)
