@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Any
@@ -102,17 +101,13 @@ def explain_stretch(
         found = explain(
             base,
             [not one.held_out for one in runs],
-            _place(runs, run),
+            runs.index(run),
             (start_utc_ns <= time) & (time <= end_utc_ns),
             known,
             workers,
         )
     progress(1, 1, "scored")
     return ExplainedStretch(vessel, hers.parameter_set, run, start_utc_ns, end_utc_ns, found)
-
-
-def _place(runs: Sequence[BoundRun], run: BoundRun) -> int:
-    return next(k for k, one in enumerate(runs) if one is run)
 
 
 def _run_of(hers: BoundRuns, start_utc_ns: int, end_utc_ns: int) -> BoundRun:

@@ -139,6 +139,12 @@ def what_if(
     step = _STEP * std if std is not None else _SHARE * abs(one.value) or 1e-6
     moves = np.arange(-_SIDE, _SIDE + 1)
     here = _log_likelihood(hers, place, 0.0)
+    if not np.isfinite(here):
+        raise DataRejected(
+            "prediction_diverges",
+            f"{hers.parameter_set.parameter_set_id} itself runs away on the manoeuvres of {vessel!r}.",
+            "Choose another set with --set.",
+        )
     tried = []
     for done, move in enumerate(moves.tolist()):
         progress(done, moves.size, f"{parameter} at {one.value + move * step:.4g}")
@@ -155,12 +161,6 @@ def what_if(
             )
         )
     progress(moves.size, moves.size, "tried")
-    if not np.isfinite(here):
-        raise DataRejected(
-            "prediction_diverges",
-            f"{hers.parameter_set.parameter_set_id} itself runs away on the manoeuvres of {vessel!r}.",
-            "Choose another set with --set.",
-        )
     return WhatIf(vessel, hers.parameter_set, parameter, one.unit, one.value, std, run, tuple(tried))
 
 

@@ -12,6 +12,7 @@ from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
 from kempf.workbench.cli.ladder import print_rungs
 from kempf.workbench.cli.options import json_option, verbose_option, vessel_option, warehouse_option
+from kempf.workbench.documents.tried import refits
 from kempf.workbench.ranked_warnings import show_warnings
 from kempf.workbench.terminal import number, print_json, print_note, print_table, progress_bar
 
@@ -44,18 +45,14 @@ def try_formula(formula: str, vessel: str, name: str, uri: str, as_json: bool) -
 
 def _print_candidate(document: Mapping[str, Any]) -> None:
     (candidate,) = document["candidates"]
-    found = [*document["sets"], *document["immaterial"], *document["stand_ins"]]
-    refits = [r for one in found for r in one["refits"]] + document["refused"]
     click.echo(click.style(f"{document['formula']} on {document['vessel']}", bold=True))
     click.echo(f"  score {number(candidate['score'])}, p = {number(candidate['p_adjusted'], 2)}")
     click.echo(f"  absorbed by the model as it is: {number(candidate['absorption'])}")
-    for one in refits:
+    for one in refits(document):
         for parameter, value in one["parameters"].items():
             shown = f"  {parameter} = {number(value['value'])} ± {number(value['std'], 2)} {value['unit']}"
             click.echo(shown.rstrip())
-        gains = [*one["gains_left_out"], *one["gains_held_out"]]
-        better = sum(g > 0 for g in gains)
-        click.echo(f"  refitted: BIC {number(one['bic_change'], 3)}, {better} of {len(gains)} manoeuvres better")
+        click.echo(f"  refitted: BIC {number(one['bic_change'], 3)}, {one['better']} of {one['of']} manoeuvres better")
     kept = bool(document["sets"])
     if document["immaterial"]:
         click.echo(f"  it holds, but is immaterial: {candidate['why']}")

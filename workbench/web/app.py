@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
@@ -58,6 +58,7 @@ _STATUS_OF_CODE = {
     "job_over": 409,
     "upload_too_large": 413,
 }
+Fields = Mapping[str, str]
 #: bytes that a form may have
 _MOST_FORM = 16_384
 
@@ -93,6 +94,15 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
         if gather is not None:
             app.add_route(path, lambda r: _shown(r, gather(r)))
 
+    def serve_answer(
+        place: str, gather: Callable[[Desk, str, Fields], Page], document: Callable[[Desk, str, Fields], Any]
+    ) -> None:
+        serve(
+            f"/v/{{vessel}}/{place}",
+            lambda r: gather(desk, hers(r), r.query_params),
+            lambda r: document(desk, hers(r), r.query_params),
+        )
+
     def named(key: str) -> Callable[[Request], str]:
         return lambda request: str(request.path_params[key])
 
@@ -108,21 +118,8 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
         lambda r: model.gather(desk, hers(r), *(r.query_params.get(name) for name in ("set", "h", "run", "beside"))),
         lambda r: model.document(desk, hers(r), r.query_params.get("set"), r.query_params.get("h")),
     )
-    serve(
-        "/v/{vessel}/predict",
-        lambda r: predict.gather(desk, hers(r), r.query_params),
-        lambda r: predict.document(desk, hers(r), r.query_params),
-    )
-    serve(
-        "/v/{vessel}/explain",
-        lambda r: explain.gather(desk, hers(r), r.query_params),
-        lambda r: explain.document(desk, hers(r), r.query_params),
-    )
-    serve(
-        "/v/{vessel}/what-if",
-        lambda r: what_if.gather(desk, hers(r), r.query_params),
-        lambda r: what_if.document(desk, hers(r), r.query_params),
-    )
+    for place, page in (("predict", predict), ("explain", explain), ("what-if", what_if)):
+        serve_answer(place, page.gather, page.document)
     serve("/compare", lambda r: compare.gather(desk, *_both(r)), lambda r: compare.document(desk, *_both(r)))
     app.add_route("/logs/{log_id}/series", lambda r: _series(desk, r))
     serve("/logs/{log_id}", lambda r: log.gather(desk, log_id(r), *_window(r)), lambda r: log.document(desk, log_id(r)))

@@ -8,10 +8,10 @@ from typing import Any
 
 from jinja2 import Environment, PackageLoader, StrictUndefined
 
+from kempf.workbench.documents.tried import refits
 from kempf.workbench.terminal import number
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.pages.corrections import as_asked, undoing
-from kempf.workbench.web.pages.tried import refits
 
 
 def rendered(template: str, **content: Any) -> str:

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from kempf.flows.fleet.state import fleet_state, responsible_code
+from kempf.flows.fleet.state import VesselState, responsible_code
 from kempf.pipeline.channels.series import Float, Nanoseconds
 from kempf.warehouse.canonical import canonical_json, sha256
-from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
@@ -39,11 +38,10 @@ class KeptPrediction:
         return self.columns[segment_id]["time_utc_ns"].astype(np.int64)
 
 
-def key_of(warehouse: Warehouse, vessel: str, set_id: str, horizon: str) -> str:
-    """Return what a prediction is kept under: other logs, corrections or code have another."""
-    state = fleet_state(warehouse, [vessel])[vessel]
+def key_of(state: VesselState, set_id: str, horizon: str) -> str:
+    """Return what a prediction of a vessel is kept under: other logs, corrections or code have another."""
     rests_on = [*state.inputs, state.ingest_ids, responsible_code()]
-    return sha256(canonical_json([vessel, set_id, horizon, rests_on]))[:24]
+    return sha256(canonical_json([state.vessel, set_id, horizon, rests_on]))[:24]
 
 
 def keep(state: Path, key: str, found: Comparison) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, cast, get_args
 
 from kempf.flows.jobs.predict_request import Kind, PredictRequest, required
 from kempf.schemas.errors import UsageError
+from kempf.workbench.web.numbers import number_of
 
 if TYPE_CHECKING:
     from kempf.pipeline.manoeuvre.prediction import Prediction
@@ -41,7 +42,7 @@ def request_of(asked: Mapping[str, Any]) -> PredictRequest:
         )
     if side not in SIDES:
         raise UsageError("side_unknown", f"{side[:40]!r} is no side.", "Choose starboard or port.")
-    rudder, speed = _number(asked["rudder"], "rudder"), _number(asked["speed"], "speed")
+    rudder, speed = number_of(asked["rudder"], "rudder"), number_of(asked["speed"], "speed")
     angles = angles_of(asked["angles"] or "20/20")
     request = PredictRequest(cast(Kind, kind), asked["set"] or None, rudder, angles, cast(Any, side), speed)
     required(request)
@@ -67,17 +68,6 @@ def angles_of(text: str) -> tuple[float, float]:
             "angles_unreadable", f"{text[:60]!r} is no pair of angles.", "Give heading and rudder, such as 20/20."
         )
     return float(found[1]), float(found[2])
-
-
-def _number(text: str, of: str) -> float | None:
-    if not text.strip():
-        return None
-    try:
-        return float(text[:40])
-    except ValueError:
-        raise UsageError(
-            "number_unreadable", f"{text[:40]!r} is no {of}.", "Give a number, or leave the field blank."
-        ) from None
 
 
 def curves_of(made: Prediction) -> dict[str, list[list[list[float]]]]:

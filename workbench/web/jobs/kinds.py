@@ -38,16 +38,18 @@ def _keep_predictions(
     warehouse: Warehouse, state: Path, vessel: str, name: str, progress: Progress, asked: str | None = None
 ) -> None:
     """Keep what a set predicts at every horizon; one that is too long for the runs is left out, unless asked for."""
+    from kempf.flows.fleet.state import fleet_state
     from kempf.flows.jobs.bound_runs import bound
     from kempf.flows.jobs.compare_vessel import compared
     from kempf.pipeline.predict.horizon import horizon_of
     from kempf.workbench.web.data.predictions import HORIZONS, keep, key_of
 
+    rests_on = fleet_state(warehouse, [vessel])[vessel]
     hers = bound(warehouse, vessel, name, progress)
     every = dict.fromkeys((*([asked] if asked else []), *(horizon_of(short).name for short, _ in HORIZONS)))
     for horizon in every:
         try:
-            keep(state, key_of(warehouse, vessel, name, horizon), compared(hers, horizon_of(horizon), progress))
+            keep(state, key_of(rests_on, name, horizon), compared(hers, horizon_of(horizon), progress))
         except DataRejected:
             if horizon == asked:
                 raise

@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from kempf.flows.fleet.state import fleet_state
 from kempf.flows.jobs.chosen_set import named_set
 from kempf.flows.jobs.out_of_date import said_of_sets
 from kempf.warehouse import aliases, vessels
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.workbench.documents.compared_sets import compared_sets
-from kempf.workbench.web.data.predictions import KeptPrediction, kept, key_of
+from kempf.workbench.web.data.predictions import kept, key_of
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.differences import draw_differences
 from kempf.workbench.web.pages.page import Page
@@ -79,7 +80,9 @@ def _inputs(one: ParameterSet, other: ParameterSet) -> Iterator[tuple[str, Any, 
 
 def _runs(desk: Desk, one: ParameterSet, other: ParameterSet) -> dict[str, Any]:
     """Return how both predict the same manoeuvres freely, and which of the two predictions are not made yet."""
-    found = {each.parameter_set_id: _kept(desk, each) for each in (one, other)}
+    state = fleet_state(desk.warehouse, [one.vessel])[one.vessel]
+    names = (one.parameter_set_id, other.parameter_set_id)
+    found = {name: kept(desk.state, key_of(state, name, _HORIZON)) for name in names}
     lacking = [name for name, made in found.items() if made is None]
     if lacking:
         return {"lacking": lacking, "rows": []}
@@ -91,7 +94,3 @@ def _runs(desk: Desk, one: ParameterSet, other: ParameterSet) -> dict[str, Any]:
         for name in sorted(first.keys() & second.keys(), key=lambda name: str(first[name]["start"]))
     ]
     return {"lacking": [], "rows": rows}
-
-
-def _kept(desk: Desk, each: ParameterSet) -> KeptPrediction | None:
-    return kept(desk.state, key_of(desk.warehouse, each.vessel, each.parameter_set_id, _HORIZON))

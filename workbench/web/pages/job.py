@@ -80,16 +80,17 @@ def ask(desk: Desk, form: Mapping[str, str]) -> Job:
 def settled(desk: Desk, kind: str, vessel: str, form: Mapping[str, str]) -> tuple[Arguments, str]:
     """Return the arguments of a job, with what the form leaves open, and the digest of what it works on."""
     arguments: Arguments = {"vessel": vessel, **{name: form.get(name, "") for name in KINDS[kind].fields}}
-    digest = fleet_state(desk.warehouse, [vessel])[vessel].digest
     settle = _SETTLE.get(kind)
-    return arguments, digest if settle is None else settle(desk, arguments) or digest
+    own = settle(desk, arguments) if settle is not None else None
+    return arguments, own or fleet_state(desk.warehouse, [vessel])[vessel].digest
 
 
 def _predict(desk: Desk, arguments: Arguments) -> str:
     arguments["horizon"] = horizon_of(arguments["horizon"]).name
     _name_the_set(desk, arguments)
     # a set that came since moves no prediction with another one
-    arguments["key"] = key_of(desk.warehouse, arguments["vessel"], arguments["set"], arguments["horizon"])
+    state = fleet_state(desk.warehouse, [arguments["vessel"]])[arguments["vessel"]]
+    arguments["key"] = key_of(state, arguments["set"], arguments["horizon"])
     return str(arguments["key"])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from kempf.flows.fleet.state import fleet_state
 from kempf.flows.jobs.chosen_set import chosen_set
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.errors import NotFound
@@ -92,11 +93,8 @@ def _kept(
 ) -> tuple[str, str, KeptPrediction | None]:
     chosen, _ = chosen_set(desk.warehouse, vessel, asked_set or None)
     horizon = horizon_of(asked_horizon or "free").name
-    return (
-        chosen.parameter_set_id,
-        horizon,
-        kept(desk.state, key_of(desk.warehouse, vessel, chosen.parameter_set_id, horizon)),
-    )
+    state = fleet_state(desk.warehouse, [vessel])[vessel]
+    return chosen.parameter_set_id, horizon, kept(desk.state, key_of(state, chosen.parameter_set_id, horizon))
 
 
 def _worst(where: dict[str, Any]) -> list[dict[str, Any]]:

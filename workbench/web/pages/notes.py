@@ -9,6 +9,7 @@ from kempf.schemas.errors import UsageError
 from kempf.warehouse import notes
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.numbers import number_of
 from kempf.workbench.web.window import instant
 
 #: letters that a note may have
@@ -36,7 +37,7 @@ def write(desk: Desk, form: Mapping[str, str]) -> str:
         )
     named = (form.get(name) or None for name in ("vessel", "log", "segment", "set"))
     whose, subject, subject_id = subject_of(desk.warehouse, *named)
-    at, draught = form.get("at", "").strip(), form.get("draught", "").strip()
+    at = form.get("at", "").strip()
     notes.add(
         desk.warehouse,
         whose,
@@ -44,15 +45,6 @@ def write(desk: Desk, form: Mapping[str, str]) -> str:
         subject_id,
         text,
         event_utc_ns=instant(at) if at else None,
-        draught_m=_metres(draught) if draught else None,
+        draught_m=number_of(form.get("draught", ""), "draught", "metres"),
     )
     return of_vessel(whose) + "#notes" if subject == "vessel" else _PAGES[subject] + subject_id
-
-
-def _metres(text: str) -> float:
-    try:
-        return float(text[:40])
-    except ValueError:
-        raise UsageError(
-            "number_unreadable", f"{text[:40]!r} is no draught.", "Give it in metres, or leave the field blank."
-        ) from None

@@ -10,18 +10,13 @@ from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.sailed import MANOEUVRES
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.sailed import draw_sailed
-from kempf.workbench.web.jobs.kinds import KINDS
-from kempf.workbench.web.jobs.queue import ACTIVE, DONE, Job
-from kempf.workbench.web.pages.job import settled
+from kempf.workbench.web.pages.answer import answer
 from kempf.workbench.web.pages.page import Page
-
-_KIND = "sail"
 
 
 def document(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf predict MANOEUVRE --vessel NAME --compare --json` prints, where it was made; else None."""
-    job = _asked_for(desk, vessel, asked)[1]
-    return job.result["document"] if job is not None and job.state == DONE else None
+    return answer(desk, "sail", vessel, asked).document
 
 
 def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
@@ -32,29 +27,22 @@ def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
     asked : mapping of str to str
         Fields of `kempf.workbench.web.data.sailed.request_of`, any of them; the errors are its.
     """
-    arguments, job = _asked_for(desk, vessel, asked)
+    found = answer(desk, "sail", vessel, asked)
     content: dict[str, Any] = {
         "vessel": vessel,
-        "asked": arguments,
+        "asked": found.arguments,
         "manoeuvres": MANOEUVRES,
-        "made": None,
-        "job": job if job is not None and job.state in ACTIVE else None,
+        "made": found.document,
+        "job": found.waiting,
     }
-    if job is not None and job.state == DONE:
-        made = job.result["document"]
+    if found.made is not None:
+        made = found.made["document"]
         content |= {
-            "made": made,
-            "drawn": draw_sailed(made["manoeuvre"], job.result["curves"]),
+            "drawn": draw_sailed(made["manoeuvre"], found.made["curves"]),
             "rows": list(_rows(made)),
             "measured": list(_measured(made)),
         }
     return Page("predict.html", "Predict a manoeuvre", content, ((vessel, of_vessel(vessel)),))
-
-
-def _asked_for(desk: Desk, vessel: str, asked: Mapping[str, str]) -> tuple[dict[str, Any], Job | None]:
-    given = {name: asked.get(name, "") for name in KINDS[_KIND].fields}
-    arguments, digest = settled(desk, _KIND, vessel, given)
-    return arguments, desk.queue.known(_KIND, arguments, digest)
 
 
 def _rows(made: Mapping[str, Any]) -> Iterator[dict[str, Any]]:

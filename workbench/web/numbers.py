@@ -1,0 +1,36 @@
+"""Numbers as they are typed into a form."""
+
+from __future__ import annotations
+
+from kempf.schemas.errors import UsageError
+
+
+def number_of(text: str, of: str, unit: str = "") -> float | None:
+    """Return a number; None of a blank field.
+
+    Parameters
+    ----------
+    of : str
+        What it is, for the message.
+    unit : str, optional
+        In which it is expected, in words.
+
+    Raises
+    ------
+    UsageError
+        ``number_unreadable``.
+
+    Examples
+    --------
+    >>> number_of(" 8.1", "draught"), number_of("", "draught")
+    (8.1, None)
+    """
+    if not text.strip():
+        return None
+    try:
+        return float(text[:40])
+    except ValueError:
+        expected = f"Give it in {unit}" if unit else "Give a number"
+        raise UsageError(
+            "number_unreadable", f"{text[:40]!r} is no {of}.", f"{expected}, or leave the field blank."
+        ) from None

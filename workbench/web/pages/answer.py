@@ -1,0 +1,44 @@
+"""The answer of a job at a page's address: the page asks by its own fields whether it was made."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.jobs.kinds import KINDS
+from kempf.workbench.web.jobs.queue import ACTIVE, DONE, Job
+from kempf.workbench.web.pages.job import settled
+
+
+@dataclass(frozen=True)
+class Answer:
+    """What a page asks for, and what came of it."""
+
+    #: Arguments of the job, with what the address leaves open.
+    arguments: dict[str, Any]
+    #: None where nobody asked yet.
+    job: Job | None
+
+    @property
+    def made(self) -> dict[str, Any] | None:
+        """The job's result; None before it is done."""
+        return self.job.result if self.job is not None and self.job.state == DONE else None
+
+    @property
+    def document(self) -> dict[str, Any] | None:
+        """What the command line prints; None before it is made."""
+        return None if self.made is None else self.made["document"]
+
+    @property
+    def waiting(self) -> Job | None:
+        """The job as long as it waits or runs."""
+        return self.job if self.job is not None and self.job.state in ACTIVE else None
+
+
+def answer(desk: Desk, kind: str, vessel: str, asked: Mapping[str, str]) -> Answer:
+    """Return the answer to the fields of an address; errors are those of `kempf.workbench.web.pages.job.settled`."""
+    given = {name: asked.get(name, "") for name in KINDS[kind].fields}
+    arguments, digest = settled(desk, kind, vessel, given)
+    return Answer(arguments, desk.queue.known(kind, arguments, digest))
