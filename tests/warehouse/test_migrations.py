@@ -23,15 +23,11 @@ from kempf.warehouse.migrations import by_month, chain, to_3
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import Problem, verify
 from tests.flows.content import seen
-from tests.warehouse.earlier import write_earlier_keys
+from tests.warehouse.earlier import look, write_earlier_keys
 from tests.warehouse.samples import delivery, inputs, parameter_set
 from tests.warehouse.samples import readings as readings_of
 
 TABLE = "readings"
-
-
-def look(done: int, total: int, what: str) -> None:
-    assert 0 <= done <= total and what
 
 
 @pytest.fixture(scope="module")
@@ -204,7 +200,7 @@ def test_what_another_process_commits_between_is_kept(warehouse: Warehouse, monk
 
 def test_rows_that_differ_in_the_end_stop_it(warehouse: Warehouse) -> None:
     place = passing(warehouse)
-    for _ in by_month.lay_out(place, TABLE):
+    for _ in by_month.carry_out(place, TABLE):
         pass
     assert by_month.require_same(place, TABLE) == 4
     table = delta.open_table(place, TABLE)

@@ -37,7 +37,7 @@ from kempf.warehouse.migrations import by_name, chain
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import verify
 from tests.flows.content import seen
-from tests.warehouse.earlier import write_earlier_keys
+from tests.warehouse.earlier import look, write_earlier_keys
 from tests.warehouse.samples import delivery, examination, parameter_set, segment
 
 
@@ -76,10 +76,6 @@ def test_no_two_vessels_share_a_folder(tmp_path: Path, monkeypatch: pytest.Monke
     with pytest.raises(UsageError) as caught:
         vessels.register(warehouse, "ferry one", profile)
     assert caught.value.code == "vessel_key_taken" and vessels.names(warehouse) == ["Ferry One"]
-
-
-def look(done: int, total: int, what: str) -> None:
-    assert 0 <= done <= total and what
 
 
 @pytest.fixture(scope="module")

@@ -17,6 +17,7 @@ from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
 from kempf.warehouse import delta, logs, purges
 from kempf.warehouse.instant import month_of
+from kempf.warehouse.migrations.commits import MOST_ROWS, alone, batches, overtaken, version_said
 from kempf.warehouse.scan import scanned
 from kempf.warehouse.store import Warehouse
 
@@ -24,8 +25,7 @@ if TYPE_CHECKING:
     import polars as pl
     from deltalake import DeltaTable
 
-#: Rows and logs of one commit: what a writer holds at a time.
-MOST_ROWS = 4_000_000
+#: Logs of one commit.
 MOST_LOGS = 256
 #: What the first commit says of itself: the version that holds the rows of before.
 _BEFORE = "kempf_laid_out_from"
@@ -61,7 +61,7 @@ def missing(warehouse: Warehouse, name: str) -> list[Held]:
     return [one for one in _held(warehouse, name, before) if one.ingest_id not in held]
 
 
-def lay_out(warehouse: Warehouse, name: str) -> Iterator[int]:
+def carry_out(warehouse: Warehouse, name: str) -> Iterator[int]:
     """Lay a table out by month; yields how many ingests are done after every commit.
 
     Raises
@@ -76,11 +76,11 @@ def lay_out(warehouse: Warehouse, name: str) -> Iterator[int]:
     todo = missing(warehouse, name)
     if is_by_log(warehouse, name):
         if table.version() != before:
-            raise _overtaken(name)
+            raise overtaken(name)
         _commit(table, name, (), first=before)
     source = delta.open_table(warehouse, name, before)
     done = 0
-    for batch in _batches(todo):
+    for batch in batches(todo, MOST_LOGS, MOST_ROWS):
         # asked before anything is written: a table cannot be asked while the library writes
         parts = [(one, scanned(source, name, _where(one))) for one in batch]
         _commit(table, name, parts, first=None)
@@ -95,8 +95,7 @@ def version_before(warehouse: Warehouse, name: str) -> int | None:
         return None
     if is_by_log(warehouse, name):
         return table.version()
-    said = (entry.get(_BEFORE) for entry in table.history())
-    return next((int(version) for version in said if version is not None), None)
+    return version_said(table, _BEFORE)
 
 
 def contents(warehouse: Warehouse, name: str, version: int | None = None) -> dict[str, tuple[int, int, int]]:
@@ -191,18 +190,6 @@ def _where(one: Held) -> dict[str, str]:
     return {"vessel_key": one.vessel_key, "ingest_id": one.ingest_id}
 
 
-def _batches(todo: Sequence[Held]) -> Iterator[list[Held]]:
-    """Yield ingests that are written together, in the order of their folders."""
-    batch: list[Held] = []
-    for one in todo:
-        if batch and (len(batch) == MOST_LOGS or sum(b.rows for b in batch) + one.rows > MOST_ROWS):
-            yield batch
-            batch = []
-        batch.append(one)
-    if batch:
-        yield batch
-
-
 def _frames(parts: Sequence[tuple[Held, pl.LazyFrame]]) -> Iterator[pl.DataFrame]:
     import polars as pl
 
@@ -212,19 +199,6 @@ def _frames(parts: Sequence[tuple[Held, pl.LazyFrame]]) -> Iterator[pl.DataFrame
 
 
 def _commit(table: DeltaTable, name: str, parts: Sequence[tuple[Held, pl.LazyFrame]], *, first: int | None) -> None:
-    from deltalake.exceptions import CommitFailedError
-
     said = None if first is None else {_BEFORE: first}
-    try:
+    with alone(name):
         delta.append_alone(table, name, _frames(parts), lay_out=said)
-    except CommitFailedError as error:
-        raise _overtaken(name) from error
-
-
-def _overtaken(name: str) -> KempfError:
-    return KempfError(
-        "warehouse_busy",
-        f"Another process committed to the table {name} meanwhile.",
-        "End whatever else works on the warehouse, then run `kempf migrate` again: it goes on, and nothing is lost.",
-        {"table": name},
-    )

@@ -9,7 +9,6 @@ out and puts in at once, and rests on the very version that was read, so that ev
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -17,6 +16,7 @@ from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES, arrow_schema
 from kempf.warehouse import delta
 from kempf.warehouse.keys import earlier_key, one_of, require_apart, vessel_key
+from kempf.warehouse.migrations.commits import MOST_ROWS, alone, batches, overtaken, version_said
 from kempf.warehouse.scan import by_file, scanned
 from kempf.warehouse.store import Warehouse
 
@@ -24,8 +24,7 @@ if TYPE_CHECKING:
     import polars as pl
     from deltalake import DeltaTable
 
-#: Rows and folders of one commit: what a writer holds at a time.
-MOST_ROWS = 4_000_000
+#: Folders of one commit.
 MOST_FOLDERS = 256
 _KEY = "vessel_key"
 
@@ -75,7 +74,7 @@ def require_known(warehouse: Warehouse) -> None:
     require_apart([(vessel_key(vessel), vessel) for vessel in sorted(every)])
 
 
-def key_anew(warehouse: Warehouse, name: str) -> Iterator[int]:
+def carry_out(warehouse: Warehouse, name: str) -> Iterator[int]:
     """Put rows under the new keys; yields how many folders are done after every commit.
 
     Raises
@@ -87,19 +86,20 @@ def key_anew(warehouse: Warehouse, name: str) -> Iterator[int]:
     table = delta.open_table(warehouse, name)
     if table is None:
         return
-    before = _version_before(table)
+    before = version_said(table, delta.BROUGHT)
     if before is None:
         if _has_words(table, name) and not missing(warehouse, name):
             return  # made by this version
         before = table.version()
-        with _alone(name):
+        with alone(name):
             delta.describe_alone(table, name, _KEY, before)
     todo = missing(warehouse, name)
     # after: of what is to be done the name is known
     names = {key: vessel for key, vessel in _whose(warehouse, name) if _is_earlier(key)}
     done = 0
     whole = not TABLES[name].partition_by
-    for batch in _batches(todo, whole=whole):
+    # a table without folders is written as a whole
+    for batch in [todo] if whole and todo else batches(todo, MOST_FOLDERS, MOST_ROWS):
         with delta.ensured(warehouse, name) as table:  # which has every column
             # read by another handle: a table cannot be asked while the library writes to it
             source = delta.open_table(warehouse, name, table.version())
@@ -107,12 +107,12 @@ def key_anew(warehouse: Warehouse, name: str) -> Iterator[int]:
             each = [where for one in batch for where in _wheres(one, names)]
             parts = [scanned(source, name)] if whole else [p for where in each for p in by_file(source, name, where)]
             predicate = None if whole else _predicate(batch, names)
-            with _alone(name):
+            with alone(name):
                 delta.exchange_alone(table, name, _frames(parts, names, ordered=whole), predicate, before)
         done += len(batch)
         yield done
     if missing(warehouse, name):  # of one that opened the table after its words were changed
-        raise _overtaken(name)
+        raise overtaken(name)
 
 
 def require_same(warehouse: Warehouse, name: str) -> int:
@@ -126,7 +126,7 @@ def require_same(warehouse: Warehouse, name: str) -> int:
         ``migration_differs``.
     """
     table = delta.open_table(warehouse, name)
-    before = None if table is None else _version_before(table)
+    before = None if table is None else version_said(table, delta.BROUGHT)
     if table is None or before is None:
         return 0
     others = [entry["version"] for entry in table.history() if entry["version"] > before and delta.BROUGHT not in entry]
@@ -171,12 +171,6 @@ def _compare(warehouse: Warehouse, name: str, since: int, until: int) -> int:
             {"table": name, "version": since, "vessels": differ},
         )
     return len(then)
-
-
-def _version_before(table: DeltaTable) -> int | None:
-    """Return the version of before the first commit; None where there was none yet."""
-    said = (entry.get(delta.BROUGHT) for entry in table.history())
-    return next((int(version) for version in said if version is not None), None)
 
 
 def _has_words(table: DeltaTable, name: str) -> bool:
@@ -228,19 +222,6 @@ def _whose(warehouse: Warehouse, name: str) -> set[tuple[str, str]]:
     return found
 
 
-def _batches(todo: Sequence[Held], *, whole: bool) -> Iterator[list[Held]]:
-    """Yield folders that are written together, in order; a table without folders is written as a whole."""
-    batch: list[Held] = []
-    for one in todo:
-        full = len(batch) == MOST_FOLDERS or sum(b.rows for b in batch) + one.rows > MOST_ROWS
-        if batch and full and not whole:
-            yield batch
-            batch = []
-        batch.append(one)
-    if batch:
-        yield batch
-
-
 def _wheres(one: Held, names: dict[str, str]) -> list[dict[str, str]]:
     """Return what is read of a folder: also what is under the new key already, as it is put in place of both."""
     month = {} if one.month is None else {"month": one.month}
@@ -268,22 +249,3 @@ def _frames(parts: Sequence[pl.LazyFrame], names: dict[str, str], *, ordered: bo
         # so that a reader of one vessel skips the others
         keyed = keyed.sort(_KEY, maintain_order=True) if ordered else keyed
         yield from keyed.collect_batches(maintain_order=True)
-
-
-@contextmanager
-def _alone(name: str) -> Iterator[None]:
-    from deltalake.exceptions import CommitFailedError
-
-    try:
-        yield
-    except CommitFailedError as error:
-        raise _overtaken(name) from error
-
-
-def _overtaken(name: str) -> KempfError:
-    return KempfError(
-        "warehouse_busy",
-        f"Another process committed to the table {name} meanwhile.",
-        "End whatever else works on the warehouse, then run `kempf migrate` again: it goes on, and nothing is lost.",
-        {"table": name},
-    )

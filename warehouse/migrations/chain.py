@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from kempf.schemas.errors import KempfError
 from kempf.schemas.tables import TABLES
 from kempf.warehouse.marker import LAYOUT, Marker
-from kempf.warehouse.migrations import by_name, to_3, to_4
+from kempf.warehouse.migrations import by_name, commits, to_3, to_4
 from kempf.warehouse.store import Warehouse
 from kempf.warehouse.verify import damages, unfinished
 
@@ -19,7 +19,7 @@ class Step:
 
     #: to_do: What is to be done, a phrase each; carry_out: Does it, however far an earlier attempt came.
     to_do: Callable[[Warehouse], list[str]]
-    carry_out: Callable[[Warehouse, to_3.Look], list[str]]
+    carry_out: Callable[[Warehouse, commits.Look], list[str]]
 
 
 #: By the layout that each begins with.
@@ -61,7 +61,7 @@ def to_do(warehouse: Warehouse) -> list[str]:
     return [words for begun in range(standing(warehouse), LAYOUT) for words in STEPS[begun].to_do(passing)]
 
 
-def migrate(warehouse: Warehouse, look: to_3.Look) -> list[str]:
+def migrate(warehouse: Warehouse, look: commits.Look) -> list[str]:
     """Bring a warehouse to the layout of this version, a step after the other; one that was killed goes on.
 
     Returns
@@ -94,7 +94,7 @@ def migrate(warehouse: Warehouse, look: to_3.Look) -> list[str]:
     return said
 
 
-def _require_whole(warehouse: Warehouse, look: to_3.Look) -> None:
+def _require_whole(warehouse: Warehouse, look: commits.Look) -> None:
     found = list(unfinished(warehouse))
     for name in TABLES:
         look(0, 1, f"table {name}")

@@ -5,14 +5,13 @@ Each part looks for what is still to be done and does that, so that a migration 
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
 
 from kempf.schemas.errors import KempfError
 from kempf.warehouse import aliases, delta, deposit
 from kempf.warehouse.keys import one_of
-from kempf.warehouse.migrations import by_month, sealing
+from kempf.warehouse.migrations import by_month, commits, sealing
 from kempf.warehouse.store import Warehouse
 
 #: Tables that are laid out by vessel and month.
@@ -20,8 +19,6 @@ BY_MONTH = ("readings", "rejected")
 #: What earlier versions pointed to the model with effects and to the pooled set, before there was one ``current``; they
 #: came first where a warehouse still had them.
 _BEFORE_CURRENT = ("model", "pooled")
-
-Look = Callable[[int, int, str], None]
 
 
 def to_do(warehouse: Warehouse) -> list[str]:
@@ -58,7 +55,7 @@ def holds(warehouse: Warehouse) -> bool:
     return True
 
 
-def carry_out(warehouse: Warehouse, look: Look) -> list[str]:
+def carry_out(warehouse: Warehouse, look: commits.Look) -> list[str]:
     """Bring a warehouse of layout 2 to layout 3.
 
     Parameters
@@ -81,20 +78,11 @@ def carry_out(warehouse: Warehouse, look: Look) -> list[str]:
     look(0, 1, "seals")
     sealing.seal_all(warehouse)
     _one_current(warehouse)
-    said = []
-    for name in BY_MONTH:
-        total = len(by_month.missing(warehouse, name))
-        look(0, max(total, 1), name)
-        for done in by_month.lay_out(warehouse, name):
-            look(done, total, name)
-        look(0, 1, f"{name}, compared")
-        compared = by_month.require_same(warehouse, name)
-        if compared:
-            said.append(f"{name}: {compared} ingests have the same rows as before.")
+    compared = commits.carry_out(warehouse, BY_MONTH, by_month, look)
     look(0, 1, "raw logs")
     deposit.describe_all(warehouse)
     sealing.seal_all(warehouse)
-    return said
+    return [f"{name}: {count} ingests have the same rows as before." for name, count in compared.items()]
 
 
 def _one_current(warehouse: Warehouse) -> None:

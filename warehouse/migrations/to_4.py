@@ -5,14 +5,11 @@ Each table is looked at for what is still to be done, so that a migration that w
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from contextlib import suppress
 
 from kempf.schemas.errors import KempfError
-from kempf.warehouse.migrations import by_name, sealing
+from kempf.warehouse.migrations import by_name, commits, sealing
 from kempf.warehouse.store import Warehouse
-
-Look = Callable[[int, int, str], None]
 
 
 def to_do(warehouse: Warehouse) -> list[str]:
@@ -35,7 +32,7 @@ def holds(warehouse: Warehouse) -> bool:
     return True
 
 
-def carry_out(warehouse: Warehouse, look: Look) -> list[str]:
+def carry_out(warehouse: Warehouse, look: commits.Look) -> list[str]:
     """Bring a warehouse of layout 3 to layout 4.
 
     Parameters
@@ -55,15 +52,9 @@ def carry_out(warehouse: Warehouse, look: Look) -> list[str]:
     KempfError
         ``warehouse_busy``, ``migration_differs``, ``vessel_key_unknown``, ``table_damaged``, ``disk_full``, ...
     """
-    said = []
-    for name in by_name.tables():
-        total = len(by_name.missing(warehouse, name))
-        look(0, max(total, 1), name)
-        for done in by_name.key_anew(warehouse, name):
-            look(done, total, name)
-        look(0, 1, f"{name}, compared")
-        compared = by_name.require_same(warehouse, name)
-        if compared:
-            said.append(f"{name}: {compared} vessel{'s have' if compared > 1 else ' has'} the same rows as before.")
+    compared = commits.carry_out(warehouse, by_name.tables(), by_name, look)
     sealing.seal_all(warehouse)
-    return said
+    return [
+        f"{name}: {count} vessel{'s have' if count > 1 else ' has'} the same rows as before."
+        for name, count in compared.items()
+    ]
