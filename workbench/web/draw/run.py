@@ -14,6 +14,8 @@ from kempf.workbench.web.draw.svg import drawing, element
 _WIDTH, _PANEL, _LEFT, _GAP = 760.0, 78.0, 62.0, 20.0
 _POINTS = 260
 _DEG = 180.0 / np.pi
+#: Values, and how they are drawn.
+Line = tuple[Float, str]
 #: column, words, factor to the unit shown
 _SHOWN = (
     ("yaw_rate", "rad_s", "yaw rate, deg/s", _DEG),
@@ -35,24 +37,20 @@ def draw_run(columns: Mapping[str, Float], before: Mapping[str, Float] | None = 
     if before is not None and not np.array_equal(before["time_utc_ns"], columns["time_utc_ns"]):
         before = None
     time = (columns["time_utc_ns"] - columns["time_utc_ns"][0]).astype(np.float64) / SECOND_NS
-    end = float(time[-1])
-    parts = _panel(0.0, "rudder, deg", time, end, [(_DEG * columns["rudder_angle_rad"], "rudder")])
-    top = _PANEL + _GAP
+    panels = []
     for name, unit, words, factor in _SHOWN:
         measured, predicted = columns[f"{name}_{unit}"] * factor, columns[f"{name}_predicted_{unit}"] * factor
-        if not np.isfinite(measured).any():
-            continue
-        lines = [(measured, "measured"), (predicted, "predicted"), (measured - predicted, "left")]
+        lines = [(measured, "measured")]
         if before is not None:
-            lines.insert(1, (before[f"{name}_predicted_{unit}"] * factor, "before"))
-        if name == "heading":
+            lines.append((before[f"{name}_predicted_{unit}"] * factor, "before"))
+        lines.append((predicted, "predicted"))
+        if name != "heading":
             # what is left beside a heading of 300 deg would lie off the panel
-            lines.pop()
-        parts += _panel(top, words, time, end, lines)
-        top += _PANEL + _GAP
+            lines.append((measured - predicted, "left"))
+        panels.append((words, lines))
     beside = ", predicted by the other set (dashed)" if before is not None else ""
-    words = f"Measured (dots), predicted (line){beside} and the difference (thin line)"
-    return drawing(_WIDTH, top + 4.0, words, *parts, *_seconds(top, end))
+    title = f"Measured (dots), predicted (line){beside} and the difference (thin line)"
+    return _figure(time, columns["rudder_angle_rad"], panels, title)
 
 
 def draw_panels(
@@ -71,16 +69,23 @@ def draw_panels(
     words : str
         What the figure is called when it is read aloud.
     """
-    end = float(time_s[-1])
-    parts = _panel(0.0, "rudder, deg", time_s, end, [(_DEG * measured["rudder_angle_rad"], "rudder")])
-    top = _PANEL + _GAP
+    panels = []
     for name, unit, said, factor in _SHOWN:
         column = f"{name}_{unit}"
-        if np.isfinite(measured[column]).any():
-            lines = [(factor * one[column], kind) for one, kind in tried]
-            parts += _panel(top, said, time_s, end, [(factor * measured[column], "measured"), *lines])
-            top += _PANEL + _GAP
-    return drawing(_WIDTH, top + 4.0, words, *parts, *_seconds(top, end))
+        lines = [(factor * one[column], kind) for one, kind in tried]
+        panels.append((said, [(factor * measured[column], "measured"), *lines]))
+    return _figure(time_s, measured["rudder_angle_rad"], panels, words)
+
+
+def _figure(time: Float, rudder_rad: Float, panels: Sequence[tuple[str, list[Line]]], title: str) -> Markup:
+    """Draw the rudder and below it every panel whose first line was measured."""
+    end = float(time[-1])
+    shown = [(words, lines) for words, lines in panels if np.isfinite(lines[0][0]).any()]
+    parts, top = [], 0.0
+    for words, lines in (("rudder, deg", [(_DEG * rudder_rad, "rudder")]), *shown):
+        parts += _panel(top, words, time, end, lines)
+        top += _PANEL + _GAP
+    return drawing(_WIDTH, top + 4.0, title, *parts, *_seconds(top, end))
 
 
 def _seconds(top: float, end: float) -> list[Markup]:
@@ -95,7 +100,7 @@ def _x(second: float, end: float) -> float:
     return _LEFT + (_WIDTH - _LEFT - 12.0) * second / max(end, 1e-9)
 
 
-def _panel(top: float, words: str, time: Float, end: float, lines: list[tuple[Float, str]]) -> list[Markup]:
+def _panel(top: float, words: str, time: Float, end: float, lines: Sequence[Line]) -> list[Markup]:
     every = np.concatenate([values[np.isfinite(values)] for values, _ in lines])
     low, high = (float(every.min()), float(every.max())) if every.size else (0.0, 1.0)
     room = 0.06 * (high - low) or 1.0
