@@ -45,8 +45,8 @@ SHIP_SYMBOLS: dict[str, str] = {
     "b2": "of eq. (16), 1/m^2",
     "L": "length, m",
     "T": "draught, m",
-    "V0": "speed of the approach, m/s",
-    "n0": "shaft speed of the approach, 1/s",
+    "V0": "speed that the shaft keeps on a straight course, that of the approach where no shaft speed is logged, m/s",
+    "n0": "shaft speed that keeps V0, 1/s",
 }
 #: channels of the log by symbol; and three that every run has
 CHANNEL_SYMBOLS: dict[str, str] = {

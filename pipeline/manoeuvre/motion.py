@@ -115,11 +115,11 @@ def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignor
     for i in range(6):
         values[SHIP + i, 0] = hull[i, 0]
     values[SHIP + 6, 0], values[SHIP + 7, 0] = numbers[LENGTH], numbers[DRAUGHT]
-    values[SHIP + 8, 0], values[SHIP + 9, 0] = numbers[APPROACH], 1.0
+    values[SHIP + 8, 0], values[SHIP + 9, 0] = numbers[SHAFT], 1.0
     for i in range(p):
         values[PARAMETER + i, 0] = values_of_effects[i]
-    # the shaft turning on, deep water, upright; n0 is 1 and V0 the speed of the approach
-    row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = numbers[SHAFT] / numbers[APPROACH], 1e12, day
+    # the shaft turning on, deep water, upright; n and n0 are 1 and V0 is the speed that the shaft keeps
+    row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = 1.0, 1e12, day
     ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
     stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))
     return row, ship, width, table, values, slopes, stack, by, total, np.zeros((width, width, 1))

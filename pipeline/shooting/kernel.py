@@ -113,8 +113,8 @@ def shoot(  # type: ignore[no-untyped-def]
         To be filled, window after window, m their instants.
     """
     size, width, B = starts.shape[1], starts.shape[1] - N_AFTER, each(lanes)
-    arm, length, draught, V0, n0, exponent = constants_of_ship
-    ship = (hull, (arm, 0.0, 0.0, 0.0, exponent, V0))
+    arm, length, draught, V0, n0, exponent, approach = constants_of_ship
+    ship = (hull, (arm, 0.0, 0.0, 0.0, exponent, approach))
     m = PARAMETER + parameters.shape[0]
     values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
     values[SHIP : SHIP + 6] = hull

@@ -36,12 +36,24 @@ def test_a_run_that_begins_slow_has_the_race_of_its_shaft() -> None:
         race = run.approach_m_s * run.inputs[::ROWS, SHAFT] / run.approach_per_s
         assert race == pytest.approx(4.0 * was.inputs[::ROWS, SHAFT], rel=0.01)
         assert run.approach_m_s == was.approach_m_s
+        # effects take for V0 what the shaft keeps, the rudder's power of V goes by the approach
+        V0, n0, _, approach = run.constants(1.0)[3:]
+        assert [V0, n0] == pytest.approx([4.0 * n0, was.approach_per_s], rel=0.01)
+        assert approach == was.approach_m_s
 
 
 def test_runs_without_a_shaft_speed_stay_as_they_are() -> None:
     whole = sailed().runs[0]
     without = replace(whole, channels=whole.channels - {"shaft_speed"})
     assert with_common_slip([without]) == (without,)
+    assert without.shaft_per_s is None
+    assert without.settled_m_s == without.approach_m_s
+    assert without.constants(2.0)[3:].tolist() == [
+        without.approach_m_s,
+        without.approach_per_s,
+        2.0,
+        without.approach_m_s,
+    ]
 
 
 def test_the_approach_of_a_run_from_rest_is_the_speed_that_it_comes_to() -> None:

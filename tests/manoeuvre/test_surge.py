@@ -14,7 +14,6 @@ from kempf.pipeline.manoeuvre.covered import beyond, covered
 from kempf.pipeline.manoeuvre.rudder_rate import SOLAS_RAD_S, rudder_rate
 from kempf.pipeline.manoeuvre.sailed import Reach
 from kempf.pipeline.manoeuvre.surge.identify import surge_of
-from kempf.pipeline.manoeuvre.surge.logged_speed import settled_speed
 from kempf.pipeline.simulate.hulls import HULLS
 from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
@@ -72,7 +71,7 @@ def test_a_loss_by_drift_and_turn_is_seen_to_be_one_whatever_the_shaft_keeps() -
     tau, by_drift = 7.0, 9.0
     run = losing(run, tau, by_drift * turning(run)[0])
     fit = surge_of([run], LENGTH)
-    assert settled_speed(run) == pytest.approx(8.4)
+    assert run.settled_m_s == pytest.approx(8.4)
     assert fit.best[1] == pytest.approx(by_drift, rel=0.15)
     # what the yaw rate has beside it, the data put near nothing
     assert abs(fit.best[2]) < 2.0 * max(fit.std[2], 0.1)

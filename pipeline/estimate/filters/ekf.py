@@ -287,8 +287,8 @@ def extended(  # type: ignore[no-untyped-def]
     withheld : ndarray of bool, shape (n,)
         Instants whose measurements are predicted and not taken in.
     current_row : ndarray, shape (n, 2)
-    constants_of_ship : ndarray, shape (6,)
-        l, L, T, V0, n0 and the exponent of V in the rudder's force.
+    constants_of_ship : ndarray, shape (7,)
+        l, L, T, V0, n0, the exponent of V in the rudder's force and the speed of the approach that it goes by.
     rates : ndarray, shape (4,)
         Correlation rates of F, M, the current and the speed's error, 1/s.
     x0 : ndarray, shape (9 + k, lanes); P0 : ndarray, shape (9 + k, 9 + k)
@@ -311,8 +311,8 @@ def extended(  # type: ignore[no-untyped-def]
     x, P = x0.copy(), np.zeros((n, n, B))
     for b in range(B):
         P[:, :, b] = P0
-    arm, length, draught, V0, n0, exponent = constants_of_ship
-    ship = (hull, (arm, rates[0], rates[1], rates[3], exponent, V0))
+    arm, length, draught, V0, n0, exponent, approach = constants_of_ship
+    ship = (hull, (arm, rates[0], rates[1], rates[3], exponent, approach))
     m = PARAMETER + parameters.shape[0]
     values, slopes = np.zeros((m, B)), np.zeros((m, width, B))
     values[SHIP : SHIP + 6] = hull

@@ -113,6 +113,20 @@ class GridRun:
         rudder: Float = self.inputs[::ROWS, 1]
         return rudder
 
+    @property
+    def shaft_per_s(self) -> float | None:
+        """Mean shaft speed, 1/s; None where it is not logged or the shaft does not turn ahead."""
+        if "shaft_speed" not in self.channels or not self.approach_per_s > 0.0:
+            return None
+        shaft = float(np.mean(self.inputs[::ROWS, 2 + list(CHANNEL_SYMBOLS).index("n")]))
+        return shaft if shaft > 0.0 else None
+
+    @property
+    def settled_m_s(self) -> float:
+        """Speed that the shaft keeps on a straight course, m/s; that of the approach where the shaft is unknown."""
+        shaft = self.shaft_per_s
+        return self.approach_m_s if shaft is None else self.approach_m_s * shaft / self.approach_per_s
+
     def constants(self, rudder_speed_exponent: float) -> Float:
         """Return what the terms may ask of ship and approach, see `kempf.pipeline.estimate.filters.ekf.extended`.
 
@@ -123,13 +137,14 @@ class GridRun:
 
         Returns
         -------
-        ndarray, shape (6,)
+        ndarray, shape (7,)
+            V0 is the speed that the shaft keeps: at the first execute she may not have come to it.
         """
         ship = self.ship
         return np.array(
             [
-                *(ship.arm_per_m, ship.length_m, ship.draught_m, self.approach_m_s, self.approach_per_s),
-                rudder_speed_exponent,
+                *(ship.arm_per_m, ship.length_m, ship.draught_m, self.settled_m_s),
+                *(self.shaft_per_s or self.approach_per_s, rudder_speed_exponent, self.approach_m_s),
             ]
         )
 

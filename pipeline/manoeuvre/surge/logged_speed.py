@@ -13,13 +13,6 @@ from kempf.pipeline.manoeuvre.surge.usual import KINDS, SETTLED_STD, UNSETTLED, 
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 
-def settled_speed(run: GridRun) -> float:
-    """Return the speed that the shaft of a run keeps on a straight course, m/s; that of the approach where unknown."""
-    if "shaft_speed" not in run.channels or not run.approach_per_s > 0.0:
-        return run.approach_m_s
-    return run.approach_m_s * float(np.mean(_shaft(run))) / run.approach_per_s
-
-
 def _shaft(run: GridRun) -> Float:
     return _channel(run, "shaft_speed")
 
@@ -55,7 +48,7 @@ class LoggedSpeed:
     @classmethod
     def of(cls, run: GridRun, length_m: float, exponent: float) -> LoggedSpeed | None:
         """Return what a run's log showed; None where it has no yaw rate, or stands still, or is too short."""
-        speed, settled = run.speed_m_s, settled_speed(run)
+        speed, settled = run.speed_m_s, run.settled_m_s
         rate = _yaw_rate(run, length_m)
         if rate is None or not settled > 0.0 or not np.all(np.isfinite(speed)) or speed.size < 20:
             return None
