@@ -11,6 +11,7 @@ from __future__ import annotations
 import argparse
 import json
 from collections.abc import Callable, Sequence
+from math import nan
 from pathlib import Path
 from typing import Any
 
@@ -45,24 +46,15 @@ def judge(case: Case, work: Path) -> Judged:
     return Judged(truth, said, best)
 
 
-def refitted(one: Judged) -> str:
-    """Return what the diagnosis fitted for the true effect with its standard error, empty where it is not named."""
-    found = one.said.get("diagnosis", {})
-    for claim in (*found.get("sets", ()), *found.get("immaterial", ())):
-        for refit in claim["refits"]:
-            if refit["effect"] == one.truth["effect"]:
-                return " ".join(f"{k} {p['value']:.3g} ± {p['std']:.2g}" for k, p in refit["parameters"].items())
-    return ""
-
-
 def row(one: Judged) -> list[str]:
     """Return the line of one case in the table."""
     truth = one.truth
     sets = "; ".join(" or ".join(names) for names in one.sets) or one.verdict
     value = " ".join(f"{key} {size:.3g}" for key, size in truth["parameters"].items())
     condition = f"{truth['hull']}, noise {truth['noise']:g}, {truth['disturbance']}"
+    refit = " ".join(f"{key} {p['value']:.3g} ± {p['std'] or nan:.2g}" for key, p in (one.refit or {}).items())
     gained = f"{one.expected_score:.0f}"
-    return [truth["effect"], condition, "yes" if truth["sold"] else "", value, refitted(one), gained, sets]
+    return [truth["effect"], condition, "yes" if truth["sold"] else "", value, refit, gained, sets]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:

@@ -97,21 +97,30 @@ class Judged:
         return float(last / first) if last is not None and first else None
 
     @property
+    def refit(self) -> Mapping[str, Any] | None:
+        """What the diagnosis fitted for the true effect, by parameter; None where it was not named."""
+        found = self.said.get("diagnosis")
+        for one in (*found["sets"], *found["immaterial"]) if found else ():
+            for refit in one["refits"]:
+                if refit["effect"] == self.truth["effect"]:
+                    parameters: Mapping[str, Any] = refit["parameters"]
+                    return parameters
+        return None
+
+    @property
     def covered(self) -> bool | None:
         """Whether the 95 % interval of the refit true effect holds the true value; None where it was not named.
 
         A rudder's feedback that is off is in no log: its effects are true of the rudder that the log shows.
         """
-        found, name = self.said.get("diagnosis"), self.truth["effect"]
+        name, refit = self.truth["effect"], self.refit
+        if refit is None:
+            return None
         shown = (1.0 + RUDDER_OFF) ** CATALOGUE[name].of_rudder if self.truth["sold"] and name in CATALOGUE else 1.0
-        for one in (*found["sets"], *found["immaterial"]) if found else ():
-            for refit in one["refits"]:
-                if refit["effect"] == name:
-                    told, (key, value) = refit["parameters"], next(iter(self.truth["parameters"].items()))
-                    std = told[key]["std"]
-                    # an interval that could not be told covers nothing
-                    return bool(std is not None and std > 0 and abs(told[key]["value"] - shown * value) <= 1.96 * std)
-        return None
+        key, value = next(iter(self.truth["parameters"].items()))
+        std = refit[key]["std"]
+        # an interval that could not be told covers nothing
+        return bool(std is not None and std > 0 and abs(refit[key]["value"] - shown * value) <= 1.96 * std)
 
     @property
     def falls(self) -> bool | None:

@@ -20,6 +20,8 @@ from kempf.schemas.model_spec import ModelSpec
 from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS
 
 _APPROACH_S = 5.0
+#: column of the shaft speed in `GridRun.inputs`
+_SHAFT = 2 + list(CHANNEL_SYMBOLS).index("n")
 #: quantile of speed over shaft speed that is that of a settled ship: her straight courses are few in zigzags
 _SETTLED = 0.95
 
@@ -118,7 +120,7 @@ class GridRun:
         """Mean shaft speed, 1/s; None where it is not logged or the shaft does not turn ahead."""
         if "shaft_speed" not in self.channels or not self.approach_per_s > 0.0:
             return None
-        shaft = float(np.mean(self.inputs[::ROWS, 2 + list(CHANNEL_SYMBOLS).index("n")]))
+        shaft = float(np.mean(self.inputs[::ROWS, _SHAFT]))
         return shaft if shaft > 0.0 else None
 
     @property
@@ -277,7 +279,6 @@ def make_run(
     inputs[:, first_of_run], inputs[:, first_of_run + 1], inputs[:, first_of_run + 2] = heading, fine, load
     inputs[:, SPEED_ERROR_GAIN] = np.interp(fine, record.time_s, record.speed_error.gain_rad_s_m)
     coarse = heading[::ROWS]
-    shaft = 2 + list(CHANNEL_SYMBOLS).index("n")
     first = fine <= _APPROACH_S
     # what is over within a step is white noise to it
     brief = record.speed_error.time_s < step_s
@@ -298,7 +299,7 @@ def make_run(
         current_row=_current_row(spec, coarse),
         heading_rad=coarse,
         approach_m_s=approach_speed(fine, inputs[:, 0]),
-        approach_per_s=float(np.median(inputs[first, shaft])) or 1.0,
+        approach_per_s=float(np.median(inputs[first, _SHAFT])) or 1.0,
         channels=frozenset(have),
         ship=ship,
         day=day,
@@ -361,8 +362,7 @@ def with_common_slip(runs: Sequence[GridRun], kept_m: float | None = None) -> tu
 
 def common_slip(runs: Sequence[GridRun]) -> float | None:
     """Return the speed that a shaft speed of one revolution a second keeps, m; None where no run has both."""
-    shaft = 2 + list(CHANNEL_SYMBOLS).index("n")
-    turning = [(run.speed_m_s, run.inputs[::ROWS, shaft]) for run in runs if "shaft_speed" in run.channels]
+    turning = [(run.speed_m_s, run.inputs[::ROWS, _SHAFT]) for run in runs if "shaft_speed" in run.channels]
     ratios = [speed[n > 0.0] / n[n > 0.0] for speed, n in turning if np.any(n > 0.0)]
     kept = float(np.quantile(np.concatenate(ratios), _SETTLED)) if ratios else 0.0
     return kept if kept > 0.0 else None

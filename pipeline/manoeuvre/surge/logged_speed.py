@@ -13,10 +13,6 @@ from kempf.pipeline.manoeuvre.surge.usual import KINDS, SETTLED_STD, UNSETTLED, 
 from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 
-def _shaft(run: GridRun) -> Float:
-    return _channel(run, "shaft_speed")
-
-
 def _head_wind(run: GridRun) -> Float:
     """Return W at the instants, m^2/s^2; NaN where no wind is logged."""
     if not {"wind_speed", "wind_angle"} <= set(run.channels):
@@ -53,9 +49,8 @@ class LoggedSpeed:
         if rate is None or not settled > 0.0 or not np.all(np.isfinite(speed)) or speed.size < 20:
             return None
         shaft = np.ones(speed.size)
-        if "shaft_speed" in run.channels and run.approach_per_s > 0.0:
-            shaft = _shaft(run)
-            shaft = shaft / np.mean(shaft)
+        if run.shaft_per_s is not None:
+            shaft = _channel(run, "shaft_speed") / run.shaft_per_s
         lateral, unit = _lateral(run, length_m), length_m / settled
         drift = np.full(speed.size, np.nan) if lateral is None else -lateral * rate * unit / settled
         rudder = run.rudder_rad**2 * np.maximum(speed / settled, 0.0) ** exponent
