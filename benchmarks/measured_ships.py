@@ -3,13 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
+from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.ingest_logs import IngestOutcome, ingest
-from kempf.schemas.errors import NotFound
+from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
+from kempf.schemas.errors import KempfError, NotFound
 from kempf.warehouse.store import Warehouse
 
 _PROFILES = Path(__file__).parents[1] / "docs" / "profiles"
@@ -74,6 +78,36 @@ def fleet(data: Path, trials: str = "trials") -> list[Ship]:
 def take_in(warehouse: Warehouse, ship: Ship) -> list[IngestOutcome]:
     """Ingest the logs of a ship, one outcome a log in their order."""
     return ingest(warehouse, ship.logs, ship.name, read_profiles(ship.profiles))
+
+
+def every(data: Path) -> Iterator[tuple[str, VesselRuns]]:
+    """Lay out the runs of all ships, measured ones and trial logs, one after the other.
+
+    Yields
+    ------
+    (str, VesselRuns)
+        Name of a ship; those that are not there are left out.
+    """
+    for make in (tank, pond, boat):
+        try:
+            ship = make(data)
+        except KempfError:
+            continue
+        yield ship.name, _laid_out(ship)
+    for trials in ("trials", "trials_as_sold"):
+        try:
+            ships = fleet(data, trials)
+        except KempfError:
+            continue
+        for ship in ships:
+            yield f"{trials} {ship.name}", _laid_out(ship)
+
+
+def _laid_out(ship: Ship) -> VesselRuns:
+    with TemporaryDirectory() as folder:
+        warehouse = Warehouse(str(Path(folder) / "warehouse"))
+        take_in(warehouse, ship)
+        return assembled(warehouse, choose(warehouse, ship.name), default_model_of(warehouse, ship.name))
 
 
 def ordered(file_name: str) -> Run:

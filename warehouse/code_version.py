@@ -55,7 +55,7 @@ STAGES: dict[Stage, Entry] = {
             *("estimate.updated", "predict.free_run"),
             *("estimate.no_log.companions", "estimate.record.cut", "estimate.record.left_out"),
             "estimate.record.loads",
-            *("diagnose.staged", "diagnose.ladder_step", "diagnose.split", "diagnose.late_velocity"),
+            *("diagnose.staged", "diagnose.ladder_step", "diagnose.split", "diagnose.unsure_instants"),
         ),
         ("ingest",),
     ),

@@ -8,7 +8,7 @@ are fitted anew. Simulated ships are sailed as in the standard trial, on a day o
 from __future__ import annotations
 
 import argparse
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -34,7 +34,6 @@ from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
-from kempf.schemas.errors import KempfError
 from kempf.warehouse.store import Warehouse
 
 _DAY_NS = 86_400_000_000_000
@@ -108,31 +107,6 @@ def simulated(hull: str, count: int) -> VesselRuns:
         return assembled(warehouse, choose(warehouse, hull), default_model_of(warehouse, hull))
 
 
-def measured(data: Path) -> Iterator[tuple[str, VesselRuns]]:
-    """Take the measured ships in, one after the other; those that are not there are left out."""
-    makers = (measured_ships.tank, measured_ships.pond, measured_ships.boat)
-    for make in makers:
-        try:
-            ship = make(data)
-        except KempfError:
-            continue
-        yield ship.name, _taken_in(ship)
-    for trials in ("trials", "trials_as_sold"):
-        try:
-            ships = measured_ships.fleet(data, trials)
-        except KempfError:
-            continue
-        for ship in ships:
-            yield f"{trials} {ship.name}", _taken_in(ship)
-
-
-def _taken_in(ship: measured_ships.Ship) -> VesselRuns:
-    with TemporaryDirectory() as folder:
-        warehouse = Warehouse(str(Path(folder) / "warehouse"))
-        measured_ships.take_in(warehouse, ship)
-        return assembled(warehouse, choose(warehouse, ship.name), default_model_of(warehouse, ship.name))
-
-
 def page(outcomes: Sequence[Outcome]) -> list[str]:
     """Return the lines of the page."""
     head = (
@@ -167,7 +141,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     asked = parser.parse_args(arguments)
     with ThreadPoolExecutor(usable()) as workers:
         outcomes = []
-        for name, runs in measured(asked.data):
+        for name, runs in measured_ships.every(asked.data):
             if len(runs.runs) >= 4:
                 outcomes.append(compare(name, runs, len(runs.runs) // 2, len(runs.runs), workers))
                 print(outcomes[-1], flush=True)

@@ -307,11 +307,16 @@ def build(instruments: Mapping[str, Instruments], request: SetRequest) -> Parame
     record = make_record(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
     if KEY in inputs.settings:
         result = estimate_of(record, spec.with_arm(arm), arm or 0.0, profile, inputs, instruments)
-    else:
-        given = (spec.with_arm(arm), arm or 0.0, dict(inputs.settings), profile.length_m)
-        result = estimate(inputs.estimator, record, *given)
-        if inputs.estimator == SINGLE and (may_last(result.fit) or record.velocity_late_std_s > 0.0):
-            made = build_with_errors_that_last(instruments, request)
-            if made is not None:
-                return made
+        return as_parameter_set(result, request, without_arm(spec, arm))
+    single, unsure = inputs.estimator == SINGLE, not record.instant_errors.known
+    made = build_with_errors_that_last(instruments, request) if single and unsure else None
+    if made is not None:
+        return made
+    result = estimate(
+        *(inputs.estimator, record, spec.with_arm(arm), arm or 0.0, dict(inputs.settings), profile.length_m)
+    )
+    if single and not unsure and may_last(result.fit):
+        made = build_with_errors_that_last(instruments, request)
+        if made is not None:
+            return made
     return as_parameter_set(result, request, without_arm(spec, arm))

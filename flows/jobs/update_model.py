@@ -24,7 +24,9 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
+from kempf.pipeline.diagnose.unsure_instants import with_instants
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
+from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.posterior import from_json, posterior_of
 from kempf.pipeline.estimate.updated import Updated, updated
 from kempf.pipeline.model.effect_model import EffectModel
@@ -252,20 +254,22 @@ def _updated_set(runs: VesselRuns, request: SetRequest, before: ParameterSet) ->
     model = _model(before, Own.from_json(settings.get("own") or {}))
     search = settings_of(settings.get(SEARCH) or {})
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        found = updated(left, model, runs.runs, runs.spec, workers, search)
+        found = updated(
+            left, model, runs.runs, runs.spec, workers, search, stated=lambda fit: with_instants(fit, workers).fit
+        )
     if found is None:
         return None
-    errors = errors_of(found.fit, found.known, found.beside)
+    errors = errors_of(found.fit, found.known)
     gross_errors = sum(sum(one.gross_errors.values()) for one in found.alone)
-    made = as_set(found.fit, errors.widened(found.agreement), runs, gross_errors, request)
+    made = as_set(errors.fit, errors.widened(found.agreement), runs, gross_errors, request)
     then = before.convergence
-    behind = posterior_of(found.fit, errors.together, found.agreement, found.log_likelihood)
+    behind = posterior_of(errors.fit, errors.together, found.agreement, found.log_likelihood, errors.late)
     skipped = {name: why for name, why in {**runs.skipped, **found.left_out}.items() if name in request.segment_ids}
     number = len(then["levels"])
     return replace(
         made,
         start_utc_ns=min(before.start_utc_ns, made.start_utc_ns),
-        fit={"horizon": "free run", "rung": _rung(found, before, number)},
+        fit={"horizon": "free run", "rung": _rung(found, errors.fit, before, number)},
         convergence={
             **made.convergence,
             "log_likelihood": found.log_likelihood,
@@ -286,12 +290,12 @@ def _updated_set(runs: VesselRuns, request: SetRequest, before: ParameterSet) ->
     )
 
 
-def _rung(found: Updated, before: ParameterSet, number: int) -> dict[str, Any]:
+def _rung(found: Updated, fit: PooledFit, before: ParameterSet, number: int) -> dict[str, Any]:
     """Return the rung of the ladder: of the new runs, means over all, and what was foreseen of the new ones."""
-    first, count = before.fit["rung"], len(found.fit.runs)
-    made = rung(0, step_of(found.fit, (), None), agreement=found.agreement)
+    first, count = before.fit["rung"], len(fit.runs)
+    made = rung(0, step_of(fit, (), None), agreement=found.agreement)
     left = from_json(before.convergence[POSTERIOR])
-    foreseen = [free_run_of(one, left.point[:6], left.point[6:]) for one in found.fit.runs]
+    foreseen = [free_run_of(one, left.point[:6], left.point[6:]) for one in fit.runs]
     intensity = {
         name: float(np.exp(_mean(np.log(first["disturbance_intensity"][name]), number, np.log(value), count)))
         for name, value in made["disturbance_intensity"].items()

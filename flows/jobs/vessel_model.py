@@ -25,9 +25,9 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
-from kempf.pipeline.diagnose.late_velocity import covariance_of_lateness
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.unsure_instants import with_instants
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
@@ -198,7 +198,7 @@ def build_with_errors_that_last(instruments: Mapping[str, Instruments], request:
     """
     fitted = _fitted_request(instruments, request)
     fit = fitted.fits[-1]
-    late = any(one.run.velocity_late_std_s > 0.0 for one in fit.runs)
+    late = not all(one.run.instant_errors.known for one in fit.runs)
     return _single(fitted, request) if (fit.noise or late) and fit.converged else None
 
 
@@ -206,7 +206,7 @@ def _single(fitted: Fitted, request: SetRequest) -> ParameterSet:
     fit, (record,) = fitted.fits[-1], fitted.runs.records
     errors = errors_of(fit, uncertainty_of(fit))
     known = errors.widened(agreement_of(fit)) if fit.ship.model.effects else errors.together
-    made = as_set(fit, known, fitted.runs, fitted.plain.gross_errors, request)
+    made = as_set(errors.fit, known, fitted.runs, fitted.plain.gross_errors, request)
     return replace(
         made,
         noise=(
@@ -238,12 +238,12 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
         )
     _, left = split(runs.runs)
     number = next(k for k, one in enumerate(fitted.fits) if one is fit)
-    step = step_of(fit, [runs.runs[i] for i in left], fitted.ahead[number])
     before = fitted.ahead[number - 1] if number else None
     plain, errors = fitted.plain, errors_of(fit, uncertainty_of(fit))
+    step = step_of(errors.fit, [runs.runs[i] for i in left], fitted.ahead[number])
     agreement = agreement_of(fit) if effects else plain.agreement
-    made = as_set(fit, errors.widened(agreement), runs, plain.gross_errors, request)
-    left_behind = posterior_of(fit, errors.together, agreement, fit.log_likelihood)
+    made = as_set(errors.fit, errors.widened(agreement), runs, plain.gross_errors, request)
+    left_behind = posterior_of(errors.fit, errors.together, agreement, fit.log_likelihood, errors.late)
     alone = () if step.held else ("no manoeuvre is held out: fewer than three can be used; the errors are in sample",)
     # of the manoeuvres that the inputs name, so that a rerun says the same
     skipped = {name: why for name, why in {**runs.skipped, **plain.left_out}.items() if name in request.segment_ids}
@@ -274,8 +274,10 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
 class Errors:
     """What is known of the errors of a fit, before what the runs disagree about widens them."""
 
+    #: The fit as it is stated: instants of measurement that are not quite known are free.
+    fit: PooledFit
     known: PooledUncertainty
-    #: Shape (6 + p, 6 + p). What is not known of a receiver's lateness adds.
+    #: Shape (6 + p, 6 + p). What is not known of the instants adds.
     late: Float
     #: Whether the model has effects: their diagnosis widens the first alone.
     of_effects: bool
@@ -293,22 +295,20 @@ class Errors:
         return replace(both, covariance=both.covariance * agreement.widened**2)
 
 
-def errors_of(fit: PooledFit, known: PooledUncertainty, before: Float | None = None) -> Errors:
-    """Return the errors of a fit with those of lateness; of a model with effects those that its diagnosis states.
+def errors_of(fit: PooledFit, known: PooledUncertainty) -> Errors:
+    """Return a fit and its errors, instants free; those of a model with effects are the ones that its diagnosis states.
 
     Parameters
     ----------
     known : PooledUncertainty
-        Of all runs, without the lateness of those that are fitted here.
-    before : array, shape (6 + p, 6 + p), optional
-        What of ``known`` is not information, such as the lateness of runs that the fit brings forward.
+        Of all runs, without what is not known of the instants of those that are fitted here.
     """
     of_effects = bool(fit.ship.model.effects)
     if of_effects:
         known = replace(known, covariance=fit.covariance, kind="information")
     with ThreadPoolExecutor(max_workers=usable()) as workers:
-        late = covariance_of_lateness(fit, workers)
-    return Errors(known, late if before is None or not of_effects else late + before, of_effects)
+        found = with_instants(fit, workers)
+    return Errors(found.fit, known, found.covariance, of_effects)
 
 
 def pooling(agreement: Agreement, alone: Sequence[Alone], fit: PooledFit, before: int = 0) -> dict[str, Any]:

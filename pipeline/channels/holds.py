@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import Float, Nanoseconds
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
 
 #: fewer runs than this say nothing about an instrument's period
 _MIN_RUNS = 20
@@ -22,6 +22,9 @@ _ORDERS = 5
 _REGULAR = 0.9
 #: share of the changes that are of the smallest size where a channel is only rounded
 _ONE_STEP = 0.9
+#: standard deviation of what lies anywhere between 0 and 1; share of the scatter on either side that is left out;
+#: part of a row that is never known
+_WITHIN, _SCATTER, _BENT = 12.0**-0.5, 0.025, 0.3
 #: samples over which an instrument's clock is taken for steady
 _BLOCK = 400
 
@@ -36,6 +39,8 @@ class Held:
     time_utc_ns: Nanoseconds
     #: Rows that one measurement is held for; 1 where nothing is held.
     rows_per_value: int
+    #: Standard error of the instants that they have in common, s; 0 where nothing is held.
+    std_s: float = 0.0
 
 
 def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
@@ -83,7 +88,8 @@ def find_held(time_utc_ns: Nanoseconds, values: Float) -> Held:
     copies = np.maximum(1, np.floor(lengths / period + 0.4).astype(np.int64))
     within = np.arange(copies.sum()) - np.repeat(np.cumsum(copies) - copies, copies)
     rows = np.repeat(starts, copies) + within * period
-    return Held(rows, _instants(time_utc_ns, rows, period), period)
+    instants, std_s = _instants(time_utc_ns, rows, period)
+    return Held(rows, instants, period, std_s)
 
 
 def _rounded(values: Float) -> bool:
@@ -96,23 +102,34 @@ def _rounded(values: Float) -> bool:
     return True
 
 
-def _instants(time_utc_ns: Nanoseconds, rows: NDArray[np.int64], period: int) -> Nanoseconds:
-    """Return when the values that first show in these rows were measured, shape (m,)."""
+def _instants(time_utc_ns: Nanoseconds, rows: NDArray[np.int64], period: int) -> tuple[Nanoseconds, float]:
+    """Return when the values that first show in these rows were measured, shape (m,), and their common error, s."""
     row_ns = float(np.median(np.diff(time_utc_ns)))
-    shown = time_utc_ns[rows]
-    middle = shown - round(0.5 * row_ns)
-    instants = middle.copy()
+    middle = time_utc_ns[rows] - round(0.5 * row_ns)
     # By blocks: a sample that equals its neighbour to the last digit is lost, and shifts the count from there on.
-    for first in range(0, rows.size, _BLOCK):
-        block = slice(first, first + _BLOCK)
-        instants[block] = _steady(middle[block], period * row_ns, row_ns)
-    return instants if bool(np.all(np.diff(instants) > 0)) else middle
+    blocks = [_steady(middle[first : first + _BLOCK], period * row_ns, row_ns) for first in range(0, rows.size, _BLOCK)]
+    instants = np.concatenate([block for block, _ in blocks])
+    if not bool(np.all(np.diff(instants) > 0)):
+        return middle, row_ns * _WITHIN / SECOND_NS
+    # the last block may be short, and its clock unknown
+    sizes = [block.size for block, _ in blocks]
+    variance = np.average([std_ns**2 for _, std_ns in blocks], weights=sizes)
+    return instants, float(np.sqrt(variance)) / SECOND_NS
 
 
-def _steady(middle: Nanoseconds, period_ns: float, row_ns: float) -> Nanoseconds:
-    """Return the instants of a steady clock that explain the middles of the rows, or these where there is none."""
+def _steady(middle: Nanoseconds, period_ns: float, row_ns: float) -> tuple[Nanoseconds, float]:
+    """Return the instants of a steady clock that explain the middles of the rows, or these where there is none.
+
+    Returns
+    -------
+    (ndarray of shape (m,), float)
+        And their common error, ns. Where the clock and the rows keep step, every measurement shows at the same place of
+        its row, and nothing tells which. Where they do not, or the clock jitters, measurements cross the rows' edges
+        and their middles scatter around the clock's line, over a whole row at most: what they do not scatter over is
+        where the line may lie.
+    """
     if middle.size < _MIN_RUNS:
-        return middle
+        return middle, row_ns * _WITHIN
     elapsed = (middle - middle[0]).astype(np.float64)
     apart = np.diff(elapsed) / period_ns
     # neighbours are one tick apart even where a sample slipped into the next row; a longer pause lost samples
@@ -120,6 +137,9 @@ def _steady(middle: Nanoseconds, period_ns: float, row_ns: float) -> Nanoseconds
     slope, offset = np.polyfit(ticks, elapsed, 1)
     steady = slope * ticks + offset
     if np.max(np.abs(steady - elapsed)) > 1.2 * row_ns:
-        return middle
+        return middle, row_ns * _WITHIN
     result: Nanoseconds = middle[0] + np.round(steady).astype(np.int64)
-    return result
+    # a message that came late for once says nothing of the clock
+    low, high = np.quantile(elapsed - steady, [_SCATTER, 1.0 - _SCATTER])
+    # and a clock that crosses one edge only, in all its time, bends the line
+    return result, max(_BENT * row_ns, row_ns - float(high - low)) * _WITHIN

@@ -6,7 +6,7 @@ here, so that later rooms know one form only.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import polars as pl
@@ -43,6 +43,9 @@ class Instruments:
     notes: tuple[str, ...]
     #: Channels that the log does not have and that were computed from others.
     derived: frozenset[str] = frozenset()
+    #: Standard error, s, of the instants of a channel that its log repeats in several rows, see
+    #: `kempf.pipeline.channels.holds.Held`.
+    instant_std_s: dict[str, float] = field(default_factory=dict)
 
     def get(self, channel: str) -> Series | None:
         """Return the series of a channel, or None where the log lacks it."""
@@ -69,6 +72,7 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
     series: dict[str, Series] = {}
     sources: dict[str, str] = {}
     notes: list[str] = []
+    unsure: dict[str, float] = {}
     for group in groups:
         offered = counts.filter(pl.col(_name(group)) > 0)
         if offered.is_empty():
@@ -80,13 +84,15 @@ def from_readings(readings: pl.DataFrame | pl.LazyFrame) -> Instruments:
         time = rows["time_utc_ns"].to_numpy().astype(np.int64, copy=False)
         values = rows.select(_columns(group)).to_numpy().astype(np.float64, copy=False)
         del rows
-        for name, one in _at_instants(group, time, values, source, notes).items():
-            series[name] = one
-            sources[name] = source
+        found, std_s = _at_instants(group, time, values, source, notes)
+        series |= found
+        sources |= dict.fromkeys(found, source)
+        if std_s > 0.0:
+            unsure |= dict.fromkeys(found, std_s)
     own = set(series)
     _add_speed_and_course(series, sources, notes)
     _add_from_the_bow(series, sources, notes)
-    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own))
+    return Instruments(series, sources, tuple(notes), frozenset(set(series) - own), unsure)
 
 
 def _columns(group: tuple[str, ...]) -> list[str]:
@@ -122,7 +128,8 @@ def _choose(counts: dict[str, int], group: tuple[str, ...], notes: list[str]) ->
 
 def _at_instants(
     group: tuple[str, ...], time: Nanoseconds, values: Float, source: str, notes: list[str]
-) -> dict[str, Series]:
+) -> tuple[dict[str, Series], float]:
+    """Return the series of a group and what is not known of their instants, s."""
     # most logs are in order, and a long one is not copied for nothing
     if np.any(time[1:] < time[:-1]):
         order = np.argsort(time, kind="stable")
@@ -143,7 +150,7 @@ def _at_instants(
         if CHANNELS[name].wrap == "circle":
             value = np.unwrap(value)
         result[name] = Series(held.time_utc_ns, value)
-    return result
+    return result, held.std_s
 
 
 def _add_from_the_bow(series: dict[str, Series], sources: dict[str, str], notes: list[str]) -> None:

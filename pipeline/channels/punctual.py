@@ -13,6 +13,7 @@ import numpy as np
 from kempf.pipeline.channels.averaging import readings_averaged
 from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.instant_errors import InstantErrors, instant_errors, said_of
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import Lateness, velocity_lateness
 from kempf.pipeline.channels.series import SECOND_NS, Series
@@ -29,10 +30,10 @@ class Punctual:
 
     #: The very same where nothing was late.
     instruments: Instruments
-    #: A sentence for each speed that was.
+    #: A sentence for each speed that was, and for instants that are not known.
     said: tuple[str, ...]
-    #: Standard error of the lateness that was taken from the velocity over ground, s; 0 where none was.
-    velocity_late_std_s: float
+    #: What is not known of the instants, with what is not known of a lateness that was undone.
+    errors: InstantErrors
 
 
 def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Punctual:
@@ -65,7 +66,8 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
             f"the speed log shows means over {many * log.period_s:.2g} s: taken at their middle, one after the other"
         )
     whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
-    return Punctual(whole, tuple(said), 0.0 if late is None else late.std_s)
+    errors = instant_errors(instruments.instant_std_s, 0.0 if late is None else late.std_s)
+    return Punctual(whole, (*said, *said_of(instruments.instant_std_s)), errors)
 
 
 def _velocity_lateness(series: dict[str, Series]) -> Lateness | None:

@@ -11,6 +11,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.forward_selection import added
 from kempf.pipeline.diagnose.screen import Candidate
+from kempf.pipeline.diagnose.unsure_instants import WithInstants, with_instants, within_rows
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -65,6 +66,10 @@ class Confirmation:
     absent: bool
     #: Of ``fit``.
     unseen: Unseen
+    #: ``fit`` as it is stated.
+    stated: WithInstants
+    #: Whether it is a latency that may be in the rows of the log alone, which repeat values.
+    within_rows: bool = False
     #: Whether the refit was given up, for it could not come near what another one reached; its gains are then those of
     #: ``before``: none.
     outdone: bool = False
@@ -77,7 +82,7 @@ class Confirmation:
             self.bic_change < -BIC_SAVING
             and np.mean(gains > 0.0) > 0.5
             and np.sum(gains) > 0.0
-            and not (self.at_bound or self.absent or self.outdone)
+            and not (self.at_bound or self.absent or self.outdone or self.within_rows)
             and np.isfinite(self.fit.log_likelihood)
         )
 
@@ -115,6 +120,7 @@ def confirm(
     nothing = lowest & (fit.model.low[last] == 0.0)
     outdone = not fit.converged and fit.log_likelihood < wanted
     after = before if outdone else unseen(fit, held, workers)
+    usable = not outdone and bool(np.isfinite(fit.log_likelihood))
     return Confirmation(
         fit=fit,
         likelihood_ratio=ratio,
@@ -125,6 +131,8 @@ def confirm(
         # what the refit gained is then a better hull's: it found another maximum
         absent=bool(np.all(nothing)),
         unseen=after,
+        stated=with_instants(fit, workers) if usable else WithInstants(fit, np.zeros_like(fit.covariance)),
+        within_rows=within_rows(fit, candidate.effect),
         outdone=outdone,
     )
 

@@ -122,16 +122,15 @@ def _values(effect: Effect, values: Float, std: Float) -> dict[str, Any]:
 
 
 def _refit(candidate: Candidate, confirmation: Confirmation) -> dict[str, Any]:
-    size, fit = len(candidate.effect.parameters), confirmation.fit
-    widened = agreement_of(fit).widened
+    size, stated = len(candidate.effect.parameters), confirmation.stated
     return {
         "effect": candidate.effect.name,
-        "parameters": _values(candidate.effect, fit.values[-size:], (widened * fit.std)[-size:]),
-        "widened": widened,
+        "parameters": _values(candidate.effect, stated.fit.values[-size:], stated.std(size)),
+        "widened": agreement_of(confirmation.fit).widened,
         "likelihood_ratio": confirmation.likelihood_ratio,
         "bic_change": confirmation.bic_change,
         "gains_left_out": confirmation.fold_gains,
         "gains_held_out": confirmation.held_out_gains,
         "at_bound": confirmation.at_bound,
-        "converged": fit.converged,
+        "converged": confirmation.fit.converged,
     }

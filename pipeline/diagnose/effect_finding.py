@@ -139,9 +139,9 @@ def refusal(confirmation: Confirmation) -> str:
         return "the refitted model diverges"
     if confirmation.outdone:
         return "another effect is so much better that its fit was not finished"
-    if confirmation.at_bound or confirmation.absent:
-        limit = "its size is at the limit of what is physical"
-        return limit if confirmation.at_bound else "the refit leaves nothing of it"
+    size = _unusable_size(confirmation)
+    if size:
+        return size
     if confirmation.bic_change > -6.0:
         return f"the improvement does not justify its parameters (BIC {confirmation.bic_change:+.1f})"
     if np.mean(gains > 0.0) <= 0.5 or np.sum(gains) <= 0.0:
@@ -149,6 +149,15 @@ def refusal(confirmation: Confirmation) -> str:
             f"it predicts only {int(np.sum(gains > 0.0))} of {gains.size} manoeuvres better that it was not fitted to"
         )
     return "another effect is clearly better"
+
+
+def _unusable_size(confirmation: Confirmation) -> str:
+    """Say what is wrong with the size of an effect; empty where nothing is."""
+    if confirmation.within_rows:
+        return "it may be in the rows of the log alone, which repeat values: within a row nobody knows their instants"
+    if confirmation.at_bound:
+        return "its size is at the limit of what is physical"
+    return "the refit leaves nothing of it" if confirmation.absent else ""
 
 
 def _too_weak(candidate: Candidate) -> str:

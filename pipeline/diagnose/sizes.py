@@ -8,7 +8,6 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.ladder_step import Step
-from kempf.pipeline.estimate.agreement import stated_std
 from kempf.schemas.effect import Effect
 
 
@@ -31,7 +30,7 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect, confirmation: Confi
 def sized(effect: Effect, confirmation: Confirmation) -> str:
     """Return an effect's size with its standard errors, in the units people use."""
     size = len(effect.parameters)
-    return _with_size(effect, confirmation.fit.values[-size:], stated_std(confirmation.fit)[-size:])
+    return _with_size(effect, confirmation.stated.fit.values[-size:], confirmation.stated.std(size))
 
 
 def _with_size(effect: Effect, values: Float, std: Float) -> str:

@@ -46,11 +46,6 @@ class Agreement:
         return float(max(np.sqrt(self.statistic / self.degrees_of_freedom), 1.0))
 
 
-def stated_std(fit: PooledFit) -> Float:
-    """Return the standard errors of hull and effects, shape (6 + p,), wider by what the runs disagree about."""
-    return fit.std * agreement_of(fit).widened
-
-
 def agreement_of(fit: PooledFit) -> Agreement:
     """Return how well the runs of a fit agree on hull and effects, to first order in what each would change of them.
 

@@ -29,9 +29,9 @@ class Posterior:
     names: tuple[str, ...]
     #: Shape (q,). Where the log-likelihood is highest.
     point: Float
-    #: Shape (q, q). Inverse of the expected information, noise levels of the runs unknown.
+    #: Shape (q, q). Inverse of the expected information, noise levels and unsure instants of the runs unknown.
     covariance: Float
-    #: Shape (q, q). Of the errors, where prediction errors are not white or a receiver is late; else the same.
+    #: Shape (q, q). Of the errors, where prediction errors are not white; else the same.
     stated: Float
     #: ``information`` or ``sandwich``.
     kind: str
@@ -79,18 +79,26 @@ def from_json(content: Mapping[str, Any]) -> Posterior:
     )
 
 
-def posterior_of(fit: PooledFit, known: PooledUncertainty, agreement: Agreement, log_likelihood: float) -> Posterior:
+def posterior_of(
+    fit: PooledFit,
+    known: PooledUncertainty,
+    agreement: Agreement,
+    log_likelihood: float,
+    late: Float | float = 0.0,
+) -> Posterior:
     """Return what a fit leaves behind.
 
     Parameters
     ----------
     known : PooledUncertainty
-        Its errors, not widened by what the runs disagree about.
+        Its errors, not widened by what the runs disagree about, with those of instants.
     agreement : Agreement
         Of all runs that it rests on.
     log_likelihood : float
         Of all of them.
+    late : ndarray, shape (q, q), optional
+        What is not known of instants adds to the covariance: beside unsure instants the runs say that much less.
     """
     names = (*HULL_PARAMETERS, *fit.model.names)
     point = np.concatenate([fit.hull, fit.values])
-    return Posterior(names, point, fit.covariance, known.covariance, known.kind, agreement, log_likelihood)
+    return Posterior(names, point, fit.covariance + late, known.covariance, known.kind, agreement, log_likelihood)

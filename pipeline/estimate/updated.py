@@ -7,7 +7,7 @@ found, the parabola says nothing of it, and all runs are to be fitted anew.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass
 
@@ -44,10 +44,8 @@ class Updated:
     alone: tuple[Alone, ...]
     #: New runs that cannot be identified by themselves, with the reason.
     left_out: dict[str, str]
-    #: Errors of all, not widened by what the runs disagree about, and without a receiver's lateness in the new runs.
+    #: Errors of all, not widened by what the runs disagree about, nor by what is not known of the new runs' instants.
     known: PooledUncertainty
-    #: Shape (q, q). What else than their information the runs before state, such as a receiver's lateness, of it.
-    beside: Float
     #: How well all runs agree on the ship.
     agreement: Agreement
     #: Of all runs.
@@ -61,6 +59,7 @@ def updated(
     spec: ModelSpec,
     workers: Executor,
     settings: MaximumLikelihoodSettings = STANDARD,
+    stated: Callable[[PooledFit], PooledFit] = lambda fit: fit,
 ) -> Updated | None:
     """Bring a common fit forward by further runs.
 
@@ -78,6 +77,8 @@ def updated(
         Runs share it; the sums do not depend on it.
     settings : MaximumLikelihoodSettings, optional
         Of the search of single runs.
+    stated : callable, optional
+        Returns a fit as it is stated, with unsure instants free: so it is compared with what the runs before say.
 
     Returns
     -------
@@ -93,9 +94,10 @@ def updated(
     levels = np.concatenate([single.search.theta[N_HULL:] + to_intensities(spec) for single in alone])
     begin = np.concatenate([before.point / layout.scale, levels])
     fit = ended(layout, climb_in_variances(layout, begin, MAX_ITERATIONS, DECREMENT))
-    loss = before.parabola.loss(np.concatenate([fit.hull, fit.values]))
     if not fit.converged or not np.all(np.isfinite(fit.covariance)):
         return None
+    there = stated(fit)
+    loss = before.parabola.loss(np.concatenate([there.hull, there.values]))
     own, free = agreement_of(fit), N_HULL + int(np.count_nonzero(fit.model.of_ship))
     added = Agreement(own.statistic + 2.0 * loss, own.degrees_of_freedom + free)
     # in what the runs before disagree by, standard errors are that much wider
@@ -103,12 +105,12 @@ def updated(
     if loss > _FAR * scatter or Agreement(added.statistic / scatter, added.degrees_of_freedom).p_value < _ODD:
         return None
     share = fit.covariance @ before.parabola.information
-    known, beside = _known(before, fit, share), share @ (before.stated - before.covariance) @ share.T
+    known = _known(before, fit, share)
     agreement = Agreement(
         before.agreement.statistic + added.statistic,
         before.agreement.degrees_of_freedom + added.degrees_of_freedom,
     )
-    return Updated(fit, alone, left_out, known, beside, agreement, before.log_likelihood - loss + fit.log_likelihood)
+    return Updated(fit, alone, left_out, known, agreement, before.log_likelihood - loss + fit.log_likelihood)
 
 
 def _known(before: Posterior, fit: PooledFit, share: Float) -> PooledUncertainty:

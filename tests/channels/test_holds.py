@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 from kempf.pipeline.channels.holds import find_held
 from kempf.pipeline.channels.instruments import from_readings
 from kempf.pipeline.channels.lateral_speed import lateral_speed
-from kempf.pipeline.channels.series import Series
+from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.ingest.read import read_log
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.logger_profile import logger_profile
@@ -57,6 +57,37 @@ def test_one_row_a_measurement_within_a_row_of_its_instant(
     error = (held.time_utc_ns - np.sort(instants)[kept])[1:]
     assert np.max(np.abs(error)) <= 1.3 * ROW_NS
     assert abs(np.mean(error)) <= 0.6 * ROW_NS
+
+
+@settings(max_examples=100, deadline=None)
+@given(
+    period=st.integers(3, 12),
+    phase=st.floats(0.0, 1.0),
+    drift=st.sampled_from([0.0, 0.003, 0.03]),
+    jitter=st.floats(0.0, 0.1),
+    seed=st.integers(0, 2**16),
+)
+def test_the_instants_are_as_far_off_as_is_said(
+    period: int, phase: float, drift: float, jitter: float, seed: int
+) -> None:
+    """A clock that keeps step with the rows may stand anywhere in a row; one that does not shows where it stands."""
+    random = np.random.default_rng(seed)
+    n_values = 200
+    ticks = (np.arange(n_values) * (period + drift) + phase) * ROW_NS
+    instants = np.sort(np.round(ticks + jitter * random.uniform(-1.0, 1.0, n_values) * ROW_NS).astype(np.int64))
+    time, values = logged(instants, np.arange(n_values, dtype=np.float64) ** 1.5, n_values * period)
+    held = find_held(time, values)
+    assert held.rows_per_value == period
+    row_s = ROW_NS / SECOND_NS
+    assert 0.0 <= held.std_s <= row_s / np.sqrt(12.0) * (1.0 + 1e-9)
+    if drift == 0.03:
+        assert held.std_s < 0.12 * row_s
+    if drift == 0.0 and jitter == 0.0:
+        assert held.std_s > 0.28 * row_s
+    kept = np.round(values[held.rows, 0] ** (1.0 / 1.5)).astype(int)
+    off_s = float(np.mean((held.time_utc_ns - instants[kept])[1:])) / SECOND_NS
+    # anywhere within a row of this size; what jitters crosses an edge or not, which hides as much
+    assert abs(off_s) <= np.sqrt(3.0) * held.std_s + (0.06 + jitter) * row_s
 
 
 @given(step_deg=st.sampled_from([0.1, 0.5, 1.0]), seed=st.integers(0, 2**16))

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from kempf.pipeline.channels.doctor.log import EARTH_M, Log
+from kempf.pipeline.channels.instant_errors import IN_THE_LOG
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import velocity_lateness
 from kempf.pipeline.channels.punctual import apart, punctual
@@ -67,7 +68,7 @@ def test_it_is_undone_and_said() -> None:
     ship, there = boat(smoothed_s=0.4), boat()
     found = punctual(ship, 0, int(LONG_S * SECOND_NS))
     assert any("late beside the fixes" in sentence for sentence in found.said)
-    assert 0.0 < found.velocity_late_std_s < 0.1
+    assert 0.0 < found.errors.velocity_s < 0.1
     off = [found.instruments.series["course_over_ground"], ship.series["course_over_ground"]]
     off_rad = [float(np.std(one.value - there.series["course_over_ground"].value)) for one in off]
     assert off_rad[0] < 0.3 * off_rad[1]
@@ -80,7 +81,7 @@ def test_what_is_not_late_stays_as_it_is() -> None:
         found = punctual(ship, 0, int(LONG_S * SECOND_NS))
         assert found.instruments is ship
         assert found.said == ()
-        assert found.velocity_late_std_s == 0.0
+        assert found.errors == IN_THE_LOG
 
 
 def test_a_log_of_means_is_read_at_their_middle_one_after_the_other() -> None:

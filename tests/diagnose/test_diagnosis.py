@@ -21,6 +21,7 @@ from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.pipeline.diagnose.verdict import verdict
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -294,8 +295,10 @@ def test_a_channel_that_the_runs_lack_is_named() -> None:
 
 def refitted(likelihood_ratio: float = 500.0) -> Confirmation:
     """A refit that gains so much everywhere, worth two parameters."""
+    fit = cast(PooledFit, SimpleNamespace(log_likelihood=100.0))
     return Confirmation(
-        fit=cast(PooledFit, SimpleNamespace(log_likelihood=100.0)),
+        fit=fit,
+        stated=WithInstants(fit, np.zeros((7, 7))),
         likelihood_ratio=likelihood_ratio,
         bic_change=10.0 - likelihood_ratio,
         fold_gains=np.ones(3),

@@ -59,12 +59,35 @@ def test_errors_that_are_no_information_still_count_as_far_as_their_runs_do(befo
     plain, made = brought(before, run(25)), brought(replace(before, stated=before.stated + late), run(25))
     assert plain is not None and made is not None
     np.testing.assert_array_equal(made.fit.hull, plain.fit.hull)
-    share = np.diag(made.beside - plain.beside) / np.diag(late)
+    share = np.diag(made.known.covariance - plain.known.covariance) / np.diag(late)
     # four of the five runs: of the weight of a run's errors, each counts with its share twice
     assert np.all((share > 0.4) & (share < 1.0))
-    np.testing.assert_allclose(
-        made.known.covariance - plain.known.covariance, made.beside - plain.beside, rtol=0, atol=1e-12
-    )
+
+
+def test_what_is_not_known_of_instants_counts_against_what_the_runs_before_say(before: Posterior) -> None:
+    plain = brought(before, run(25))
+    unsure = replace(before, covariance=4.0 * before.covariance, stated=4.0 * before.stated)
+    made = brought(unsure, run(25))
+    assert plain is not None and made is not None
+    wider = np.diag(made.known.covariance) / np.diag(plain.known.covariance)
+    # five runs that count for one and a quarter, and the new one
+    assert np.all((wider > 1.5) & (wider < 4.0))
+
+
+def test_a_new_run_is_judged_where_it_is_stated(before: Posterior) -> None:
+    with ThreadPoolExecutor(2) as executor:
+        found = [
+            updated(
+                before,
+                EffectModel(),
+                [run(25)],
+                SPEC,
+                executor,
+                stated=lambda fit, k=k: replace(fit, hull=k * fit.hull),  # type: ignore[misc]
+            )
+            for k in (1.0, 1.5)
+        ]
+    assert found[0] is not None and found[1] is None
 
 
 def test_a_run_of_another_ship_is_not_brought_in(before: Posterior) -> None:

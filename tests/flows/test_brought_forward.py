@@ -20,6 +20,7 @@ from kempf.flows.jobs.rerun_all import verify_all
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, POOLED
 from kempf.flows.jobs.vessel_model import POSTERIOR, store_model
+from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.pipeline.estimate.posterior import from_json
 from kempf.pipeline.ingest.log_file import LogFile
 from kempf.pipeline.simulate.csv_log import to_csv
@@ -166,7 +167,11 @@ def test_a_model_with_effects_is_brought_forward_with_its_parents(own: Warehouse
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(update_model, "FEWEST", FIRST + 2)
         # the receiver of the first days was late by what nobody knows
-        patch.setattr(vessel_model, "covariance_of_lateness", lambda fit, _: fit.covariance * (len(fit.runs) > 1))
+        patch.setattr(
+            vessel_model,
+            "with_instants",
+            lambda fit, _: WithInstants(fit, fit.covariance * (len(fit.runs) > 1)),
+        )
         made, new = store_model(own, choose(own, "ferry"), spec, NONE_OF_ONES_OWN)
         assert new
         aliases.point(own, "ferry", made.parameter_set_id)
@@ -182,6 +187,7 @@ def test_a_model_with_effects_is_brought_forward_with_its_parents(own: Warehouse
     lag = {p.name: p for p in now.parameters}["yaw_quadratic.c"]
     before = {p.name: p for p in made.parameters}["yaw_quadratic.c"]
     assert lag.std and before.std and lag.std < before.std and np.isfinite(lag.value)
-    left = from_json(now.convergence[POSTERIOR])
-    # errors of the lateness of earlier runs stay beside those of the new one
-    assert np.all(np.diag(left.stated) > 1.3 * np.diag(left.covariance))
+    first, left = (from_json(one.convergence[POSTERIOR]) for one in (made, now))
+    # what is not known of the instants of the first runs counts against them, and the new one adds what it says
+    assert np.all(np.diag(left.covariance) < np.diag(first.covariance))
+    np.testing.assert_allclose(first.stated, first.covariance, rtol=1e-12)

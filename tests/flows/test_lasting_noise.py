@@ -17,6 +17,7 @@ from kempf.flows.jobs.identify_vessel import identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.pipeline.diagnose import instrument_noise
+from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.schemas.instrument_noise import NAMES
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
@@ -70,7 +71,7 @@ def test_a_set_holds_what_is_not_known_of_a_lateness_also_where_no_noise_lasts(
         assert all(any("late beside the fixes" in said for said in one.warnings) for one in sets)
         assert [lasting(one) for one in sets] == [set()] * 4
         stds.append([next(p.std for p in one.parameters if p.name == "a21") for one in sets])
-        monkeypatch.setattr(vessel_model, "covariance_of_lateness", lambda fit, _: np.zeros_like(fit.covariance))
+        monkeypatch.setattr(vessel_model, "with_instants", lambda fit, _: WithInstants(fit, 0.0 * fit.covariance))
     # sway, and by drift the yaw
     assert np.all(np.array(stds[0]) > 1.02 * np.array(stds[1])), stds
 

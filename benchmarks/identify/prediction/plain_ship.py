@@ -31,6 +31,7 @@ from kempf.flows.jobs.pool_vessel import pool_vessel
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.hulls import HULLS, HullParameters, SimulatedHull
+from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS, Instrument
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, Step, TurningCircle, ZigzagTest
 from kempf.pipeline.simulate.mcap_log import to_mcap
@@ -97,13 +98,22 @@ def compared(number: int, *, stamped: bool) -> ComparedShip:
     """
     hull, _ = drawn(number)
     with tempfile.TemporaryDirectory() as folder:
-        warehouse = _identified(hull, number, Path(folder), stamped=stamped)
+        warehouse = taken_in(hull, number, Path(folder), stamped=stamped)
+        pool_vessel(warehouse, hull.name, Request(), identify_vessel(warehouse, hull.name))
         figures, refused, models = predicted_beside(warehouse, hull.name, hull.trial_speed_m_s, _truth(hull))
     return ComparedShip("stamped" if stamped else "plain", hull.name, "", figures, refused, models=models)
 
 
-def _identified(hull: SimulatedHull, number: int, folder: Path, *, stamped: bool) -> Warehouse:
-    """Sail her zigzags in wind and stream and identify her from their log."""
+def taken_in(hull: SimulatedHull, number: int, folder: Path, *, stamped: bool) -> Warehouse:
+    """Sail her zigzags in wind and stream and take their log in.
+
+    Parameters
+    ----------
+    folder : Path
+        Of the log and of the warehouse.
+    stamped : bool
+        Whether every reading of the log has its own instant.
+    """
     own_s = hull.length_m / hull.trial_speed_m_s
     steps = (
         SteadyCourse(90.0),
@@ -111,14 +121,22 @@ def _identified(hull: SimulatedHull, number: int, folder: Path, *, stamped: bool
         SteadyCourse(240.0, heading_deg=60.0),
         ZigzagTest(10.0, 10.0, "port", duration_s=_LONGEST_LENGTHS[10.0] * own_s),
     )
-    settings = TrialSettings(hull, steps, PAPER_ENVIRONMENT, seed=number, heading_deg=20.0 * number)
+    settings = TrialSettings(
+        hull, steps, PAPER_ENVIRONMENT, _instruments(number), seed=number, heading_deg=20.0 * number
+    )
     log, trial = folder / ("trial.mcap" if stamped else "trial.csv"), simulate_trial(settings)
     log.write_bytes(to_mcap(trial) if stamped else to_csv(trial))
     warehouse = Warehouse(str(folder / "warehouse"))
     ingest(warehouse, [log], hull.name, logger_profile(settings))
-    outcomes = identify_vessel(warehouse, hull.name)
-    pool_vessel(warehouse, hull.name, Request(), outcomes)
     return warehouse
+
+
+def _instruments(number: int) -> tuple[Instrument, ...]:
+    """Return what a ship carries; nobody sets the clocks of her instruments by the rows of her log."""
+    random = np.random.default_rng([_SEED, number, 1])
+    return tuple(
+        replace(one, phase_s=max(one.jitter_s, float(random.uniform()) / one.rate_hz)) for one in DEFAULT_INSTRUMENTS
+    )
 
 
 def _truth(hull: SimulatedHull) -> Truth:

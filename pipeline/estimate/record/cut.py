@@ -104,7 +104,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         lateral=lateral,
         noise_start=noise,
         warnings=tuple(warnings),
-        velocity_late_std_s=on_time.velocity_late_std_s,
+        instant_errors=on_time.errors,
     )
 
 

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.estimate.filters.ekf import ROWS
@@ -75,7 +76,7 @@ class GridRun:
     #: Number of the log among the vessel's.
     day: int
     #: See `kempf.pipeline.estimate.record.record.Record`.
-    velocity_late_std_s: float = 0.0
+    instant_errors: InstantErrors = IN_THE_LOG
     #: See `kempf.pipeline.estimate.record.loads`.
     load: float = 0.0
 
@@ -304,7 +305,7 @@ def make_run(
         ship=ship,
         day=day,
         load=load,
-        velocity_late_std_s=record.velocity_late_std_s,
+        instant_errors=record.instant_errors,
     )
 
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.lateral_speed import LateralSpeed
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.speed_error import SpeedError
@@ -65,5 +66,5 @@ class Record(Instants):
     #: Eq. (18) with its standard errors.
     lateral: LateralSpeed
     warnings: tuple[str, ...]
-    #: Standard error of the lateness that was taken from the velocity over ground, s; 0 where it was not late.
-    velocity_late_std_s: float = 0.0
+    #: What is not known of the instants at which the instruments measured.
+    instant_errors: InstantErrors = IN_THE_LOG

@@ -1,0 +1,71 @@
+"""How well the instants of a log's instruments are known: an error of these is one error for the whole log."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import astuple, dataclass
+from math import hypot
+
+from kempf.schemas.enumeration import listed
+
+#: channels that a velocity over ground comes from
+_VELOCITY = (
+    *("speed_over_ground", "course_over_ground", "velocity_north", "velocity_east"),
+    *("velocity_forward", "velocity_starboard"),
+)
+_OTHERS = ("heading", "yaw_rate", "rudder_angle")
+
+
+@dataclass(frozen=True)
+class InstantErrors:
+    """Standard errors of the instants at which the instruments of a log measured, s; 0 where they are in the log.
+
+    A velocity that is smoothed is late by what is taken from it (decision 0045), a value that rows repeat was measured
+    somewhere within the row before it first shows (decision 0073). Both are off by as much in all manoeuvres of a log.
+    """
+
+    velocity_s: float = 0.0
+    heading_s: float = 0.0
+    yaw_rate_s: float = 0.0
+    rudder_s: float = 0.0
+
+    @property
+    def known(self) -> bool:
+        """Whether all instants are those in the log."""
+        return not any(astuple(self))
+
+
+#: of a log in which every reading has its instant
+IN_THE_LOG = InstantErrors()
+
+
+def instant_errors(instant_std_s: Mapping[str, float], late_std_s: float) -> InstantErrors:
+    """Return the errors of the instants of one log.
+
+    Parameters
+    ----------
+    instant_std_s : mapping of str to float
+        See `kempf.pipeline.channels.instruments.Instruments`.
+    late_std_s : float
+        Standard error of the lateness that was taken from the velocity, s.
+    """
+    velocity = max(instant_std_s.get(name, 0.0) for name in _VELOCITY)
+    return InstantErrors(hypot(velocity, late_std_s), *(instant_std_s.get(name, 0.0) for name in _OTHERS))
+
+
+def said_of(instant_std_s: Mapping[str, float]) -> tuple[str, ...]:
+    """Return a sentence for every size of the errors of a log's instants.
+
+    Parameters
+    ----------
+    instant_std_s : mapping of str to float
+        See `kempf.pipeline.channels.instruments.Instruments`.
+    """
+    by_size: dict[str, list[str]] = {}
+    for name in (*_VELOCITY, *_OTHERS):
+        if instant_std_s.get(name, 0.0) > 0.0:
+            by_size.setdefault(f"{instant_std_s[name]:.1g}", []).append(name.replace("_", " "))
+    return tuple(
+        f"the log repeats values in its rows: the instants of {listed(names)} are known to {size} s (1 s.e.)"
+        for size, names in by_size.items()
+    )

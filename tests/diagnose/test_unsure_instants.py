@@ -1,0 +1,106 @@
+"""Instants that are not quite known are found beside the hull, as far as the manoeuvres show them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.unsure_instants import with_instants, within_rows
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.plain_fit import fit_plain
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.record.grid_run import GridRun
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.schemas.effects import get
+from tests.diagnose.sailing import WORKERS, Sailed, sailed
+
+#: what an instrument is late by, s, and which measurement shows it
+LATE_S = 0.2
+LATE = {"heading_latency": InstantErrors(heading_s=LATE_S), "gyro_latency": InstantErrors(yaw_rate_s=LATE_S)}
+PLAIN = (EffectModel(), np.zeros(0))
+
+
+def late(ship: Sailed, fit: PooledFit, effect: str, run: GridRun) -> GridRun:
+    """A run as the instruments show it where one of them is late."""
+    model = EffectModel((get(effect),))
+    start, measured = np.zeros(8), run.measured.copy()
+    shown = [RunFilter(run, m, ship.spec).free(fit.hull, v, start) for m, v in ((model, np.array([LATE_S])), PLAIN)]
+    return replace(run, measured=measured + (shown[0] - shown[1])[:, :3])
+
+
+def test_a_hull_is_as_if_the_instants_were_right() -> None:
+    effect = "heading_latency"
+    ship = sailed()
+    runs = ship.runs[:3]
+    right = fit_plain(runs, ship.spec, WORKERS).fit
+    off = fit_plain([late(ship, right, effect, run) for run in runs], ship.spec, WORKERS).fit
+    found = with_instants(_unsure(off, LATE[effect], (0,)), WORKERS)
+    before, after = (np.abs(hull - right.hull) / right.std[:6] for hull in (off.hull, found.fit.hull))
+    # a lateness of which the fit knows nothing moves the hull by more than its errors
+    assert np.max(before) > 2.0
+    assert np.max(after) < 0.35 * np.max(before)
+    # and what is left lies in what is stated for it
+    assert np.all(np.abs(found.fit.hull - right.hull) < 2.0 * np.sqrt(np.diag(found.covariance)) + 0.1 * right.std[:6])
+
+
+def test_what_is_known_is_left_alone() -> None:
+    ship = sailed()
+    fit = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit
+    found = with_instants(fit, WORKERS)
+    assert found.fit is fit and not np.any(found.covariance)
+
+
+def test_every_log_errs_by_itself() -> None:
+    ship = sailed()
+    runs = [replace(run, day=k % 2) for k, run in enumerate(ship.runs[:4])]
+    fit = fit_plain(runs, ship.spec, WORKERS).fit
+    added = {days: with_instants(_unsure(fit, LATE["heading_latency"], days), WORKERS) for days in ((0, 1), (0,), (1,))}
+    for days, one in added.items():
+        size = np.sqrt(np.diag(one.covariance))
+        assert np.linalg.matrix_rank(one.covariance / np.outer(size, size), tol=1e-6) == len(days)
+    # each log adds its part, and one says nothing of the instants of the other but through the hull
+    assert np.all(np.diag(added[0, 1].covariance) > np.diag(added[0,].covariance))
+
+
+def test_a_latency_of_the_model_is_known_no_better_than_the_instants() -> None:
+    ship = sailed("heading_latency")
+    fit = ship.diagnosis(("heading_latency",)).steps[1].fit
+    own = fit.model.names.index("heading_latency.tau") + 6
+    unsure = _unsure(fit, LATE["heading_latency"], tuple(run.day for run in ship.runs))
+    found = with_instants(unsure, WORKERS)
+    assert found.covariance[own, own] == pytest.approx(LATE_S**2, rel=0.2)
+    assert found.fit.values[own - 6] == pytest.approx(fit.values[own - 6], abs=1e-3)
+    effect = get("heading_latency")
+    assert within_rows(unsure, effect) == bool(abs(fit.values[-1]) < 12.0**0.5 * LATE_S)
+    assert not within_rows(fit, effect) and not within_rows(unsure, get("gyro_latency"))
+
+
+def _unsure(fit: PooledFit, errors: InstantErrors, days: tuple[int, ...]) -> PooledFit:
+    """A fit of whose instants not all are known, on some days."""
+    return replace(
+        fit,
+        runs=tuple(
+            replace(one, run=replace(one.run, instant_errors=errors if one.run.day in days else IN_THE_LOG))
+            for one in fit.runs
+        ),
+    )
+
+
+def test_a_column_that_is_not_tried_moves_nothing() -> None:
+    """Instants of an instrument that no run has are free, and move no hull."""
+    ship = sailed()
+    runs = [replace(run, measured=_without_yaw(run.measured)) for run in ship.runs[:2]]
+    fit = fit_plain(runs, ship.spec, WORKERS).fit
+    found = with_instants(_unsure(fit, LATE["gyro_latency"], (0,)), WORKERS)
+    assert found.fit.hull == pytest.approx(fit.hull, rel=1e-12)
+    assert np.max(np.abs(found.covariance)) < 1e-12
+
+
+def _without_yaw(measured: Float) -> Float:
+    made = measured.copy()
+    made[:, 1] = np.nan
+    return made
