@@ -124,7 +124,7 @@ def _steady(middle: Nanoseconds, period_ns: float, row_ns: float) -> tuple[Nanos
     -------
     (ndarray of shape (m,), float)
         And their common error, ns. Where the clock and the rows keep step, every measurement shows at the same place of
-        its row, and nothing tells which. Where they do not, or the clock jitters, measurements cross the rows' edges
+        its row, and nothing shows which. Where they do not, or the clock jitters, measurements cross the rows' edges
         and their middles scatter around the clock's line, over a whole row at most: what they do not scatter over is
         where the line may lie.
     """
