@@ -30,6 +30,8 @@ DECREMENT = 1e-3
 MAX_ITERATIONS = 60
 #: largest change of an effect in one step of the search, in its own steps
 _REACH = 5.0
+#: slope beyond which there is none
+_STEEPEST = 1e100
 
 
 @dataclass(frozen=True, eq=False)
@@ -409,4 +411,6 @@ def _line(base: Passed, columns: Sequence[tuple[int, Float]]) -> Linearised:
     if not columns:
         return Linearised(base, np.zeros(0), np.zeros((0, 0)), [])
     J = np.column_stack([column for _, column in columns])
-    return Linearised(base, sensitivity.whitened(base), np.nan_to_num(J), [index for index, _ in columns])
+    # a filter that runs away beside its point shows no slope there, and its square is no number
+    J = np.where(np.abs(J) < _STEEPEST, J, 0.0)
+    return Linearised(base, sensitivity.whitened(base), J, [index for index, _ in columns])

@@ -5,15 +5,18 @@ from __future__ import annotations
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from functools import lru_cache
+from typing import Any
 
 import numpy as np
 import pytest
 
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.agreement import LEVEL
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, identify
 from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain, off_in_std
-from kempf.pipeline.estimate.pooled_fit import CommonLikelihood
+from kempf.pipeline.estimate.pooled_fit import CommonLikelihood, linearise
 from kempf.pipeline.estimate.pooled_uncertainty import uncertainty_of
 from kempf.pipeline.estimate.record.average import step_of
 from kempf.pipeline.estimate.record.grid_run import GridRun, ShipConstants, make_run
@@ -54,6 +57,28 @@ def test_one_hull_from_three_zigzags(three: PlainFit) -> None:
     assert three.agreement.p_value > LEVEL and three.agreement.widened == 1.0
     assert three.agreement.degrees_of_freedom == 12 and 0.0 < three.agreement.statistic < 30.0
     assert [one.run.name for one in three.alone] == ["ferry 21", "ferry 22", "ferry 23"]
+
+
+def test_a_filter_that_runs_away_beside_its_point_shows_no_slope_there(
+    three: PlainFit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its square is no number, and one eigenvalue that is none ended a diagnosis."""
+    fit, columns = three.fit, sensitivity.columns
+
+    def astray(*given: Any) -> list[Float]:
+        found = columns(*given)
+        found[0] = found[0].copy()
+        found[0][:3] = np.inf, 1e200, np.nan
+        return found
+
+    monkeypatch.setattr(sensitivity, "columns", astray)
+    with ThreadPoolExecutor(2) as workers:
+        points, bases = [fit.point(k) for k in range(3)], [one.passed for one in fit.linearised]
+        lines = linearise(fit.runs, points, bases, workers)
+    for line, before in zip(lines, fit.linearised, strict=True):
+        assert not np.any(line.J[:3, 0])
+        np.testing.assert_array_equal(line.J[3:], before.J[3:])
+        assert np.all(np.isfinite(line.J.T @ line.J))
 
 
 def test_information_of_the_runs_adds_up(three: PlainFit) -> None:
