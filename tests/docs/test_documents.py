@@ -68,14 +68,6 @@ def test_honesty_quotes_the_benchmarks() -> None:
     assert f"it converges on {still[1]}, of which {still[2]} have the signs" in text
 
 
-def test_what_does_not_exist_yet_does_not_exist() -> None:
-    text = (ROOT / "docs" / "honesty.md").read_text(encoding="utf-8")
-    section = text.partition("## What does not exist yet")[2].partition("\n## ")[0]
-    named = re.findall(r"\(`(\w+)`", section)
-    assert named == []
-    assert not set(named) & set(COMMANDS)
-
-
 def test_readme_leads_to_every_page() -> None:
     linked = set(LINK.findall((ROOT / "README.md").read_text(encoding="utf-8")))
     assert {f"docs/{path.name}" for path in (ROOT / "docs").glob("*.md")} <= linked
