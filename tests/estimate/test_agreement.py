@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of, stated_std
+from kempf.pipeline.diagnose.unsure_instants import WithInstants
+from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit, fit
 from kempf.pipeline.model.effect_model import EffectModel
@@ -30,12 +31,17 @@ def with_neutral_angle(*offset_rad: float) -> PooledFit:
         return fit(filters, plain.hull, plain.levels, np.zeros(1), workers)
 
 
+def stated(fit: PooledFit) -> WithInstants:
+    """Her fit as a diagnosis states it, all instants known."""
+    return WithInstants(fit, np.zeros_like(fit.covariance))
+
+
 def test_runs_of_one_ship_agree() -> None:
     same = with_neutral_angle(0.02, 0.02, 0.02)
     found = agreement_of(same)
     assert found.degrees_of_freedom == 14 and 2.0 < found.statistic < 35.0
     assert found.p_value > LEVEL and found.widened == 1.0
-    np.testing.assert_array_equal(stated_std(same), same.std)
+    np.testing.assert_array_equal(stated(same).std(7), same.std)
 
 
 def test_an_effect_that_changes_from_run_to_run_has_wider_errors() -> None:
@@ -44,7 +50,7 @@ def test_an_effect_that_changes_from_run_to_run_has_wider_errors() -> None:
     assert found.p_value < 1e-6 and found.widened > 1.5
     # the two angles differ from their mean by more than the errors that would hold for one angle
     assert abs(other.values[0] - 0.04) > 3.0 * other.std[6]
-    assert stated_std(other)[6] == pytest.approx(found.widened * other.std[6])
+    assert stated(other).std(1)[0] == pytest.approx(found.widened * other.std[6])
 
 
 def test_to_first_order_it_is_the_likelihood_ratio_of_separate_hulls() -> None:
