@@ -133,6 +133,8 @@ def _with_circles(ship: Ship) -> tuple[VesselRuns, frozenset[str]]:
             segments=(*chosen.segments, *circles),
             ingests=chosen.ingests | {s.log_id: s.ingest_id for s in circles},
             file_names=names | chosen.file_names,
+            # by the number of the log, those of circles among them
+            loads={},
         )
         made = assembled(warehouse, both, default_model_of(warehouse, ship.name))
     return made, frozenset(s.segment_id for s in circles)
