@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
-from dataclasses import astuple, dataclass
+from dataclasses import astuple, dataclass, fields
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -22,6 +22,7 @@ from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.vessel_runs import VesselRuns, assembled
 from kempf.flows.process.cores import usable
+from kempf.pipeline.channels.instant_errors import InstantErrors
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.unsure_instants import with_instants
 from kempf.pipeline.estimate.plain_fit import fit_plain
@@ -32,7 +33,7 @@ from kempf.schemas.model_spec import HULL_PARAMETERS
 
 #: standard errors to either side of a 95 % interval
 _WIDE = 1.96
-_SHIPS, _CLOCKS = 40, ("velocity_s", "heading_s", "yaw_rate_s", "rudder_s")
+_SHIPS, _CLOCKS = 40, tuple(one.name for one in fields(InstantErrors))
 
 
 @dataclass(frozen=True, eq=False)
