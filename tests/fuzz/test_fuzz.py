@@ -1,4 +1,4 @@
-"""The fuzzing of the readers in a form that takes seconds, the whole of it is `benchmarks.ingest.fuzz`."""
+"""A hundred damaged inputs a reader; a campaign of minutes is `benchmarks.ingest.fuzz`."""
 
 import pytest
 from mcap.writer import CompressionType
@@ -10,9 +10,9 @@ from benchmarks.ingest.fuzzing.whole_chunks import vouched_times
 
 @pytest.mark.parametrize("reader", READERS)
 def test_damaged_inputs_crash_nothing_and_no_failed_checksum_is_accepted(reader):
-    found = run(reader, 1, seconds=1.5, iterations=150)
+    found = run(reader, 1, iterations=100)
     assert [(one.what, one.name, one.data[:500]) for one in found.findings] == []
-    assert found.iterations > 20
+    assert found.iterations == 100
     assert len(found.outcomes) > 3
 
 

@@ -52,7 +52,7 @@ def deployed(place: Warehouse, server: Server, tmp_path_factory: pytest.TempPath
 
 
 def ran(command: list[str], env: dict[str, str]) -> subprocess.CompletedProcess[str]:
-    return subprocess.run(command, env=env, cwd=ROOT, capture_output=True, text=True, timeout=300, check=False)
+    return subprocess.run(command, env=env, cwd=ROOT, capture_output=True, text=True, timeout=900, check=False)
 
 
 def flow_runs(*states: str) -> list[Any]:
