@@ -8,6 +8,7 @@ import numpy as np
 
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
+from kempf.pipeline.channels.signal import rounding_std
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +94,10 @@ def noise_std(series: Series) -> float:
     """
     if len(series) < 8:
         return float("nan")
-    steps = np.abs(np.diff(series.value))
-    # a coarse channel that moves little repeats itself: its rounding is noise all the same
-    rounding = float(np.min(steps[steps > 0.0], initial=np.inf)) / np.sqrt(12.0) if np.mean(steps == 0.0) > 0.5 else 0.0
     difference = np.diff(series.value, n=3)
     white = float(1.4826 * np.median(np.abs(difference - np.median(difference))) / np.sqrt(20.0))
-    return max(white, rounding) if np.isfinite(rounding) else white
+    # a coarse channel that moves little repeats itself: its rounding is noise all the same
+    return max(white, rounding_std(series))
 
 
 def check_current(

@@ -1,4 +1,4 @@
-"""The cubic smoothing spline at its own knots, of several columns at once.
+"""The smoothing spline at its own knots, cubic or straight, of several columns at once.
 
 scipy's `make_smoothing_spline` gives the same values and a curve in between, which nobody asks for here, in fifty times
 the time: its loop over the knots is Python.
@@ -7,7 +7,7 @@ the time: its loop over the knots is Python.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import solveh_banded
+from scipy.linalg import cho_solve_banded, cholesky_banded
 
 from kempf.pipeline.channels.series import Float
 
@@ -20,6 +20,8 @@ class Smoother:
     time_s : ndarray, shape (n,)
         Rising, n >= 3.
     columns : ndarray, shape (n, k)
+    order : int, optional
+        Derivative that is kept small: 2 of a cubic spline, 1 of one of straight lines.
 
     References
     ----------
@@ -27,42 +29,68 @@ class Smoother:
     Regression and Generalized Linear Models, sect. 2.3.
     """
 
-    def __init__(self, time_s: Float, columns: Float) -> None:
+    def __init__(self, time_s: Float, columns: Float, order: int = 2) -> None:
         h = np.diff(time_s)
-        # second divided differences are Q' y: three numbers a row
-        self._q = np.stack([1.0 / h[:-1], -1.0 / h[:-1] - 1.0 / h[1:], 1.0 / h[1:]])
-        self._columns, self._bent = columns, self._differences(columns)
-        a, b, c = self._q
-        m = a.size
-        self._squares, self._ribs = np.zeros((3, m)), np.zeros((3, m))
-        self._squares[2] = a * a + b * b + c * c
-        self._squares[1, 1:] = b[:-1] * a[1:] + c[:-1] * b[1:]
-        self._squares[0, 2:] = c[:-2] * a[2:]
-        self._ribs[2] = (h[:-1] + h[1:]) / 3.0
-        self._ribs[1, 1:] = h[1:-1] / 6.0
+        # divided differences of that order are Q' y: two or three numbers a row
+        if order == 1:
+            self._q = np.stack([-np.ones(h.size), np.ones(h.size)])
+            ribs = [h]
+        else:
+            self._q = np.stack([1.0 / h[:-1], -1.0 / h[:-1] - 1.0 / h[1:], 1.0 / h[1:]])
+            ribs = [(h[:-1] + h[1:]) / 3.0, h[1:-1] / 6.0]
+        self._columns, self._order = columns, order
+        self._bent = sum(row[:, None] * self._shifted(k) for k, row in enumerate(self._q))
+        # the upper diagonals, the main one last
+        self._squares, self._ribs = np.zeros((order + 1, h.size + 1 - order)), np.zeros((order + 1, h.size + 1 - order))
+        for k in range(order + 1):
+            self._squares[order - k, k:] = sum(
+                self._q[i + k, : self._q.shape[1] - k] * self._q[i, k:] for i in range(order + 1 - k)
+            )
+        for k, row in enumerate(ribs):
+            self._ribs[order - k, k:] = row
+        # the last factor of every difference: what turns readings into differences
+        self._log_scale = float(np.sum(np.log(self._q[-1])))
 
     def smooth(self, penalty: float) -> Float:
-        """Return the columns g with the least sum of (y - g)^2 + ``penalty`` times the integral of g''^2.
+        """Return the columns g with the least sum of (y - g)^2 + ``penalty`` times the integral of g''^2 (or g'^2).
 
         Parameters
         ----------
         penalty : float
-            s^3.
+            s^3, s of order 1.
 
         Returns
         -------
         ndarray, shape (n, k)
         """
-        curvature = solveh_banded(self._ribs + penalty * self._squares, self._bent)
-        a, b, c = (row[:, None] for row in self._q)
+        bent = cho_solve_banded((self._factor(penalty), False), self._bent)
         taken = np.zeros_like(self._columns)
-        taken[:-2] += a * curvature
-        taken[1:-1] += b * curvature
-        taken[2:] += c * curvature
+        for k, row in enumerate(self._q):
+            taken[k : k + row.size] += row[:, None] * bent
         result: Float = self._columns - penalty * taken
         return result
 
-    def _differences(self, y: Float) -> Float:
-        a, b, c = (row[:, None] for row in self._q)
-        result: Float = a * y[:-2] + b * y[1:-1] + c * y[2:]
-        return result
+    def weighed(self, penalty: float) -> tuple[Float, Float, float]:
+        """Return the differences of the columns, what their inverse covariance makes of them, and its logarithm.
+
+        Of the readings' noise, white and of variance 1, and of a derivative (the one that is kept small) that is white
+        noise of a density of 1 / ``penalty`` (Wahba 1978, "Improper priors, spline smoothing and the problem of
+        guarding against model errors in regression", JRSS B 40).
+
+        Returns
+        -------
+        differences, weighed : ndarray, shape (n - order, k)
+        log_determinant : float
+            Of the covariance of the readings after the first ones, as many as the order, given these.
+        """
+        factor = self._factor(penalty)
+        log_determinant = 2.0 * float(np.sum(np.log(factor[-1]))) - factor.shape[1] * np.log(penalty)
+        weighed = penalty * cho_solve_banded((factor, False), self._bent)
+        return self._bent, weighed, log_determinant - 2.0 * self._log_scale
+
+    def _factor(self, penalty: float) -> Float:
+        factor: Float = cholesky_banded(self._ribs + penalty * self._squares)
+        return factor
+
+    def _shifted(self, by: int) -> Float:
+        return self._columns[by : by + self._q.shape[1]]

@@ -160,13 +160,15 @@ class EffectModel:
                 rudder_rad = RUDDER_COURSES[effect.rudder_course](time_s, rudder_rad, own)
         return rudder_rad
 
-    def rudders(self, time_s: Float, rudder_rad: Float, between: Float, values: Float) -> Float:
+    def rudders(self, time_s: Float, rudder_rad: Float, before: Float, between: Float, values: Float) -> Float:
         """Return the rudder as the effects have it for several sets of their parameters, shape (n, k).
 
         Parameters
         ----------
         time_s, rudder_rad : ndarray, shape (n,)
             Evenly spaced.
+        before : ndarray, shape (m,)
+            The rudder at as many instants before the first.
         between : ndarray, shape (n,)
             What is added to every course, see `kempf.pipeline.estimate.record.grid_run.GridRun.rudder_between`.
         values : ndarray, shape (p, k)
@@ -175,5 +177,7 @@ class EffectModel:
         if all(effect.rudder_course is None for effect in self.effects):
             return np.repeat(rudder_rad[:, None] + between[:, None], values.shape[1], axis=1)
         own, of = np.unique(values, axis=1, return_inverse=True)
-        courses = [self.rudder(time_s, rudder_rad, one) for one in own.T]
+        step, known = time_s[1] - time_s[0], np.concatenate([before, rudder_rad])
+        time = time_s[0] + step * (np.arange(known.size) - before.size)
+        courses = [self.rudder(time, known, one)[before.size :] for one in own.T]
         return np.ascontiguousarray((np.stack(courses, axis=-1) + between[:, None])[:, of])

@@ -93,7 +93,9 @@ class ShotRun:
         x0 = np.zeros((w, N_BEFORE + extra + N_AFTER, many))
         x0[:, :3], x0[:, 3], x0[:, 4] = starts, own[0], own[1]
         x0[:, -3:] = own[None, 2:]
-        rudder = self.model.rudders(run.fine_time_s, run.inputs[:, 1], run.rudder_between, shared[N_HULL:])
+        rudder = self.model.rudders(
+            run.fine_time_s, run.inputs[:, 1], run.rudder_before, run.rudder_between, shared[N_HULL:]
+        )
         constants = run.constants(self.spec.rudder_speed_exponent)
         found = np.empty((self.windows.rows.size, 3, many))
         shoot(

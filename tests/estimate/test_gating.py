@@ -32,7 +32,7 @@ def test_gross_errors_do_not_bend_the_estimate(clean: tuple[Record, float]) -> N
     plain = ml.identify(record, ModelSpec(), arm, SETTINGS)
     measured = record.measured.copy()
     rows = np.flatnonzero(np.isfinite(measured[:, 0]))[7::29]
-    jumps = np.where(np.arange(rows.size) % 2, 2.5, -4.0)
+    jumps = np.where(np.arange(rows.size) % 2, 2.5, -4.5)
     measured[rows, 0] += jumps
     bent = ml.identify(replace(record, measured=measured), ModelSpec(), arm, SETTINGS)
     assert bent.report["gross_errors"] == {"lateral_speed": rows.size}

@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.pipeline.channels.smooth import smoothed
+from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.record.water_speed import water_speed
 
 LEG_S = 100.0
@@ -40,7 +39,7 @@ def test_the_loss_in_the_turns_is_not_smoothed_away() -> None:
         found = water_speed(log, heading, rudder)
         error = found.series.value - truth
         beside.append(np.std(error))
-        alone.append(np.std(smoothed(log, noise_std(log)).series.value - truth))
+        alone.append(np.std(signal(log).series.value - truth))
         told.append(found.error_std)
         dips.append((error - error.mean()) @ (truth - truth.mean()) / np.sum((truth - truth.mean()) ** 2))
     assert np.mean(beside) < 0.7 * np.mean(alone)
@@ -62,6 +61,4 @@ def test_a_speed_that_turning_does_not_touch_is_left_alone() -> None:
 def test_without_a_turn_it_is_the_spline_alone() -> None:
     log, heading, _, _ = sailed(loss=80.0, seed=0)
     still = Series(log.time_utc_ns, np.zeros(len(log)))
-    np.testing.assert_array_equal(
-        water_speed(log, heading, still).series.value, smoothed(log, float(noise_std(log))).series.value
-    )
+    np.testing.assert_array_equal(water_speed(log, heading, still).series.value, signal(log).series.value)

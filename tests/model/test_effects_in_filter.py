@@ -46,6 +46,7 @@ def run() -> GridRun:
         step_s=step,
         inputs=inputs,
         rudder_between=np.zeros(fine.size),
+        rudder_before=np.zeros(0),
         rudder_noise=np.zeros(n),
         speed_error_std_m_s=0.0,
         speed_error_rate_per_s=0.0,

@@ -46,6 +46,7 @@ def run_of(step: float = STEP, n: int = N, *, seed: int = 0) -> GridRun:
         step_s=step,
         inputs=inputs,
         rudder_between=np.zeros(fine.size),
+        rudder_before=np.zeros(0),
         rudder_noise=np.full(n, 2e-3),
         speed_error_std_m_s=0.1,
         speed_error_rate_per_s=0.2,

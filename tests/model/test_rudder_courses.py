@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.effects import RUDDER_COURSES
 from kempf.schemas.effect import Effect
 from kempf.schemas.effects import catalogue
@@ -101,3 +102,17 @@ def test_rate_limit_is_exact_between_the_instants() -> None:
     assert np.max(np.abs(np.diff(reference))) <= 1e-3 / 20.0 + 1e-15
     stepped = np.where(coarse < 5.0, 0.0, 0.3)
     assert course(coarse, stepped, slowness)[4:12] == pytest.approx([0, 0.05, 0.1, 0.15, 0.2, 0.25, 0.3, 0.3])
+
+
+@courses
+def test_what_the_rudder_did_before_a_run_decides_where_it_stands(effect: Effect, course: Course) -> None:
+    time, rudder = zigzag()
+    model, size = EffectModel((effect,)), one(effect, 1)
+    cut = 350
+    values = np.stack([np.zeros(size.size), size], axis=1)
+    between = np.zeros(time.size - cut)
+    found = model.rudders(time[: time.size - cut], rudder[cut:], rudder[:cut], between, values)
+    np.testing.assert_array_equal(found[:, 0], rudder[cut:])
+    np.testing.assert_allclose(found[:, 1], course(time, rudder, size)[cut:], atol=1e-12)
+    alone = model.rudders(time[: time.size - cut], rudder[cut:], np.zeros(0), between, values)
+    assert np.max(np.abs(alone[:, 1] - found[:, 1])) > 1e-3

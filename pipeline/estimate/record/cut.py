@@ -13,7 +13,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from kempf.pipeline.channels.punctual import punctual
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
-from kempf.pipeline.channels.smooth import without_spikes
+from kempf.pipeline.channels.spikes import without_spikes
 from kempf.pipeline.channels.standing import averaged_where_standing
 from kempf.pipeline.estimate.record.channel_faults import EXAMINED, check_channels
 from kempf.pipeline.estimate.record.checks import check_course, check_manoeuvre, check_sway, check_way

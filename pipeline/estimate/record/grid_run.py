@@ -11,14 +11,16 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.average import cell_means, instants_of, step_of
+from kempf.pipeline.estimate.record.conditions import conditions
 from kempf.pipeline.estimate.record.record import Instants, Record
 from kempf.pipeline.estimate.record.rudder_inflow import approach_speed
 from kempf.pipeline.estimate.record.speed_error import SpeedError
 from kempf.pipeline.model.dynamics import N_INPUT, SPEED_ERROR_GAIN
 from kempf.schemas.model_spec import ModelSpec
-from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS
+from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 _APPROACH_S = 5.0
 #: column of the shaft speed in `GridRun.inputs`
@@ -51,6 +53,9 @@ class GridRun:
     #: over half a step, by which the extended filter goes, gives its very integral: it turns corners between them. 0 at
     #: the ends of half steps.
     rudder_between: Float
+    #: Shape (m,). The rudder at the instants of the input table before its first one, as far back as the log goes
+    #: and no longer than the run: where a play in the gear stands, what came before decides.
+    rudder_before: Float
     #: Shape (n,).
     rudder_noise: Float
     #: speed_error_std_m_s, speed_error_rate_per_s: Of the error of the speed, a first-order process; 0 where there is
@@ -263,15 +268,9 @@ def make_run(
     inputs = np.zeros((fine.size, N_INPUT))
     inputs[:, 0] = np.interp(fine, record.time_s, record.speed_m_s)
     inputs[:, 1] = np.interp(fine, record.time_s, record.rudder_rad)
-    have = set()
-    for k, channel in enumerate(CHANNEL_SYMBOLS.values()):
-        column = _channel(instruments.get(channel), record.start_utc_ns, fine)
-        if column is not None:
-            inputs[:, 2 + k] = column
-            have.add(channel)
-    for channel in LOGGED_CHANNELS:
-        if channel not in have and _channel(instruments.get(channel), record.start_utc_ns, fine) is not None:
-            have.add(channel)
+    columns, have = conditions(instruments, record, fine)
+    for k, symbol in enumerate(CHANNEL_SYMBOLS):
+        inputs[:, 2 + k] = columns.get(symbol, 0.0)
     heading: Float = 0.0 * fine
     if known.any():
         heading = np.interp(fine, record.time_s[known], record.heading_rad[known])
@@ -289,6 +288,7 @@ def make_run(
         step_s=step_s,
         inputs=inputs,
         rudder_between=_between(record, fine, inputs[:, 1]),
+        rudder_before=_before(instruments.get("rudder_angle"), record.start_utc_ns, fine),
         rudder_noise=np.interp(
             time, record.time_s, record.shake_rad_sqrt_s if brief else record.rudder_noise_rad_sqrt_s
         ),
@@ -301,7 +301,7 @@ def make_run(
         heading_rad=coarse,
         approach_m_s=approach_speed(fine, inputs[:, 0]),
         approach_per_s=float(np.median(inputs[first, _SHAFT])) or 1.0,
-        channels=frozenset(have),
+        channels=have,
         ship=ship,
         day=day,
         load=load,
@@ -321,22 +321,22 @@ def _between(record: Record, fine: Float, rudder: Float) -> Float:
     return result
 
 
+def _before(rudder: Series | None, start_ns: int, fine: Float) -> Float:
+    """Return `GridRun.rudder_before`."""
+    if rudder is None:
+        return np.zeros(0)
+    back = np.round(fine[:0:-1] * SECOND_NS).astype(np.int64)
+    earlier = rudder.between(start_ns - int(back[0]), start_ns + round(gap_limit_s(rudder) * SECOND_NS))
+    course = signal(earlier).series.at(start_ns - back, gap_limit_s(rudder))
+    unknown = np.flatnonzero(np.isnan(course))
+    known: Float = course[unknown[-1] + 1 :] if unknown.size else course
+    return known
+
+
 def _current_row(spec: ModelSpec, heading: Float) -> Float:
     if spec.current == "earth":
         return np.column_stack([-np.sin(heading), np.cos(heading)])
     return np.tile([1.0 if spec.current == "lateral" else 0.0, 0.0], (heading.size, 1))
-
-
-def _channel(series: Series | None, start_ns: int, fine: Float) -> Float | None:
-    """Return a channel at the fine instants, or None where the log lacks it there."""
-    if series is None or len(series) < 2:
-        return None
-    value = series.at(start_ns + np.round(fine * SECOND_NS).astype(np.int64), gap_limit_s(series))
-    good = np.isfinite(value)
-    if np.count_nonzero(good) < 0.9 * value.size:
-        return None
-    filled: Float = np.interp(fine, fine[good], value[good])
-    return filled
 
 
 def with_common_slip(runs: Sequence[GridRun], kept_m: float | None = None) -> tuple[GridRun, ...]:

@@ -10,16 +10,15 @@ from __future__ import annotations
 import numpy as np
 from scipy.signal import lfilter
 
-from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.series import Float, Series
-from kempf.pipeline.channels.smooth import SmoothedSpeed, smoothed
+from kempf.pipeline.channels.signal import Signal, signal
 from kempf.pipeline.estimate.record.moves import moves
 
 #: times in which a ship wins her speed back that are tried, in legs of the manoeuvre
 _LEGS = (0.3, 1.0, 3.0)
 
 
-def water_speed(log: Series, heading: Series, rudder: Series) -> SmoothedSpeed:
+def water_speed(log: Series, heading: Series, rudder: Series) -> Signal:
     """Return the speed at the log's instants, and how large and how slow its error is.
 
     Parameters
@@ -34,10 +33,9 @@ def water_speed(log: Series, heading: Series, rudder: Series) -> SmoothedSpeed:
     Norrbin (1971), "Theory and observations on the use of a mathematical model for ship manoeuvring in deep and
     confined waters", SSPA 68: the speed lost in a turn goes with v r and r^2.
     """
-    noise = float(np.nan_to_num(noise_std(log)))
     turns = moves(rudder.value)
     if not turns or len(log) < 2:
-        return smoothed(log, noise)
+        return signal(log)
     leg_s = (log.time_utc_ns[-1] - log.time_utc_ns[0]) * 1e-9 / turns
     square = _yaw_rate(heading, log) ** 2
     shapes = []
@@ -45,14 +43,14 @@ def water_speed(log: Series, heading: Series, rudder: Series) -> SmoothedSpeed:
         kept = float(np.exp(-log.period_s / (legs * leg_s)))
         # at rest in the mean: what came before the segment is the spline's
         shapes.append(np.asarray(lfilter([1.0 - kept], [1.0, -kept], square - np.mean(square))))
-    return smoothed(log, noise, [shape for shape in shapes if np.ptp(shape) > 0.0])
+    return signal(log, [shape for shape in shapes if np.ptp(shape) > 0.0])
 
 
 def _yaw_rate(heading: Series, log: Series) -> Float:
     """Return the heading's rate at the log's instants, rad/s, its noise smoothed away."""
     if len(heading) < 2:
         return np.zeros(len(log))
-    still = smoothed(heading, float(np.nan_to_num(noise_std(heading)))).series
+    still = signal(heading).series
     origin = int(still.time_utc_ns[0])
     own = still.seconds_since(origin)
     rate: Float = np.interp(log.seconds_since(origin), own, np.gradient(still.value, own))

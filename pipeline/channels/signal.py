@@ -1,0 +1,170 @@
+"""What a channel was, given all of its readings: the signal without the noise of its instrument.
+
+A model that goes by a noisy input answers too weakly to it: what is noise in the input moves no ship, so that a
+coefficient comes out too small, and too certain. By the signal that the readings let expect it does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from kempf.pipeline.channels.series import Float, Series
+from kempf.pipeline.channels.spline import Smoother
+
+#: fewer readings do not part noise from signal
+_FEWEST = 12
+#: widths that are tried, in periods of the readings: noise of a narrower one is none; a straight line through all of a
+#: series would know its error for nothing; and beyond the last one the equations lose their digits
+_NARROWEST, _PART_OF_SERIES, _WIDEST, _STEP = 0.1, 8.0, 2000.0, 0.6
+_EXACT = 1.01 * _NARROWEST
+#: log-likelihood of a width that leaves less than the rounding
+_IMPOSSIBLE = -1e12
+#: variance of what is left of the noise, as a part of the noise's, times the width in periods, by order: the integral
+#: of 1 / (1 + w^(2 order)) over all w, divided by 2 pi
+_LEFT = {1: 0.5, 2: 0.5**1.5}
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A series without its noise, and the error of that."""
+
+    #: At its own instants.
+    series: Series
+    #: Standard deviation of the error, in the series' unit.
+    error_std: float
+    #: Its correlation time, s: that of the first-order process with as much variance and as much power at frequency 0.
+    error_time_s: float
+
+
+@dataclass(frozen=True)
+class _Candidate:
+    log_likelihood: float
+    order: int
+    log_width: float
+    #: column of the shape that it stands beside, 0 beside none; and its multiple
+    shape: int
+    multiple: float
+    noise_variance: float
+    multiple_variance: float
+
+
+def signal(series: Series, shapes: Sequence[Float] = ()) -> Signal:
+    """Take the noise out of a series.
+
+    The signal wanders (a random walk: gusts, revolutions) or bends (an integrated one: a speed, a roll), the noise of
+    the readings is white. Which of the two, and how strong signal and noise are, the readings' likelihood says.
+
+    Parameters
+    ----------
+    series : Series
+    shapes : sequence of ndarray, shape (n,), optional
+        What the series may go with, at its instants. A multiple of one of them, the one that helps most, may come on
+        top, so that less is left to follow.
+
+    Returns
+    -------
+    Signal
+        With the same series where its readings show no noise, or are fewer than 12.
+
+    References
+    ----------
+    Wahba (1985), "A comparison of GCV and GML for choosing the smoothing parameter", Annals of Statistics 13: the
+    likelihood of a spline's width. Harvey (1989), Forecasting, Structural Time Series Models and the Kalman Filter,
+    ch. 2 and 4: both signals, and regression beside them. Silverman (1984), "Spline smoothing: the equivalent variable
+    kernel method", Annals of Statistics 12: what a width passes on. Carroll, Ruppert, Stefanski & Crainiceanu (2006),
+    Measurement Error in Nonlinear Models, ch. 4: regression on the expected input is free of the bias of one on a noisy
+    input.
+    """
+    if len(series) < _FEWEST or not np.ptp(series.value) > 0.0:
+        return Signal(series, 0.0, 0.5 * series.period_s if len(series) > 1 else 0.0)
+    search = _Search(series, shapes)
+    best = search.best
+    width = float(np.exp(best.log_width))
+    noise_std = float(np.sqrt(best.noise_variance))
+    if width <= _EXACT:
+        return Signal(series, noise_std, 0.5 * series.period_s)
+    value, around = search.laid(best)
+    left = min(_LEFT[best.order] / width, 1.0)
+    # white noise of the readings: all of its power at frequency 0 passes
+    return Signal(
+        Series(series.time_utc_ns, value),
+        float(np.hypot(noise_std * np.sqrt(left), around)),
+        0.5 * series.period_s / left,
+    )
+
+
+class _Search:
+    """The most likely signal among those that wander or bend, beside a shape or none."""
+
+    def __init__(self, series: Series, shapes: Sequence[Float]) -> None:
+        # time in periods of the readings, so that one list of widths serves every rate
+        time = series.seconds_since(int(series.time_utc_ns[0])) / series.period_s
+        self._floor = rounding_std(series) ** 2
+        self._first_step = float(time[1] - time[0])
+        self._columns = np.column_stack([series.value, *shapes])
+        self._smoothers = {order: Smoother(time, self._columns, order) for order in _LEFT}
+        widest = np.log(np.clip(len(series) / _PART_OF_SERIES, 1.0, _WIDEST))
+        widths = np.arange(np.log(_NARROWEST), widest + _STEP, _STEP)
+        found = [self.at(order, width) for order in _LEFT for width in widths]
+        top = max(found, key=lambda one: one.log_likelihood)
+
+        def unlikely(width: float) -> float:
+            return -self.at(top.order, width).log_likelihood
+
+        bounds = max(top.log_width - _STEP, widths[0]), min(top.log_width + _STEP, widths[-1])
+        closer = minimize_scalar(unlikely, bounds=bounds, method="bounded", options={"xatol": 0.02})
+        self.best = max(top, self.at(top.order, float(closer.x)), key=lambda one: one.log_likelihood)
+
+    def at(self, order: int, log_width: float) -> _Candidate:
+        """Return the likeliest multiple at one width.
+
+        By how likely the readings are from the third on, after the first two, so that both orders compare; a shape
+        costs one, as by Akaike.
+        """
+        penalty = float(np.exp(2.0 * order * log_width))
+        bent, solved, log_det = self._smoothers[order].weighed(penalty)
+        count = bent.shape[0]
+        own, best = bent.T @ solved, None
+        for shape in range(bent.shape[1]):
+            multiple = multiple_variance = 0.0
+            square = float(own[0, 0])
+            if shape:
+                if not own[shape, shape] > 0.0:
+                    continue
+                multiple = float(own[0, shape] / own[shape, shape])
+                square -= multiple * float(own[0, shape])
+            variance = max(square, 0.0) / count
+            if variance <= self._floor:
+                continue
+            if shape:
+                multiple_variance = variance / float(own[shape, shape])
+            likely = -0.5 * (count * (np.log(2.0 * np.pi * variance) + 1.0) + log_det) - bool(shape)
+            if order == 1:
+                step = float(bent[0, 0] - (multiple * bent[0, shape] if shape else 0.0))
+                spread = variance * (2.0 + self._first_step / penalty)
+                likely += 0.5 * (np.log(2.0 * np.pi * spread) + step**2 / spread)
+            if best is None or likely > best.log_likelihood:
+                best = _Candidate(float(likely), order, log_width, shape, multiple, variance, multiple_variance)
+        return best or _Candidate(_IMPOSSIBLE, order, log_width, 0, 0.0, self._floor, 0.0)
+
+    def laid(self, one: _Candidate) -> tuple[Float, float]:
+        """Return the signal, shape (n,), and the standard error that the multiple brings in."""
+        smooth = self._smoothers[one.order].smooth(float(np.exp(2.0 * one.order * one.log_width)))
+        value: Float = smooth[:, 0]
+        if not one.shape:
+            return value, 0.0
+        rough = self._columns[:, one.shape] - smooth[:, one.shape]
+        return value + one.multiple * rough, float(np.sqrt(one.multiple_variance * np.mean(rough**2)))
+
+
+def rounding_std(series: Series) -> float:
+    """Return the standard deviation of the rounding of a channel that mostly repeats itself; 0 of any other."""
+    steps = np.abs(np.diff(series.value))
+    if not np.mean(steps == 0.0) > 0.5:
+        return 0.0
+    least = float(np.min(steps[steps > 0.0], initial=np.inf))
+    return least / np.sqrt(12.0) if np.isfinite(least) else 0.0
