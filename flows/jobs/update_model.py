@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.errors_of_fit import errors_of
 from kempf.flows.jobs.out_of_date import command_for
 from kempf.flows.jobs.parameter_set_of import SetRequest
 from kempf.flows.jobs.standing_model import SEARCH, Own, goes_by_load, inputs_of, known_effects, stored_model
-from kempf.flows.jobs.vessel_model import POSTERIOR, as_set, errors_of, pooling, store_model
+from kempf.flows.jobs.vessel_model import POSTERIOR, as_set, pooling, store_model
 from kempf.flows.jobs.vessel_runs import Like, VesselRuns, assemble, assembled
 from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
@@ -311,5 +312,7 @@ def _rung(found: Updated, fit: PooledFit, before: ParameterSet, number: int) -> 
     }
 
 
-def _mean(first: float, number: int, second: float, count: int) -> float:
-    return float((number * first + count * second) / (number + count))
+def _mean(first: float | None, number: int, second: float, count: int) -> float:
+    # a free run that diverges has no error, and a mean with it has none
+    before = np.nan if first is None else first
+    return float((number * before + count * second) / (number + count))

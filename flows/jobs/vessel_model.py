@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
+from kempf.flows.jobs.errors_of_fit import errors_of
 from kempf.flows.jobs.lasting_noise import lasting_noise_of
 from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.flows.jobs.parameter_set_of import SetRequest, arm_of, channel_warnings, described, stored, without_arm
@@ -23,11 +24,9 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.fit_report import reported_to
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.ladder_step import rung, step_of
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
-from kempf.pipeline.diagnose.unsure_instants import with_instants
 from kempf.pipeline.estimate.agreement import LEVEL, Agreement, agreement_of
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.maximum_likelihood import settings_of
@@ -136,7 +135,7 @@ def store_model(
             )
             ids = tuple(segment.segment_id for segment in chosen.segments)
             made.append(_model_set(fit, fitted, SetRequest(inputs, profile, chosen.vessel, ids, origin, parent)))
-            progress(len(way) + 1, len(way) + 1, _errors_in_words(made[-1]))
+            progress(len(way) + 1, len(way) + 1, errors_in_words(made[-1].fit["rung"]))
     if keep is None:
         parameter_sets.insert(warehouse, made)
     else:
@@ -144,12 +143,14 @@ def store_model(
     return made[-1], True
 
 
-def _errors_in_words(made: ParameterSet) -> str:
-    found = made.fit["rung"]
-    held = "" if found["held_out_error"] is None else f", {100.0 * found['held_out_error']:.3g} % held out"
-    return (
-        f"{found['added'] or 'the plain model'}: free-run error {100.0 * found['in_sample_error']:.3g} % fitted{held}"
-    )
+def errors_in_words(rung: Mapping[str, Any]) -> str:
+    """Say how well a rung of the ladder runs free, in the manoeuvres that it was fitted to and in those held out."""
+
+    def share(error: float | None) -> str:
+        return "diverges" if error is None or np.isnan(error) else f"{100.0 * error:.3g} %"
+
+    held = f", {share(rung['held_out_error'])} held out" if rung["held_out"] else ""
+    return f"{rung['added'] or 'the plain model'}: free-run error {share(rung['in_sample_error'])} fitted{held}"
 
 
 def build_model(instruments: Mapping[str, Instruments], request: SetRequest) -> ParameterSet:
@@ -268,47 +269,6 @@ def _model_set(fit: PooledFit, fitted: Fitted, request: SetRequest) -> Parameter
         ),
         parent=request.parent,
     )
-
-
-@dataclass(frozen=True, eq=False)
-class Errors:
-    """What is known of the errors of a fit, before what the runs disagree about widens them."""
-
-    #: The fit as it is stated: instants of measurement that are not quite known are free.
-    fit: PooledFit
-    known: PooledUncertainty
-    #: Shape (6 + p, 6 + p). What is not known of the instants adds.
-    late: Float
-    #: Whether the model has effects: their diagnosis widens the first alone.
-    of_effects: bool
-
-    @property
-    def together(self) -> PooledUncertainty:
-        """Both."""
-        return replace(self.known, covariance=self.known.covariance + self.late)
-
-    def widened(self, agreement: Agreement) -> PooledUncertainty:
-        """Return both, wider by what the runs disagree about."""
-        if self.of_effects:
-            return replace(self.known, covariance=self.known.covariance * agreement.widened**2 + self.late)
-        both = self.together
-        return replace(both, covariance=both.covariance * agreement.widened**2)
-
-
-def errors_of(fit: PooledFit, known: PooledUncertainty) -> Errors:
-    """Return a fit and its errors, instants free; those of a model with effects are the ones that its diagnosis states.
-
-    Parameters
-    ----------
-    known : PooledUncertainty
-        Of all runs, without what is not known of the instants of those that are fitted here.
-    """
-    of_effects = bool(fit.ship.model.effects)
-    if of_effects:
-        known = replace(known, covariance=fit.covariance, kind="information")
-    with ThreadPoolExecutor(max_workers=usable()) as workers:
-        found = with_instants(fit, workers)
-    return Errors(found.fit, known, found.covariance, of_effects)
 
 
 def pooling(agreement: Agreement, alone: Sequence[Alone], fit: PooledFit, before: int = 0) -> dict[str, Any]:

@@ -8,7 +8,7 @@ import pytest
 
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.standing_model import NONE_OF_ONES_OWN, PLAIN
-from kempf.flows.jobs.vessel_model import store_model
+from kempf.flows.jobs.vessel_model import errors_in_words, store_model
 from kempf.flows.process.fit_report import FitReport, reported_to
 from kempf.flows.process.progress import Figures, silent
 from kempf.pipeline.estimate.iteration import SILENT, Iteration
@@ -61,6 +61,15 @@ def test_a_model_is_seen_being_fitted_and_its_last_figures_are_those_stored(two_
     assert "predicting one leg ahead" in whats
     assert whats[-1].startswith("gyro_bias: free-run error ")
     assert kept.lines[-1][0] == kept.lines[-1][1]
+
+
+def test_a_rung_that_runs_away_is_said_to_diverge() -> None:
+    rung = {"added": None, "in_sample_error": None, "held_out_error": 0.1234, "held_out": {"seg-1": {}}}
+    assert errors_in_words(rung) == "the plain model: free-run error diverges fitted, 12.3 % held out"
+    assert errors_in_words({**rung, "held_out_error": float("nan"), "in_sample_error": 0.05, "added": "gyro_bias"}) == (
+        "gyro_bias: free-run error 5 % fitted, diverges held out"
+    )
+    assert errors_in_words({**rung, "held_out": {}}) == "the plain model: free-run error diverges fitted"
 
 
 def test_who_takes_no_figures_is_told_in_words_and_who_listens_to_nothing_costs_nothing():

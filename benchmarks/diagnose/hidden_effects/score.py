@@ -76,7 +76,9 @@ def page(cases: Sequence[Judged], asked: int) -> list[str]:
             )
     return [
         *lines,
-        *result_page.table(("condition", "level", "cases", "in a set, score >= 50", "claims without effect"), rows),
+        *result_page.table(
+            ("condition", "level", "cases", "in a set, score >= 50", "not adequate without effect"), rows
+        ),
         "",
         f"![Named against true]({_NAME}.png)",
     ]
