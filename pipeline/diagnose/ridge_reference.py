@@ -1,6 +1,6 @@
 """The flexible reference: how much a smooth force of everything could still explain, in runs that did not fit it.
 
-Some sixty terms in v, r, delta, heading and speed, shrunk together, fitted to the whitened innovations of all runs but
+Some seventy terms in v, r, delta, heading and speed, shrunk together, fitted to the whitened innovations of all runs but
 one and tried on that one (Geisser 1975, JASA 70; ridge regression: Hoerl & Kennard 1970, Technometrics 12). It names
 nothing. It says whether something that repeats itself is left, whatever its name.
 """
@@ -49,6 +49,10 @@ _BOTH = {
     "cos K": "cos(K)*V**2/L",
     "sin 2K": "sin(2*K)*V**2/L",
     "cos 2K": "cos(2*K)*V**2/L",
+    "sin 3K": "sin(3*K)*V**2/L",
+    "cos 3K": "cos(3*K)*V**2/L",
+    "sin 4K": "sin(4*K)*V**2/L",
+    "cos 4K": "cos(4*K)*V**2/L",
     "speed v": "v*(V-V0)/L",
     "speed r": "r*(V-V0)",
     "speed delta": "delta*V*(V-V0)/L",
