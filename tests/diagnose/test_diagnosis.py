@@ -16,6 +16,7 @@ from kempf.pipeline.diagnose.diagnosis_json import as_json
 from kempf.pipeline.diagnose.effect_finding import finding, refusal
 from kempf.pipeline.diagnose.forward_selection import added, is_ship
 from kempf.pipeline.diagnose.remainder import something_left
+from kempf.pipeline.diagnose.ridge_reference import ridge_reference_of
 from kempf.pipeline.diagnose.screen import score
 from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
@@ -127,6 +128,16 @@ def test_an_effect_that_no_catalogue_names_is_not_given_a_wrong_name() -> None:
     assert all(one["verdict"] != "present" for one in shown["candidates"])
     assert shown["left_over"]["gain_after"] > 12.0 and len(shown["left_over"]["runs"]) == 3
     assert "{" not in "".join(shown["sentences"])
+
+
+def test_a_force_by_a_harmonic_of_the_heading_is_left_over() -> None:
+    ship = sailed("heading_harmonic")
+    _, fits = staged(ship.runs, ship.spec, [], WORKERS)
+    found = ridge_reference_of(fits[-1], WORKERS)
+    assert found.repeats and found.gain > 40.0
+    other = sailed("none")
+    _, fits = staged(other.runs, other.spec, [], WORKERS)
+    assert ridge_reference_of(fits[-1], WORKERS).gain < 8.0
 
 
 def test_a_small_rest_of_a_strong_effect_is_no_sign_of_another(late: tuple[Sailed, Diagnosis]) -> None:
