@@ -1,8 +1,8 @@
 """The flexible reference: how much a smooth force of everything could still explain, in runs that did not fit it.
 
-Some seventy terms in v, r, delta, heading and speed, shrunk together, fitted to the whitened innovations of all runs but
-one and tried on that one (Geisser 1975, JASA 70; ridge regression: Hoerl & Kennard 1970, Technometrics 12). It names
-nothing. It says whether something that repeats itself is left, whatever its name.
+Some seventy terms in v, r, delta, heading and speed, shrunk together, fitted to the whitened innovations of all runs
+but one and tried on that one (Geisser 1975, JASA 70; ridge regression: Hoerl & Kennard 1970, Technometrics 12). It
+names nothing. It says whether something that repeats itself is left, whatever its name.
 """
 
 from __future__ import annotations
