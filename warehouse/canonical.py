@@ -23,7 +23,7 @@ def plain(value: Any, *, name_non_finite: bool = False) -> Any:
     value : object
         Nested mappings, sequences, numpy scalars and arrays, and JSON's own types.
     name_non_finite : bool, optional
-        Whether NaN and the infinities become ``"nan"``, ``"inf"``, ``"-inf"`` (so that a hash tells them apart) or,
+        Whether NaN and the infinities become ``"nan"``, ``"inf"``, ``"-inf"`` (so that their hashes differ) or,
         the default, null (JSON has no other word).
 
     Raises

@@ -54,7 +54,7 @@ def require_apart(held: Iterable[tuple[str, str]]) -> None:
     Parameters
     ----------
     held : iterable of (str, str)
-        Keys and names; the earlier name is told as the one that has the key.
+        Keys and names; the earlier name is given as the one that has the key.
 
     Raises
     ------

@@ -66,7 +66,7 @@ class Segment:
 
     @property
     def own_time(self) -> bool:
-        """Whether her log tells the time itself, rather than counting from a stated start or from being switched on."""
+        """Whether her log has the time itself, rather than counting from a stated start or from being switched on."""
         return self.detail.get("own_time") is not False
 
     @property

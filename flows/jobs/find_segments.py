@@ -129,7 +129,7 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
 
 
 def _own_time(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile) -> bool:
-    """Tell whether the log tells the time itself; one of before `CLOCK_FIRST_NS` has a clock that was never set."""
+    """Return whether the log has the time itself; one of before `CLOCK_FIRST_NS` has a clock that was never set."""
     source = profile.source_for(ingest.file_name)
     stated = source is not None and source.time is not None and source.time.stated
     return not stated and zigzag.start_utc_ns >= CLOCK_FIRST_NS

@@ -28,7 +28,7 @@ class FitReport:
     Parameters
     ----------
     progress : Progress
-        Told of pieces of work, of their parts, and of iterations: with figures where it takes them, else in words.
+        Notified of pieces of work, of their parts, and of iterations: with figures where it takes them, else in words.
     pieces : int, optional
         How many pieces of work there are, where that is known.
     """

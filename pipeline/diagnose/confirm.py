@@ -109,7 +109,7 @@ def confirm(
     most_bic : float, optional
         The change of the information criterion without which it is of no use: another one did better.
     listener : Listener, optional
-        Told of every iteration.
+        Notified of every iteration.
     """
     price = len(candidate.effect.parameters) * float(np.log(base.count))
     wanted = base.log_likelihood + 0.5 * (price - most_bic)

@@ -87,7 +87,7 @@ def diagnose(
     given : sequence of Effect, optional
         Effects that the model has already.
     listener : Listener, optional
-        Told of what is being done and of every iteration.
+        Notified of what is being done and of every iteration.
     """
     chosen, apart = split(runs)
     listener.begins(f"fitting the model to {len(chosen)} manoeuvres, {len(apart)} held out")

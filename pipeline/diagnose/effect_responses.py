@@ -46,7 +46,7 @@ def responses(
     workers : Executor
         Share the passes; nothing depends on it.
     listener : Listener, optional
-        Told of the trials that are done.
+        Notified of the trials that are done.
 
     Returns
     -------

@@ -43,7 +43,7 @@ def added(
     wanted : float, optional
         Log-likelihood without which the fit is of no use: climbs that cannot reach it are given up, not converged.
     listener : Listener, optional
-        Told of every iteration, of the race too.
+        Notified of every iteration, of the race too.
     """
     model = base.model.with_effect(candidate.effect)
     begin = _begin(candidate)

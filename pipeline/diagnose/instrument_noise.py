@@ -42,7 +42,7 @@ def with_instrument_noise(fit: PooledFit, workers: Executor, listener: Listener 
     workers : Executor
         Share the work; nothing depends on it.
     listener : Listener, optional
-        Told of every iteration.
+        Notified of every iteration.
     """
     some = _some_of(fit)
     found = _one_by_one(some, workers, listener)

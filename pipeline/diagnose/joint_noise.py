@@ -37,7 +37,7 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     workers : Executor
         Share the work; nothing depends on it.
     listener : Listener, optional
-        Told of every iteration.
+        Notified of every iteration.
 
     Returns
     -------

@@ -74,7 +74,7 @@ def screen(
     workers : Executor
         Effects share it; nothing depends on it.
     listener : Listener, optional
-        Told of what has been tried.
+        Notified of what has been tried.
     """
     present = {effect.name for effect in base.model.effects}
     chosen = [effect for effect in effects.values() if effect.name not in present]

@@ -41,7 +41,7 @@ def staged(
     settings : MaximumLikelihoodSettings, optional
         Of the search of single runs.
     listener : Listener, optional
-        Told of every model that is fitted, of its iterations and where they ended.
+        Notified of every model that is fitted, of its iterations and where they ended.
 
     Returns
     -------

@@ -47,7 +47,7 @@ def _standing_out(found: Explained) -> list[StretchEffect]:
 
 
 def why_not_testable(one: StretchEffect) -> str:
-    """Say why a stretch tells nothing of an effect; empty where it does."""
+    """Say why a stretch shows nothing of an effect; empty where it does."""
     by_channels = channels_say(one.missing, one.measured_by)
     if by_channels:
         return by_channels

@@ -30,7 +30,7 @@ from kempf.schemas.model_spec import ModelSpec
 #: log-likelihoods this close are taken for one maximum; ones this far behind in the race cannot win it
 _SAME_HILL = 0.1
 _OUT_OF_REACH = 50.0
-#: the race need not be run to the end: what is left over is less than what tells two hills apart
+#: the race need not be run to the end: what is left over is less than what separates two hills
 _RACE_DECREMENT = 1e-2
 #: nor need its steps be exact: those of the thinned record are long, and cutting them up would cost more than the rest;
 #: at this |A| h the process noise of a step is right to 1e-4

@@ -100,7 +100,7 @@ def fit_plain(
     workers : Executor
         Runs share it; the sums do not depend on it.
     listener : Listener, optional
-        Told of every run that is fitted by itself, then of every iteration of the common fit.
+        Notified of every run that is fitted by itself, then of every iteration of the common fit.
 
     Raises
     ------

@@ -184,7 +184,7 @@ def fit(
     wanted : float, optional
         Log-likelihood without which the fit is of no use: where it is out of reach the climb is given up.
     listener : Listener, optional
-        Told of every iteration.
+        Notified of every iteration.
     """
     layout = CommonLikelihood(filtered, workers)
     model = layout.model

@@ -1,6 +1,6 @@
 """The drift of a turning circle: how far the ship is set between two passages of one heading, turn after turn.
 
-A uniform current sets her so, and a steady wind. A water log tells one from the other: over ground she is faster than
+A uniform current sets her so, and a steady wind. A water log separates the two: over ground she is faster than
 through the water when she heads with a current, while a wind changes both speeds alike.
 """
 

@@ -1,4 +1,4 @@
-"""The manoeuvres of one log beside its zigzags: turning circles, pull-outs and spirals, found without being told.
+"""The manoeuvres of one log beside its zigzags: turning circles, pull-outs and spirals, found by themselves.
 
 Turns of the heading say where to look (`turns`), the rudder held meanwhile what it was (`held_rudder`). A manoeuvre
 that overlaps a zigzag is not reported again.

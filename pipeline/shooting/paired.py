@@ -8,7 +8,7 @@ import numpy as np
 
 from kempf.pipeline.shooting.left_out import LeftOut
 
-#: part of the median error below which errors are not told apart
+#: part of the median error below which errors are not distinguished
 _LEAST = 0.1
 
 

@@ -165,7 +165,7 @@ def test_a_tank_has_neither_wind_nor_current() -> None:
     assert found.converged
     assert np.max(np.abs(z(found, trial))) < 3.0
     assert [n.name for n in found.noise] == ["sigma_v", "sigma_r", "sigma_psi"]
-    # what need not be told apart from the hull leaves her better determined
+    # what need not be distinguished from the hull leaves her better determined
     open_sea = fitted(trial)
     assert all(a.std < 1.01 * b.std for a, b in zip(found.parameters, open_sea.parameters, strict=True))
     assert found.parameters[2].std < 0.9 * open_sea.parameters[2].std

@@ -46,7 +46,7 @@ def to_do(warehouse: Warehouse) -> list[str]:
 def holds(warehouse: Warehouse) -> bool:
     """Return whether a warehouse of which that is not known has layout 3, by the folders of its readings.
 
-    Every later version makes these; a table that cannot be opened tells nothing.
+    Every later version makes these; a table that cannot be opened shows nothing.
     """
     for name in BY_MONTH:
         with suppress(KempfError):

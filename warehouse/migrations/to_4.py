@@ -23,7 +23,7 @@ def to_do(warehouse: Warehouse) -> list[str]:
 def holds(warehouse: Warehouse) -> bool:
     """Return whether a warehouse of which that is not known has layout 4, by the keys in its tables.
 
-    A table that cannot be read tells nothing.
+    A table that cannot be read shows nothing.
     """
     for name in by_name.tables():
         with suppress(KempfError):

@@ -122,7 +122,7 @@ def _way(log: Log, kind: str, heading: Series, velocity: Velocity) -> _Way | Non
     if way < _LEAST_WAY * speed or fitted.left_over > _TOGETHER:
         why_not = "heading and direction of the velocity are not correlated"
     elif own > _SURE_WAY:
-        why_not = "the way that she makes herself cannot be told from a stream"
+        why_not = "the way that she makes herself cannot be distinguished from a stream"
     return _Way(float(np.angle(np.exp(1j * axis))), own, fitted.left_over, why_not)
 
 

@@ -124,7 +124,7 @@ def _compare(
     if answered is None:
         return [untestable(name, channels, "the channels hardly overlap in time")]
     if answered.ambiguous:
-        return [untestable(name, channels, "a wrong sign and a delay of the rudder cannot be told apart")]
+        return [untestable(name, channels, "a wrong sign and a delay of the rudder cannot be distinguished")]
     moved, swung = reach(rudder.value), reach(turned[0].value)
     if _is_faint(moved, swung):
         return [_faint(name, channels, answered, moved, swung)]

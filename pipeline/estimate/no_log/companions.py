@@ -17,11 +17,11 @@ from kempf.pipeline.channels.series import SECOND_NS
 
 #: a run farther away in time is of another day: the stream, the load and the engine are others
 _SAME_DAY_S = 12 * 3600.0
-#: below this angle between the headings a run tells hardly more than one on the same heading
+#: below this angle between the headings a run adds hardly more than one on the same heading
 _LEAST_TURN_DEG = 60.0
 #: relative difference of the shaft speeds up to which the engine setting counts as the same
 _SAME_SHAFT_SPEED = 0.03
-#: each run more costs as much time as the first, and tells less than the one before
+#: each run more costs as much time as the first, and adds less than the one before
 _MOST = 2
 #: the log counts for a segment from so many readings on, within so much more at either end, as `make_record` has it
 _FEWEST_READINGS, _MARGIN_NS = 20, 5 * SECOND_NS

@@ -86,7 +86,7 @@ def identify_without_log(
         Its ``speed_m_s`` is the GNSS speed along the bow, to start from; its rudder as it was read, see
         `kempf.pipeline.estimate.record.rudder_inflow`.
     spec : ModelSpec
-        Disturbance model. Only the ``earth`` current tells a current along the course from the speed.
+        Disturbance model. Only the ``earth`` current separates a current along the course from the speed.
     arm_per_m : float
         l of eq. (16), 1/m.
     settings : MaximumLikelihoodSettings
@@ -99,7 +99,7 @@ def identify_without_log(
     Returns
     -------
     Estimate
-        ``estimator`` is ``ml-no-log``; ``report["speed"]`` tells the speed, its standard error and the current. The
+        ``estimator`` is ``ml-no-log``; ``report["speed"]`` has the speed, its standard error and the current. The
         discrete parameters do not depend on the speed and keep their standard errors.
 
     Raises

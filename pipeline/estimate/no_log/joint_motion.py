@@ -142,7 +142,7 @@ def join(runs: tuple[MotionRun, ...], fits: tuple[LateralFit, ...], priors: Prio
         One a run.
     current : {"earth", "lateral", "none"}
         See `kempf.schemas.model_spec.ModelSpec`. ``lateral``: V_T across the bow, and beside it a current along it that
-        nothing but V_0 tells from the speed.
+        only V_0 separates from the speed.
     """
     parts = [_lateral_half(run, fit, current) for run, fit in zip(runs, fits, strict=True)]
     for number in range(1, len(runs)):

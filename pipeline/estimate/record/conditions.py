@@ -52,7 +52,7 @@ def _wind(speed: Series, angle: Series, record: Record, at_ns: NDArray[np.int64]
     """Return the relative wind, from what the air does over the earth.
 
     A ship that turns and an anemometer that is read every second part the relative wind from its readings between
-    them; gusts and noise are told apart where the ship's own motion is taken out.
+    them; gusts and noise are distinguished where the ship's own motion is taken out.
     """
     known = np.isfinite(record.heading_rad)
     origin, own = record.start_utc_ns, record.time_s

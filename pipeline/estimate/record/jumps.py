@@ -33,7 +33,7 @@ class Jumps:
 
     #: Shape (n,).
     inside: NDArray[np.bool_]
-    #: Leaps where so much would have to go, or so little, that nothing tells which side of them is right; none is taken
+    #: Leaps where so much would have to go, or so little, that it is unknown which side of them is right; none is taken
     #: out then.
     unresolved: int
 

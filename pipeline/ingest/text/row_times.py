@@ -27,7 +27,7 @@ _DAMAGED = 0.005
 #: A column is coarse where so many rows bear the stamp of the row before, and so many stamps are there to see it by.
 _REPEATED, _FEWEST_ROWS, _FEWEST_STAMPS = 0.5, 20, 3
 
-#: Stamps so many rows apart are told, where the interval does not fit.
+#: Stamps so many rows apart are reported, where the interval does not fit.
 _PAUSE = 20
 
 _PARTS = {"yyyy": r"(?<y>\d{4})", "yy": r"(?<y>\d{2})", "mm": r"(?<m>\d{1,2})", "dd": r"(?<d>\d{1,2})"}
