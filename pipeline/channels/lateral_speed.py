@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.rounding import rounding_std
 from kempf.pipeline.channels.series import Float, Nanoseconds, Series
-from kempf.pipeline.channels.signal import rounding_std
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import minimize_scalar
 
+from kempf.pipeline.channels.rounding import rounding_std
 from kempf.pipeline.channels.series import Float, Series
 from kempf.pipeline.channels.spline import Smoother
 
@@ -159,12 +160,3 @@ class _Search:
             return value, 0.0
         rough = self._columns[:, one.shape] - smooth[:, one.shape]
         return value + one.multiple * rough, float(np.sqrt(one.multiple_variance * np.mean(rough**2)))
-
-
-def rounding_std(series: Series) -> float:
-    """Return the standard deviation of the rounding of a channel that mostly repeats itself; 0 of any other."""
-    steps = np.abs(np.diff(series.value))
-    if not np.mean(steps == 0.0) > 0.5:
-        return 0.0
-    least = float(np.min(steps[steps > 0.0], initial=np.inf))
-    return least / np.sqrt(12.0) if np.isfinite(least) else 0.0

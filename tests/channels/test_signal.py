@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from kempf.pipeline.channels.rounding import rounding_std
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.pipeline.channels.signal import rounding_std, signal
+from kempf.pipeline.channels.signal import signal
 
 
 def slow(period_s: float = 1.0, noise: float = 0.05, seed: int = 0) -> tuple[Series, np.ndarray]:

@@ -10,7 +10,7 @@ from shutil import copytree
 import numpy as np
 import pytest
 
-from kempf.flows.jobs import update_model, vessel_model
+from kempf.flows.jobs import errors_of_fit, update_model
 from kempf.flows.jobs.chosen_manoeuvres import choose
 from kempf.flows.jobs.default_model import default_model_of
 from kempf.flows.jobs.ingest_logs import ingest_log
@@ -168,7 +168,7 @@ def test_a_model_with_effects_is_brought_forward_with_its_parents(own: Warehouse
         patch.setattr(update_model, "FEWEST", FIRST + 2)
         # the receiver of the first days was late by what nobody knows
         patch.setattr(
-            vessel_model,
+            errors_of_fit,
             "with_instants",
             lambda fit, _: WithInstants(fit, fit.covariance * (len(fit.runs) > 1)),
         )
