@@ -126,37 +126,38 @@ class _Search:
         By how likely the readings are from the third on, after the first two, so that both orders compare; a shape
         costs one, as by Akaike.
         """
-        penalty = float(np.exp(2.0 * order * log_width))
+        penalty = _penalty(order, log_width)
         bent, solved, log_det = self._smoothers[order].weighed(penalty)
         count = bent.shape[0]
         own, best = bent.T @ solved, None
         for shape in range(bent.shape[1]):
-            multiple = multiple_variance = 0.0
-            square = float(own[0, 0])
-            if shape:
-                if not own[shape, shape] > 0.0:
-                    continue
-                multiple = float(own[0, shape] / own[shape, shape])
-                square -= multiple * float(own[0, shape])
-            variance = max(square, 0.0) / count
+            if not own[shape, shape] > 0.0:
+                continue
+            # beside no shape there is no multiple
+            multiple = float(own[0, shape] / own[shape, shape]) if shape else 0.0
+            variance = max(float(own[0, 0]) - multiple * float(own[0, shape]), 0.0) / count
             if variance <= self._floor:
                 continue
-            if shape:
-                multiple_variance = variance / float(own[shape, shape])
             likely = -0.5 * (count * (np.log(2.0 * np.pi * variance) + 1.0) + log_det) - bool(shape)
             if order == 1:
-                step = float(bent[0, 0] - (multiple * bent[0, shape] if shape else 0.0))
+                step = float(bent[0, 0] - multiple * bent[0, shape])
                 spread = variance * (2.0 + self._first_step / penalty)
                 likely += 0.5 * (np.log(2.0 * np.pi * spread) + step**2 / spread)
             if best is None or likely > best.log_likelihood:
-                best = _Candidate(float(likely), order, log_width, shape, multiple, variance, multiple_variance)
+                around = variance / float(own[shape, shape])
+                best = _Candidate(float(likely), order, log_width, shape, multiple, variance, around)
         return best or _Candidate(_IMPOSSIBLE, order, log_width, 0, 0.0, self._floor, 0.0)
 
     def laid(self, one: _Candidate) -> tuple[Float, float]:
         """Return the signal, shape (n,), and the standard error that the multiple brings in."""
-        smooth = self._smoothers[one.order].smooth(float(np.exp(2.0 * one.order * one.log_width)))
+        smooth = self._smoothers[one.order].smooth(_penalty(one.order, one.log_width))
         value: Float = smooth[:, 0]
         if not one.shape:
             return value, 0.0
         rough = self._columns[:, one.shape] - smooth[:, one.shape]
         return value + one.multiple * rough, float(np.sqrt(one.multiple_variance * np.mean(rough**2)))
+
+
+def _penalty(order: int, log_width: float) -> float:
+    """Return what the spline of a width pays, time in periods of the readings."""
+    return float(np.exp(2.0 * order * log_width))

@@ -38,7 +38,7 @@ class Smoother:
         else:
             self._q = np.stack([1.0 / h[:-1], -1.0 / h[:-1] - 1.0 / h[1:], 1.0 / h[1:]])
             ribs = [(h[:-1] + h[1:]) / 3.0, h[1:-1] / 6.0]
-        self._columns, self._order = columns, order
+        self._columns = columns
         self._bent = sum(row[:, None] * self._shifted(k) for k, row in enumerate(self._q))
         # the upper diagonals, the main one last
         self._squares, self._ribs = np.zeros((order + 1, h.size + 1 - order)), np.zeros((order + 1, h.size + 1 - order))

@@ -42,9 +42,13 @@ def conditions(instruments: Instruments, record: Record, fine_s: Float) -> tuple
         columns |= _wind(read["wind_speed"], read["wind_angle"], record, at_ns)
     for symbol, name in CHANNEL_SYMBOLS.items():
         if name in read and symbol not in columns:
-            columns[symbol] = _laid(_without_noise(read[name], int(at_ns[0]), int(at_ns[-1])), at_ns)
+            columns[symbol] = _laid(_without_noise(read[name], at_ns), at_ns, gap_limit_s(read[name]))
     known = {symbol: column for symbol, column in columns.items() if column is not None}
-    others = {name for name, s in read.items() if name not in CHANNEL_SYMBOLS.values() and _laid(s, at_ns) is not None}
+    others = {
+        name
+        for name, s in read.items()
+        if name not in CHANNEL_SYMBOLS.values() and _laid(s, at_ns, gap_limit_s(s)) is not None
+    }
     return known, frozenset({CHANNEL_SYMBOLS[symbol] for symbol in known} | others)
 
 
@@ -61,8 +65,7 @@ def _wind(speed: Series, angle: Series, record: Record, at_ns: NDArray[np.int64]
         time_s = (instants - origin) / SECOND_NS
         return np.interp(time_s, own[known], record.heading_rad[known]), np.interp(time_s, own, record.speed_m_s)
 
-    beyond = round(gap_limit_s(speed) * SECOND_NS)
-    near = speed.between(int(at_ns[0]) - beyond, int(at_ns[-1]) + beyond)
+    near = _near(speed, at_ns)
     direction = angle.at(near.time_utc_ns, gap_limit_s(angle))
     both = np.isfinite(direction)
     time_ns, speeds = near.time_utc_ns[both], near.value[both]
@@ -75,7 +78,8 @@ def _wind(speed: Series, angle: Series, record: Record, at_ns: NDArray[np.int64]
     from_, heading = from_ - along, heading - along
     # the air past the ship, turned round, less what her own way makes of it
     parts = (speeds * np.cos(from_) - ahead * np.cos(heading), speeds * np.sin(from_) - ahead * np.sin(heading))
-    x, y = (_laid(signal(Series(time_ns, part)).series, at_ns) for part in parts)
+    signals = [signal(Series(time_ns, part)).series for part in parts]
+    x, y = (_laid(one, at_ns, gap_limit_s(one)) for one in signals)
     if x is None or y is None:
         return {"U": None, "gamma": None}
     heading, ahead = motion(at_ns)
@@ -86,17 +90,24 @@ def _wind(speed: Series, angle: Series, record: Record, at_ns: NDArray[np.int64]
     return {"U": np.hypot(x, y), "gamma": gamma - turns}
 
 
-def _without_noise(series: Series, start_ns: int, end_ns: int) -> Series:
-    """Return the series with its noise taken out from start to end, and the readings beside these as they are."""
-    inside = (series.time_utc_ns >= start_ns) & (series.time_utc_ns <= end_ns)
-    value = series.value.copy()
-    value[inside] = signal(series.between(start_ns, end_ns)).series.value
-    return Series(series.time_utc_ns, value)
+def _near(series: Series, at_ns: NDArray[np.int64]) -> Series:
+    """Return the readings of a manoeuvre and those beside it: its log may be a voyage's."""
+    beyond = round(gap_limit_s(series) * SECOND_NS)
+    return series.between(int(at_ns[0]) - beyond, int(at_ns[-1]) + beyond)
 
 
-def _laid(series: Series, at_ns: NDArray[np.int64]) -> Float | None:
+def _without_noise(series: Series, at_ns: NDArray[np.int64]) -> Series:
+    """Return the series with its noise taken out within the manoeuvre, and the readings beside it as they are."""
+    near = _near(series, at_ns)
+    inside = (near.time_utc_ns >= at_ns[0]) & (near.time_utc_ns <= at_ns[-1])
+    value = near.value.copy()
+    value[inside] = signal(Series(near.time_utc_ns[inside], near.value[inside])).series.value
+    return Series(near.time_utc_ns, value)
+
+
+def _laid(series: Series, at_ns: NDArray[np.int64], max_gap_s: float) -> Float | None:
     """Return a channel at the instants, or None where the log lacks it there."""
-    value = series.at(at_ns, gap_limit_s(series))
+    value = series.at(at_ns, max_gap_s)
     good = np.isfinite(value)
     if np.count_nonzero(good) < _COVERED * value.size:
         return None

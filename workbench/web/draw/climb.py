@@ -13,7 +13,7 @@ from kempf.flows.process.progress import Figures
 from kempf.workbench.web.draw.svg import drawing, element
 
 _WIDTH, _PANEL, _LEFT, _RIGHT, _GAP = 640.0, 110.0, 76.0, 10.0, 14.0
-#: how many times as far as the worst quarter of the iterations lies from the best a panel reaches: where a climb begins
+#: how many times as far as the worst quarter of the iterations is from the best a panel reaches: where a climb begins
 #: far off, nothing would be seen of the rest
 _REACH = 3.0
 
@@ -96,7 +96,7 @@ def _panel(
 
 
 def _ends(values: Sequence[float], *, rises: bool) -> tuple[float, float]:
-    """Return between which values a panel shows them; what is farther off lies on its edge."""
+    """Return between which values a panel shows them; what is farther off is on its edge."""
     if not values:
         return 0.0, 1.0
     ordered = sorted(values)

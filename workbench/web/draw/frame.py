@@ -32,12 +32,12 @@ class Frame:
     up: tuple[float, float]
 
     def x(self, value: float) -> float:
-        """Return where a value lies from the left."""
+        """Return how far a value is from the left."""
         low, high = self.across
         return LEFT + (self.width - LEFT - RIGHT) * (value - low) / ((high - low) or 1.0)
 
     def y(self, value: float) -> float:
-        """Return where a value lies from the top."""
+        """Return how far a value is from the top."""
         low, high = self.up
         return TOP + (self.height - TOP - BOTTOM) * (high - value) / ((high - low) or 1.0)
 
