@@ -34,7 +34,11 @@ COMPUTED_SYMBOLS: dict[str, str] = {
     "V": "speed through the water, m/s",
     "vdot": "sway acceleration of the model, m/s^2 (in measurements only)",
     "rdot": "yaw acceleration of the model, rad/s^2 (in measurements only)",
+    "vddot": "rate of change of vdot over the last step of the grid, m/s^3 (in measurements only)",
+    "rddot": "rate of change of rdot over the last step of the grid, rad/s^3 (in measurements only)",
 }
+#: of these, what is known once the forces are
+ACCELERATION_SYMBOLS: tuple[str, ...] = ("vdot", "rdot", "vddot", "rddot")
 #: constants of the ship
 SHIP_SYMBOLS: dict[str, str] = {
     "a11": "of eq. (16), 1/m",

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
-from kempf.pipeline.diagnose.confirm import Confirmation, Unseen, unseen
-from kempf.pipeline.diagnose.confusion_sets import WINDOW, shortlist, undecided
+from kempf.pipeline.diagnose.confirm import BIC_SAVING, Confirmation, Unseen, unseen
+from kempf.pipeline.diagnose.confusion_sets import ALIKE, WINDOW, alike, shortlist, undecided
 from kempf.pipeline.diagnose.forward_selection import is_ship
 from kempf.pipeline.diagnose.immaterial import Immaterial, weighed
 from kempf.pipeline.diagnose.ladder import Ladder
@@ -72,7 +73,8 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
         idle = _idle(found.steps)
         if idle is not None:
             found.steps = ladder.without(idle, found.steps)
-            ladder.probe = found.steps[-1].fit
+        found.steps = _not_superseded(ladder, found.steps)
+        ladder.probe = found.steps[-1].fit
     claimed = {c.effect.name for step in found.steps for c, _ in step.chosen_from}
     claimed |= {c.effect.name for one in found.immaterial for c, _ in one.chosen_from}
     found.suspected = {name: why for name, why in sorted(found.suspected.items()) if name not in claimed}
@@ -124,6 +126,29 @@ def _kept(
         else:
             kept.append((pair, ahead))
     return kept
+
+
+def _not_superseded(ladder: Ladder, steps: list[Step]) -> list[Step]:
+    """Return the ladder without what was taken for the effect that was added last, where that alone does as well.
+
+    Beside what it was taken for the true effect finds little left; the wrong one keeps a size of several standard
+    errors, for the likelihood bends. So the question is what the last effect does without it.
+    """
+    last = steps[-1]
+    assert last.added is not None
+    for below, step in pairwise(steps[:-1]):
+        assert step.added is not None
+        beside = {one.effect.name: one for one in below.screened}
+        first, second = beside.get(step.added.name), beside.get(last.added.name)
+        if first is None or second is None or not alike(first, second) > ALIKE:
+            continue
+        without = ladder.without(step.added, steps)
+        price = len(step.added.parameters) * float(np.log(last.fit.count))
+        saved = 2.0 * (last.fit.log_likelihood - without[-1].fit.log_likelihood) - price
+        worse = last.ahead is not None and without[-1].ahead is not None and worsens(last.ahead, without[-1].ahead)
+        if saved < BIC_SAVING and not worse:
+            return without
+    return steps
 
 
 def _idle(steps: Sequence[Step]) -> Effect | None:

@@ -40,10 +40,14 @@ class Agreement:
 
     @property
     def widened(self) -> float:
-        """Factor by which what the runs disagree about widens standard errors."""
-        if self.p_value >= LEVEL:
+        """Factor by which what the runs disagree about widens standard errors: Birge's ratio, at least 1.
+
+        There is no threshold (decision 0079): runs that pull apart by a fifth more than their errors say prove
+        nothing, and their errors are too small by a fifth all the same.
+        """
+        if self.degrees_of_freedom <= 0:
             return 1.0
-        return float(max(np.sqrt(self.statistic / self.degrees_of_freedom), 1.0))
+        return float(np.sqrt(max(self.statistic / self.degrees_of_freedom, 1.0)))
 
 
 def agreement_of(fit: PooledFit) -> Agreement:

@@ -10,10 +10,12 @@ from kempf.pipeline.compiled import FILLING, njit
 from kempf.pipeline.model.batch import each
 from kempf.pipeline.model.chain import N_CHAIN, PSI, F, M, R, V
 from kempf.pipeline.model.terms.evaluation import evaluate
+from kempf.pipeline.model.terms.program import VARIABLE
 from kempf.schemas.symbols import SYMBOLS
 
 #: places of symbols among the variables; states come first, in the filter's order
 DELTA, SPEED, VDOT, RDOT = (SYMBOLS.index(name) for name in ("delta", "V", "vdot", "rdot"))
+VDDOT, RDDOT = SYMBOLS.index("vddot"), SYMBOLS.index("rddot")
 SHIP, CHANNEL, PARAMETER = SYMBOLS.index("a11"), SYMBOLS.index("U"), len(SYMBOLS)
 #: columns of the input table: V, delta, the symbols of channels and of the run, and the rudder that does what a unit
 #: of the speed's error does
@@ -114,3 +116,78 @@ def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lane
             for j in range(carried):
                 for b in range(each(lanes)):
                     J[target, j, b] += total[j + 1, b]
+
+
+@njit(**FILLING)
+def asks_for_jerk(table):  # type: ignore[no-untyped-def]
+    """Return whether any program speaks of vddot or rddot."""
+    code, found = table[1], False
+    for i in range(code.shape[0]):
+        found |= code[i, 0] == VARIABLE and (code[i, 1] == VDDOT or code[i, 1] == RDDOT)
+    return found
+
+
+@njit(**FILLING)
+def measured_by(  # type: ignore[no-untyped-def]
+    x,
+    row,
+    rudder,
+    step_s,
+    before,
+    rudder_before,
+    jerky,
+    ship,
+    width,
+    carried,
+    table,
+    values,
+    slopes,
+    stack,
+    by,
+    total,
+    room,
+    f,
+    J,
+    lanes,
+):
+    """Do as `dynamics`, and fill the variables that measurements alone may ask for, with their slopes.
+
+    The accelerations' rate of change is the difference over the step that ends here, along the motion as it is here,
+    so that the rudder's movement is in it (decision 0077). Its slopes leave out the curvature of the forces.
+
+    Parameters
+    ----------
+    before, rudder_before
+        Row of inputs and rudder one step earlier.
+    jerky : bool
+        See `asks_for_jerk`.
+    room : tuple of ndarray, shape (width, lanes)
+        Two, scratch.
+    """
+    earlier, f_earlier = room
+    if jerky:
+        dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, f, J, lanes)
+        for i in range(width):
+            for b in range(each(lanes)):
+                earlier[i, b] = x[i, b] - step_s * f[i, b]
+        dynamics(
+            *(earlier, before, rudder_before, ship, width, 0),
+            *(table, values, slopes, stack, by, total, f_earlier, J, lanes),
+        )
+    dynamics(x, row, rudder, ship, width, carried, table, values, slopes, stack, by, total, f, J, lanes)
+    for i in range(width):
+        for b in range(each(lanes)):
+            values[i, b] = x[i, b]
+    for b in range(each(lanes)):
+        values[VDOT, b], values[RDOT, b] = f[V, b], f[R, b]
+        for j in range(carried):
+            slopes[VDOT, j, b], slopes[RDOT, j, b] = J[V, j, b], J[R, j, b]
+    if jerky:
+        for b in range(each(lanes)):
+            values[VDDOT, b] = (f[V, b] - f_earlier[V, b]) / step_s
+            values[RDDOT, b] = (f[R, b] - f_earlier[R, b]) / step_s
+            for j in range(carried):
+                slopes[VDDOT, j, b] = slopes[RDDOT, j, b] = 0.0
+                for i in range(carried):
+                    slopes[VDDOT, j, b] += J[V, i, b] * J[i, j, b]
+                    slopes[RDDOT, j, b] += J[R, i, b] * J[i, j, b]

@@ -18,12 +18,12 @@ from kempf.pipeline.model.dynamics import (
     N_AFTER,
     ON_LATERAL,
     PARAMETER,
-    RDOT,
     SHIP,
     SPEED,
-    VDOT,
     add_programs,
+    asks_for_jerk,
     dynamics,
+    measured_by,
 )
 from kempf.pipeline.model.terms.program import DEPTH
 
@@ -55,16 +55,31 @@ def _step(x, rows, rudders, h, ship, table, values, slopes, stack, by, total, ro
 
 @njit(**FILLING)
 def _measured(  # type: ignore[no-untyped-def]
-    x, row, rudder, offset_s, current_row, ship, table, values, slopes, stack, by, total, k1, J, out, lanes
+    x,
+    rows,
+    rudders,
+    step_s,
+    jerky,
+    offset_s,
+    current_row,
+    ship,
+    table,
+    values,
+    slopes,
+    stack,
+    by,
+    total,
+    room,
+    out,
+    lanes,
 ):
     """Fill ``out``, shape (3, lanes), with what would be measured at one instant."""
+    k1, k2, k3, _, _, J = room
     width, n = k1.shape[0], x.shape[0]
-    dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, k1, J, lanes)
-    for i in range(width):
-        for b in range(each(lanes)):
-            values[i, b] = x[i, b]
-    for b in range(each(lanes)):
-        values[VDOT, b], values[RDOT, b] = k1[V, b], k1[R, b]
+    measured_by(
+        *(x, rows[-1], rudders[-1], step_s, rows[0], rudders[0], jerky, ship, width, 0),
+        *(table, values, slopes, stack, by, total, (k2, k3), k1, J, lanes),
+    )
     for channel in range(3):
         state, late = (V, R, PSI)[channel], offset_s[channel]
         for b in range(each(lanes)):
@@ -130,7 +145,7 @@ def shoot(  # type: ignore[no-untyped-def]
         np.zeros((width, B)),
     )
     room = (k1, k2, k3, k4, xs, J)
-    row = 0
+    row, jerky = 0, asks_for_jerk(table)
     for w in range(begins.shape[0]):
         x[:] = starts[w]
         for k in range(begins[w], ends[w] + 1):
@@ -140,8 +155,9 @@ def shoot(  # type: ignore[no-untyped-def]
                     *(x, inputs[i:end:HALF], rudder[i:end:HALF], step_s, ship),
                     *(table, values, slopes, stack, by, total, room, lanes),
                 )
+            here, earlier = ROWS * k + 1, max(ROWS * (k - 1), 0)
             _measured(
-                *(x, inputs[ROWS * k], rudder[ROWS * k], offset_s[k], current_row[k], ship),
-                *(table, values, slopes, stack, by, total, k1, J, predicted[row], lanes),
+                *(x, inputs[earlier:here], rudder[earlier:here], step_s, jerky, offset_s[k], current_row[k], ship),
+                *(table, values, slopes, stack, by, total, room, predicted[row], lanes),
             )
             row += 1

@@ -14,7 +14,7 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model import dynamics
 from kempf.pipeline.model.batch import ONE
 from kempf.pipeline.model.chain import PSI, R, V
-from kempf.pipeline.model.dynamics import N_BEFORE, N_INPUT, PARAMETER, RDOT, SHIP, VDOT, E
+from kempf.pipeline.model.dynamics import N_BEFORE, N_INPUT, PARAMETER, SHIP, E
 from kempf.pipeline.model.ship import Hull
 from kempf.pipeline.model.terms.program import DEPTH
 from kempf.pipeline.steering.motion import LinearMotion, ShipEffects
@@ -59,10 +59,12 @@ class _Course:
         f, J = np.zeros((width, 1)), np.zeros((width, width, 1))
         state, rudder = x[:, None].copy(), np.array([rudder_rad])
         shared = (self.table, self.values, self.slopes, *room)
-        dynamics.dynamics(state, self.row, rudder, self.ship, width, width, *shared, f, J, ONE)
-        self.values[:width] = state
-        self.values[VDOT], self.values[RDOT] = f[V], f[R]
-        self.slopes[VDOT], self.slopes[RDOT] = J[V], J[R]
+        # vddot and rddot stay 0: they go by the rudder's rate, which is no input here
+        unused = (np.zeros((0, 1)), np.zeros((0, 1)))
+        dynamics.measured_by(
+            *(state, self.row, rudder, 1.0, self.row, rudder, False),
+            *(self.ship, width, width, *shared, unused, f, J, ONE),
+        )
         y, C = np.zeros(3), np.zeros((3, width))
         for channel, own in enumerate((V, R, PSI)):
             y[channel], C[channel, own] = x[own], 1.0

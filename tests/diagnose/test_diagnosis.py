@@ -15,6 +15,8 @@ from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
 from kempf.pipeline.diagnose.diagnosis_json import as_json
 from kempf.pipeline.diagnose.effect_finding import finding, refusal
 from kempf.pipeline.diagnose.forward_selection import added, is_ship
+from kempf.pipeline.diagnose.ladder import Ladder
+from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.remainder import something_left
 from kempf.pipeline.diagnose.ridge_reference import ridge_reference_of
 from kempf.pipeline.diagnose.screen import score
@@ -24,6 +26,7 @@ from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.pipeline.diagnose.verdict import verdict
+from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.terms.own import from_expression
@@ -56,7 +59,7 @@ def dragged() -> tuple[Sailed, Diagnosis]:
 def value_of(diagnosis: Diagnosis, name: str) -> tuple[float, float]:
     fit = diagnosis.steps[-1].fit
     at = fit.model.names.index(name)
-    return float(fit.values[at]), float(fit.std[6 + at])
+    return float(fit.values[at]), float(agreement_of(fit).widened * fit.std[6 + at])
 
 
 def test_nothing_is_claimed_of_a_ship_without_an_effect(calm: tuple[Sailed, Diagnosis]) -> None:
@@ -335,3 +338,20 @@ def test_a_hull_of_which_a_sign_is_wrong_is_no_ship(wrong: int) -> None:
     hull[wrong] *= -1.0
     # a12 may have either sign
     assert is_ship(hull) == (wrong == 1)
+
+
+def test_what_was_taken_for_the_true_effect_goes_when_that_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
+    def lag_first(ladder: Ladder, steps: list[Step]) -> list[Step]:
+        (lag,) = (one for one in steps[0].screened if one.effect.name == "rudder_lag")
+        made = ladder.confirmed(steps[0].fit, ladder.unseen(steps[0]), lag)
+        step = ladder.stepped(((lag, made),), (), ladder.ahead(steps[0], lag.effect), None)
+        ladder.probe = step.fit
+        return [*steps, step]
+
+    # the lag keeps several standard errors beside the dead time
+    ship = sailed("dead_time", strength=1, seed=4)
+    monkeypatch.setattr("kempf.pipeline.diagnose.diagnosis.predicting_better", lag_first)
+    found = ship.diagnosis(("rudder_lag", "dead_time"))
+    assert [step.added.name for step in found.steps if step.added] == ["dead_time"]
+    tau, std = value_of(found, "dead_time.tau")
+    assert abs(tau - ship.c) < 3.0 * std

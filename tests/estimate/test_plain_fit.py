@@ -54,7 +54,7 @@ def test_one_hull_from_three_zigzags(three: PlainFit) -> None:
     truth = truth_of(sailed("ferry", seed=21, heading_deg=80.0 * 21, duration_s=500.0))
     assert three.fit.converged and not three.left_out
     assert np.max(np.abs(three.fit.hull - truth) / three.fit.std) < 3.0
-    assert three.agreement.p_value > LEVEL and three.agreement.widened == 1.0
+    assert three.agreement.p_value > LEVEL and three.agreement.widened < 1.5
     assert three.agreement.degrees_of_freedom == 12 and 0.0 < three.agreement.statistic < 30.0
     assert [one.run.name for one in three.alone] == ["ferry 21", "ferry 22", "ferry 23"]
 

@@ -71,8 +71,13 @@ def test_memory_is_a_state_that_has_settled_in_slow_motion() -> None:
 
 def test_what_is_measured_has_its_effects() -> None:
     late = continuous(HULL, STILL, V, effects=having(gnss_latency=0.7, gyro_scale=0.1))
-    assert late.D[0, 0] == pytest.approx(-0.7 * HULL.b1 * V**2) and late.C[1, 1] == pytest.approx(1.1)
-    assert late.C[0, :2] == pytest.approx([1.0 - 0.7 * HULL.a11 * V, -0.7 * (HULL.a12 * V + V)])
+    # the acceleration across her V r to second order, that of the drift to first: the rudder's rate is no input
+    by_drift, by_turn, by_rudder = HULL.a21 * V, HULL.a22 * V, HULL.b2 * V**2
+    second = 0.5 * 0.7**2 * V
+    assert late.D[0, 0] == pytest.approx(-0.7 * HULL.b1 * V**2 + second * by_rudder)
+    assert late.C[1, 1] == pytest.approx(1.1)
+    turned = -0.7 * (HULL.a12 * V + V) + second * by_turn
+    assert late.C[0, :2] == pytest.approx([1.0 - 0.7 * HULL.a11 * V + second * by_drift, turned])
     sea = continuous(HULL, STILL, V, effects=having(waves=(0.01, 1.0, 6.0)))
     assert list(sea.states)[3:] == ["waves_m1", "waves_m2"] and sea.Q[4, 4] > 0.0 and not sea.Q[3, 3]
     assert sea.steered == [0, 1, 2]

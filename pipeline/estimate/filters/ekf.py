@@ -37,13 +37,13 @@ from kempf.pipeline.model.dynamics import (
     ON_LATERAL,
     ON_NOISE,
     PARAMETER,
-    RDOT,
     SHIP,
     SPEED,
-    VDOT,
     E,
     add_programs,
+    asks_for_jerk,
     dynamics,
+    measured_by,
 )
 from kempf.pipeline.model.terms.program import DEPTH
 
@@ -162,8 +162,10 @@ def _measurements(  # type: ignore[no-untyped-def]
     k,
     x,
     P,
-    row,
-    rudder,
+    rows,
+    rudders,
+    step_s,
+    jerky,
     measured,
     offset_s,
     withheld,
@@ -184,17 +186,16 @@ def _measurements(  # type: ignore[no-untyped-def]
     lanes,
 ):
     """Predict the measurements of instant ``k``, take them in, and add theirs to the log-likelihoods."""
-    k1, J, gain, weight, h, stood, value, S = room
+    k1, J, gain, weight, h, stood, value, S, jerk = room
     n, width = x.shape[0], k1.shape[0]
     # linearised once, where the prediction stands; one measurement after the other moves on from there
-    dynamics(x, row, rudder, ship, width, width, table, values, slopes, stack, by, total, k1, J, lanes)
+    measured_by(
+        *(x, rows[-1], rudders[-1], step_s, rows[0], rudders[0], jerky, ship, width, width),
+        *(table, values, slopes, stack, by, total, jerk, k1, J, lanes),
+    )
     for i in range(n):
         for b in range(each(lanes)):
             stood[i, b] = x[i, b]
-    for b in range(each(lanes)):
-        values[VDOT, b], values[RDOT, b] = k1[V, b], k1[R, b]
-        for j in range(width):
-            slopes[VDOT, j, b], slopes[RDOT, j, b] = J[V, j, b], J[R, j, b]
     for channel in range(3):
         late, state = offset_s[channel], (V, R, PSI)[channel]
         for b in range(each(lanes)):
@@ -335,7 +336,7 @@ def extended(  # type: ignore[no-untyped-def]
     )
     gain, weight = np.zeros((1, n, B)), np.zeros((1, n, B))
     h, stood, decay = np.zeros((n, B)), np.zeros((n, B)), np.ones(n)
-    at_measurements = (k1, J, gain, weight, h, stood, np.zeros(B), np.zeros(B))
+    at_measurements = (k1, J, gain, weight, h, stood, np.zeros(B), np.zeros(B), (np.zeros(vector), np.zeros(vector)))
     decay[n - 3 : n - 1] = np.exp(-rates[2] * step_s)
     drive[0], drive[3], drive[4] = levels[0] ** 2, levels[2] ** 2, 2.0 * rates[3] * P0[E, E]
     if P0[M, M] > 0.0:
@@ -345,7 +346,7 @@ def extended(  # type: ignore[no-untyped-def]
         driven[source] = np.any(drive[source] > 0.0)
     # what does not move acts all the same: a constant force in a free run
     state[:] = x[:width]
-    log_likelihood = np.zeros(B)
+    log_likelihood, jerky = np.zeros(B), asks_for_jerk(table)
     for k in range(measured.shape[0]):
         if k > 0:
             drive[2], driven[2] = rudder_noise[k] ** 2, rudder_noise[k] > 0.0
@@ -359,8 +360,10 @@ def extended(  # type: ignore[no-untyped-def]
                 for b in range(B):
                     x[i, b] *= decay[i]
             _spread(P, A, w, step_s, drive, driven, decay, live, after, spreading, lanes)
+        here, earlier = ROWS * k + 1, max(ROWS * (k - 1), 0)
         _measurements(
-            *(k, x, P, inputs[ROWS * k], rudder[ROWS * k], measured[k], offset_s[k], withheld[k], current_row[k]),
+            *(k, x, P, inputs[earlier:here], rudder[earlier:here], step_s, jerky),
+            *(measured[k], offset_s[k], withheld[k], current_row[k]),
             *(
                 levels,
                 ship,

@@ -102,6 +102,7 @@ def _filled(values: Float, state: tuple[float, ...]) -> Float:
         filled[_INDEX[name]] = number
     filled[_INDEX["F"]], filled[_INDEX["M"]] = 0.01 * state[0], 0.01 * state[1]
     filled[_INDEX["vdot"]], filled[_INDEX["rdot"]] = -0.05 * state[0], -0.05 * state[1]
+    filled[_INDEX["vddot"]], filled[_INDEX["rddot"]] = 0.003 * state[0], 0.003 * state[1]
     return filled
 
 

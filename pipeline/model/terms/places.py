@@ -10,6 +10,7 @@ from kempf.pipeline.model.terms.expression import names_in
 from kempf.schemas.effect import Effect
 from kempf.schemas.errors import UsageError
 from kempf.schemas.symbols import (
+    ACCELERATION_SYMBOLS,
     CHANNEL_SYMBOLS,
     INSTRUMENT_STATES,
     OWN_STATES,
@@ -22,12 +23,12 @@ Kind = Literal["speed", "rudder", "force", "measured", "noise"]
 
 #: what a term of each kind may not ask for beyond the states of other effects
 _LATER: Mapping[Kind, frozenset[str]] = {
-    "speed": frozenset({"delta", "vdot", "rdot"}),
-    "rudder": frozenset({"vdot", "rdot"}),
-    "force": frozenset({"vdot", "rdot"}),
+    "speed": frozenset({"delta", *ACCELERATION_SYMBOLS}),
+    "rudder": frozenset(ACCELERATION_SYMBOLS),
+    "force": frozenset(ACCELERATION_SYMBOLS),
     "measured": frozenset(),
     # asked for once, before the run begins
-    "noise": frozenset({*STATE_SYMBOLS, "delta", "vdot", "rdot", *CHANNEL_SYMBOLS, *RUN_SYMBOLS}),
+    "noise": frozenset({*STATE_SYMBOLS, "delta", *ACCELERATION_SYMBOLS, *CHANNEL_SYMBOLS, *RUN_SYMBOLS}),
 }
 #: kind of term by target
 KINDS: Mapping[str, Kind] = {
