@@ -10,6 +10,9 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.shooting.shot_run import Moved, ShotRun, Unknowns
 from kempf.pipeline.shooting.windows import Rows
 
+#: m/s, rad/s, rad, also by unit of a parameter: who is predicted beyond has run away; the square may be no number
+_RUNAWAY = 1e100
+
 
 @dataclass(frozen=True, eq=False)
 class Scales:
@@ -79,7 +82,7 @@ def reduce(shot: ShotRun, at: Unknowns, scales: Scales, without: Moved | None = 
     """
     windows = shot.windows
     predicted, slopes = shot.moved(at, scales.error, without)
-    if not (np.all(np.isfinite(predicted)) and np.all(np.isfinite(slopes))):
+    if not (np.all(np.abs(predicted) < _RUNAWAY) and np.all(np.abs(slopes) < _RUNAWAY)):
         return _diverged(shot, at)
     error, weight = whitened(shot, predicted, scales)
     e = error * weight
@@ -143,6 +146,6 @@ def squares(shot: ShotRun, error: Float) -> Float:
     for i in range(3):
         of = windows.of_row[made[:, i]]
         many = np.bincount(of, minlength=windows.begins.size)
-        with np.errstate(invalid="ignore", divide="ignore"):
+        with np.errstate(invalid="ignore", divide="ignore", over="ignore"):
             found[:, i] = np.bincount(of, error[made[:, i], i] ** 2, minlength=windows.begins.size) / many
     return found

@@ -133,7 +133,7 @@ class ShotRun:
         fresh = np.arange(first, by.size if without is None else at.shared.size)
         lanes = np.concatenate([[0], 1 + fresh])
         found = self.predicted(shared[:, lanes], own[:, lanes], starts[..., lanes])
-        with np.errstate(invalid="ignore"):
+        with np.errstate(invalid="ignore", over="ignore"):
             slopes: Float = (found[..., 1:] - found[..., :1]) / by[fresh]
         if without is None:
             return found[..., 0], slopes
