@@ -141,7 +141,7 @@ _ALL = (
             _INGEST,
             _LOG,
             Column("verdict", "text", "clean, faults, untested; failed where the doctor himself did"),
-            Column("findings", "texts", "what lies, a sentence each"),
+            Column("findings", "texts", "what is wrong, a sentence each"),
             Column("content_json", "text", "findings with evidence and profile lines, every check with its figures"),
             _CODE,
         ),

@@ -235,13 +235,13 @@ class Warehouse:
         return True
 
     def _refuse_other_layout(self, found: Marker) -> None:
-        told = {"found": found.layout, "expected": LAYOUT}
+        layouts = {"found": found.layout, "expected": LAYOUT}
         if found.layout > LAYOUT:
             raise KempfError(
                 "warehouse_layout",
                 f"The warehouse {self.uri} has layout {found.layout}; this version reads layout {LAYOUT}.",
                 "Update kempf, or give another folder with --warehouse.",
-                told,
+                layouts,
             )
         if self.migrating:
             return
@@ -251,14 +251,14 @@ class Warehouse:
                 f"The warehouse {self.uri} is being brought from layout {found.migrating} to layout {found.layout}, "
                 "which is not finished.",
                 "Wait where it is going on; `kempf migrate` finishes one that was interrupted.",
-                {**told, "from": found.migrating},
+                {**layouts, "from": found.migrating},
             )
         if found.layout < LAYOUT:
             raise KempfError(
                 "warehouse_layout_old",
                 f"The warehouse {self.uri} has layout {found.layout}; this version works with layout {LAYOUT}.",
                 "`kempf migrate` brings it forward; nothing is lost.",
-                told,
+                layouts,
             )
 
     def marker(self) -> Marker | None:

@@ -216,7 +216,7 @@ def _report(
         },
         spec=spec,
         iterations=best.iterations,
-        # the innovations' levels: in the innovations form nothing tells noise and disturbance apart
+        # the innovations' levels: in the innovations form nothing separates noise and disturbance
         noise=(
             Value("innovation_v", float(std[0]), float("nan"), "m/s"),
             Value("innovation_r", float(std[1]), float("nan"), "rad/s"),

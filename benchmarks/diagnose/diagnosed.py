@@ -14,7 +14,7 @@ from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse.store import Warehouse
 
 _DEG = 57.29577951308232
-#: candidates told beside those that were found
+#: candidates listed beside those that were found
 _SHOWN = 8
 
 
@@ -26,20 +26,20 @@ def diagnosed(ship: Ship, spec: ModelSpec) -> Mapping[str, Any]:
         return diagnose_vessel(warehouse, ship.name, spec)[0].show()
 
 
-def section(told: Mapping[str, Any]) -> list[str]:
+def section(stated: Mapping[str, Any]) -> list[str]:
     """Return a vessel's part of the page."""
-    lines = [f"## {told['vessel']}: {told['verdict'].replace('_', ' ')}", ""]
-    lines += [f"- {sentence}" for sentence in told["sentences"]]
-    lines += ["", *result_page.table(_LADDER, [_rung(told, one) for one in told["ladder"]]), ""]
+    lines = [f"## {stated['vessel']}: {stated['verdict'].replace('_', ' ')}", ""]
+    lines += [f"- {sentence}" for sentence in stated["sentences"]]
+    lines += ["", *result_page.table(_LADDER, [_rung(stated, one) for one in stated["ladder"]]), ""]
     found = ("present", "immaterial", "suspected")
-    shown = [c for c in told["candidates"] if c["verdict"] in found]
-    shown += [c for c in told["candidates"] if c["verdict"] not in found and c["score"] is not None][:_SHOWN]
+    shown = [c for c in stated["candidates"] if c["verdict"] in found]
+    shown += [c for c in stated["candidates"] if c["verdict"] not in found and c["score"] is not None][:_SHOWN]
     rows = [
         [c["effect"], _number(c["score"], ".1f"), _change(c), _number(c["absorption"], ".4f"), c["verdict"], c["why"]]
         for c in shown
     ]
     lines += result_page.table(["effect", "score", "expected change", "absorbed", "verdict", "why"], rows)
-    blind = [c["effect"] for c in told["candidates"] if c["verdict"] == "not_testable"]
+    blind = [c["effect"] for c in stated["candidates"] if c["verdict"] == "not_testable"]
     if blind:
         lines += ["", f"Not testable with these data: {', '.join(blind)}."]
     return [*lines, ""]
@@ -52,7 +52,7 @@ _LADDER = (
 )
 
 
-def _rung(told: Mapping[str, Any], one: Mapping[str, Any]) -> list[str]:
+def _rung(stated: Mapping[str, Any], one: Mapping[str, Any]) -> list[str]:
     runs = one["held_out"] or one["in_sample"]
     rms = {
         channel: (sum((run[channel] or 0.0) ** 2 for run in runs.values()) / len(runs)) ** 0.5
@@ -91,9 +91,9 @@ def _number(value: float | None, form: str) -> str:
 
 
 def _change(candidate: Mapping[str, Any]) -> str:
-    told = []
+    stated = []
     for name, c in candidate["expected_change"].items():
         std = "" if c["std"] is None else f" ± {c['std']:.2g}"
         value = "" if c["value"] is None else f"{c['value']:.3g}"
-        told.append(f"{name} {value}{std} {c['unit']}".rstrip())
-    return ", ".join(told)
+        stated.append(f"{name} {value}{std} {c['unit']}".rstrip())
+    return ", ".join(stated)

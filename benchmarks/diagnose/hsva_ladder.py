@@ -17,17 +17,19 @@ def main() -> None:
     parser.add_argument("--data", type=Path, default=Path(__file__).parents[3] / "shared")
     given = parser.parse_args()
     spec = read_model(_MODEL).model_copy(update={"rate_bias": False})
-    told = diagnosed(measured_ships.tank(given.data), spec)
-    first, last = told["ladder"][0], told["ladder"][-1]
+    stated = diagnosed(measured_ships.tank(given.data), spec)
+    first, last = stated["ladder"][0], stated["ladder"][-1]
     ratio = _yaw_rate(last) / _yaw_rate(first)
     lines = [
-        f"{len(told['fitted'])} runs fitted, {len(told['held_out'])} held out before anything was looked at. The "
+        f"{len(stated['fitted'])} runs fitted, {len(stated['held_out'])} held out before anything was looked at. The "
         f"held-out yaw-rate rms of the last model is {100 * ratio:.0f} % of the linear model's (wanted: at most half); "
-        f"the ladder stops after {len(told['ladder']) - 1} effects, when no candidate stands the tests or the "
+        f"the ladder stops after {len(stated['ladder']) - 1} effects, when no candidate stands the tests or the "
         "largest number of steps is reached.",
         "",
     ]
-    result_page.write("diagnose.hsva_ladder", "Towing-tank runs: the ladder on held-out runs", [*lines, *section(told)])
+    result_page.write(
+        "diagnose.hsva_ladder", "Towing-tank runs: the ladder on held-out runs", [*lines, *section(stated)]
+    )
 
 
 def _yaw_rate(rung: dict[str, dict[str, dict[str, float]]]) -> float:

@@ -22,10 +22,10 @@ def main() -> None:
 
 def conclude(name: str, title: str, ships: Sequence[Ship]) -> None:
     """Diagnose ships from the plain model and write the page of what is concluded."""
-    told = []
+    stated = []
     for ship in ships:
-        told.append(diagnosed(ship, PLAIN))
-        print(ship.name, told[-1]["verdict"], _sets(told[-1]["sets"]), flush=True)
+        stated.append(diagnosed(ship, PLAIN))
+        print(ship.name, stated[-1]["verdict"], _sets(stated[-1]["sets"]), flush=True)
     rows = [
         [
             one["vessel"],
@@ -35,7 +35,7 @@ def conclude(name: str, title: str, ships: Sequence[Ship]) -> None:
             "" if one["share_explained"] is None else f"{100.0 * one['share_explained']:.0f}",
             f"{len(one['fitted'])} + {len(one['held_out'])}",
         ]
-        for one in told
+        for one in stated
     ]
     head = ["vessel", "verdict", "lacks", "certain but immaterial", "explained, %", "zigzags fitted + held out"]
     lines = [
@@ -48,7 +48,7 @@ def conclude(name: str, title: str, ships: Sequence[Ship]) -> None:
         *result_page.table(head, rows),
         "",
     ]
-    result_page.write(name, title, [*lines, *(line for one in told for line in section(one))])
+    result_page.write(name, title, [*lines, *(line for one in stated for line in section(one))])
 
 
 def _sets(found: Sequence[Mapping[str, Any]]) -> str:

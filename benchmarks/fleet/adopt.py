@@ -1,8 +1,8 @@
-"""What is told of a change of the code before it is adopted, and whether adopting it then does what was told.
+"""What is said of a change of the code before it is adopted, and whether adopting it then does that.
 
 A small fleet is simulated and identified. Copies of the source with one change each are asked by
 ``kempf rerun --all --preview`` what they would move; then each copy reprocesses a copy of the warehouse, and the moves
-that came about are held against those that were told.
+that came about are compared with those that were announced.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ CHANGES = (
 
 
 @dataclass(frozen=True)
-class Told:
-    """What was told of one change, what came about, and how long either took, s."""
+class Stated:
+    """What was said of one change, what came about, and how long either took, s."""
 
     change: Change
     preview: dict[str, Any]
@@ -109,7 +109,7 @@ def fleet(folder: Path, logs_each: int) -> Path:
 
 
 def compared(place: Path, preview: dict[str, Any]) -> int:
-    """Count the sets whose values after adopting are, bit for bit, those that were told."""
+    """Count the sets whose values after adopting are, bit for bit, those that were announced."""
     from kempf.warehouse import parameter_sets
     from kempf.warehouse.store import Warehouse
 
@@ -123,8 +123,8 @@ def compared(place: Path, preview: dict[str, Any]) -> int:
     return found
 
 
-def tried(folder: Path, place: Path, change: Change) -> Told:
-    """Ask a changed copy of the source, then let it do what it told."""
+def tried(folder: Path, place: Path, change: Change) -> Stated:
+    """Ask a changed copy of the source, then let it do what it said."""
     source = changed(folder / "source", change)
     begin = perf_counter()
     preview = kempf(source, "rerun", "--all", "--preview", "--warehouse", str(place))
@@ -135,22 +135,22 @@ def tried(folder: Path, place: Path, change: Change) -> Told:
     for hull in HULLS:
         kempf(source, "reprocess", "--vessel", hull, "--warehouse", str(own))
     adopted = perf_counter()
-    return Told(change, preview, compared(own, preview), preview["moved"], asked - begin, adopted - copied)
+    return Stated(change, preview, compared(own, preview), preview["moved"], asked - begin, adopted - copied)
 
 
-def page(found: list[Told], verify_s: float) -> list[str]:
+def page(found: list[Stated], verify_s: float) -> list[str]:
     """Lines of the page."""
     head = ["change", "sets", "same bit for bit", "would move", "told as it came", "largest move, standard errors"]
     rows = []
-    for told in found:
-        p = told.preview
+    for stated in found:
+        p = stated.preview
         first = p["parameters"][0] if p["parameters"] else None
         largest = f"{first['largest_in_std']:+.2g} ({first['vessel']}, {first['parameter']})" if first else "-"
         same = p["up_to_date"] + p["identical"]  # of code that does the same, and of code that comes to the same
         counts = [str(p["sets"]), str(same), str(p["moved"])]
-        rows.append([told.change.words, *counts, f"{told.agreed} of {told.sets}", largest])
+        rows.append([stated.change.words, *counts, f"{stated.agreed} of {stated.sets}", largest])
     lines = [*table(head, rows), ""]
-    most = max(found, key=lambda told: told.preview["moved"])
+    most = max(found, key=lambda stated: stated.preview["moved"])
     if most.preview["parameters"]:
         lines += [f"The largest moves of *{most.change.words}*:", ""]
         names = ["vessel", "parameter", "estimator", "sets", "largest, standard errors", "median", "std ratio"]
@@ -167,8 +167,8 @@ def page(found: list[Told], verify_s: float) -> list[str]:
             for line in most.preview["parameters"][:8]
         ]
         lines += [*table(names, shown), ""]
-    ratios = ", ".join(f"{told.preview_s / told.adopt_s:.2f}" for told in found)
-    verify = ", ".join(f"{told.preview_s / verify_s:.2f}" for told in found)
+    ratios = ", ".join(f"{stated.preview_s / stated.adopt_s:.2f}" for stated in found)
+    verify = ", ".join(f"{stated.preview_s / verify_s:.2f}" for stated in found)
     return [
         f"{len(HULLS)} ships ({', '.join(HULLS)}), {found[0].preview['sets']} parameter sets. *Told as it came*: sets "
         "whose values after `kempf reprocess` are, bit for bit, those that the preview had told.",
@@ -191,9 +191,9 @@ def main() -> None:
             found.append(tried(Path(name) / str(k), place, change))
         begin = perf_counter()
         kempf(ROOT, "rerun", "--all", "--verify", "--warehouse", str(place))
-        told = page(found, perf_counter() - begin)
+        stated = page(found, perf_counter() - begin)
     path = write(
-        "fleet.adopt", "What code would move, told before it is adopted", told, options=f"--logs {options.logs}"
+        "fleet.adopt", "What code would move, told before it is adopted", stated, options=f"--logs {options.logs}"
     )
     print(path.read_text(encoding="utf-8"))
 

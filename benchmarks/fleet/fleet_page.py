@@ -112,12 +112,12 @@ def _threads_over_workers(figures: Figures) -> list[list[str]]:
 
 def commits(figures: Figures) -> list[str]:
     """Lines about what a commit costs."""
-    told, sizes = figures["commits"], figures["commits"]["sizes"]
+    stated, sizes = figures["commits"], figures["commits"]["sizes"]
     writers = sorted({n for size in sizes for n in size["writers"]}, key=int)
-    shared = f"{told['together']} vessels"
+    shared = f"{stated['together']} vessels"
     return [
-        f"A commit to the table {told['table']} by the number of vessels in it, one set and one file each, which is "
-        f"the least that a table with a folder a vessel has: medians of {told['times']}. A commit is planned over "
+        f"A commit to the table {stated['table']} by the number of vessels in it, one set and one file each, which is "
+        f"the least that a table with a folder a vessel has: medians of {stated['times']}. A commit is planned over "
         "all files of its table.",
         "",
         *result_page.table(
@@ -139,7 +139,7 @@ def commits(figures: Figures) -> list[str]:
         ),
         "",
         f"Writers at once, in threads of one process, each commit of {shared}, no vessel of two writers, "
-        f"{told['shared']} commits in all:",
+        f"{stated['shared']} commits in all:",
         "",
         *result_page.table(
             ["vessels", *(f"{n} writer{'s' if n != '1' else ''}, {what}" for n in writers for what in _AT_ONCE)],
@@ -196,11 +196,11 @@ def draw(figures: Figures, path: Path) -> None:
 
 
 def _draw_commits(figures: Figures, axes: Axes) -> None:
-    told = figures["commits"]
-    vessels = [size["vessels"] for size in told["sizes"]]
-    for what, name, mark in (("one", "of one vessel", "o-"), ("together", f"of {told['together']} vessels", "s--")):
+    stated = figures["commits"]
+    vessels = [size["vessels"] for size in stated["sizes"]]
+    for what, name, mark in (("one", "of one vessel", "o-"), ("together", f"of {stated['together']} vessels", "s--")):
         axes.loglog(
-            vessels, [size[what]["cpu_s"] for size in told["sizes"]], mark, color="black", mfc="white", label=name
+            vessels, [size[what]["cpu_s"] for size in stated["sizes"]], mark, color="black", mfc="white", label=name
         )
     axes.set(xlabel="vessels in the table", ylabel="s", title="a commit, s of the processor")
     axes.grid(visible=True, which="major", linewidth=0.4)

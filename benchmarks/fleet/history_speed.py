@@ -74,7 +74,7 @@ def copies(
     one, key = template.parameters, vessel_key(vessel)
     ingest = json.loads(template.sets["provenance_json"][0])["ingest_ids"][0]
     values = random.standard_normal((count, len(one))) * [p["std"] for p in one] + [p["value"] for p in one]
-    told = pa.StructArray.from_arrays(
+    stated = pa.StructArray.from_arrays(
         [
             pa.array([p["name"] for p in one] * count),
             pa.array(values.ravel()),
@@ -91,7 +91,7 @@ def copies(
             "parameter_set_id": [f"ps-{name[:16]}" for name in ids],
             "start_utc_ns": [_START_NS + i * _DAY_NS for i in range(count)],
             "provenance_json": [template.sets["provenance_json"][0].replace(ingest, name[16:32]) for name in ids],
-            "parameters": pl.from_arrow(pa.ListArray.from_arrays(offsets, told)),
+            "parameters": pl.from_arrow(pa.ListArray.from_arrays(offsets, stated)),
         }
     )
     hers = own.select("vessel_key", "vessel").with_columns(
@@ -168,7 +168,7 @@ def ask(warehouse: Warehouse, vessels: int, times: int) -> dict[str, float]:
 
 
 def _asked_anew(folder: Path, vessels: int, times: int) -> dict[str, float]:
-    """Ask in a new process, of which the first question is told apart."""
+    """Ask in a new process, of which the first question is counted apart."""
     command = [sys.executable, "-m", "benchmarks.fleet.history_speed", "--ask", str(folder)]
     command += ["--vessels", str(vessels), "--times", str(times)]
     where = Path(__file__).parents[2]
@@ -224,14 +224,14 @@ def measure(folder: Path, vessels: int, each: int, commits: int, times: int) -> 
     template, place = real_set(folder), folder / "warehouse"
     warehouse = Warehouse(str(place))
     rows = fill(warehouse, template, vessels, each)
-    told: list[list[str]] = []
+    stated: list[list[str]] = []
 
     def state(what: str) -> dict[str, float]:
         found = _asked_anew(place, vessels, times)
         opened = delta.open_table(warehouse, "parameter_sets")
         assert opened is not None
         counted = [str(opened.version()), str(len(opened.file_uris())), f"{_size_mb(place):.0f}"]
-        told.append([what, *counted, *(f"{found[k]:.0f}" for k in ("first", "then", "processor", "as of"))])
+        stated.append([what, *counted, *(f"{found[k]:.0f}" for k in ("first", "then", "processor", "as of"))])
         return found
 
     before = state("as filled")
@@ -261,7 +261,7 @@ def measure(folder: Path, vessels: int, each: int, commits: int, times: int) -> 
             [[n, f"{t:.1f}", f"{t / ours:.2g}"] for n, t in compared.items()],
         ),
     ]
-    return told, [f"{rows.height} parameter rows of {vessels} vessels, {each} sets each.", *lines]
+    return stated, [f"{rows.height} parameter rows of {vessels} vessels, {each} sets each.", *lines]
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -276,7 +276,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         print(json.dumps(ask(Warehouse(str(options.ask)), options.vessels, options.times)))
         return
     with TemporaryDirectory() as name:
-        told, (first, *rest) = measure(Path(name), options.vessels, options.sets, options.commits, options.times)
+        stated, (first, *rest) = measure(Path(name), options.vessels, options.sets, options.commits, options.times)
     head = [
         "state",
         "version",
@@ -290,7 +290,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     lines = [
         f"{first} History of one vessel, medians of {options.times} vessels in one process.",
         "",
-        *table(head, told),
+        *table(head, stated),
     ]
     asked = f"--vessels {options.vessels} --sets {options.sets} --commits {options.commits}"
     path = write("fleet.history_speed", "The history of one vessel among many", [*lines, *rest], options=asked)

@@ -203,7 +203,7 @@ def measure(
     return found
 
 
-def told(found: Mapping[str, tuple[float, list[Killed]]]) -> list[str]:
+def stated(found: Mapping[str, tuple[float, list[Killed]]]) -> list[str]:
     """Lines that say what became of the kills."""
     head = [
         "job",
@@ -243,7 +243,7 @@ def told(found: Mapping[str, tuple[float, list[Killed]]]) -> list[str]:
 def page(found: Mapping[str, tuple[float, list[Killed]]], seed: int) -> list[str]:
     """Lines of the page."""
     return [
-        *told(found),
+        *stated(found),
         "",
         "`ingest` takes in three logs of one ship (NMEA, delimited text, MCAP) and identifies her; `reprocess` then "
         "changes her profile, so that every log is read anew (six readings in all) and every set made anew. Moments "

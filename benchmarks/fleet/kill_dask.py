@@ -122,12 +122,12 @@ def main() -> None:
         found = kill.measure(
             folder, options.kills, options.seed, launch, jobs=("reprocess",), begin=stocked(folder / "stocked")
         )
-    told = kill.told(found)
+    stated = kill.stated(found)
     path = write(
         "fleet.kill_dask",
         "Killed at random moments, on Dask",
         [
-            *told,
+            *stated,
             "",
             f"{FLEET} ships with a log each are read and identified anew on {WORKERS} Dask workers. Killed were "
             f"{victims.count('worker')} times a worker, in which case the run goes on with the other one, and "

@@ -273,7 +273,7 @@ def _job(begin: str | None, run: Run, *done: str) -> Job:
 
 
 _REPAIR = typed("repair", "--yes")
-#: By the command as a person types it; what follows a comma tells two jobs of one command apart.
+#: By the command as a person types it; what follows a comma distinguishes two jobs of one command.
 JOBS: Mapping[str, Job] = {
     "ingest": _job(None, _INGEST),
     "inbox": _job("registered", _inbox),
@@ -340,7 +340,7 @@ def work(name: str, uri: str, environ: Mapping[str, str], folder: Path, log: Pat
     log : Path
         What is printed goes there.
     begun : Connection
-        Is told when the work begins.
+        Is called when the work begins.
     """
     run, done = (JOBS[name].run, JOBS[name].done) if name in JOBS else (BEGINS[name][1], frozenset[str]())
     os.environ.update(environ, DO_NOT_TRACK="1", NO_COLOR="1")

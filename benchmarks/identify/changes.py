@@ -269,7 +269,7 @@ def accuracy(pool: Float, runs: int, name: str, size: float, n: int = 20) -> Acc
 
 
 def up_and_back(pool: Float, runs: int, size: float) -> tuple[Share, Share]:
-    """A load taken on and discharged, 24 sets: exactly two steps told, and both times in their intervals."""
+    """A load taken on and discharged, 24 sets: exactly two steps reported, and both times in their intervals."""
     sets = np.arange(24)
     shift = size * np.outer((sets >= 8) & (sets < 16), AXES["step in b2"])
     both = inside = 0
@@ -310,14 +310,14 @@ def main() -> None:
     rival = rival_alarms(pool, runs)
     curves = powers(pool, few)
     quiet, late = looks(pool, few, 0.0, 0, 24), looks(pool, few, 0.04, 10, 22)
-    told = {key: accuracy(pool, few, *key) for key in (("step in b2", 0.04), ("step in a22", 0.06))}
-    told["drift of all damping (fouling)", 0.1] = accuracy(pool, few, "drift of all damping (fouling)", 0.1)
+    stated = {key: accuracy(pool, few, *key) for key in (("step in b2", 0.04), ("step in a22", 0.06))}
+    stated["drift of all damping (fouling)", 0.1] = accuracy(pool, few, "drift of all damping (fouling)", 0.1)
     back, days = up_and_back(pool, few, 0.06), same_days(pool, runs)
     draw_changes(alarms, rival, curves, SIZES, SETTINGS, RESULTS / "changes.png")
     write(
         "identify.changes",
         "Changes of the ship: false alarms and power",
-        page(pool, alarms, rival, curves, quiet, late, told, back, days),
+        page(pool, alarms, rival, curves, quiet, late, stated, back, days),
         options="" if runs == 500 else f"--runs {runs}",
     )
 
@@ -339,7 +339,7 @@ def page(
     curves: dict[tuple[str, int], list[Share]],
     quiet: list[int],
     late: list[int],
-    told: dict[tuple[str, float], Accuracy],
+    stated: dict[tuple[str, float], Accuracy],
     back: tuple[Share, Share],
     days: tuple[Share, Share],
 ) -> list[str]:
@@ -408,7 +408,7 @@ def page(
                     str(a.named_wrongly),
                     str(a.extra),
                 ]
-                for (name, size), a in told.items()
+                for (name, size), a in stated.items()
             ],
         ),
         "",

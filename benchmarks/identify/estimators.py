@@ -2,7 +2,7 @@
 
 Equal terms: every method gets the same records, every reading at its true instant; those that live in discrete time
 put it on the same grid; all step the ship exactly at the logged speed (the subspace method at the mean one, as it
-must); all begin from the same ladder of Mariner-like ships, told nothing of the length. What the rivals leave to
+must); all begin from the same ladder of Mariner-like ships, given nothing of the length. What the rivals leave to
 taste was set in their favour, on other seeds: see docs/estimators.md.
 """
 

@@ -41,7 +41,7 @@ _TANK = Path(__file__).parents[2] / "docs" / "models" / "tank.yaml"
 
 @dataclass(frozen=True)
 class Trained:
-    """One way of training: how it is told, the estimate, and the free runs by name of the run."""
+    """One way of training: its description, the estimate, and the free runs by name of the run."""
 
     title: str
     fit: PooledFit

@@ -37,7 +37,7 @@ from kempf.warehouse.store import Warehouse
 
 #: The ships that the count is made of.
 HULLS = ("mariner", "container", "tanker", "ferry")
-#: Too quick for these instruments (she answers her rudder within a sample or two); run and told, but not counted.
+#: Too quick for these instruments (she answers her rudder within a sample or two); run and listed, but not counted.
 TOO_QUICK, TOO_QUICK_RUNS = "usv", 6
 FORMATS: dict[str, Callable[[Trial], bytes]] = {"nmea.gz": to_nmea, "mcap": to_mcap, "csv.gz": to_csv}
 PARAMETERS = tuple(HULL_PARAMETERS)

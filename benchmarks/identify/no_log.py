@@ -206,8 +206,8 @@ def run(case: Case, ways: tuple[str, ...]) -> list[Result]:
     if case.surge_wander:
         speed += float(np.mean(np.interp(since, trial.truth.trajectory.time_s, wander(trial))))
     truth = np.array([*(getattr(trial.truth.parameters, name) for name in PARAMETERS), speed])
-    told = hull.trial_speed_m_s * (1.0 + TRIAL_SPEED_STD * np.random.default_rng([case.number, 13]).standard_normal())
-    known = NoLogSettings(trial_speed_m_s=float(told), trial_speed_std_m_s=TRIAL_SPEED_STD * hull.trial_speed_m_s)
+    stated = hull.trial_speed_m_s * (1.0 + TRIAL_SPEED_STD * np.random.default_rng([case.number, 13]).standard_normal())
+    known = NoLogSettings(trial_speed_m_s=float(stated), trial_speed_std_m_s=TRIAL_SPEED_STD * hull.trial_speed_m_s)
     found: dict[str, Estimate] = {}
     for way in ways:
         if way in ("log", "gnss"):
@@ -220,10 +220,10 @@ def run(case: Case, ways: tuple[str, ...]) -> list[Result]:
 
 
 def _result(case: Case, way: str, estimate: Estimate, truth: np.ndarray) -> Result:
-    told = estimate.report.get("speed", {"mean_m_s": estimate.report["speed_m_s"], "std_m_s": np.nan, "rounds": [0]})
-    value = np.array([*(p.value for p in estimate.parameters), told["mean_m_s"]])
-    std = np.array([*(p.std for p in estimate.parameters), told["std_m_s"]])
-    return Result(case, way, value / truth - 1.0, std / np.abs(truth), estimate.converged, len(told["rounds"]))
+    stated = estimate.report.get("speed", {"mean_m_s": estimate.report["speed_m_s"], "std_m_s": np.nan, "rounds": [0]})
+    value = np.array([*(p.value for p in estimate.parameters), stated["mean_m_s"]])
+    std = np.array([*(p.std for p in estimate.parameters), stated["std_m_s"]])
+    return Result(case, way, value / truth - 1.0, std / np.abs(truth), estimate.converged, len(stated["rounds"]))
 
 
 def rms(results: list[Result]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -394,8 +394,8 @@ def main() -> None:
             ships += voyage.result()
             print(f"{number + 1}/{len(voyages)} {every[number].ship} {every[number].day}", file=sys.stderr)
     draw(results)
-    told = f"--runs {options.runs} --days {options.days}"
-    result_page.write("identify.no_log", "What it costs to have no log", page(results, ships), options=told)
+    stated = f"--runs {options.runs} --days {options.days}"
+    result_page.write("identify.no_log", "What it costs to have no log", page(results, ships), options=stated)
 
 
 if __name__ == "__main__":

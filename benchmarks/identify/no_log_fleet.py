@@ -97,10 +97,10 @@ def compare(zigzag: Zigzag, others: tuple[Record, ...]) -> list[Found]:
         if way == "others" and not companions:
             continue
         e = identify_without_log(zigzag.blind, spec, zigzag.arm_per_m, settings, no_log, companions)
-        told, b2 = e.report["speed"], e.parameters[5]
+        stated, b2 = e.report["speed"], e.parameters[5]
         ratio, std = b2.value / with_log, b2.std / abs(with_log)
         log = zigzag.logged.mean_speed_m_s
-        found.append(Found(zigzag.ship, way, log, told["mean_m_s"], told["std_m_s"], ratio, std))
+        found.append(Found(zigzag.ship, way, log, stated["mean_m_s"], stated["std_m_s"], ratio, std))
     return found
 
 

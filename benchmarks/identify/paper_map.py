@@ -202,16 +202,16 @@ def map_table(cells: list[Cell]) -> list[str]:
 
 def cause_table(parts: dict[str, Float]) -> list[str]:
     """Errors by cause, one row a noise and cause."""
-    told = {
+    stated = {
         "foretold": "foretold, [A B] M (M + R)^-1",
         "undisturbed": "(14) with the true disturbances taken off",
         "settled": f"the procedure, first {SETTLING_S:g} s left out",
         "written": "the procedure as written",
     }
     rows = [
-        [f"{noise:g}", told[name], *(f"{e:+.1f}" for e in parts[name][k])]
+        [f"{noise:g}", stated[name], *(f"{e:+.1f}" for e in parts[name][k])]
         for k, noise in enumerate(NOISES)
-        for name in told
+        for name in stated
     ]
     return result_page.table(["noise", "mean error, %", *HULL_PARAMETERS], rows)
 
@@ -271,13 +271,13 @@ def reasons(parts: dict[str, Float]) -> list[str]:
     loud = [k for k, noise in enumerate(NOISES) if noise >= 0.1]
     grown = parts["undisturbed"] - parts["undisturbed"][0]
     ratio = [float(np.median(grown[k] / parts["foretold"][k])) for k in loud]
-    told = ", ".join(f"{r:.2f} at noise {NOISES[k]:g}" for r, k in zip(ratio, loud, strict=True))
+    seen = ", ".join(f"{r:.2f} at noise {NOISES[k]:g}" for r, k in zip(ratio, loud, strict=True))
     written, settled = parts["written"][0], parts["settled"][0]
     last = {name: float(np.max(np.abs(values[-1]))) for name, values in parts.items()}
     return [
         "- Noise in the regressors. With the true disturbances taken off, the part of the error "
         "that comes with noise is the",
-        f"  foretold one: seen over foretold, median of the six parameters, {told}. A longer record does not mend it.",
+        f"  foretold one: seen over foretold, median of the six parameters, {seen}. A longer record does not mend it.",
         f"- The settling of the filter. At noise {NOISES[0]:g} the procedure as written leaves "
         f"{written[0]:+.1f} % in a11, {written[1]:+.1f} % in a12 and",
         f"  {written[4]:+.1f} % in b1; with the first {SETTLING_S:g} s left out of the regressions {settled[0]:+.1f}, "

@@ -1,7 +1,7 @@
 """Sixteen trial logs of eight ships through the main job: ledgers, zigzags, identification, rerun; a picture a ship.
 
 Executes are compared with an estimate that shares no code with the job: the logs are read by the small readers of
-`tests.segment.loading`, and the start of a rudder movement is told from when it is half way.
+`tests.segment.loading`, and the start of a rudder movement is taken from when it is half way.
 """
 
 from __future__ import annotations

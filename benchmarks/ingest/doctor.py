@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks import result_page
 from benchmarks.baselines.doctor_rule_of_thumb import suspected
-from benchmarks.ingest.doctor_faults import LIES, NEEDS, Told, with_body_velocities, with_velocities
+from benchmarks.ingest.doctor_faults import LIES, NEEDS, Stated, with_body_velocities, with_velocities
 from benchmarks.ingest.doctor_logs import fleet, simulated
 from benchmarks.ingest.doctor_traps import examined, traps
 from kempf.pipeline.channels.doctor.corrections import put_into
@@ -31,9 +31,9 @@ _TURNS_DEG, _DELAYS_S = (4.0, 8.0, 12.0, 16.0, 24.0, 32.0), (0.5, 1.0, 2.0, 3.0,
 
 @dataclass
 class Score:
-    """Counts over the logs that one lie was told about."""
+    """Counts over the logs that one fault was put into."""
 
-    told: int = 0
+    stated: int = 0
     found: int = 0
     alone: int = 0
     others: int = 0
@@ -41,10 +41,11 @@ class Score:
     missed: list[str] = field(default_factory=list)
 
 
-def named(found: Examination, told: Told) -> tuple[bool, bool, bool]:
-    """Whether the lie is named, whether named alone, whether a channel that told the truth is accused for certain."""
+def named(found: Examination, stated: Stated) -> tuple[bool, bool, bool]:
+    """Whether the fault is named, whether named alone, whether a sound channel is accused for certain."""
     right = [
-        [f for f in x.faults if f.kind == told.kind and set(f.channels) <= set(told.channels)] for x in found.findings
+        [f for f in x.faults if f.kind == stated.kind and set(f.channels) <= set(stated.channels)]
+        for x in found.findings
     ]
     alone = any(len(x.faults) == 1 and ok for x, ok in zip(found.findings, right, strict=True))
     wrong = any(len(x.faults) == 1 and not ok for x, ok in zip(found.findings, right, strict=True))
@@ -98,26 +99,26 @@ def lie_about(logs: Sequence[tuple[str, Log]]) -> tuple[dict[str, Score], float,
         fitting = [one for one in logs if NEEDS.get(what, "heading") in one[1].series]
         for k in range(_LOGS_A_LIE):
             name, log = fitting[(place * 5 + k * 7) % len(fitting)]
-            told = lie(log, np.random.Generator(np.random.PCG64([place, k])))
+            stated = lie(log, np.random.Generator(np.random.PCG64([place, k])))
             start = perf_counter()
-            found = examine(told.log)
+            found = examine(stated.log)
             middle = perf_counter()
-            eye = suspected(told.log)
+            eye = suspected(stated.log)
             doctor_s, eye_s = doctor_s + middle - start, eye_s + perf_counter() - middle
-            right, alone, wrong = named(found, told)
-            score.told += 1
+            right, alone, wrong = named(found, stated)
+            score.stated += 1
             score.found += right
             score.alone += alone
             score.others += wrong
-            score.by_eye += bool(eye & set(told.channels))
+            score.by_eye += bool(eye & set(stated.channels))
             if not right:
-                score.missed.append(f"{name} ({told.size:.3g})")
-        print(f"{what}: {score.found} of {score.told}, alone {score.alone}", flush=True)
+                score.missed.append(f"{name} ({stated.size:.3g})")
+        print(f"{what}: {score.found} of {score.stated}, alone {score.alone}", flush=True)
     return scores, doctor_s, eye_s
 
 
 def clean_rows(logs: Sequence[tuple[str, Log]]) -> tuple[list[list[str]], list[str], float]:
-    rows, told, seconds = [], [], 0.0
+    rows, stated, seconds = [], [], 0.0
     forms = {"speed and course": lambda log: log, "earth-fixed": with_velocities, "body-fixed": with_body_velocities}
     total = eye_total = 0
     for form, changed in forms.items():
@@ -130,12 +131,12 @@ def clean_rows(logs: Sequence[tuple[str, Log]]) -> tuple[list[list[str]], list[s
             wolf += bool(found.findings)
             eye += bool(suspected(honest))
             if found.findings:
-                told.append(f"{name}, {form}: {', '.join(o.check for x in found.findings for o in x.evidence)}")
+                stated.append(f"{name}, {form}: {', '.join(o.check for x in found.findings for o in x.evidence)}")
         rows.append([form, interval(wolf, len(logs)), interval(eye, len(logs))])
         total, eye_total = total + wolf, eye_total + eye
     n = len(forms) * len(logs)
     rows.append(["all", interval(total, n), interval(eye_total, n)])
-    return rows, told, seconds / n
+    return rows, stated, seconds / n
 
 
 def by_size(logs: Sequence[tuple[str, Log]]) -> dict[str, tuple[tuple[float, ...], list[float]]]:
@@ -146,7 +147,7 @@ def by_size(logs: Sequence[tuple[str, Log]]) -> dict[str, tuple[tuple[float, ...
         hits = 0
         for _, log in logs:
             lying = Fault(kind, (channel,), value, "turned" if kind == "offset" else "late").corrected(log)  # type: ignore[arg-type]
-            hits += named(examine(lying), Told(lying, kind, (channel,)))[0]
+            hits += named(examine(lying), Stated(lying, kind, (channel,)))[0]
         return hits / len(logs)
 
     return {
@@ -163,9 +164,9 @@ def draw(scores: dict[str, Score], sizes: dict[str, tuple[tuple[float, ...], lis
 
     figure, (left, *right) = plt.subplots(1, 3, figsize=(13, 5.5), width_ratios=[2, 1, 1], layout="constrained")
     place = np.arange(len(scores))[::-1]
-    found = np.array([100 * s.found / s.told for s in scores.values()])
-    alone = np.array([100 * s.alone / s.told for s in scores.values()])
-    eye = np.array([100 * s.by_eye / s.told for s in scores.values()])
+    found = np.array([100 * s.found / s.stated for s in scores.values()])
+    alone = np.array([100 * s.alone / s.stated for s in scores.values()])
+    eye = np.array([100 * s.by_eye / s.stated for s in scores.values()])
     left.barh(place + 0.2, found, 0.38, color="tab:blue", alpha=0.45, label="among those named")
     left.barh(place + 0.2, alone, 0.38, color="tab:blue", label="named alone")
     left.barh(place - 0.2, eye, 0.3, color="0.7", label="by correlations: the pair looks wrong")
@@ -186,14 +187,14 @@ def page(data: Path, many: int) -> list[str]:
     clean, wolves, clean_s = clean_rows(logs)
     scores, doctor_s, eye_s = lie_about(logs)
     draw(scores, by_size(logs[:10]), result_page.RESULTS / "doctor.png")
-    told, found = sum(s.told for s in scores.values()), sum(s.found for s in scores.values())
+    stated, found = sum(s.stated for s in scores.values()), sum(s.found for s in scores.values())
     rows = [
-        [what, f"{s.found} of {s.told}", str(s.alone), str(s.others), str(s.by_eye), ", ".join(s.missed) or "none"]
+        [what, f"{s.found} of {s.stated}", str(s.alone), str(s.others), str(s.by_eye), ", ".join(s.missed) or "none"]
         for what, s in scores.items()
     ]
     alone, eye = sum(s.alone for s in scores.values()), sum(s.by_eye for s in scores.values())
     others = sum(s.others for s in scores.values())
-    rows.append(["all", interval(found, told), interval(alone, told), str(others), interval(eye, told), ""])
+    rows.append(["all", interval(found, stated), interval(alone, stated), str(others), interval(eye, stated), ""])
     return [
         "## Real traps",
         "",
@@ -219,8 +220,8 @@ def page(data: Path, many: int) -> list[str]:
         "",
         "## Cost",
         "",
-        f"An honest log takes {clean_s:.2f} s, one that lies {doctor_s / told / clean_s:.1f} times as long; the "
-        f"correlations take {eye_s / told / clean_s:.2f} times as long as an honest log's examination.",
+        f"An honest log takes {clean_s:.2f} s, one that lies {doctor_s / stated / clean_s:.1f} times as long; the "
+        f"correlations take {eye_s / stated / clean_s:.2f} times as long as an honest log's examination.",
         "",
         "![Found by lie, and by the size of two of them](doctor.png)",
     ]

@@ -1,4 +1,4 @@
-"""The lies that are told about honest logs, each as a change to the channels and the truth that is to be found."""
+"""Faults put into sound logs, each as a change to the channels and the truth that is to be found."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ _GNSS = ("latitude", "longitude", "speed_over_ground", "course_over_ground")
 
 
 @dataclass(frozen=True)
-class Told:
-    """A lie: the log that tells it, the kind of fault and the channels that should be named."""
+class Stated:
+    """A fault: the log that has it, the kind of fault and the channels that should be named."""
 
     log: Log
     kind: str
@@ -28,9 +28,9 @@ class Told:
     size: float = 0.0
 
 
-Lie = Callable[[Log, np.random.Generator], Told]
+Lie = Callable[[Log, np.random.Generator], Stated]
 
-#: What a log must have for a lie to be told about it, beside the channels of every log here.
+#: What a log must have for a fault to be put into it, beside the channels of every log here.
 NEEDS = {"rudder order, zero at 25 to 45 deg": "rudder_order"}
 
 
@@ -87,64 +87,64 @@ def with_body_velocities(log: Log) -> Log:
 
 
 def _sign(name: str) -> Lie:
-    return lambda log, _: Told(_changed(log, name, np.negative), "sign", (name,))
+    return lambda log, _: Stated(_changed(log, name, np.negative), "sign", (name,))
 
 
 def _times(name: str, factor: float) -> Lie:
-    return lambda log, _: Told(_changed(log, name, lambda v: v * factor), "unit", (name,), factor)
+    return lambda log, _: Stated(_changed(log, name, lambda v: v * factor), "unit", (name,), factor)
 
 
 def _turned(name: str) -> Lie:
-    def lie(log: Log, random: np.random.Generator) -> Told:
+    def lie(log: Log, random: np.random.Generator) -> Stated:
         angle = float(np.deg2rad(random.uniform(20.0, 160.0)) * random.choice([-1.0, 1.0]))
-        return Told(_changed(log, name, lambda v: v + angle), "offset", (name,), angle)
+        return Stated(_changed(log, name, lambda v: v + angle), "offset", (name,), angle)
 
     return lie
 
 
-def _anticlockwise(log: Log, _: np.random.Generator) -> Told:
-    return Told(_changed(log, "heading", lambda v: np.pi / 2 - v), "offset", ("heading",))
+def _anticlockwise(log: Log, _: np.random.Generator) -> Stated:
+    return Stated(_changed(log, "heading", lambda v: np.pi / 2 - v), "offset", ("heading",))
 
 
 def _swapped(first: str, second: str, prepare: Callable[[Log], Log] = lambda log: log) -> Lie:
-    def lie(log: Log, _: np.random.Generator) -> Told:
+    def lie(log: Log, _: np.random.Generator) -> Stated:
         log = prepare(log)
-        return Told(log.with_series({first: log.series[second], second: log.series[first]}), "swap", (first, second))
+        return Stated(log.with_series({first: log.series[second], second: log.series[first]}), "swap", (first, second))
 
     return lie
 
 
-def _frame(prepare: Callable[[Log], Log], log: Log) -> Told:
+def _frame(prepare: Callable[[Log], Log], log: Log) -> Stated:
     log = prepare(log)
     earth = ("velocity_north", "velocity_east")
     channels = earth if "velocity_north" in log.series else ("velocity_forward", "velocity_starboard")
     lying = Fault("frame", channels).corrected(log)
     other = ("velocity_forward", "velocity_starboard") if channels == earth else earth
-    return Told(lying, "frame", other)
+    return Stated(lying, "frame", other)
 
 
 def _late(*names: str) -> Lie:
-    def lie(log: Log, random: np.random.Generator) -> Told:
+    def lie(log: Log, random: np.random.Generator) -> Stated:
         late = float(random.uniform(3.0, 12.0))
-        return Told(_shifted(log, names, lambda t: t + late), "latency", names, late)
+        return Stated(_shifted(log, names, lambda t: t + late), "latency", names, late)
 
     return lie
 
 
 def _fast(*names: str) -> Lie:
-    def lie(log: Log, random: np.random.Generator) -> Told:
+    def lie(log: Log, random: np.random.Generator) -> Stated:
         one = log.series[names[0]]
         span = float(one.time_utc_ns[-1] - one.time_utc_ns[0]) / SECOND_NS
         # no clock that ran at all is out by more than a hundredth or two
         rate = min(float(random.uniform(5.0, 20.0)) / span, _FASTEST) * float(random.choice([-1.0, 1.0]))
-        return Told(_shifted(log, names, lambda t: t * (1.0 + rate)), "clock_scale", names, rate)
+        return Stated(_shifted(log, names, lambda t: t * (1.0 + rate)), "clock_scale", names, rate)
 
     return lie
 
 
-def _zero_elsewhere(log: Log, random: np.random.Generator) -> Told:
+def _zero_elsewhere(log: Log, random: np.random.Generator) -> Stated:
     angle = float(np.deg2rad(random.uniform(25.0, 45.0)))
-    return Told(_changed(log, "rudder_order", lambda v: v + angle), "offset", ("rudder_order",), angle)
+    return Stated(_changed(log, "rudder_order", lambda v: v + angle), "offset", ("rudder_order",), angle)
 
 
 #: Every lie by name, in the order of the page.

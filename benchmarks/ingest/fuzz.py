@@ -29,7 +29,7 @@ HUNG_S = 30.0
 _SHOWN = 3_000
 
 
-def told(campaign: Campaign) -> dict[str, Any]:
+def stated(campaign: Campaign) -> dict[str, Any]:
     """Return a campaign as plain data."""
     return {
         "iterations": campaign.iterations,
@@ -47,7 +47,7 @@ def told(campaign: Campaign) -> dict[str, Any]:
 
 
 def stint(reader: Reader, seed: int, seconds: float, folder: Path) -> dict[str, Any]:
-    """Fuzz in a process of its own; return what it tells, or what it died of."""
+    """Fuzz in a process of its own; return what it reports, or what it died of."""
     current = folder / "current"
     command = [sys.executable, "-m", "benchmarks.ingest.fuzz", "--reader", reader, "--seed", str(seed)]
     command += ["--stint", str(seconds), "--current", str(current)]
@@ -154,7 +154,7 @@ def main() -> None:
             options.current.write_bytes(name.encode() + b"\n" + data)
             signal.setitimer(signal.ITIMER_PROF, HUNG_S)
 
-        print(json.dumps(told(run(readers[0], options.seed, seconds=options.stint, before=before))))
+        print(json.dumps(stated(run(readers[0], options.seed, seconds=options.stint, before=before))))
         return
     kept = RESULTS / "fuzz.json"
     latest: dict[str, dict[str, Any]] = json.loads(kept.read_text(encoding="utf-8")) if kept.is_file() else {}

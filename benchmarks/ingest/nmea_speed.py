@@ -84,8 +84,10 @@ def measure(name: str, data: bytes, wrong: set[int] | None, rounds: int) -> Meas
     profile = VesselProfile()
     content = unpacked(name, data)
     readings = read_log(name, data, profile)
-    told = set(readings.rejected.filter(readings.rejected["reason"] == "checksum")["record"].to_list())
-    found = f"{len(told)}" if wrong is None else f"{len(told & wrong)} of {len(wrong)}, {len(told - wrong)} others"
+    stated = set(readings.rejected.filter(readings.rejected["reason"] == "checksum")["record"].to_list())
+    found = (
+        f"{len(stated)}" if wrong is None else f"{len(stated & wrong)} of {len(wrong)}, {len(stated - wrong)} others"
+    )
     tracemalloc.start()
     decode(content)
     peak = tracemalloc.get_traced_memory()[1] / len(content)

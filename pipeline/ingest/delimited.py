@@ -94,7 +94,7 @@ def decode(name: str, data: bytes, source: Source) -> Decoded:
     timed = row_times(name, cells, record, layout.rows.take(record), source.time)
     time = np.full(n, NO_TIME, dtype=np.int64)
     time[record[timed.good]] = timed.time_utc_ns[timed.good]
-    reason[record[~timed.good & timed.told]] = CODE[Reason.MALFORMED]
+    reason[record[~timed.good & timed.stated]] = CODE[Reason.MALFORMED]
     channels: dict[str, Values] = {}
     for column, mapped in source.channels.items():
         value = cells[column]

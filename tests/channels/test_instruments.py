@@ -73,12 +73,12 @@ def test_a_long_log_is_asked_column_by_column_and_says_the_same(monkeypatch: pyt
     heights: list[int] = []
     collect = pl.LazyFrame.collect
 
-    def told(frame: pl.LazyFrame) -> pl.DataFrame:
+    def stated(frame: pl.LazyFrame) -> pl.DataFrame:
         found = collect(frame)
         heights.append(found.height)
         return found
 
-    monkeypatch.setattr(pl.LazyFrame, "collect", told)
+    monkeypatch.setattr(pl.LazyFrame, "collect", stated)
     short = from_readings(rows.lazy())
     assert rows.height in heights
     heights.clear()

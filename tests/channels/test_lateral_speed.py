@@ -29,7 +29,7 @@ def compute(speed: Series, course: Series, heading: Series) -> LateralSpeed:
 def test_closed_form(drift_deg: float, heading_deg: float) -> None:
     V, beta = 6.0, np.deg2rad(drift_deg)
     heading = np.full(20, np.deg2rad(heading_deg))
-    # the course as the receiver tells it, in [0, 2 pi)
+    # the course as the receiver gives it, in [0, 2 pi)
     course = (heading + beta) % (2 * np.pi)
     found = compute(series(np.full(20, V)), series(course), series(heading))
     np.testing.assert_allclose(found.value_m_s, V * np.sin(beta), atol=1e-12)

@@ -44,21 +44,21 @@ def test_a_change_faster_than_the_noise_allows_is_not_smoothed_away() -> None:
 
 def test_the_noise_that_is_left_is_as_large_and_as_slow_as_it_says() -> None:
     for period_s in (0.2, 1.0):
-        left, told = [], []
+        left, stated = [], []
         for seed in range(40):
             read, truth = slow(period_s, seed=seed)
             found = signal(read)
             inside = slice(len(read) // 6, -len(read) // 6)
             left.append((found.series.value - truth)[inside])
-            told.append(found)
+            stated.append(found)
         errors = np.array(left)
         # about their mean, which is what smoothing does to the speed itself
         spread = np.sqrt(np.mean(np.var(errors, axis=0)))
-        assert spread / np.mean([one.error_std for one in told]) == pytest.approx(1.0, abs=0.2)
+        assert spread / np.mean([one.error_std for one in stated]) == pytest.approx(1.0, abs=0.2)
         # twice the integral of the autocorrelation is the power at frequency 0, that of the reading's own noise
         slowly = np.var(np.mean(errors, axis=1)) * errors.shape[1] * period_s
         assert slowly == pytest.approx(0.05**2 * period_s, rel=0.6)
-        for one in told:
+        for one in stated:
             assert 2.0 * one.error_std**2 * one.error_time_s == pytest.approx(0.05**2 * period_s, rel=0.25)
 
 

@@ -98,7 +98,7 @@ def test_a_manoeuvre_that_another_log_holds_too_is_not_held_out(place: Path, doc
         assert [run["held_out"] for run in one["runs"]] == [False]
         assert one["summary"]["held_out"] is None
         assert one["judged"]["sample"] == "fitted"
-        # the other log's segment is told as left out
+        # the other log's segment is listed as left out
         assert len(one["skipped"]) == 1
 
 

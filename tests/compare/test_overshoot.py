@@ -1,4 +1,4 @@
-"""Overshoots, levels and what is told of a run."""
+"""Overshoots, levels and what is said of a run."""
 
 from __future__ import annotations
 

@@ -242,7 +242,7 @@ def test_held_out_runs_change_no_fitted_bit(late: tuple[Sailed, Diagnosis]) -> N
 
 
 def test_zigzags_to_one_side_alone_claim_no_asymmetry() -> None:
-    """Twenty and fifteen degrees, both first to starboard: what is one side's and what is a bias is hardly told."""
+    """Twenty and fifteen degrees, both first to starboard: what is one side's and what is a bias is hardly seen."""
     ship = sailed("none")
     numbers = [0, 2]
     found = replace(ship, runs=tuple(ship.runs[k] for k in numbers)).diagnosis(

@@ -20,8 +20,8 @@ def test_the_terms_that_made_the_force_are_proposed_with_their_sizes():
         text = next(iter(TERMS[k].terms.values()))
         before, after = text.split("*c")
         assert one.expression.startswith(f"{before}*") and one.expression.endswith(after)
-        told = float(one.expression[len(before) + 1 : len(one.expression) - len(after)])
-        assert told == pytest.approx(size, abs=0.06)
+        stated = float(one.expression[len(before) + 1 : len(one.expression) - len(after)])
+        assert stated == pytest.approx(size, abs=0.06)
     assert found[0].gain > found[1].gain > 20.0
 
 

@@ -1,4 +1,4 @@
-"""A fit tells of every iteration, rising within a climb and ending where the fit does, and is the same to the bit."""
+"""A fit reports every iteration, rising within a climb and ending where the fit does, and is the same to the bit."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.diagnose.sailing import SOME, WORKERS, sailed
 
 @dataclass
 class Heard:
-    """A listener that keeps what it is told."""
+    """A listener that keeps what it hears."""
 
     pieces: list[str] = field(default_factory=list)
     counts: list[tuple[int, int]] = field(default_factory=list)
@@ -69,7 +69,7 @@ def test_the_screen_counts_what_it_has_tried():
     _, (fit,) = staged(ship.runs[:2], ship.spec, (), WORKERS)
     known = catalogue()
     effects = {name: known[name] for name in SOME}
-    told = screen(fit, effects, WORKERS, heard)
-    assert [one.score for one in told] == [one.score for one in screen(fit, effects, WORKERS)]
+    stated = screen(fit, effects, WORKERS, heard)
+    assert [one.score for one in stated] == [one.score for one in screen(fit, effects, WORKERS)]
     done, totals = zip(*heard.counts, strict=True)
     assert list(done) == sorted(set(done)) and set(totals) == {done[-1]} and len(done) > 1

@@ -32,8 +32,8 @@ def base() -> PooledFit:
     points = [Point(hull, values, LEVELS) for _ in runs]
     lines = linearise(runs, points, [passed(run, point) for run, point in zip(runs, points, strict=True)], WORKERS)
     levels = np.stack([LEVELS, LEVELS])
-    told = (0.0, np.full((7, 7), np.nan), tuple(lines), True, "", 0)
-    return PooledFit(model, runs, hull, values, levels, *told)
+    stated = (0.0, np.full((7, 7), np.nan), tuple(lines), True, "", 0)
+    return PooledFit(model, runs, hull, values, levels, *stated)
 
 
 def alone(base: PooledFit, trial: EffectTrial) -> np.ndarray | None:

@@ -1,4 +1,4 @@
-"""docs/model.md is true: every model in it is valid, every key is told with its default, models beside it are valid."""
+"""docs/model.md is true: every model in it is valid, every key is given with its default, so are models beside it."""
 
 from pathlib import Path
 

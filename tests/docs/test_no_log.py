@@ -1,4 +1,4 @@
-"""docs/no_log.md is true: every setting is told with its default, its example runs, what it quotes was measured."""
+"""docs/no_log.md is true: every setting is given with its default, its example runs, what it quotes was measured."""
 
 from dataclasses import fields
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""docs/profile.md is true: every profile in it is valid, reads the log beside it, and every key and channel is told."""
+"""docs/profile.md is true: every profile in it is valid, reads the log beside it, and keys and channels are named."""
 
 import itertools
 from math import radians
@@ -93,10 +93,12 @@ def test_velocities_become_speed_and_course() -> None:
 
 def test_nmea_example_corrects_three_instruments() -> None:
     frame = read("tug").frame
-    told = {column: frame[column].drop_nulls().to_list() for column in ("rudder_angle_rad", "heading_rad", "roll_rad")}
-    assert told["rudder_angle_rad"] == pytest.approx([radians(5.0)])
-    assert told["heading_rad"] == pytest.approx([radians(22.0)])
-    assert told["roll_rad"] == pytest.approx([radians(-0.04)])
+    stated = {
+        column: frame[column].drop_nulls().to_list() for column in ("rudder_angle_rad", "heading_rad", "roll_rad")
+    }
+    assert stated["rudder_angle_rad"] == pytest.approx([radians(5.0)])
+    assert stated["heading_rad"] == pytest.approx([radians(22.0)])
+    assert stated["roll_rad"] == pytest.approx([radians(-0.04)])
 
 
 def test_mcap_example_reads_a_logger_file() -> None:

@@ -73,8 +73,8 @@ def test_a_share_comes_with_its_spread() -> None:
 
 
 def test_threads_are_held_against_dask_workers_of_the_same_run_only() -> None:
-    told = "threads of one process over two Dask workers, 24 vessels, on the clock | 2.00 |"
-    assert told in "\n".join(fleet_page.lines({**_figures(), "dask_of": 40}))
+    stated = "threads of one process over two Dask workers, 24 vessels, on the clock | 2.00 |"
+    assert stated in "\n".join(fleet_page.lines({**_figures(), "dask_of": 40}))
     assert "over two Dask workers" not in "\n".join(fleet_page.lines(_figures()))
 
 

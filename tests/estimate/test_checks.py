@@ -170,7 +170,7 @@ def test_sway_that_only_repeats_the_yaw_rate_is_flagged() -> None:
 @pytest.mark.parametrize("hull", sorted(HULLS))
 def test_good_input_raises_no_alarm(hull: str) -> None:
     record: Record = record_of(sailed(hull, seed=3, duration_s=900.0))
-    # the small boat's sway is hardly told from her yaw rate: what is said of that is true
+    # the small boat's sway is hardly distinguished from her yaw rate: what is said of that is true
     assert [w for w in record.warnings if hull != "usv" or "collinear" not in w] == []
 
 

@@ -51,7 +51,7 @@ def test_a_stream_that_does_not_change_is_no_fault() -> None:
     assert found.report["changes"]["sigma_V"]["value"] < 0.01
     assert found.report["changes"]["sigma_V"]["within_s"] == 600.0
     assert not any("at a bound" in warning for warning in found.warnings)
-    # how large it could be is told all the same, and holds the truth: nothing
+    # how large it could be is said all the same, and holds the truth: nothing
     level = next(one for one in found.noise if one.name == "sigma_V")
     assert 0.0 < level.std < 2.0
     north, east = found.report["at_the_end"]["current_north"], found.report["at_the_end"]["current_east"]
@@ -60,7 +60,7 @@ def test_a_stream_that_does_not_change_is_no_fault() -> None:
 
 
 def test_a_direction_that_is_hardly_determined_says_what_would_help() -> None:
-    # one execute and a half, what turns her beside the rudder not known: hardly anything tells sway's parameters apart
+    # one execute and a half, what turns her beside the rudder not known: hardly anything separates sway's parameters
     trial = sailed("mariner", seed=1)
     record = record_of(trial)
     short = record.time_s < 60.0

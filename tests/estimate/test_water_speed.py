@@ -33,17 +33,17 @@ def sailed(loss: float, seed: int) -> tuple[Series, Series, Series, np.ndarray]:
 
 
 def test_the_loss_in_the_turns_is_not_smoothed_away() -> None:
-    beside, alone, told, dips = [], [], [], []
+    beside, alone, stated, dips = [], [], [], []
     for seed in range(12):
         log, heading, rudder, truth = sailed(loss=80.0, seed=seed)
         found = water_speed(log, heading, rudder)
         error = found.series.value - truth
         beside.append(np.std(error))
         alone.append(np.std(signal(log).series.value - truth))
-        told.append(found.error_std)
+        stated.append(found.error_std)
         dips.append((error - error.mean()) @ (truth - truth.mean()) / np.sum((truth - truth.mean()) ** 2))
     assert np.mean(beside) < 0.7 * np.mean(alone)
-    assert np.mean(beside) == pytest.approx(np.mean(told), rel=0.35)
+    assert np.mean(beside) == pytest.approx(np.mean(stated), rel=0.35)
     assert abs(np.mean(dips)) < 0.03
 
 

@@ -24,8 +24,8 @@ def seen(warehouse: Warehouse) -> dict[str, list[dict[str, Any]]]:
     for name in ("readings", "rejected", "lost", "examinations", "segments"):
         content[name] = [row for row in content[name] if row["ingest_id"] in ingests]
     for row in content["parameter_sets"]:
-        told = json.loads(row["provenance_json"])
-        row["provenance_json"] = json.dumps({k: v for k, v in told.items() if k != "table_versions"}, sort_keys=True)
+        stated = json.loads(row["provenance_json"])
+        row["provenance_json"] = json.dumps({k: v for k, v in stated.items() if k != "table_versions"}, sort_keys=True)
     files, root = warehouse._files
     kept = [
         f

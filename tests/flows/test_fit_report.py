@@ -1,4 +1,4 @@
-"""The job that fits a model tells of every iteration, counted on, and ends at what it stores."""
+"""The job that fits a model reports every iteration, counted on, and ends at what it stores."""
 
 from __future__ import annotations
 

@@ -47,15 +47,15 @@ def stocked(_stocked: Path, tmp_path: Path) -> Warehouse:
 
 
 def test_progress_is_shown_from_the_first_to_the_last(harbour: Path, tmp_path: Path):
-    told: list[tuple[int, int, str]] = []
+    stated: list[tuple[int, int, str]] = []
 
     def progress(done: int, total: int, what: str) -> None:
-        told.append((done, total, what))
+        stated.append((done, total, what))
 
     paths = [harbour / "mariner.csv.gz", harbour / "none"]
     ingest(fresh(tmp_path / "w"), paths, given=loaded(harbour), progress=progress)
     identify_vessel(fresh(tmp_path / "w"), "mariner", LEAST_SQUARES, progress=progress)
-    assert told == [
+    assert stated == [
         (0, 2, "reading mariner.csv.gz"),
         (1, 2, "reading none"),
         (2, 2, "done"),

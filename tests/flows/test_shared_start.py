@@ -91,8 +91,8 @@ def test_they_are_pooled_and_compared_and_what_is_left_out_is_said(tank: Warehou
     listed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(tank.uri), "--json").json
     pooled = [one for one in listed if one["estimator"] == "ml-pooled"]
     assert len(pooled) == 1 and len(pooled[0]["segments"]) == 3
-    told = [one["not_pooled"] for one in listed if "not_pooled" in one]
-    assert len(listed) == 5 and len(told) == 1 and "another log" in told[0]
+    stated = [one["not_pooled"] for one in listed if "not_pooled" in one]
+    assert len(listed) == 5 and len(stated) == 1 and "another log" in stated[0]
     comparison = compare_vessel(tank, "mariner")
     assert len(comparison.runs) == 3 and len(comparison.skipped) == 1
     assert {run.held_out for run in comparison.runs} == {False, True}

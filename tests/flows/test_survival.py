@@ -70,13 +70,13 @@ def disk(tmp_path: Path) -> Iterator[Disk]:
 
 
 def test_a_full_disk_is_one_clear_error_and_costs_nothing(harbour: Path, disk: Disk, one_log: dict[str, Any]):
-    place, told = disk.folder / "w", []
+    place, stated = disk.folder / "w", []
     for kilobytes in (40, 70, 110, 150, 200, 240):  # the write that finds no room is another each time
         assert disk.size(kilobytes, "remount,")
         ran = kempf(*asked(harbour, place))
         if ran.code == 0:
             break
-        told.append(kilobytes)
+        stated.append(kilobytes)
         error = ran.json["error"]
         assert (ran.code, error["code"]) == (1, "disk_full"), ran
         assert str(place) in error["message"] and "\x1b" not in error["message"]
@@ -84,7 +84,7 @@ def test_a_full_disk_is_one_clear_error_and_costs_nothing(harbour: Path, disk: D
         assert error["details"]["free_bytes"] < 1024 * kilobytes
         assert "Traceback" not in ran.err
         assert not (place / "logs").exists() or seen(fresh(place))["logs"] == []
-    assert len(told) >= 3, told
+    assert len(stated) >= 3, stated
     assert disk.size(20_000, "remount,")
     assert kempf(*asked(harbour, place)).code == 0
     assert held(fresh(place)) == one_log

@@ -44,10 +44,10 @@ def warehouse(_filled: Path, tmp_path: Path) -> Warehouse:
 def test_a_removed_log_is_in_nothing_and_comes_back(warehouse: Warehouse, _filled: Path) -> None:
     before = history.standing(warehouse, "mariner")
     first = next(row for row in logs.current(warehouse) if row.format == "mcap")
-    told = of_logs(warehouse, [first])
-    assert len(told.segment_ids) == 1 and told.set_ids and set(told.set_ids) <= set(before)
+    stated = of_logs(warehouse, [first])
+    assert len(stated.segment_ids) == 1 and stated.set_ids and set(stated.set_ids) <= set(before)
     found = remove(warehouse, [first], "a trial of another draught")
-    assert found == told
+    assert found == stated
     assert first.log_id not in {row.log_id for row in logs.current(warehouse)}
     assert first.log_id not in {one.log_id for one in segments.every(warehouse, "mariner")}
     assert not set(found.set_ids) & set(history.standing(warehouse, "mariner"))

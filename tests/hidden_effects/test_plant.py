@@ -64,8 +64,8 @@ def test_every_effect_changes_the_motion_and_every_zigzag_is_finished(name: str,
     assert np.max(moved) > radians(0.02)
     assert [len(e) for e in with_effect.executes_s] == [len(e) for e in plain.executes_s]
     assert effect.sign * c >= 0.0
-    for told in catalogue()[name].parameters if name in CATALOGUE else ():
-        assert told.low <= effect.parameters(c).get(told.name, told.low) <= told.high
+    for stated in catalogue()[name].parameters if name in CATALOGUE else ():
+        assert stated.low <= effect.parameters(c).get(stated.name, stated.low) <= stated.high
     if not effect.sizes and effect.most == float("inf"):
         # the strength was chosen without the effect; with it she turns less, and the share is another, but not wholly
         assert 0.1 < sail.added(voyages, hull, weathers, theta(effect, c, hull)) < 0.6
@@ -116,23 +116,23 @@ def test_an_effect_is_what_the_catalogue_calls_so(name: str) -> None:
     terms, given = catalogue()[name].terms, CATALOGUE[name].parameters(c)
     lift = [b * SPEED**2 for b in (FERRY.parameters.b1, FERRY.parameters.b2)]
     turned = said(terms["rudder"], given) if "rudder" in terms else 0.0
-    told = [
+    stated = [
         (said(terms[target], given) if target in terms else 0.0) + b * turned
         for target, b in zip(("sway", "yaw"), lift, strict=True)
     ]
     # the strips of the one and the nodes of the other differ where the flow changes its side
-    assert gain(name, c) == pytest.approx(told, rel=2e-2 if name == "cross_flow_drag" else 1e-6, abs=1e-15)
+    assert gain(name, c) == pytest.approx(stated, rel=2e-2 if name == "cross_flow_drag" else 1e-6, abs=1e-15)
 
 
 def test_effects_outside_the_catalogue_are_their_equations() -> None:
     p, L = FERRY.parameters, FERRY.length_m
     flat = 0.05 * FERRY.trial_speed_m_s
-    told = {
+    stated = {
         "bow_thruster_product": (L / 6 * V * SPEED * RUDDER, V * SPEED * RUDDER),
         "heading_harmonic": (L / 6 * np.sin(3 * HEADING), np.sin(3 * HEADING)),
         "dead_zone": (p.a11 * SPEED * flat, p.a21 * SPEED * flat),
     }
-    for name, expected in told.items():
+    for name, expected in stated.items():
         assert gain(name, 1e-3) == pytest.approx([1e-3 * e for e in expected], rel=1e-6), name
 
 

@@ -35,11 +35,11 @@ def judged(
     aside = (
         [{"effects": [immaterial], "refits": [{"effect": immaterial, "parameters": parameters}]}] if immaterial else []
     )
-    told = {"verdict": verdict, "sets": named, "immaterial": aside, "ladder": ladder, "candidates": []}
+    stated = {"verdict": verdict, "sets": named, "immaterial": aside, "ladder": ladder, "candidates": []}
     truth = {"kind": kind, "effect": effect, "hull": "ferry", "noise": 1.0, "disturbance": "calm", "strength": 1}
     truth |= {"parameters": {"c": 1.0}, "sold": verdict == "ambiguous"}
     oracle = {"likelihood_ratio": ratio, "held_out": 0.21} if kind == "catalogue" else {}
-    return Judged(truth, {"diagnosis": told, "seconds": {"diagnose": 3.0}}, oracle)
+    return Judged(truth, {"diagnosis": stated, "seconds": {"diagnose": 3.0}}, oracle)
 
 
 CASES = [
@@ -57,7 +57,7 @@ CASES = [
 
 
 def test_every_target_counts_what_it_says() -> None:
-    found = {asked: told for asked, _, told in targets(CASES)}
+    found = {asked: stated for asked, _, stated in targets(CASES)}
     begins = {
         "true effect in a named set": "75 % (3 of 4",
         "of these claimed": "50 % (2 of 4",
@@ -75,15 +75,15 @@ def test_every_target_counts_what_it_says() -> None:
         "held-out error": "100 % (4 of 4",
         "95 % interval": "67 % (2 of 3",
     }
-    for asked, told in begins.items():
+    for asked, stated in begins.items():
         (line,) = [text for name, text in found.items() if name.startswith(asked)]
-        assert line.startswith(told), asked
+        assert line.startswith(stated), asked
 
 
 @pytest.mark.parametrize(("effect", "value"), [("rudder_stall", 1.02**-2), ("backlash", 1.02), ("gyro_bias", 1.0)])
 def test_a_rudder_that_is_off_is_true_of_its_own_log(effect: str, value: float) -> None:
-    told = {"effect": effect, "parameters": {"c": {"value": value, "std": 1e-4, "unit": "1"}}}
-    said = {"diagnosis": {"sets": [{"effects": [effect], "refits": [told]}], "immaterial": []}}
+    stated = {"effect": effect, "parameters": {"c": {"value": value, "std": 1e-4, "unit": "1"}}}
+    said = {"diagnosis": {"sets": [{"effects": [effect], "refits": [stated]}], "immaterial": []}}
     truth = {"effect": effect, "parameters": {"c": 1.0}}
     assert Judged({**truth, "sold": True}, said, {}).covered
     assert Judged({**truth, "sold": False}, said, {}).covered == (value == 1.0)

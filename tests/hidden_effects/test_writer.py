@@ -54,9 +54,9 @@ def test_the_flows_take_a_case_in_and_find_its_zigzags(written, tmp_path: Path):
         outcomes = ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
         assert [o.error for o in outcomes] == [None, None]
         assert 6 <= sum(len(o.segments) for o in outcomes) <= 8
-        for outcome, told in zip(outcomes, answer["executes_utc_ns"], strict=True):
-            assert len(outcome.segments) == len(told)
-            for segment, instants in zip(outcome.segments, told, strict=True):
+        for outcome, stated in zip(outcomes, answer["executes_utc_ns"], strict=True):
+            assert len(outcome.segments) == len(stated)
+            for segment, instants in zip(outcome.segments, stated, strict=True):
                 assert abs(segment.executes_utc_ns[0] - instants[0]) < 2e9
                 assert len(segment.executes_utc_ns) in (len(instants) - 1, len(instants))
 
@@ -66,8 +66,8 @@ def plain(path: Path) -> str:
     data = path.read_bytes()
     if path.suffix == ".mcap":
         reader = make_reader(BytesIO(data))
-        told = [f"{s.name} {s.data!r} {c.topic} {c.metadata} {m.data!r}" for s, c, m in reader.iter_messages()]
-        return " ".join([*told, str(reader.get_header())])
+        stated = [f"{s.name} {s.data!r} {c.topic} {c.metadata} {m.data!r}" for s, c, m in reader.iter_messages()]
+        return " ".join([*stated, str(reader.get_header())])
     return (gzip.decompress(data) if path.suffix == ".gz" else data).decode("latin-1")
 
 
@@ -108,8 +108,8 @@ def test_the_answers_are_sealed_and_an_interrupted_run_goes_on(tmp_path: Path, m
     write.write_all(out, key, 6, 1, show=lambda line: None)
     assert len(made) == 7
     data = (out / "sealed.bin").read_bytes()
-    told = open_sealed(data, key.read_bytes())["cases"]
-    assert {name: one["effect"] for name, one in told.items()} == {c.case_id: c.effect for c in design(6, 1)}
+    stated = open_sealed(data, key.read_bytes())["cases"]
+    assert {name: one["effect"] for name, one in stated.items()} == {c.case_id: c.effect for c in design(6, 1)}
     assert sorted(p.name for p in out.iterdir()) == ["cases", "sealed.bin"]
     assert sorted(p.name for p in tmp_path.iterdir()) == ["elsewhere.key", "out"]
     assert b"effect" not in data

@@ -30,7 +30,7 @@ def test_two_vectors_are_the_wald_test() -> None:
     wald = gap @ np.linalg.inv(h.covariance.sum(axis=0)) @ gap
     assert found.q == pytest.approx(wald, rel=1e-6)
     assert found.dof == 6
-    # leaving one of two out is the same test, told twice
+    # leaving one of two out is the same test, counted twice
     assert found.set_p_value == pytest.approx(np.full(2, min(1.0, 2 * stats.chi2.sf(wald, 6))), rel=1e-5)
 
 

@@ -15,14 +15,14 @@ ROOT = Path(__file__).parents[2]
 def test_every_field_of_every_message_is_mapped_with_its_unit():
     profile = parse(yaml.safe_load((ROOT / "docs/profiles/trial_logger.yaml").read_text()), "trial_logger.yaml")
     mapped = {key: channel.unit for key, channel in profile.source_for("a.mcap").channels.items()}
-    told = {}
+    stated = {}
     for path in (ROOT / "schemas" / "messages").glob("*.json"):
         message = json.loads(path.read_text())
         assert message["title"] == path.stem
         assert set(message["required"]) == set(message["properties"])
         for field, what in message["properties"].items():
-            told[f"{message['topic']}.{field}"] = what["unit"]
-    assert told == mapped
+            stated[f"{message['topic']}.{field}"] = what["unit"]
+    assert stated == mapped
 
 
 def test_the_same_messages_as_ros_definitions_are_read_without_a_profile():

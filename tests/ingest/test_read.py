@@ -1,4 +1,4 @@
-"""The way in: formats told by content, compression, refusals of whole files."""
+"""The way in: formats recognised by content, compression, refusals of whole files."""
 
 import gzip
 

@@ -1,4 +1,4 @@
-"""Damaged MCAP files: messages of whole chunks are kept, none of a chunk whose CRC fails, and what is lost is told."""
+"""Damaged MCAP files: messages of whole chunks are kept, none of a chunk whose CRC fails, and losses are reported."""
 
 import json
 import struct

@@ -27,7 +27,7 @@ def rows(times: list[object]) -> bytes:
     return ("t,hdg\n" + "".join(f"{t},{k % 90}.5\n" for k, t in enumerate(times))).encode()
 
 
-def told(readings) -> bool:
+def stated(readings) -> bool:
     return any("The times are of 1970" in note and "start:" in note for note in readings.notes)
 
 
@@ -44,7 +44,7 @@ def told(readings) -> bool:
 def test_a_log_that_counts_from_1970_is_taken_with_a_note(time: dict, times: list[object]) -> None:
     readings = read_log("a.csv", rows(times), profile(time))
     assert readings.tally.records_kept == 100 and readings.tally.records_rejected == 0
-    assert told(readings)
+    assert stated(readings)
     assert readings.frame["time_utc_ns"].is_sorted()
 
 
@@ -69,14 +69,14 @@ def test_a_clock_that_is_set_on_the_way_leaves_out_what_was_before() -> None:
     times = [*range(40), *(1_746_252_000 + k for k in range(60))]
     readings = read_log("a.csv", rows(times), profile({"column": "t", "unit": "s"}))
     assert readings.tally.by_reason == {"clock_unset": 40} and readings.tally.records_kept == 60
-    assert not told(readings)
+    assert not stated(readings)
 
 
 def test_a_damaged_time_does_not_date_a_log_and_is_refused() -> None:
     times: list[object] = [*range(300)]
     times[100] = 1_746_252_000
     readings = read_log("a.csv", rows(times), profile({"column": "t", "unit": "s"}))
-    assert told(readings) and readings.tally.by_reason == {"no_time": 1}
+    assert stated(readings) and readings.tally.by_reason == {"no_time": 1}
 
 
 def test_a_wrong_unit_is_still_seen() -> None:
@@ -89,10 +89,10 @@ def test_a_wrong_unit_is_still_seen() -> None:
 def test_an_nmea_log_with_stamps_of_1970() -> None:
     lines = [f"1970-01-01T00:{k // 60:02d}:{k % 60:02d}Z {sentence(f'HEHDT,{k}.0,T')}" for k in range(100)]
     readings = read_log("a.nmea", "".join(line + "\n" for line in lines).encode(), VesselProfile())
-    assert told(readings) and readings.tally.records_kept == 100
+    assert stated(readings) and readings.tally.records_kept == 100
     dated = parse({"sources": [{"match": "*", "time": {"start": "2025-05-03T06:00:00Z"}}]}, "profile.yaml")
     readings = read_log("a.nmea", "".join(line + "\n" for line in lines).encode(), dated)
-    assert readings.frame["time_utc_ns"][0] == TRUE_START and not told(readings)
+    assert readings.frame["time_utc_ns"][0] == TRUE_START and not stated(readings)
 
 
 def test_a_receiver_that_knows_the_date_sets_stamps_of_1970_right() -> None:
@@ -105,7 +105,7 @@ def test_a_receiver_that_knows_the_date_sets_stamps_of_1970_right() -> None:
             f"{at}.750Z {sentence(f'HEHDT,{k}.0,T')}",
         ]
     readings = read_log("a.nmea", "".join(line + "\n" for line in lines).encode(), VesselProfile())
-    assert readings.tally.records_kept == 200 and not told(readings)
+    assert readings.tally.records_kept == 200 and not stated(readings)
     assert readings.frame["time_utc_ns"][:3].to_list() == [TRUE_START + k * SECOND // 2 for k in range(3)]
     assert "200 stamps were put right by the receiver's UTC" in readings.notes[0]
 
@@ -127,11 +127,11 @@ def test_an_mcap_log_of_1970_in_one_part_or_in_several(together: int, monkeypatc
     monkeypatch.setattr(decode, "_TOGETHER", together)
     log = mcap([k * SECOND // 2 for k in range(1000)])
     readings = read_log("a.mcap", log, profile(None, "/gyro.psi"))
-    assert told(readings) and readings.tally.records_kept == 1000
+    assert stated(readings) and readings.tally.records_kept == 1000
     start = {"start": "2025-05-03T06:00:00Z"}
     for time in (start, {"column": "log_time", **start}):
         dated = read_log("a.mcap", log, profile(time, "/gyro.psi"))
         assert dated.frame["time_utc_ns"][0] == TRUE_START and dated.tally.records_kept == 1000
     later = mcap([*(k * SECOND for k in range(500)), *(TRUE_START + k * SECOND for k in range(500))])
     readings = read_log("a.mcap", later, profile(None, "/gyro.psi"))
-    assert readings.tally.by_reason == {"clock_unset": 500} and not told(readings)
+    assert readings.tally.by_reason == {"clock_unset": 500} and not stated(readings)

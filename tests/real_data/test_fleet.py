@@ -23,9 +23,9 @@ def test_all_logs_are_in_and_their_ledgers_close(fleet: list[Voyage]) -> None:
         assert tally.records_read == tally.records_kept + tally.records_rejected, log
         assert tally.values_read == tally.values_kept + tally.values_rejected, log
         assert tally.values_kept > 50_000, log
-        told = sum(tally.by_reason.values())
-        assert max(tally.records_rejected, tally.values_rejected) <= told, log
-        assert told <= tally.records_rejected + tally.values_rejected, log
+        stated = sum(tally.by_reason.values())
+        assert max(tally.records_rejected, tally.values_rejected) <= stated, log
+        assert stated <= tally.records_rejected + tally.values_rejected, log
 
 
 def test_damaged_sentences_are_counted(fleet: list[Voyage]) -> None:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from tests.scale.servers import free_port, running, wait_for
 
-#: Command line of Dask on the one core that is told first.
+#: Command line of Dask on the one core that is named first.
 _PINNED = (
     "import os, sys; os.sched_setaffinity(0, {int(sys.argv[1])}); "
     "sys.argv = ['dask', *sys.argv[2:]]; from dask.cli import run_cli; run_cli()"

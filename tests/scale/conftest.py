@@ -79,7 +79,7 @@ def touch(warehouse: Warehouse, *names: str) -> None:
 
 @dataclass(frozen=True)
 class Server:
-    """A Prefect server that runs as docs/fleet.md starts it, and what the programs beside it are told."""
+    """A Prefect server that runs as docs/fleet.md starts it, and what the programs beside it are given."""
 
     url: str
     settings: dict[str, str]

@@ -27,7 +27,7 @@ def free_port() -> int:
 
 
 def environment(**more: str) -> dict[str, str]:
-    """The environment of a process: the one of the tests without anybody's settings, and what is told."""
+    """The environment of a process: the one of the tests without anybody's settings, and what is given."""
     kept = {k: v for k, v in os.environ.items() if not k.startswith(("KEMPF_", "PREFECT_", "AWS_", "DASK_"))}
     path = os.pathsep.join((str(Path(sys.executable).parent), kept.get("PATH", "")))
     beside = os.pathsep.join((str(ROOT), *filter(None, (kept.get("PYTHONPATH"),))))

@@ -76,8 +76,8 @@ def test_two_workers_do_what_one_process_does(
     assert all(any(f"{name}: changed" in text for name in FLEET) for text in did), "each of the two had a share"
     do_fleet(alone)
     there, here = seen(fleet), seen(alone)
-    for told in (there, here):  # which run made a set differs, what it says does not
-        for row in told["parameter_sets"]:
+    for stated in (there, here):  # which run made a set differs, what it says does not
+        for row in stated["parameter_sets"]:
             row["provenance_json"] = without_run(row["provenance_json"])
     assert there == here
     assert [r["status"] for r in run(cluster, fleet, bucket)] == ["unchanged"] * len(FLEET)

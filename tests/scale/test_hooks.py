@@ -79,19 +79,19 @@ def test_the_figures_of_a_run_are_pushed(place: Warehouse, monkeypatch: pytest.M
 
 
 @pytest.fixture
-def told(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
+def stated(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[dict[str, Any]]]:
     with receiver() as (url, received):
         monkeypatch.setenv("OPENLINEAGE_URL", url.rsplit("/", 1)[0])
         yield received
 
 
-def test_a_run_says_what_it_read_and_wrote(place: Warehouse, told: list[dict[str, Any]]) -> None:
+def test_a_run_says_what_it_read_and_wrote(place: Warehouse, stated: list[dict[str, Any]]) -> None:
     from kempf.flows.fleet.flows import reprocess
 
     touch(place, FLEET[0])
     before = delta.versions(place)
     reprocess(place.uri, list(FLEET))
-    start, complete = told
+    start, complete = stated
     assert (start["eventType"], complete["eventType"]) == ("START", "COMPLETE")
     assert start["run"]["runId"] == complete["run"]["runId"]
     assert start["job"] == complete["job"] and (start["job"]["namespace"], start["job"]["name"]) == (
@@ -108,15 +108,15 @@ def test_a_run_says_what_it_read_and_wrote(place: Warehouse, told: list[dict[str
     assert delta.versions(place)["parameter_sets"] > before["parameter_sets"]
 
 
-def test_a_run_that_failed_says_why(place: Warehouse, told: list[dict[str, Any]]) -> None:
+def test_a_run_that_failed_says_why(place: Warehouse, stated: list[dict[str, Any]]) -> None:
     from kempf.flows.fleet.flows import reprocess
 
     touch(place, FLEET[0])
     damage(place, FLEET[0])
     with pytest.raises(DataRejected):
         reprocess(place.uri, [FLEET[0]])
-    assert [one["eventType"] for one in told] == ["START", "FAIL"]
-    assert FLEET[0] in told[1]["run"]["facets"]["errorMessage"]["message"]
+    assert [one["eventType"] for one in stated] == ["START", "FAIL"]
+    assert FLEET[0] in stated[1]["run"]["facets"]["errorMessage"]["message"]
 
 
 def test_nobody_who_listens_fails_no_run(place: Warehouse, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

@@ -176,7 +176,7 @@ def test_deploying_again_changes_nothing(place: Place) -> None:
 def deployed(place: Place) -> list[tuple[str, ...]]:
     """What the server knows of deployments: name, id, pool, times of the night, parameters."""
     found = json.loads(answer(place.here("http://prefect:4200/api/deployments/filter"), {}))
-    told = [
+    stated = [
         (
             one["name"],
             one["id"],
@@ -186,7 +186,7 @@ def deployed(place: Place) -> list[tuple[str, ...]]:
         )
         for one in found
     ]
-    return sorted(told)
+    return sorted(stated)
 
 
 def test_what_the_files_name_is_there() -> None:
@@ -214,19 +214,19 @@ def test_every_setting_that_a_service_needs_is_given() -> None:
     asked = {name for name, how, _ in compose.SECRET.findall(compose.FILE.read_text(encoding="utf-8")) if how == ":?"}
     assert asked == set(secrets(Path()))
     known = compose.services(secrets(Path("/srv/inbox")))
-    told = {name: set(service.get("environment", {})) for name, service in known.items()}
+    stated = {name: set(service.get("environment", {})) for name, service in known.items()}
     page = set(re.findall(r"^export (\w+)=", (ROOT / "docs" / "fleet.md").read_text(encoding="utf-8"), re.MULTILINE))
     page |= {"AWS_SECRET_ACCESS_KEY"}  # behind another on its line
     everywhere = {"DO_NOT_TRACK", "PREFECT_SERVER_ANALYTICS_ENABLED"}
     assert everywhere <= {rest.partition("=")[0] for word, rest in image.instructions() if word == "ENV"}
-    assert page - everywhere <= told["worker"] | told["deploy"]
+    assert page - everywhere <= stated["worker"] | stated["deploy"]
     written = set(re.findall(r"\{\{ \$(\w+) \}\}", (ROOT / "prefect.yaml").read_text(encoding="utf-8")))
-    assert written and written <= told["deploy"]
+    assert written and written <= stated["deploy"]
     store = {"KEMPF_WAREHOUSE", "AWS_ENDPOINT_URL", "AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY"}
     for name in ("bucket", "dask-worker", "tables", "worker"):
-        assert store <= told[name], name
+        assert store <= stated[name], name
     for name in ("dask-worker", "deploy", "pool", "worker"):
-        assert "PREFECT_API_URL" in told[name], name
+        assert "PREFECT_API_URL" in stated[name], name
     (mounted,) = known["worker"]["volumes"]
     assert mounted["target"] == known["deploy"]["environment"]["KEMPF_INBOX"]
     units = (DEPLOY / "systemd" / "kempf.env.example").read_text(encoding="utf-8")
@@ -293,5 +293,5 @@ def test_the_image_is_built_and_run_by_an_engine() -> None:
         done = subprocess.run([docker, "run", "--rm", name, *command], check=True, capture_output=True, text=True)
         assert done.stdout.strip() == said
     if subprocess.run([docker, "compose", "version"], capture_output=True, check=False).returncode == 0:
-        told = {**os.environ, **secrets(Path("/srv/inbox"))}
-        subprocess.run([docker, "compose", "--file", compose.FILE, "config", "--quiet"], env=told, check=True)
+        stated = {**os.environ, **secrets(Path("/srv/inbox"))}
+        subprocess.run([docker, "compose", "--file", compose.FILE, "config", "--quiet"], env=stated, check=True)

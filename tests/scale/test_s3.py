@@ -149,8 +149,8 @@ def test_compaction_and_vacuum_keep_in_a_bucket_what_they_keep_in_a_folder(bucke
     moments = []
     for i in range(3):
         asked = inputs(start_utc_ns=START_NS + i)
-        told = {"table_versions": delta.versions(warehouse) if i else {}}
-        parameter_sets.insert(warehouse, [parameter_set("aurora", asked, provenance=told)])
+        stated = {"table_versions": delta.versions(warehouse) if i else {}}
+        parameter_sets.insert(warehouse, [parameter_set("aurora", asked, provenance=stated)])
         runs.record_all(warehouse, [runs.FlowRun("run-1", "test", None, str(i))])
         moments.append(datetime.now(UTC))
     pins = compaction.pinned(warehouse)["runs"]
@@ -159,7 +159,7 @@ def test_compaction_and_vacuum_keep_in_a_bucket_what_they_keep_in_a_folder(bucke
     assert compaction.compact(warehouse, more_files_than=1) == ("parameter_sets",)
     for i in range(2):
         runs.record_all(warehouse, [runs.FlowRun("run-1", "test", None, f"later {i}")])
-    time.sleep(1.1)  # a bucket tells the age of an object in whole seconds
+    time.sleep(1.1)  # a bucket gives the age of an object in whole seconds
     said = {one.table: one.files for one in compaction.vacuum(warehouse, 0.0, dry_run=True)}
     done = {one.table: one.files for one in compaction.vacuum(warehouse, 0.0)}
     assert done == said == {"parameter_sets": 0, "runs": 2, "raw": 0}

@@ -127,7 +127,7 @@ def test_rudder_that_does_not_turn_the_ship() -> None:
 
 
 def test_rudder_with_the_wrong_sign() -> None:
-    """Positive to port: the heading switches at the wrong side, and a person should be told by the channel doctor."""
+    """Positive to port: the heading switches at the wrong side, and the channel doctor should say so."""
     ship = Ship()
     ship.wait(0.0, 60.0)
     ship.zigzag(20.0, 20.0, 1, 6)

@@ -49,11 +49,11 @@ def test_one_thread_moves_rows_on() -> None:
 def test_memory_is_given_back_behind_long_logs_only(monkeypatch: pytest.MonkeyPatch) -> None:
     pool, asked = pa.default_memory_pool(), []
 
-    def told() -> pa.MemoryPool:
+    def stated() -> pa.MemoryPool:
         asked.append(True)
         return pool
 
-    monkeypatch.setattr(pa, "default_memory_pool", told)
+    monkeypatch.setattr(pa, "default_memory_pool", stated)
     give_back(10_000)
     assert not asked
     give_back(1 << 20)

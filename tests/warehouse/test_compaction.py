@@ -173,8 +173,10 @@ def test_compaction_keeps_units_rows_and_readers(warehouse: Warehouse) -> None:
 
 def test_sets_newer_than_their_tables_stop_it(warehouse: Warehouse) -> None:
     lived_in(warehouse)
-    told = parameter_set("aurora", inputs(settings={"of": "another"}), provenance={"table_versions": {"segments": 99}})
-    parameter_sets.insert(warehouse, [told])
+    stated = parameter_set(
+        "aurora", inputs(settings={"of": "another"}), provenance={"table_versions": {"segments": 99}}
+    )
+    parameter_sets.insert(warehouse, [stated])
     aged(warehouse)
     before = sorted(p.name for p in Path(str(warehouse.folder)).rglob("*.parquet"))
     with pytest.raises(KempfError) as caught:

@@ -67,7 +67,7 @@ def process(*arguments: object, cwd: Path | None = None, **changes: str) -> Ran:
 
 
 def refused(ran: Ran, exit_code: int, code: str) -> dict[str, Any]:
-    """Check that a command run with --json told one clear error with its next step, and return the error."""
+    """Check that a command run with --json ended with one clear error and its next step, and return the error."""
     assert ran.code == exit_code, ran
     document = ran.json
     assert set(document) == {"error"}

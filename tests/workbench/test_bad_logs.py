@@ -89,7 +89,7 @@ def test_a_log_without_rudder_or_heading_is_kept_and_says_so(
     assert kempf("segments", "--warehouse", place).out == "No zigzag found.\n"
     error = refused(kempf("identify", "--vessel", "mariner", "--warehouse", place, "--json"), 4, "no_segments")
     assert error["details"]["logs"] == ["day.nmea"]
-    # what is told once is told again
+    # what is said once is said again
     (again,) = take_in(place, path).json
     assert (again["outcome"], again["notes"]) == ("unchanged", outcome["notes"])
     (listed,) = kempf("logs", "list", "--warehouse", place, "--json").json

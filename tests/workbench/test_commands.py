@@ -73,7 +73,7 @@ def test_segments(filled: Path):
     assert kempf("segments", "--vessel", "mariner", "--warehouse", filled, "--json").json == found
     output = kempf("segments", "--warehouse", filled)
     assert output.code == 0
-    assert all(one["segment_id"][:12] in output.out for one in found), "the beginning tells them apart"
+    assert all(one["segment_id"][:12] in output.out for one in found), "the beginning distinguishes them"
 
 
 def test_reprocess_of_one_vessel(filled: Path):

@@ -1,4 +1,4 @@
-"""``kempf history --changes``: from parameter sets in a warehouse to what is told, and what is left out of it."""
+"""``kempf history --changes``: from parameter sets in a warehouse to what is said, and what is left out of it."""
 
 from __future__ import annotations
 

@@ -125,9 +125,9 @@ def test_a_reader_that_has_seen_enough_is_no_error(filled: Path):
     )
     assert running.stdout is not None and running.stderr is not None
     running.stdout.close()  # before anything is written
-    told = running.stderr.read().decode()
+    stated = running.stderr.read().decode()
     running.stderr.close()
-    assert (running.wait(timeout=60), told) == (0, "")
+    assert (running.wait(timeout=60), stated) == (0, "")
 
 
 def test_letters_that_the_terminal_cannot_write_are_written_out(filled: Path):

@@ -1,4 +1,4 @@
-"""``kempf reproduce-paper``: what the paper says of its experiment is found again, and what it does not say is told."""
+"""``kempf reproduce-paper``: what the paper says of its experiment is found again, and what it leaves out is listed."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ _NONE_SHARE, _OUTSIDE_SHARE = 0.125, 0.175
 class Case:
     """One ship with one effect or none."""
 
-    #: Name of her folder and of the vessel; tells nothing.
+    #: Name of her folder and of the vessel; gives nothing away.
     case_id: str
     #: kind, effect: ``catalogue``, ``outsider`` or ``none``; name of the effect, ``none`` where there is none.
     kind: Kind
@@ -56,7 +56,7 @@ class Case:
 
 
 def design(n: int, seed: int) -> tuple[Case, ...]:
-    """Return the cases in an order that tells nothing.
+    """Return the cases in an order that gives nothing away.
 
     Parameters
     ----------

@@ -111,11 +111,11 @@ def read(
     late.__dict__["latency_s"] = c
     records = []
     for one in settings.instruments:
-        told = {"start_utc_ns": settings.start_utc_ns, "seed": settings.seed}
+        stated = {"start_utc_ns": settings.start_utc_ns, "seed": settings.seed}
         seen = late if name == _LATE.get(one.name) else path
         record, clean = (
             _own(
-                measure(one, seen, hull, setting, **told, noise_scale=scale),
+                measure(one, seen, hull, setting, **stated, noise_scale=scale),
                 *(voyage, hull, settings.start_utc_ns, name, c),
             )
             for scale in (settings.noise_scale, 0.0)

@@ -110,9 +110,9 @@ def voyage(
     end = cells + 1
     _check(hull, orders, states[:end], executes)
     slope = plant.slopes(states[:end], fed[:end], forcing[:end], conditions[:end], ship, strengths)
-    told = tuple(tuple(row[np.isfinite(row)].tolist()) for row in executes[orders[:, plant.KIND_] == 1.0])
+    stated = tuple(tuple(row[np.isfinite(row)].tolist()) for row in executes[orders[:, plant.KIND_] == 1.0])
     return Voyage(
-        *(step_s, states[:end], slope, logged[:end], fed[:end], forcing[:end], conditions[:end], run[:end], told)
+        *(step_s, states[:end], slope, logged[:end], fed[:end], forcing[:end], conditions[:end], run[:end], stated)
     )
 
 

@@ -119,7 +119,7 @@ class Judged:
         shown = (1.0 + RUDDER_OFF) ** CATALOGUE[name].of_rudder if self.truth["sold"] and name in CATALOGUE else 1.0
         key, value = next(iter(self.truth["parameters"].items()))
         std = refit[key]["std"]
-        # an interval that could not be told covers nothing
+        # an interval that could not be given covers nothing
         return bool(std is not None and std > 0 and abs(refit[key]["value"] - shown * value) <= 1.96 * std)
 
     @property
@@ -170,9 +170,9 @@ class Share:
 
 def share(cases: Sequence[Any], hit: Any) -> Share:
     """Return of how many cases ``hit`` holds; a case of which it is None does not count."""
-    told = [hit(one) for one in cases]
-    told = [one for one in told if one is not None]
-    return Share(sum(bool(one) for one in told), len(told))
+    stated = [hit(one) for one in cases]
+    stated = [one for one in stated if one is not None]
+    return Share(sum(bool(one) for one in stated), len(stated))
 
 
 def kind(cases: Sequence[Judged], name: str) -> list[Judged]:

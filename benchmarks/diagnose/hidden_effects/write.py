@@ -36,7 +36,7 @@ _CASES = 336
 
 
 def _csv(trial: Trial) -> bytes:
-    # every reading stands in two rows at least, by which a reader tells when it was new
+    # every reading stands in two rows at least, by which a reader sees when it was new
     fastest = max(record.instrument.rate_hz for record in trial.instruments)
     return to_csv(trial, max(10.0, 2.0 * fastest))
 
@@ -136,8 +136,8 @@ def write_case(case: Case, folder: Path, answers: Path) -> None:
     answers : Path
         Folder of the answers that are not sealed yet; outside the cases' folder.
     """
-    told = answers / f"{case.case_id}.json"
-    if told.exists() and (folder / case.case_id).exists():
+    stated = answers / f"{case.case_id}.json"
+    if stated.exists() and (folder / case.case_id).exists():
         return
     files, answer = logs_of(case)
     part = answers / f"{case.case_id}.part"
@@ -149,7 +149,7 @@ def write_case(case: Case, folder: Path, answers: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(folder / case.case_id, ignore_errors=True)
     part.rename(folder / case.case_id)
-    told.write_text(json.dumps(answer), encoding="utf-8")
+    stated.write_text(json.dumps(answer), encoding="utf-8")
 
 
 def write_all(out: Path, key_file: Path, n: int, seed: int, show: Callable[[str], None] = print) -> str:
@@ -177,8 +177,8 @@ def write_all(out: Path, key_file: Path, n: int, seed: int, show: Callable[[str]
         write_case(case, folder, answers)
         if (done + 1) % 20 == 0 or done + 1 == n:
             show(f"{done + 1} of {n} cases")
-    told = {case.case_id: json.loads((answers / f"{case.case_id}.json").read_text("utf-8")) for case in cases}
-    data = seal({"cases": told, "n": n, "seed": seed}, key_file.read_bytes())
+    stated = {case.case_id: json.loads((answers / f"{case.case_id}.json").read_text("utf-8")) for case in cases}
+    data = seal({"cases": stated, "n": n, "seed": seed}, key_file.read_bytes())
     (out / "sealed.bin").write_bytes(data)
     shutil.rmtree(answers)
     return hashlib.sha256(data).hexdigest()

@@ -43,7 +43,7 @@ def compared(number: int, *, diagnosed: bool) -> ComparedShip:
     Parameters
     ----------
     diagnosed : bool
-        Whether a diagnosis has to find the effect; else the model is told it.
+        Whether a diagnosis has to find the effect; else it is given.
     """
     case, hull, truth, files = next(_ships(number))
     kind = "diagnosed" if diagnosed else "known"

@@ -73,7 +73,7 @@ class Oracle:
         try:
             return self._judge(name, data)
         except KempfError as error:
-            assert error.code and error.message and error.next_step, "an error that tells too little"
+            assert error.code and error.message and error.next_step, "an error that says too little"
             return ("refused", error.code)
 
     @contextmanager
@@ -152,7 +152,7 @@ def check_sentences(content: bytes, readings: Readings) -> None:
 
 
 def _gunzipped(data: bytes, readings: Readings) -> bytes:
-    """Unpack as the standard library does; a file that it refuses must have been told as cut or padded."""
+    """Unpack as the standard library does; a file that it refuses must have been reported as cut or padded."""
     try:
         return gzip.decompress(data)
     except (OSError, EOFError, zlib.error):

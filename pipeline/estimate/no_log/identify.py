@@ -140,8 +140,8 @@ def identify_without_log(
         ]
     result = _combined(estimates, found, own, rounds, converged=converged, no_log=known)
     # in still water the speed over ground along the bow is the speed, whatever the trial speed
-    told = () if spec.current == "none" else said
-    return replace(result, warnings=(*result.warnings, *told, *left_out))
+    ours = () if spec.current == "none" else said
+    return replace(result, warnings=(*result.warnings, *ours, *left_out))
 
 
 def _first_fits(

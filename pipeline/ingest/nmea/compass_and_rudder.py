@@ -102,13 +102,13 @@ def _carried_variation(frames: Frames, said: dict[str, Said]) -> tuple[Index, Fl
         if name not in said:
             continue
         value, _ = _variation(said[name].fields, name)
-        tells = np.isfinite(value)
-        if tells.any():
-            record = said[name].record[tells]
+        given = np.isfinite(value)
+        if given.any():
+            record = said[name].record[given]
             address = frames.address[record]
             most = int(np.bincount(address).argmax())
             mine = address == most
-            return record[mine], value[tells][mine], frames.names[most]
+            return record[mine], value[given][mine], frames.names[most]
     return None
 
 

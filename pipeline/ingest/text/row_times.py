@@ -46,7 +46,7 @@ class RowTimes:
     #: Shape (m,). Which rows have a time.
     good: Flag
     #: Shape (m,). Which rows say something of time, readable or not.
-    told: Flag
+    stated: Flag
     #: What a person should know.
     notes: list[str]
 
@@ -76,7 +76,7 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
         assert column.interval_s is not None
         every = np.ones(row.size, dtype=np.bool_)
         return RowTimes(_counted(row, column.interval_s) + start, every, every, [])
-    told = np.logical_and.reduce([cells[one].is_not_null().to_numpy() for one in column.columns])
+    stated = np.logical_and.reduce([cells[one].is_not_null().to_numpy() for one in column.columns])
     notes: list[str] = []
     if column.date is not None and column.time is not None:
         instant, good = _of_two(cells[column.date], cells[column.time], column, notes)
@@ -89,9 +89,9 @@ def row_times(name: str, cells: Mapping[str, pl.Series], row: Index, rows: Spans
         good &= np.abs(instant) < _FARTHEST
         instant = np.where(good, instant, 0) + start
     if column.interval_s is None:
-        return RowTimes(instant, good, told, [*notes, *_coarse(instant, good, row, rows)])
+        return RowTimes(instant, good, stated, [*notes, *_coarse(instant, good, row, rows)])
     if not good.any():
-        return RowTimes(instant, good, told, notes)
+        return RowTimes(instant, good, stated, notes)
     first = _first_row(name, instant[good], row[good], column.interval_s)
     every = np.ones(row.size, dtype=np.bool_)
     said = f"The rows are taken for evenly spaced by {column.interval_s:g} s, as the profile says"

@@ -38,7 +38,7 @@ LAST = {4, 8}
 
 
 def ticks(climb: list[Any]) -> list[Tick]:
-    """What a job tells of it."""
+    """What a job reports of it."""
     found, what = [], ""
     for one in climb:
         if isinstance(one, str):
@@ -78,9 +78,9 @@ def test_the_page_of_a_job_shows_how_its_fit_goes(queue: Queue, client: TestClie
     assert [line.count("M") for line in lines] == [2, 2] and [line.count("L") for line in lines] == [4, 3]
     assert [dots.count("M") for dots in re.findall(r'd="([^"]*)" fill="none" class="line-fitted"', page)] == [2, 2]
     assert page.count("<tr data-climb=") == 8
-    told = client.get(f"/jobs/{name}.json?after=9").json()["ticks"]
-    assert [tick["figures"]["iteration"] for tick in told] == [7, 8]
-    assert told[1]["figures"] == {
+    stated = client.get(f"/jobs/{name}.json?after=9").json()["ticks"]
+    assert [tick["figures"]["iteration"] for tick in stated] == [7, 8]
+    assert stated[1]["figures"] == {
         **{"iteration": 8, "climb": 4, "log_likelihood": 1234.52, "error": 0.0314, "fitted": True}
     }
     queue.finish(name, {"to": "/"})
