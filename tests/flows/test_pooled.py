@@ -56,7 +56,10 @@ def test_two_days_make_one_set_which_is_built_again_and_not_twice(days: Warehous
     assert abs(starts[pooled.segment_ids[0]] - starts[pooled.segment_ids[1]]) > DAY_NS / 2
     assert pooled.convergence["pooling"]["may_be_pooled"]
     single = [o.parameter_set for o in outcomes if o.parameter_set]
-    assert all(pooled.parameters[5].std < 0.95 * one.parameters[5].std for one in single)
+    # two days know more than one; what they disagree about widens the errors again
+    widened = pooled.convergence["pooling"]["widened"]
+    assert 1.0 <= widened < 1.5
+    assert all(pooled.parameters[5].std < 0.95 * widened * one.parameters[5].std for one in single)
     assert aliases.of_vessel(days, "mariner")["current"] == pooled.parameter_set_id
     assert rerun(days, pooled.parameter_set_id).verdict == "bit-identical"
     # errors that are wider already by what the days disagree about are not widened once more by what legs do
