@@ -70,11 +70,14 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
                 continue
             pairs = ((beside, again), *pairs[1:])
         found.steps.append(ladder.stepped(pairs, worse, ahead, None))
-        idle = _idle(found.steps)
+        climbed, idle = found.steps[-1].fit, _idle(found.steps)
         if idle is not None:
             found.steps = ladder.without(idle, found.steps)
         found.steps = _not_superseded(ladder, found.steps)
-        ladder.probe = found.steps[-1].fit
+        if found.steps[-1].fit is not climbed:
+            # what was found beside another ladder is looked for again beside this one
+            ladder.probe = found.steps[-1].fit
+            found.immaterial.clear()
     claimed = {c.effect.name for step in found.steps for c, _ in step.chosen_from}
     claimed |= {c.effect.name for one in found.immaterial for c, _ in one.chosen_from}
     found.suspected = {name: why for name, why in sorted(found.suspected.items()) if name not in claimed}
