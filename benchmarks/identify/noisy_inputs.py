@@ -18,10 +18,9 @@ from unittest.mock import patch
 
 from benchmarks import result_page
 from benchmarks.diagnose.hidden_effects.cases import Case
+from benchmarks.diagnose.hidden_effects.taken_in import taken_in
 from benchmarks.diagnose.hidden_effects.write import logs_of
 from kempf.flows.jobs.chosen_manoeuvres import choose
-from kempf.flows.jobs.files import read_profiles
-from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.standing_model import PLAIN
 from kempf.flows.jobs.vessel_runs import assembled
 from kempf.pipeline.channels.series import Float, Series
@@ -30,7 +29,6 @@ from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate import agreement
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effects import get
-from kempf.warehouse.store import Warehouse
 
 #: effect, hull and a seed for each ship: two of every kind, their noise twice what is usual
 _SHIPS = tuple(
@@ -49,15 +47,8 @@ def as_read(series: Series, shapes: Sequence[Float] = ()) -> Signal:
 def fits(case: Case) -> tuple[float, tuple[PooledFit, PooledFit]]:
     """Return the true size, and the true structure fitted with the inputs as read and as expected."""
     with TemporaryDirectory() as place:
-        folder = Path(place) / case.case_id
-        folder.mkdir()
         files, answer = logs_of(case)
-        for name, content in files.items():
-            (folder / name).write_bytes(content)
-        warehouse = Warehouse(str(Path(place) / "w"))
-        logs = sorted(folder / name for name in files if name != "profile.yaml")
-        ingest(warehouse, logs, None, read_profiles([folder / "profile.yaml"]))
-        made = []
+        warehouse, made = taken_in(files, Path(place)), []
         for noisy in (True, False):
             with patch("kempf.pipeline.estimate.record.conditions.signal", as_read) if noisy else nullcontext():
                 found = assembled(warehouse, choose(warehouse, case.case_id), PLAIN)

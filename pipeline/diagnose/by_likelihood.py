@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kempf.pipeline.diagnose.confirm import BIC_SAVING, Confirmation, Unseen, unseen
+from kempf.pipeline.diagnose.confirm import BIC_SAVING, Confirmation, Unseen, price_of, unseen
 from kempf.pipeline.diagnose.confusion_sets import ALIKE, WINDOW, alike, shortlist, undecided
 from kempf.pipeline.diagnose.forward_selection import is_ship
 from kempf.pipeline.diagnose.immaterial import Immaterial, weighed
@@ -124,11 +124,16 @@ def _kept(
     for pair in best:
         effect = pair[0].effect
         ahead = ladder.ahead(last, effect)
-        if last.ahead is not None and (ahead is None or worsens(last.ahead, ahead)):
+        if _worse(last.ahead, ahead):
             found.suspected[effect.name] = "it makes the prediction one leg ahead worse"
         else:
             kept.append((pair, ahead))
     return kept
+
+
+def _worse(before: Ahead | None, after: Ahead | None) -> bool:
+    """Return whether a model predicts legs worse than another, or diverges where that does not."""
+    return before is not None and (after is None or worsens(before, after))
 
 
 def _not_superseded(ladder: Ladder, steps: list[Step]) -> list[Step]:
@@ -146,10 +151,8 @@ def _not_superseded(ladder: Ladder, steps: list[Step]) -> list[Step]:
         if first is None or second is None or not alike(first, second) > ALIKE:
             continue
         without = ladder.without(step.added, steps)
-        price = len(step.added.parameters) * float(np.log(last.fit.count))
-        saved = 2.0 * (last.fit.log_likelihood - without[-1].fit.log_likelihood) - price
-        worse = last.ahead is not None and without[-1].ahead is not None and worsens(last.ahead, without[-1].ahead)
-        if saved < BIC_SAVING and not worse:
+        gained = 2.0 * (last.fit.log_likelihood - without[-1].fit.log_likelihood)
+        if gained - price_of(step.added, last.fit) < BIC_SAVING and not _worse(last.ahead, without[-1].ahead):
             return without
     return steps
 

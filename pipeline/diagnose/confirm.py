@@ -111,7 +111,7 @@ def confirm(
     listener : Listener, optional
         Notified of every iteration.
     """
-    price = len(candidate.effect.parameters) * float(np.log(base.count))
+    price = price_of(candidate.effect, base)
     wanted = base.log_likelihood + 0.5 * (price - most_bic)
     fit = added(base, candidate, workers, wanted, listener)
     ratio = 2.0 * (fit.log_likelihood - base.log_likelihood)
@@ -135,6 +135,11 @@ def confirm(
         within_rows=within_rows(fit, candidate.effect),
         outdone=outdone,
     )
+
+
+def price_of(effect: Effect, fit: PooledFit) -> float:
+    """Return what the information criterion asks for the parameters of an effect, in units of twice the likelihood."""
+    return len(effect.parameters) * float(np.log(fit.count))
 
 
 def _overboard(fit: PooledFit, effect: Effect) -> bool:

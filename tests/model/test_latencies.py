@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.model.effect_model import EffectModel
@@ -54,8 +55,6 @@ def test_a_late_reading_is_that_of_some_time_ago(effect: str, late: int) -> None
 
 @pytest.mark.parametrize(("effect", "name"), [("heading_latency", "tanker"), ("gyro_latency", "usv")])
 def test_a_long_latency_leaves_the_hull_alone(effect: str, name: str) -> None:
-    from kempf.pipeline.diagnose.staged import staged
-
     ship = sailed(effect, strength=2, name=name)
     fit = staged(ship.runs, ship.spec, (get(effect),), WORKERS)[1][-1]
     assert abs(fit.values[0] - ship.c) < 3.0 * fit.std[6]

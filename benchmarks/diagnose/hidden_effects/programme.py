@@ -53,10 +53,10 @@ def ship(name: str, seed: int) -> SimulatedHull:
     """
     hull, random = HULLS[name], stream(seed, "ship")
     p = hull.parameters
-    stated = np.array([p.a11, p.a12, p.a21, p.a22, p.b1, p.b2])
+    nominal = np.array([p.a11, p.a12, p.a21, p.a22, p.b1, p.b2])
     # a sister that is hardly stable any more would answer to everything with the same slow swing
     for _ in range(100):
-        own = HullParameters(*(stated * (1.0 + random.uniform(-0.05, 0.05, 6))).tolist())
+        own = HullParameters(*(nominal * (1.0 + random.uniform(-0.05, 0.05, 6))).tolist())
         if own.a11 * own.a22 - own.a12 * own.a21 >= 0.8 * (p.a11 * p.a22 - p.a12 * p.a21):
             break
     return replace(hull, parameters=own, speed_loss=float(random.uniform(0.4, 1.2)))

@@ -136,8 +136,8 @@ def write_case(case: Case, folder: Path, answers: Path) -> None:
     answers : Path
         Folder of the answers that are not sealed yet; outside the cases' folder.
     """
-    stated = answers / f"{case.case_id}.json"
-    if stated.exists() and (folder / case.case_id).exists():
+    own = answers / f"{case.case_id}.json"
+    if own.exists() and (folder / case.case_id).exists():
         return
     files, answer = logs_of(case)
     part = answers / f"{case.case_id}.part"
@@ -149,7 +149,7 @@ def write_case(case: Case, folder: Path, answers: Path) -> None:
     folder.mkdir(parents=True, exist_ok=True)
     shutil.rmtree(folder / case.case_id, ignore_errors=True)
     part.rename(folder / case.case_id)
-    stated.write_text(json.dumps(answer), encoding="utf-8")
+    own.write_text(json.dumps(answer), encoding="utf-8")
 
 
 def write_all(out: Path, key_file: Path, n: int, seed: int, show: Callable[[str], None] = print) -> str:
@@ -177,8 +177,8 @@ def write_all(out: Path, key_file: Path, n: int, seed: int, show: Callable[[str]
         write_case(case, folder, answers)
         if (done + 1) % 20 == 0 or done + 1 == n:
             show(f"{done + 1} of {n} cases")
-    stated = {case.case_id: json.loads((answers / f"{case.case_id}.json").read_text("utf-8")) for case in cases}
-    data = seal({"cases": stated, "n": n, "seed": seed}, key_file.read_bytes())
+    known = {case.case_id: json.loads((answers / f"{case.case_id}.json").read_text("utf-8")) for case in cases}
+    data = seal({"cases": known, "n": n, "seed": seed}, key_file.read_bytes())
     (out / "sealed.bin").write_bytes(data)
     shutil.rmtree(answers)
     return hashlib.sha256(data).hexdigest()
