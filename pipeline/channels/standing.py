@@ -1,7 +1,8 @@
-"""The rudder while its gear stands: one angle, of which every reading there says the same but for its noise.
+"""The rudder without the noise of its readings: one angle while its gear stands, a smooth course while it creeps.
 
 Noise that goes into a fit as rudder is noise that the ship is asked to follow. Averaged over the time that the gear
-stands it does as much to her in the long run, for its integral stays, and nothing from reading to reading.
+stands it does as much to her in the long run, for its integral stays, and nothing from reading to reading. Where a play
+is between gear and rudder the largest reading alone would decide where the rudder is.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.signal import signal
 
 Places = NDArray[np.int64]
 
@@ -23,8 +25,10 @@ _LONGEST = 1.5
 _SURE = 3.0
 
 
-def averaged_where_standing(rudder: Series, noise_std: float) -> Series:
-    """Return the rudder with every reading of a standing gear replaced by their mean.
+def without_noise(rudder: Series, noise_std: float) -> Series:
+    """Return the rudder with every reading of a standing gear replaced by their mean, of a creeping one by its course.
+
+    A creeping gear is a helmsman's or an autopilot's, who move it by no more than the noise from reading to reading.
 
     Parameters
     ----------
@@ -36,13 +40,14 @@ def averaged_where_standing(rudder: Series, noise_std: float) -> Series:
     Returns
     -------
     Series
-        At the same instants; the same where there is no noise, and wherever the gear moves or creeps.
+        At the same instants; the same where there is no noise, and while the gear runs, but for readings that noise
+        alone leads beyond the two angles at which it then stands.
 
     Examples
     --------
     >>> time = np.arange(0, 12) * 1_000_000_000
     >>> angle = np.array([0.01, -0.01, 0.01, -0.01, 0.01, 0.2, 0.41, 0.39, 0.41, 0.39, 0.41, 0.39])
-    >>> averaged_where_standing(Series(time, angle), 0.01).value.round(3).tolist()
+    >>> without_noise(Series(time, angle), 0.01).value.round(3).tolist()
     [0.01, -0.01, 0.01, -0.01, 0.01, 0.2, 0.41, 0.4, 0.4, 0.4, 0.4, 0.39]
     """
     if len(rudder) < _FEWEST or not noise_std > 0.0:
@@ -57,7 +62,33 @@ def averaged_where_standing(rudder: Series, noise_std: float) -> Series:
     stretch = np.cumsum(moves[:-1]) - 1
     chosen = Series(rudder.time_utc_ns[inside], rudder.value[inside])
     mean = _means(chosen, stretch[inside], int(stretch[-1]) + 1, noise_std)[stretch]
-    return Series(rudder.time_utc_ns, np.where(inside & np.isfinite(mean), mean, rudder.value))
+    stands = inside & np.isfinite(mean)
+    angle = np.where(stands, mean, rudder.value)
+    for number in np.unique(stretch[inside & ~stands]):
+        creeping = np.flatnonzero(inside & (stretch == number))
+        angle[creeping] = signal(Series(rudder.time_utc_ns[creeping], rudder.value[creeping])).series.value
+    gap = np.concatenate([[False], span > _LONGEST * float(np.median(span))])
+    return Series(rudder.time_utc_ns, _between_stands(angle, stands, gap, _NOISES * noise_std))
+
+
+def _between_stands(angle: Float, stands: NDArray[np.bool_], gap: NDArray[np.bool_], noise: float) -> Float:
+    """Return the angle without what noise alone leads beyond the two stands that a move goes between.
+
+    A gear goes from stand to stand without turning back. Where a play is between it and the rudder, one reading beyond
+    the stand pushes the rudder for as long as the gear then stands.
+    """
+    place = np.flatnonzero(stands)
+    move = np.searchsorted(place, np.arange(angle.size))
+    between = ~stands & (move > 0) & (move < place.size)
+    if not between.any():
+        return angle
+    ends = np.stack([angle[place[move[between] - 1]], angle[place[move[between]]]])
+    low, high = (np.zeros(angle.size) for _ in range(2))
+    low[between], high[between] = ends.min(axis=0), ends.max(axis=0)
+    # of a move that did go further, and over a gap, nothing is known
+    further = between & ((angle < low - noise) | (angle > high + noise))
+    unknown = np.bincount(move, further | gap, place.size + 1) > 0
+    return np.where(between & ~unknown[move], np.clip(angle, low, high), angle)
 
 
 def _means(rudder: Series, stretch: Places, many: int, noise_std: float) -> Float:

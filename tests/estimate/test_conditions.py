@@ -7,6 +7,7 @@ import pytest
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.record.conditions import conditions
 from kempf.pipeline.estimate.record.grid_run import ShipConstants, make_run, plain_run
 from kempf.schemas.model_spec import ModelSpec
@@ -59,6 +60,41 @@ def test_most_of_the_noise_of_the_anemometer_goes() -> None:
     force, true = columns["U"] ** 2 * np.sin(columns["gamma"]), speed**2 * np.sin(angle)
     about = force - force.mean()
     assert about @ (true - true.mean()) / (about @ about) == pytest.approx(1.0, abs=0.1)
+
+
+def heeled(time_s: Float) -> tuple[Instruments, Float, Float]:
+    """The log of a ship who rolls with a period of 6 s as she turns, her roll and readings of it, at 2 Hz from 0.1 s.
+
+    Her roll is integrated by steps of 0.01 s, by nothing that the estimator uses.
+    """
+    trial = sailed("ferry")
+    fine = np.arange(0.0, trial.truth.trajectory.duration_s - 1.0, 0.01)
+    state = trial.truth.trajectory.at(fine).state
+    push, w = 0.02 * state[:, 5] * state[:, 1], 2.0 * np.pi / 6.0
+    angle, rate, angles = 0.0, 0.0, np.empty(fine.size)
+    for k in range(fine.size):
+        rate += 0.01 * (-0.3 * w * rate - w * w * (angle + push[k]))
+        angle += 0.01 * rate
+        angles[k] = angle
+    read = fine[10::50]
+    true = angles[10::50]
+    noisy = true + 0.3 * np.std(true) * np.random.default_rng(4).standard_normal(true.size)
+    roll = Series(trial.settings.start_utc_ns + np.round(read * SECOND_NS).astype(np.int64), noisy)
+    wandering = np.interp(time_s, read, signal(roll).series.value)
+    return changed(instruments_of(trial), "roll", roll), np.interp(time_s, fine, angles), wandering
+
+
+@pytest.mark.parametrize("yaw_rate", [True, False])
+def test_the_heel_of_a_turn_is_what_the_turn_lets_expect(yaw_rate: bool) -> None:
+    trial = sailed("ferry")
+    record = record_of(trial) if yaw_rate else record_of(trial, "yaw_rate")
+    fine = np.arange(0.0, record.time_s[-1], 0.25)
+    log, true, wandering = heeled(fine + (record.start_utc_ns - trial.settings.start_utc_ns) * 1e-9)
+    columns, channels = conditions(log, record, fine)
+    assert "roll" in channels
+    assert np.std(columns["phi"] - true) < 0.5 * np.std(wandering - true)
+    about = columns["phi"] - columns["phi"].mean()
+    assert about @ (true - true.mean()) / (about @ about) == pytest.approx(1.0, abs=0.02)
 
 
 def test_a_channel_that_ends_within_the_manoeuvre_is_none() -> None:

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +12,7 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.channels.signal import signal
+from kempf.pipeline.estimate.record.heel import rolling
 from kempf.pipeline.estimate.record.record import Record
 from kempf.schemas.symbols import CHANNEL_SYMBOLS, LOGGED_CHANNELS
 
@@ -42,7 +46,8 @@ def conditions(instruments: Instruments, record: Record, fine_s: Float) -> tuple
         columns |= _wind(read["wind_speed"], read["wind_angle"], record, at_ns)
     for symbol, name in CHANNEL_SYMBOLS.items():
         if name in read and symbol not in columns:
-            columns[symbol] = _laid(_without_noise(read[name], at_ns), at_ns, gap_limit_s(read[name]))
+            without = partial(rolling, record=record) if name == "roll" else _wandering
+            columns[symbol] = _laid(_within(read[name], at_ns, without), at_ns, gap_limit_s(read[name]))
     known = {symbol: column for symbol, column in columns.items() if column is not None}
     others = {
         name
@@ -96,12 +101,16 @@ def _near(series: Series, at_ns: NDArray[np.int64]) -> Series:
     return series.between(int(at_ns[0]) - beyond, int(at_ns[-1]) + beyond)
 
 
-def _without_noise(series: Series, at_ns: NDArray[np.int64]) -> Series:
+def _wandering(series: Series) -> Series:
+    return signal(series).series
+
+
+def _within(series: Series, at_ns: NDArray[np.int64], without_noise: Callable[[Series], Series]) -> Series:
     """Return the series with its noise taken out within the manoeuvre, and the readings beside it as they are."""
     near = _near(series, at_ns)
     inside = (near.time_utc_ns >= at_ns[0]) & (near.time_utc_ns <= at_ns[-1])
     value = near.value.copy()
-    value[inside] = signal(Series(near.time_utc_ns[inside], near.value[inside])).series.value
+    value[inside] = without_noise(Series(near.time_utc_ns[inside], near.value[inside])).value
     return Series(near.time_utc_ns, value)
 
 

@@ -14,7 +14,7 @@ from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, n
 from kempf.pipeline.channels.punctual import punctual
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 from kempf.pipeline.channels.spikes import without_spikes
-from kempf.pipeline.channels.standing import averaged_where_standing
+from kempf.pipeline.channels.standing import without_noise
 from kempf.pipeline.estimate.record.channel_faults import EXAMINED, check_channels
 from kempf.pipeline.estimate.record.checks import check_course, check_manoeuvre, check_sway, check_way
 from kempf.pipeline.estimate.record.jumps import find_jumps
@@ -76,7 +76,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     warnings += said
     check_course(lateral)
     lateral = _without_jumps(lateral, warnings)
-    moved = with_corners(averaged_where_standing(rudder, rudder_std), rudder_std)
+    moved = with_corners(without_noise(rudder, rudder_std), rudder_std)
     timed = [lateral.time_utc_ns, heading.time_utc_ns, moved.time_utc_ns, *([yaw.time_utc_ns] if yaw else [])]
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])

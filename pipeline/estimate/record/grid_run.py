@@ -10,8 +10,9 @@ import numpy as np
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.lateral_speed import noise_std
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
-from kempf.pipeline.channels.signal import signal
+from kempf.pipeline.channels.standing import without_noise
 from kempf.pipeline.estimate.filters.ekf import ROWS
 from kempf.pipeline.estimate.record.average import cell_means, instants_of, step_of
 from kempf.pipeline.estimate.record.conditions import conditions
@@ -327,7 +328,8 @@ def _before(rudder: Series | None, start_ns: int, fine: Float) -> Float:
         return np.zeros(0)
     back = np.round(fine[:0:-1] * SECOND_NS).astype(np.int64)
     earlier = rudder.between(start_ns - int(back[0]), start_ns + round(gap_limit_s(rudder) * SECOND_NS))
-    course = signal(earlier).series.at(start_ns - back, gap_limit_s(rudder))
+    quiet = without_noise(earlier, float(np.nan_to_num(noise_std(earlier))))
+    course = quiet.at(start_ns - back, gap_limit_s(rudder))
     unknown = np.flatnonzero(np.isnan(course))
     known: Float = course[unknown[-1] + 1 :] if unknown.size else course
     return known

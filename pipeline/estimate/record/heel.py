@@ -1,0 +1,85 @@
+"""The roll of a manoeuvre without the noise of its instrument: what her turning heels her, and the rolling beside it.
+
+A turn heels a ship by the centrifugal force, and she comes to that heel as a damped oscillator does. Her yaw rate and
+speed are read more often and better than the roll: what they say of it need not be found in the roll's readings again.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.signal import cont2discrete, lfilter
+
+from kempf.pipeline.channels.series import SECOND_NS, Float, Series
+from kempf.pipeline.channels.signal import signal
+from kempf.pipeline.estimate.record.record import MEASUREMENTS, Record
+
+#: natural periods of roll that are tried, s: a boat's to a large ship's, so close that a damped one is not missed
+_PERIODS_S = np.geomspace(0.5, 40.0, 25)
+#: and parts of critical damping: bare hulls under way have 0.05 to 0.2, with bilge keels more (Himeno 1981)
+_DAMPINGS = (0.05, 0.15, 0.4)
+#: instants at which the turn is laid down, in periods of the roll's readings and in the shortest natural periods
+_OF_READING, _OF_PERIOD = 0.25, 0.1
+
+
+def rolling(roll: Series, record: Record) -> Series:
+    """Return the roll at its own instants as its readings and the turn let expect it.
+
+    Parameters
+    ----------
+    roll : Series
+        rad, within the manoeuvre.
+    record : Record
+        Of the manoeuvre.
+
+    Returns
+    -------
+    Series
+        The same where its readings show no noise.
+
+    References
+    ----------
+    Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd ed., sect. 6.5: the heel of a turn and
+    roll as a damped oscillator. Himeno (1981), "Prediction of ship roll damping: state of the art", Univ. of Michigan
+    report 239: the damping.
+    """
+    return signal(roll, _responses(roll, record)).series if len(roll) > 1 else roll
+
+
+def _responses(roll: Series, record: Record) -> list[Float]:
+    """Return the heel that the turn brings, at once and by every oscillator, at the instants of the roll."""
+    step_s = min(_OF_READING * roll.period_s, _OF_PERIOD * float(_PERIODS_S[0]))
+    at = roll.seconds_since(record.start_utc_ns)
+    time = np.arange(min(at[0], 0.0), at[-1] + step_s, step_s)
+    push = np.interp(time, record.time_s, record.speed_m_s) * _yaw_rate(record, time)
+    # at rest in the mean: what came before is left to the wandering signal
+    push = push - np.mean(push)
+    if not np.ptp(push) > 0.0:
+        return []
+    shapes = [np.interp(at, time, push)]
+    for period in _PERIODS_S[2.0 * roll.period_s <= _PERIODS_S]:
+        for damping in _DAMPINGS:
+            w = 2.0 * np.pi / period
+            above, below, _ = cont2discrete(([w * w], [1.0, 2.0 * damping * w, w * w]), step_s, method="foh")
+            shapes.append(np.interp(at, time, lfilter(above.ravel(), below, push)))
+    return shapes
+
+
+def _yaw_rate(record: Record, time_s: Float) -> Float:
+    """Return the yaw rate without its noise, rad/s: as it was measured, or of the heading."""
+    still, slope = _without_noise(record, "yaw_rate"), 0
+    if still is None:
+        still, slope = _without_noise(record, "heading"), 1
+    if still is None or len(still) <= slope:
+        return np.zeros(time_s.size)
+    own = still.seconds_since(record.start_utc_ns)
+    result: Float = np.interp(time_s, own, np.gradient(still.value, own) if slope else still.value)
+    return result
+
+
+def _without_noise(record: Record, measurement: str) -> Series | None:
+    column = record.measured[:, MEASUREMENTS.index(measurement)]
+    known = np.isfinite(column)
+    if not known.any():
+        return None
+    time_ns = record.start_utc_ns + np.round(record.time_s[known] * SECOND_NS).astype(np.int64)
+    return signal(Series(time_ns, column[known])).series
