@@ -2,7 +2,7 @@
 
 Ships with a force that goes by the wind, their roll or the depth, and with noisy instruments; the true structure is
 fitted to their logs twice, with these channels as they were read and as their readings let expect them
-(docs/decisions/0074). The ships share no code with the estimator. Readings, lateness and speed through the water do not
+(docs/decisions/0074 and 0080). The ships share no code with the estimator. Readings, lateness and speed through the water do not
 differ.
 """
 
@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import nullcontext
+from contextlib import ExitStack
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from unittest.mock import patch
@@ -39,6 +39,10 @@ _SHIPS = tuple(
 )
 
 
+#: where the noise of these channels is taken out
+_NOISE_OUT = tuple(f"kempf.pipeline.estimate.record.{room}.signal" for room in ("conditions", "heel"))
+
+
 def as_read(series: Series, shapes: Sequence[Float] = ()) -> Signal:
     """Return the readings themselves, where `kempf.pipeline.channels.signal.signal` would take their noise out."""
     return Signal(series, 0.0, 0.0)
@@ -46,11 +50,13 @@ def as_read(series: Series, shapes: Sequence[Float] = ()) -> Signal:
 
 def fits(case: Case) -> tuple[float, tuple[PooledFit, PooledFit]]:
     """Return the true size, and the true structure fitted with the inputs as read and as expected."""
-    with TemporaryDirectory() as place:
+    with TemporaryDirectory() as folder:
         files, answer = logs_of(case)
-        warehouse, made = taken_in(files, Path(place)), []
+        warehouse, made = taken_in(files, Path(folder)), []
         for noisy in (True, False):
-            with patch("kempf.pipeline.estimate.record.conditions.signal", as_read) if noisy else nullcontext():
+            with ExitStack() as patches:
+                for place in _NOISE_OUT if noisy else ():
+                    patches.enter_context(patch(place, as_read))
                 found = assembled(warehouse, choose(warehouse, case.case_id), PLAIN)
             with ThreadPoolExecutor(2) as workers:
                 made.append(staged(found.runs, found.spec, [get(case.effect)], workers)[1][-1])
