@@ -2,8 +2,8 @@
 
 Ships with a force that goes by the wind, their roll or the depth, and with noisy instruments; the true structure is
 fitted to their logs twice, with these channels as they were read and as their readings let expect them
-(docs/decisions/0074 and 0080). The ships share no code with the estimator. Readings, lateness and speed through the water do not
-differ.
+(docs/decisions/0074 and 0080). The ships share no code with the estimator. Readings, lateness and speed through the
+water do not differ.
 """
 
 from __future__ import annotations
