@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from kempf.pipeline.diagnose.confirm import BIC_SAVING, Confirmation, Unseen, price_of, unseen
+from kempf.pipeline.diagnose.confirm import BIC_SAVING, Confirmation, Unseen, price_of, unpredicted, unseen
 from kempf.pipeline.diagnose.confusion_sets import ALIKE, WINDOW, alike, shortlist, undecided
 from kempf.pipeline.diagnose.forward_selection import is_ship
 from kempf.pipeline.diagnose.immaterial import Immaterial, weighed
@@ -51,6 +51,7 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
         kept = _kept(ladder, found, undecided([pair for pair in tried if pair[1].holds]))
         if not kept:
             found.steps[-1] = replace(last, refused=(*last.refused, *tried))
+            found.suspected |= only_fitted(tried)
             break
         pairs = tuple(pair for pair, _ in kept)
         names = {candidate.effect.name for candidate, _ in pairs}
@@ -82,6 +83,21 @@ def certain_ones(ladder: Ladder, steps: list[Step]) -> Certain:
     claimed |= {c.effect.name for one in found.immaterial for c, _ in one.chosen_from}
     found.suspected = {name: why for name, why in sorted(found.suspected.items()) if name not in claimed}
     return found
+
+
+def only_fitted(tried: Sequence[tuple[Candidate, Confirmation]]) -> dict[str, str]:
+    """Return the effects that improve the fit and no prediction of what it was not fitted to, and why.
+
+    Parameters
+    ----------
+    tried : sequence of (Candidate, Confirmation)
+        Refitted beside everything that was found.
+    """
+    return {
+        candidate.effect.name: f"it improves the fit, but {unpredicted(confirmation)}"
+        for candidate, confirmation in tried
+        if confirmation.fits and not confirmation.predicts
+    }
 
 
 def _refitted(ladder: Ladder, found: Certain) -> list[tuple[Candidate, Confirmation]]:

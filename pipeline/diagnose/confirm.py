@@ -77,14 +77,42 @@ class Confirmation:
     @property
     def holds(self) -> bool:
         """Whether it stands every test: information criterion, most folds, held-out runs, a plausible value."""
-        gains = np.concatenate([self.fold_gains, self.held_out_gains])
+        return self.fits and self.predicts
+
+    @property
+    def fits(self) -> bool:
+        """Whether it is worth its parameters, with a plausible value, in the runs that it was fitted to."""
         return bool(
             self.bic_change < -BIC_SAVING
-            and np.mean(gains > 0.0) > 0.5
-            and np.sum(gains) > 0.0
             and not (self.at_bound or self.absent or self.outdone or self.within_rows)
             and np.isfinite(self.fit.log_likelihood)
         )
+
+    @property
+    def predicts(self) -> bool:
+        """Whether it gains in most runs that it was not fitted to, and in all of them together."""
+        gains = self._gains()
+        return bool(np.mean(gains > 0.0) > 0.5 and np.sum(gains) > 0.0)
+
+    @property
+    def gained_in(self) -> tuple[int, int]:
+        """In how many runs that it was not fitted to it gains, and of how many."""
+        gains = self._gains()
+        return int(np.sum(gains > 0.0)), gains.size
+
+    def _gains(self) -> Float:
+        result: Float = np.concatenate([self.fold_gains, self.held_out_gains])
+        return result
+
+
+def unpredicted(confirmation: Confirmation) -> str:
+    """Say in how few manoeuvres an effect gains that it was not fitted to."""
+    better, every = confirmation.gained_in
+    if 2 * better > every:
+        return (
+            f"it predicts {better} of {every} manoeuvres better that it was not fitted to, but the others worse by more"
+        )
+    return f"it predicts only {better} of {every} manoeuvres better that it was not fitted to"
 
 
 def confirm(

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from kempf.pipeline.diagnose.confirm import Confirmation
+from kempf.pipeline.diagnose.confirm import Confirmation, unpredicted
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step
@@ -134,7 +134,6 @@ def climbed(diagnosis: Diagnosis) -> tuple[Step, ...]:
 
 def refusal(confirmation: Confirmation) -> str:
     """Say which test a refitted effect did not stand."""
-    gains = np.concatenate([confirmation.fold_gains, confirmation.held_out_gains])
     if not np.isfinite(confirmation.fit.log_likelihood):
         return "the refitted model diverges"
     if confirmation.outdone:
@@ -144,10 +143,8 @@ def refusal(confirmation: Confirmation) -> str:
         return size
     if confirmation.bic_change > -6.0:
         return f"the improvement does not justify its parameters (BIC {confirmation.bic_change:+.1f})"
-    if np.mean(gains > 0.0) <= 0.5 or np.sum(gains) <= 0.0:
-        return (
-            f"it predicts only {int(np.sum(gains > 0.0))} of {gains.size} manoeuvres better that it was not fitted to"
-        )
+    if not confirmation.predicts:
+        return unpredicted(confirmation)
     return "another effect is clearly better"
 
 

@@ -9,6 +9,7 @@ from typing import cast
 import numpy as np
 import pytest
 
+from kempf.pipeline.diagnose.by_likelihood import only_fitted
 from kempf.pipeline.diagnose.by_prediction import _stands
 from kempf.pipeline.diagnose.confirm import Confirmation, Unseen
 from kempf.pipeline.diagnose.diagnosis import Diagnosis, diagnose
@@ -19,7 +20,7 @@ from kempf.pipeline.diagnose.ladder import Ladder
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.remainder import something_left
 from kempf.pipeline.diagnose.ridge_reference import ridge_reference_of
-from kempf.pipeline.diagnose.screen import score
+from kempf.pipeline.diagnose.screen import Candidate, score
 from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.settings import DiagnosisSettings
 from kempf.pipeline.diagnose.split import split
@@ -329,6 +330,25 @@ def test_an_effect_that_the_refit_leaves_nothing_of_is_not_claimed() -> None:
     assert sound.holds
     nothing = replace(sound, absent=True)
     assert not nothing.holds and refusal(nothing) == "the refit leaves nothing of it"
+
+
+@pytest.mark.parametrize(
+    ("folds", "held_out", "why"),
+    [
+        ([5.0, -1.0, -1.0], [-1.0], "it predicts only 1 of 4 manoeuvres better that it was not fitted to"),
+        (
+            *([1.0, 1.0, 1.0], [-9.0]),
+            "it predicts 3 of 4 manoeuvres better that it was not fitted to, but the others worse by more",
+        ),
+    ],
+)
+def test_what_only_improves_the_fit_is_suspected(folds: list[float], held_out: list[float], why: str) -> None:
+    found = replace(refitted(), fold_gains=np.array(folds), held_out_gains=np.array(held_out))
+    assert not found.holds and refusal(found) == why
+    candidate = cast(Candidate, SimpleNamespace(effect=effects.get("rudder_lag")))
+    assert only_fitted([(candidate, found)]) == {"rudder_lag": f"it improves the fit, but {why}"}
+    # one that holds is claimed, one that is not worth its parameters is absent
+    assert only_fitted([(candidate, refitted()), (candidate, replace(found, bic_change=-1.0))]) == {}
 
 
 @pytest.mark.parametrize("wrong", range(6))
