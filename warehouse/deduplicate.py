@@ -35,12 +35,12 @@ def once(found: Sequence[Segment], twins: Callable[[Segment, Segment], bool]) ->
 
 
 def _overlap(one: Segment, other: Segment) -> bool:
-    """Tell whether two segments share some time."""
+    """Return whether two segments share some time."""
     return one.end_utc_ns > other.start_utc_ns and other.end_utc_ns > one.start_utc_ns
 
 
 def same(one: Segment, other: Segment) -> bool:
-    """Tell whether two segments are one manoeuvre: at the same time, to the same side, executes at the same instants.
+    """Return whether two segments are one manoeuvre: at the same time, to the same side, executes at the same instants.
 
     Where neither log has a time of its own, since both count from a start that the profile states or from the moment
     at which the logger was switched on, the time says nothing: runs of a tank share their start. They are one only
@@ -61,6 +61,6 @@ def _apart_s(one: Segment, other: Segment) -> float:
 
 
 def _measured_alike(one: Segment, other: Segment) -> bool:
-    """Tell whether two segments have the same overshoots, to what another rounding of one signal leaves."""
+    """Return whether two segments have the same overshoots, to what another rounding of one signal leaves."""
     pairs = zip(one.overshoots_deg, other.overshoots_deg, strict=False)
     return len(one.overshoots_deg) == len(other.overshoots_deg) and all(abs(a - b) < _SAME_ANGLE_DEG for a, b in pairs)

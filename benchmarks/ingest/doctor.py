@@ -1,4 +1,4 @@
-"""How often the channel doctor finds a lie, and how often it cries wolf: ``python -m benchmarks.ingest.doctor``.
+"""How often the channel doctor finds a fault, and how often it cries wolf: ``python -m benchmarks.ingest.doctor``.
 
 The thresholds are those of the instruments' and ships' physics; what was tuned at all was tuned on seeds below 1000.
 Here are the real traps, simulated logs of seeds from 1000 on, and the trial logs of seven ships.
@@ -16,7 +16,7 @@ import numpy as np
 
 from benchmarks import result_page
 from benchmarks.baselines.doctor_rule_of_thumb import suspected
-from benchmarks.ingest.doctor_faults import LIES, NEEDS, Stated, with_body_velocities, with_velocities
+from benchmarks.ingest.doctor_faults import FAULTS, NEEDS, Stated, with_body_velocities, with_velocities
 from benchmarks.ingest.doctor_logs import fleet, simulated
 from benchmarks.ingest.doctor_traps import examined, traps
 from kempf.pipeline.channels.doctor.corrections import put_into
@@ -94,12 +94,12 @@ def _mends(fault: dict[str, object]) -> tuple[object, ...]:
 
 def lie_about(logs: Sequence[tuple[str, Log]]) -> tuple[dict[str, Score], float, float]:
     scores, doctor_s, eye_s = {}, 0.0, 0.0
-    for place, (what, lie) in enumerate(LIES.items()):
+    for place, (what, fault) in enumerate(FAULTS.items()):
         score = scores[what] = Score()
         fitting = [one for one in logs if NEEDS.get(what, "heading") in one[1].series]
         for k in range(_LOGS_A_LIE):
             name, log = fitting[(place * 5 + k * 7) % len(fitting)]
-            stated = lie(log, np.random.Generator(np.random.PCG64([place, k])))
+            stated = fault(log, np.random.Generator(np.random.PCG64([place, k])))
             start = perf_counter()
             found = examine(stated.log)
             middle = perf_counter()
@@ -210,7 +210,9 @@ def page(data: Path, many: int) -> list[str]:
         "named alone. By correlations: medians and correlations of pairs, and the right channel is in a pair that "
         "looks wrong.",
         "",
-        *result_page.table(["lie", "found", "named alone", "accused", "by correlations", "not found in (size)"], rows),
+        *result_page.table(
+            ["fault", "found", "named alone", "accused", "by correlations", "not found in (size)"], rows
+        ),
         "",
         "## False alarms on honest logs",
         "",
@@ -220,10 +222,10 @@ def page(data: Path, many: int) -> list[str]:
         "",
         "## Cost",
         "",
-        f"An honest log takes {clean_s:.2f} s, one that lies {doctor_s / stated / clean_s:.1f} times as long; the "
+        f"An honest log takes {clean_s:.2f} s, one with a fault {doctor_s / stated / clean_s:.1f} times as long; the "
         f"correlations take {eye_s / stated / clean_s:.2f} times as long as an honest log's examination.",
         "",
-        "![Found by lie, and by the size of two of them](doctor.png)",
+        "![Found by fault, and by the size of two of them](doctor.png)",
     ]
 
 

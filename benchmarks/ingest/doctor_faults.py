@@ -28,7 +28,7 @@ class Stated:
     size: float = 0.0
 
 
-Lie = Callable[[Log, np.random.Generator], Stated]
+PutIn = Callable[[Log, np.random.Generator], Stated]
 
 #: What a log must have for a fault to be put into it, beside the channels of every log here.
 NEEDS = {"rudder order, zero at 25 to 45 deg": "rudder_order"}
@@ -86,32 +86,32 @@ def with_body_velocities(log: Log) -> Log:
     )
 
 
-def _sign(name: str) -> Lie:
+def _sign(name: str) -> PutIn:
     return lambda log, _: Stated(_changed(log, name, np.negative), "sign", (name,))
 
 
-def _times(name: str, factor: float) -> Lie:
+def _times(name: str, factor: float) -> PutIn:
     return lambda log, _: Stated(_changed(log, name, lambda v: v * factor), "unit", (name,), factor)
 
 
-def _turned(name: str) -> Lie:
-    def lie(log: Log, random: np.random.Generator) -> Stated:
+def _turned(name: str) -> PutIn:
+    def fault(log: Log, random: np.random.Generator) -> Stated:
         angle = float(np.deg2rad(random.uniform(20.0, 160.0)) * random.choice([-1.0, 1.0]))
         return Stated(_changed(log, name, lambda v: v + angle), "offset", (name,), angle)
 
-    return lie
+    return fault
 
 
 def _anticlockwise(log: Log, _: np.random.Generator) -> Stated:
     return Stated(_changed(log, "heading", lambda v: np.pi / 2 - v), "offset", ("heading",))
 
 
-def _swapped(first: str, second: str, prepare: Callable[[Log], Log] = lambda log: log) -> Lie:
-    def lie(log: Log, _: np.random.Generator) -> Stated:
+def _swapped(first: str, second: str, prepare: Callable[[Log], Log] = lambda log: log) -> PutIn:
+    def fault(log: Log, _: np.random.Generator) -> Stated:
         log = prepare(log)
         return Stated(log.with_series({first: log.series[second], second: log.series[first]}), "swap", (first, second))
 
-    return lie
+    return fault
 
 
 def _frame(prepare: Callable[[Log], Log], log: Log) -> Stated:
@@ -123,23 +123,23 @@ def _frame(prepare: Callable[[Log], Log], log: Log) -> Stated:
     return Stated(lying, "frame", other)
 
 
-def _late(*names: str) -> Lie:
-    def lie(log: Log, random: np.random.Generator) -> Stated:
+def _late(*names: str) -> PutIn:
+    def fault(log: Log, random: np.random.Generator) -> Stated:
         late = float(random.uniform(3.0, 12.0))
         return Stated(_shifted(log, names, lambda t: t + late), "latency", names, late)
 
-    return lie
+    return fault
 
 
-def _fast(*names: str) -> Lie:
-    def lie(log: Log, random: np.random.Generator) -> Stated:
+def _fast(*names: str) -> PutIn:
+    def fault(log: Log, random: np.random.Generator) -> Stated:
         one = log.series[names[0]]
         span = float(one.time_utc_ns[-1] - one.time_utc_ns[0]) / SECOND_NS
         # no clock that ran at all is out by more than a hundredth or two
         rate = min(float(random.uniform(5.0, 20.0)) / span, _FASTEST) * float(random.choice([-1.0, 1.0]))
         return Stated(_shifted(log, names, lambda t: t * (1.0 + rate)), "clock_scale", names, rate)
 
-    return lie
+    return fault
 
 
 def _zero_elsewhere(log: Log, random: np.random.Generator) -> Stated:
@@ -147,8 +147,8 @@ def _zero_elsewhere(log: Log, random: np.random.Generator) -> Stated:
     return Stated(_changed(log, "rudder_order", lambda v: v + angle), "offset", ("rudder_order",), angle)
 
 
-#: Every lie by name, in the order of the page.
-LIES: dict[str, Lie] = {
+#: Every fault by name, in the order of the page.
+FAULTS: dict[str, PutIn] = {
     "yaw rate, sign": _sign("yaw_rate"),
     "yaw rate, deg/s as deg/min": _times("yaw_rate", 1.0 / 60.0),
     "yaw rate, rad/s as deg/s": _times("yaw_rate", np.pi / 180.0),

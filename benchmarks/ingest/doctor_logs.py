@@ -1,4 +1,4 @@
-"""Honest logs to lie about: simulated ones of every hull, sea, noise and format, and the trial logs of seven ships."""
+"""Honest logs to spoil: simulated ones of every hull, sea, noise and format, and the trial logs of seven ships."""
 
 from __future__ import annotations
 

@@ -19,7 +19,7 @@ from kempf.schemas.profile import VesselProfile, parse
 
 @dataclass(frozen=True)
 class Trap:
-    """A lie of the real world: the logs, how their profile is spoilt, what must be named."""
+    """A fault of the real world: the logs, how their profile is spoilt, what must be named."""
 
     name: str
     kind: str

@@ -67,7 +67,7 @@ def grid(effect: Effect) -> list[tuple[float, ...]]:
 
 
 def plausible(effect: Effect, change: Float) -> bool:
-    """Tell whether the change goes where the effect can be at all: a rudder cannot answer before it moves."""
+    """Return whether the change goes where the effect can be at all: a rudder cannot answer before it moves."""
     inside = [np.clip(x, p.low, p.high) for x, p in zip(change, effect.parameters, strict=True)]
     return any(x != 0.0 for x, p in zip(inside, effect.parameters, strict=True) if not p.shapes)
 

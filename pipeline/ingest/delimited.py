@@ -211,7 +211,7 @@ def _check_columns(name: str, layout: Layout, wanted: list[str]) -> None:
 
 
 def _cells(layout: Layout, wanted: list[str]) -> tuple[Flag, dict[str, pl.Series]]:
-    """Cut the cells of some columns out of the rows; also tell which rows have as many cells as the header."""
+    """Cut the cells of some columns out of the rows; also return which rows have as many cells as the header."""
     rows = layout.rows
     whole = rows.stop - rows.start <= _LONGEST_ROW
     parts: list[dict[str, pl.Series]] = [{name: pl.Series(name, [], dtype=pl.String) for name in wanted}]
@@ -277,7 +277,7 @@ def _unquoted(cell: pl.Expr) -> pl.Expr:
 
 
 def _inside_quotes(quote: Flag, rows: Spans) -> tuple[Flag, Flag]:
-    """Tell which bytes stand between quotation marks, and which rows close all of theirs."""
+    """Return which bytes stand between quotation marks, and which rows close all of theirs."""
     # whether the marks up to each byte are odd in number; a count of them would take eight times the memory
     odd = np.logical_xor.accumulate(quote)
     before = odd[rows.start - 1] & (rows.start > 0)

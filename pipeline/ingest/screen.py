@@ -147,7 +147,7 @@ def _sharing_an_instant(decoded: Decoded, reason: Code) -> Index:
 
 
 def _first_of(decoded: Decoded, record: Index, content: pl.Series | None = None) -> NDArray[np.bool_]:
-    """Tell which records are the first of their source and time (and content)."""
+    """Return which records are the first of their source and time (and content)."""
     keys = pl.DataFrame({"source": decoded.source[record], "time": decoded.time_utc_ns[record]})
     if content is not None:
         keys = keys.with_columns(content=content)

@@ -98,7 +98,7 @@ def lines_of(buffer: Bytes) -> Spans:
 
 
 def is_blank(byte: Bytes) -> NDArray[np.bool_]:
-    """Tell which bytes are blanks: space, tab, carriage return, vertical tab or form feed."""
+    """Return which bytes are blanks: space, tab, carriage return, vertical tab or form feed."""
     blank: NDArray[np.bool_] = (byte == 32) | ((byte >= 9) & (byte <= 13))
     return blank
 

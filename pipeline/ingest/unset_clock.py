@@ -77,7 +77,7 @@ def dated_parts(decoding: Callable[[], Iterator[Decoded]], time: TimeColumn | No
 
 
 def _of_1970(parts: Iterator[Decoded]) -> bool:
-    """Tell whether all times of a log are of 1970, but for damaged ones; the first part that says otherwise decides."""
+    """Return whether all times of a log are of 1970, but for damaged ones; the first part with another decides."""
     inside = outside = 0
     for part in parts:
         time = part.time_utc_ns[part.time_utc_ns != NO_TIME]
@@ -93,7 +93,7 @@ def _within(time: Nanoseconds) -> Flag:
 
 
 def _too_close(part: Decoded) -> bool:
-    """Tell whether the rows of a log that comes in one part are closer than those of any logger."""
+    """Return whether the rows of a log that comes in one part are closer than those of any logger."""
     time = part.time_utc_ns[_within(part.time_utc_ns)]
     return time.size >= _FEWEST and float(np.ptp(time)) < _CLOSEST_NS * (time.size - 1)
 

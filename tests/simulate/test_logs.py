@@ -33,7 +33,7 @@ def trial() -> Trial:
 
 
 def whole(line: bytes) -> bool:
-    """Tell whether a stamped sentence has a right checksum, by the plainest means."""
+    """Return whether a stamped sentence has a right checksum, by the plainest means."""
     _, _, sentence = line.partition(b" ")
     body, star, digits = sentence[1:].partition(b"*")
     if not sentence.startswith(b"$") or not star or len(digits) != 2:

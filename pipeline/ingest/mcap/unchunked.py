@@ -53,7 +53,7 @@ def chunk_behind(log: LogFile, at: int, stop: int, end: int) -> int:
 
 
 def believed(log: LogFile, summary: Summary) -> bool:
-    """Tell whether messages outside chunks are what was written there.
+    """Return whether messages outside chunks are what was written there.
 
     They are where the summary lists all chunks, so that none is stepped over unseen; where the file begins with
     messages, not with chunks, and none is hidden in what stands before; and where the CRC of the whole data section is
@@ -70,7 +70,7 @@ def believed(log: LogFile, summary: Summary) -> bool:
 
 
 def _begins_with_messages(log: LogFile, stop: int) -> bool:
-    """Tell whether messages come before any chunk, be it one in a record that says a wrong length."""
+    """Return whether messages come before any chunk, be it one in a record that says a wrong length."""
     at = len(MCAP_MAGIC)
     for _ in range(_MOST_RECORDS):
         head = log.read(at, HEAD)
@@ -88,7 +88,7 @@ def _begins_with_messages(log: LogFile, stop: int) -> bool:
 
 
 def _attached(log: LogFile, first: int, end: int) -> bool:
-    """Tell whether the content of an attachment has a CRC that is right."""
+    """Return whether the content of an attachment has a CRC that is right."""
     stored_crc = log.read(end - 4, 4) if end - first >= 4 else b""
     return stored_crc not in (b"", bytes(4)) and _crc(log, first, end - 4) == struct.unpack("<I", stored_crc)[0]
 

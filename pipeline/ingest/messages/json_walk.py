@@ -227,7 +227,7 @@ def _key(buffer, at, end, parent, nodes, keys):
 
 @njit(cache=True)
 def _walk_message(buffer, at, end, nodes, keys, inside, row, tokens, value):
-    """Walk through one message; tell whether it is a whole object without anything odd.
+    """Walk through one message; return whether it is a whole object without anything odd.
 
     What is open around a value stands in ``inside``: the node of an object, -1 of one nobody wants, -2 of a list.
     """

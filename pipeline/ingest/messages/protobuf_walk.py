@@ -35,7 +35,7 @@ def _varint(buffer, at, end):
 
 @njit(cache=True)
 def _walk_message(buffer, at, end, rows, row_of, ends, nodes, i, out, present, entered):
-    """Walk through one message; tell whether it is whole."""
+    """Walk through one message; return whether it is whole."""
     ends[0], nodes[0], level = end, 0, 0
     entered[i, 0] = True
     while True:

@@ -172,7 +172,7 @@ def _line_times(frames: Frames, said: dict[str, Said]) -> tuple[_LineTimes, int]
 
 
 def _of_a_dated_talker(frames: Frames, dated: Flag) -> Flag:
-    """Tell which sentences come from a talker that also sends the date.
+    """Return which sentences come from a talker that also sends the date.
 
     A display that repeats a receiver's position without the date repeats it late, too: it gives its own sentences
     their time, but carries none to others.
@@ -248,7 +248,7 @@ def _next(mark: Flag) -> Index:
 
 
 def _follows(said: dict[str, Said]) -> bool:
-    """Tell whether VTG repeats the speed of the RMC behind it rather than of the one before it."""
+    """Return whether VTG repeats the speed of the RMC behind it rather than of the one before it."""
     if "RMC" not in said or "VTG" not in said:
         return False
     at, asked = said["RMC"].record, said["VTG"].record

@@ -118,7 +118,7 @@ def read_type(frames: Frames, record: Index, name: str) -> Said:
 
 
 def _void(fields: Fields, sentence: Sentence) -> Flag:
-    """Tell which sentences say themselves that they are not valid; an older edition ends before the mark."""
+    """Return which sentences say themselves that they are not valid; an older edition ends before the mark."""
     void = np.zeros(fields.record.size, dtype=np.bool_)
     for place, valid in (sentence.valid or {}).items():
         void |= ~fields.at(place).is_one_of(tuple(valid)) & (fields.count >= place)

@@ -47,7 +47,7 @@ class Tags:
 
 
 def checksum_right(buffer: Bytes, prefix: Bytes, first: Index, star: Index) -> Flag:
-    """Tell which stretches are followed by their own checksum.
+    """Return which stretches are followed by their own checksum.
 
     The exclusive or of a stretch is that of the prefixes at its two ends, so one pass over the buffer serves
     every line.

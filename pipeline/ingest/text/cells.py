@@ -70,7 +70,7 @@ def words(buffer: Bytes, place: Index) -> Word:
 
 
 def all_digits(word: Word) -> Flag:
-    """Tell which words hold eight decimal digits."""
+    """Return which words hold eight decimal digits."""
     good: Flag = (((word + _ABOVE) | (word - _ZEROS)) & _TOPS) == 0
     return good
 
@@ -129,7 +129,7 @@ class Cells:
         return cls(buffer, start, stop)
 
     def there(self) -> Flag:
-        """Tell which are not empty."""
+        """Return which are not empty."""
         filled: Flag = self.stop > self.start
         return filled
 
@@ -152,7 +152,7 @@ class Cells:
         return np.where(length > 8, LONG, np.where(length > 0, word, np.uint64(0)))
 
     def is_one_of(self, texts: tuple[str, ...] | frozenset[str]) -> Flag:
-        """Tell which texts are one of some short ones."""
+        """Return which texts are one of some short ones."""
         if max(map(len, texts), default=0) <= 1:
             among = np.zeros(256, dtype=np.bool_)
             among[[ord(text) if text else 0 for text in texts]] = True
