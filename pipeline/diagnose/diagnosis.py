@@ -17,6 +17,7 @@ import numpy as np
 
 from kempf.pipeline.diagnose.by_likelihood import certain_ones
 from kempf.pipeline.diagnose.by_prediction import predicting_better
+from kempf.pipeline.diagnose.final_sizes import Size, final_sizes
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder import Ladder
 from kempf.pipeline.diagnose.ladder_step import Step, make_step
@@ -44,6 +45,9 @@ class Diagnosis:
     way: tuple[PooledFit, ...]
     #: The diagnosed model first; the effects of the others are claimed.
     steps: tuple[Step, ...]
+    #: By name, how large the effects of ``steps`` are in the last of these; and what else is in their sets, in place of
+    #: them.
+    sizes: Mapping[str, Size]
     #: Steps after them whose effects only the likelihood chose, while something that no effect explains is left: they
     #: improve the fit and may imitate it.
     imitating: tuple[Step, ...]
@@ -113,9 +117,12 @@ def diagnose(
     left = something_left(steps, before, after)
     kept = _claimed(steps) if left else len(steps)
     ahead = steps[kept - 1].ahead
+    listener.begins("sizing what was found")
+    sizes = final_sizes(steps[:kept], workers, listener)
     return Diagnosis(
         way=tuple(fits),
         steps=tuple(steps[:kept]),
+        sizes=sizes,
         imitating=tuple(steps[kept:]),
         something_left=left,
         before=before,

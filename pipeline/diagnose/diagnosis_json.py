@@ -8,12 +8,12 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.effect_finding import climbed, finding, refusal
+from kempf.pipeline.diagnose.final_sizes import Size, refitted_size
 from kempf.pipeline.diagnose.ladder_step import Step, rung
 from kempf.pipeline.diagnose.remaining_misfit import as_json as remaining_json
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.diagnose.sentences import sentences
 from kempf.pipeline.diagnose.verdict import share_explained, verdict
-from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.schemas.effect import Effect
 
 #: log-likelihood that an effect must gain in a manoeuvre to be seen in it
@@ -84,7 +84,7 @@ def _set(diagnosis: Diagnosis, name: str, step: Step) -> dict[str, Any]:
         "separated_by": step.chosen_from[0][0].effect.separated_by if len(effects) > 1 else "",
         "since_utc_ns": _since(diagnosis, step.chosen_from[0][1]),
         "stability": step.stability,
-        "refits": [_refit(c, k) for c, k in step.chosen_from],
+        "refits": [_refit(c, k, diagnosis.sizes.get(c.effect.name)) for c, k in step.chosen_from],
     }
 
 
@@ -121,12 +121,12 @@ def _values(effect: Effect, values: Float, std: Float) -> dict[str, Any]:
     }
 
 
-def _refit(candidate: Candidate, confirmation: Confirmation) -> dict[str, Any]:
-    size, stated = len(candidate.effect.parameters), confirmation.stated
+def _refit(candidate: Candidate, confirmation: Confirmation, size: Size | None = None) -> dict[str, Any]:
+    size = size or refitted_size(candidate.effect, confirmation)
     return {
         "effect": candidate.effect.name,
-        "parameters": _values(candidate.effect, stated.fit.values[-size:], stated.std(size)),
-        "widened": agreement_of(confirmation.fit).widened,
+        "parameters": _values(candidate.effect, size.values, size.std),
+        "widened": size.widened,
         "likelihood_ratio": confirmation.likelihood_ratio,
         "bic_change": confirmation.bic_change,
         "gains_left_out": confirmation.fold_gains,

@@ -10,6 +10,7 @@ import numpy as np
 
 from kempf.pipeline.diagnose.confirm import Confirmation, unpredicted
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
+from kempf.pipeline.diagnose.final_sizes import refitted_size
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.screen import Candidate
@@ -64,20 +65,20 @@ def finding(diagnosis: Diagnosis, candidate: Candidate) -> EffectFinding:
 def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
     """Return the verdict on an effect that a step was made of, or that is immaterial; None on any other."""
     for number, step in enumerate(diagnosis.steps[1:], start=1):
-        members = {c.effect.name: k for c, k in step.chosen_from}
-        if effect.name in members:
+        if effect.name in {c.effect.name for c, _ in step.chosen_from}:
             others = [c.effect.title for c, _ in step.chosen_from if c.effect.name != effect.name]
             alike = f"; these data would fit {listed(others)} as well" if others else ""
-            size = stated(diagnosis, step, effect, members[effect.name])
+            size = stated(diagnosis, step, effect)
             return EffectFinding("present", f"step {number}: {size}{alike}")
     for step in diagnosis.imitating:
         for member, confirmation in step.chosen_from:
             if member.effect.name == effect.name:
-                return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized(effect, confirmation)}")
+                return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized(effect, refitted_size(effect, confirmation))}")
     for one in diagnosis.immaterial:
         for member, confirmation in one.chosen_from:
             if member.effect.name == effect.name:
-                return EffectFinding("immaterial", f"{sized(effect, confirmation)}; {changes(one)}")
+                size = sized(effect, refitted_size(effect, confirmation))
+                return EffectFinding("immaterial", f"{size}; {changes(one)}")
     return None
 
 

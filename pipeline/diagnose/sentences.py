@@ -9,6 +9,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED, changes
+from kempf.pipeline.diagnose.final_sizes import refitted_size
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.remainder import reference_gains
 from kempf.pipeline.diagnose.remaining_misfit import said as remaining_said
@@ -29,8 +30,8 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
     said = []
     what = verdict(diagnosis)
     for step in diagnosis.steps[1:]:
-        (candidate, best), *others = step.chosen_from
-        line = f"{candidate.effect.plain.rstrip('.')}: {stated(diagnosis, step, candidate.effect, best)}"
+        (candidate, _), *others = step.chosen_from
+        line = f"{candidate.effect.plain.rstrip('.')}: {stated(diagnosis, step, candidate.effect)}"
         if others:
             line += f"; the same data would fit {listed([c.effect.title for c, _ in others])}"
             line += f". What distinguishes them: {candidate.effect.separated_by}"
@@ -41,11 +42,12 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
     for step in diagnosis.imitating:
         (candidate, best), *_ = step.chosen_from
-        size = sized(candidate.effect, best)
+        size = sized(candidate.effect, refitted_size(candidate.effect, best))
         said.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
     for one in diagnosis.immaterial:
         (candidate, best), *_ = one.chosen_from
-        said.append(f"Certain but immaterial: {sized(candidate.effect, best)}; {changes(one)}.")
+        size = sized(candidate.effect, refitted_size(candidate.effect, best))
+        said.append(f"Certain but immaterial: {size}; {changes(one)}.")
     if what == "insufficient_data":
         said.append(
             "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, "

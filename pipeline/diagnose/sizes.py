@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
+from kempf.pipeline.diagnose.final_sizes import Size
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.schemas.effect import Effect
 
 
-def stated(diagnosis: Diagnosis, step: Step, effect: Effect, confirmation: Confirmation) -> str:
+def stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
     """Return the size of an effect that is claimed, from that fit which predicts better.
 
     Where parameters fitted to legs predict better than the likelihood's, so do the sizes of effects; those of what
@@ -19,7 +19,7 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect, confirmation: Confi
     """
     ahead = diagnosis.steps[-1].ahead
     if ahead is None or ahead.disagrees is None:
-        return sized(effect, confirmation)
+        return sized(effect, diagnosis.sizes[effect.name])
     if step.added is None or effect.name != step.added.name:
         return effect.title
     own = [i for i, (of, _) in enumerate(ahead.model.parameters) if of.name == effect.name]
@@ -27,10 +27,9 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect, confirmation: Confi
     return f"{_with_size(effect, ahead.fit.values[own], std[own])}, fitted to legs"
 
 
-def sized(effect: Effect, confirmation: Confirmation) -> str:
+def sized(effect: Effect, size: Size) -> str:
     """Return an effect's size with its standard errors, in the units people use."""
-    size = len(effect.parameters)
-    return _with_size(effect, confirmation.stated.fit.values[-size:], confirmation.stated.std(size))
+    return _with_size(effect, size.values, size.std)
 
 
 def _with_size(effect: Effect, values: Float, std: Float) -> str:

@@ -1,0 +1,99 @@
+"""How large effects are beside everything else that is claimed, and beside noise of the instruments found with them.
+
+An effect is chosen by a refit beside what was known when it was chosen. What is found later, another effect or noise
+that lasts, moves it: what was missing had hidden how long the errors of a compass last.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from concurrent.futures import Executor
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.confirm import Confirmation
+from kempf.pipeline.diagnose.ladder_step import Step
+from kempf.pipeline.diagnose.unsure_instants import WithInstants, with_instants
+from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.estimate.agreement import agreement_of
+from kempf.pipeline.estimate.iteration import SILENT, Listener
+from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.model.effect_model import EffectModel
+from kempf.schemas.effect import Effect
+
+
+@dataclass(frozen=True, eq=False)
+class Size:
+    """How large an effect is."""
+
+    #: values, std: Shape (p,). Of its parameters, SI.
+    values: Float
+    std: Float
+    #: Factor on the standard errors, in ``std`` already, see `kempf.pipeline.estimate.agreement`.
+    widened: float
+
+
+def refitted_size(effect: Effect, confirmation: Confirmation) -> Size:
+    """Return the size that an effect has in the refit that it was chosen or refused by."""
+    return _in(confirmation.stated, effect)
+
+
+def final_sizes(steps: Sequence[Step], workers: Executor, listener: Listener = SILENT) -> Mapping[str, Size]:
+    """Return the sizes of the effects of a ladder in its last model, and of those in their sets in place of them.
+
+    Parameters
+    ----------
+    steps : sequence of Step
+        The claimed ones, the diagnosed model first.
+    workers : Executor
+        Share the work; nothing depends on it.
+    listener : Listener, optional
+        Notified of every iteration.
+
+    Returns
+    -------
+    mapping
+        By effect. Of what only could be in the place of an effect, where its refit does not converge, that of the refit
+        that it was compared by.
+    """
+    last = steps[-1].fit
+    sizes: dict[str, Size] = {}
+    whole = with_instants(last, workers) if len(steps) > 1 else None
+    for step in steps[1:]:
+        (chosen, confirmation), *others = step.chosen_from
+        assert whole is not None
+        sizes[chosen.effect.name] = _in(whole, chosen.effect)
+        for candidate, one in others:
+            if last is not confirmation.fit:
+                listener.begins(f"fitting {candidate.effect.title} in place of {chosen.effect.title}")
+                made = _in_place(last, chosen.effect, candidate.effect, one, workers, listener)
+                if made.converged:
+                    sizes[candidate.effect.name] = _in(with_instants(made, workers), candidate.effect)
+                    continue
+            sizes[candidate.effect.name] = refitted_size(candidate.effect, one)
+    return sizes
+
+
+def _in_place(
+    fit: PooledFit, effect: Effect, other: Effect, confirmation: Confirmation, workers: Executor, listener: Listener
+) -> PooledFit:
+    """Fit a model with another effect in the place of one of its own."""
+    model = EffectModel(tuple(other if one.name == effect.name else one for one in fit.model.effects))
+    known = {one.name: fit.values[_place(fit, one)] for one in fit.model.effects if one.name != effect.name}
+    known[other.name] = confirmation.fit.values[_place(confirmation.fit, other)]
+    values = np.concatenate([known[one.name] for one in model.effects])
+    runs = [replace(run, model=model) for run in fit.runs]
+    return pooled_fit.fit(runs, confirmation.fit.hull, fit.levels, values, workers, listener=listener)
+
+
+def _in(known: WithInstants, effect: Effect) -> Size:
+    at = _place(known.fit, effect)
+    return Size(known.fit.values[at], known.std(known.fit.values.size)[at], agreement_of(known.fit).widened)
+
+
+def _place(fit: PooledFit, effect: Effect) -> slice:
+    """Return where the parameters of an effect stand in the values of a fit."""
+    own = [number for number, (of, _) in enumerate(fit.model.parameters) if of.name == effect.name]
+    return slice(own[0], own[-1] + 1)
