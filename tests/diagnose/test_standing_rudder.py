@@ -25,7 +25,7 @@ def plain(ship: Sailed) -> PooledFit:
 @pytest.mark.parametrize("seed", [3, 5])
 def test_a_play_that_only_smooths_the_rudders_noise_is_not_seen(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
     fit = plain(sailed.__wrapped__(name="usv", seed=seed))
-    monkeypatch.setattr(cut, "averaged_where_standing", as_read)
+    monkeypatch.setattr(cut, "without_noise", as_read)
     raw = plain(sailed.__wrapped__(name="usv", seed=seed))
     assert fit.log_likelihood > raw.log_likelihood + 10.0
     play, of_raw = (score(one, get("backlash"), WORKERS).score for one in (fit, raw))
