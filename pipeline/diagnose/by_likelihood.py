@@ -94,7 +94,7 @@ def only_fitted(tried: Sequence[tuple[Candidate, Confirmation]]) -> dict[str, st
         Refitted beside everything that was found.
     """
     return {
-        candidate.effect.name: f"it improves the fit, but {unpredicted(confirmation)}"
+        candidate.effect.name: f"it improves the fit; {unpredicted(confirmation)}"
         for candidate, confirmation in tried
         if confirmation.fits and not confirmation.predicts
     }

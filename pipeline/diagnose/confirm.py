@@ -109,9 +109,8 @@ def unpredicted(confirmation: Confirmation) -> str:
     """Say in how few manoeuvres an effect gains that it was not fitted to."""
     better, every = confirmation.gained_in
     if 2 * better > every:
-        return (
-            f"it predicts {better} of {every} manoeuvres better that it was not fitted to, but the others worse by more"
-        )
+        worse = every - better
+        return f"of {every} manoeuvres that it was not fitted to it predicts {better} better and {worse} worse by more"
     return f"it predicts only {better} of {every} manoeuvres better that it was not fitted to"
 
 

@@ -338,7 +338,7 @@ def test_an_effect_that_the_refit_leaves_nothing_of_is_not_claimed() -> None:
         ([5.0, -1.0, -1.0], [-1.0], "it predicts only 1 of 4 manoeuvres better that it was not fitted to"),
         (
             *([1.0, 1.0, 1.0], [-9.0]),
-            "it predicts 3 of 4 manoeuvres better that it was not fitted to, but the others worse by more",
+            "of 4 manoeuvres that it was not fitted to it predicts 3 better and 1 worse by more",
         ),
     ],
 )
@@ -346,7 +346,7 @@ def test_what_only_improves_the_fit_is_suspected(folds: list[float], held_out: l
     found = replace(refitted(), fold_gains=np.array(folds), held_out_gains=np.array(held_out))
     assert not found.holds and refusal(found) == why
     candidate = cast(Candidate, SimpleNamespace(effect=effects.get("rudder_lag")))
-    assert only_fitted([(candidate, found)]) == {"rudder_lag": f"it improves the fit, but {why}"}
+    assert only_fitted([(candidate, found)]) == {"rudder_lag": f"it improves the fit; {why}"}
     # one that holds is claimed, one that is not worth its parameters is absent
     assert only_fitted([(candidate, refitted()), (candidate, replace(found, bic_change=-1.0))]) == {}
 
