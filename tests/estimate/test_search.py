@@ -31,23 +31,3 @@ def test_a_parameter_that_begins_at_nothing_may_leave_it() -> None:
     # warnings are errors here: there is no reach to divide by
     assert found.converged
     np.testing.assert_allclose(found.theta, TOP, atol=1e-3)
-
-
-class Cliff(Hill):
-    """The same, a hundred times as high, with a fall to nothing before its top is reached."""
-
-    asked = 0
-
-    def full(self, theta: Float) -> tuple[float, Float, Float]:
-        self.asked += 1
-        value, score, information = super().full(theta)
-        return 100.0 * value - 1e6 * (theta[0] > -1.5), 100.0 * score, 100.0 * information
-
-
-def test_a_climb_that_a_cliff_holds_up_is_given_up() -> None:
-    cliff = Cliff()
-    found = climb(cliff, np.array([-2.0, 0.5, -2.0, -1.5, 0.3, 2.0]), 200, 1e-8)
-    assert not found.converged and "next to nothing" in found.reason
-    assert found.theta[0] < -1.5 and found.log_likelihood > -50.0
-    # 200 iterations of five tries each, without that
-    assert cliff.asked < 100

@@ -26,9 +26,6 @@ _DAMPED = 0.1
 _SHORTER, _TRIES = 0.3, 3
 #: a logarithm that falls by more than this in a step, with less than so much left to gain, is on its way to nothing
 _SINKING, _LITTLE = 0.2, 0.05
-#: a climb far from the top is over when so many steps on end keep less than this share of their promise: there the
-#: log-likelihood is not what its derivatives say, and steps only become shorter
-_STUCK, _NOTHING_KEPT = 4, 1e-3
 #: a climb that is to reach a height is given up where so many times its promise would not take it there: promises are
 #: kept within a factor of two or so, but for those of the first steps
 _HOPE, _FIRST = 4.0, 3
@@ -160,7 +157,7 @@ def climb_by(
         reason = "the start has no likelihood"
         return Search(theta, -np.inf, score, information, converged=False, reason=reason, passes=())
     curvature, damping, scale = information, 1e-3, np.abs(theta[:_HULL])
-    converged, reason, in_vain = False, "the iterations allowed ran out", 0
+    converged, reason = False, "the iterations allowed ran out"
     passes = [Pass(theta, value, np.nan, damping)]
     report(passes[0])
     for _ in range(max_iterations):
@@ -193,13 +190,9 @@ def climb_by(
         else:
             made = there[2] if far else curvature
             curvature = steps.corrected(made, information, there[2], found - theta, score - there[1], movable)
-        in_vain = in_vain + 1 if far and there[0] - value < _NOTHING_KEPT * gain else 0
         theta, (value, score, information) = found, there
         passes.append(Pass(theta, value, gain, damping))
         report(passes[-1])
-        if in_vain == _STUCK:
-            reason = f"{_STUCK} steps on end raised the log-likelihood by next to nothing of what they promised"
-            break
     return Search(theta, value, score, information, converged, reason, tuple(passes))
 
 
