@@ -42,7 +42,8 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     Returns
     -------
     PooledFit
-        The very one given unless the other gains so much for every noise that it has more.
+        The very one given unless the other gains so much for every noise that it has more, and converges where the one
+        given did.
     """
     present = {effect.name for effect in fit.model.effects}
     missing = [noise for name, noise in lasting_noise().items() if name not in present]
@@ -51,7 +52,11 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
     hull = mariner_like(fit.runs[0].run.ship.length_m).array()
     made = _fitted(fit, model, hull, calm_levels(fit), values, workers, wanted, listener)
-    if not (made.converged and made.log_likelihood > wanted):
+    if made.log_likelihood > wanted and not made.converged:
+        # it came from far, and its iterations may have run out next to the top
+        made = _fitted(made, model, made.hull, made.levels, made.values, workers, wanted, listener)
+    # a fit that did not converge itself may ask no more of another
+    if not (made.log_likelihood > wanted and (made.converged or not fit.converged)):
         return fit
     return _without_idle(made, missing, least_gain, workers, listener)
 
