@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +13,9 @@ from benchmarks.diagnose.hidden_effects.as_sold import RUDDER_OFF
 from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
 from kempf.pipeline.diagnose.joint_noise import with_joint_noise
 from kempf.pipeline.diagnose.staged import staged
+from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.plain_fit import fit_plain
+from kempf.pipeline.estimate.pooled_fit import PooledFit, fit
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.effects import get, require_free
 from kempf.schemas.errors import UsageError
@@ -73,6 +76,23 @@ def test_joint_noise_on_the_same_hill_leaves_the_fit_as_it_is():
     fit = with_instrument_noise(plain, WORKERS)
     assert fit.model.effects
     assert with_joint_noise(fit, 15.0, WORKERS) is fit
+
+
+def test_joint_noise_whose_iterations_run_out_next_to_the_top_goes_on(monkeypatch: pytest.MonkeyPatch):
+    ship = sailed(name="tanker", seed=6, sold=True)
+    plain = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit
+    whole, climbs = with_joint_noise(plain, 15.0, WORKERS), []
+    assert whole is not plain and whole.converged
+
+    def cut_short(*given: Any, **named: Any) -> PooledFit:
+        made = fit(*given, max_iterations=60 if climbs else 6, **named)
+        climbs.append(made)
+        return made
+
+    monkeypatch.setattr(pooled_fit, "fit", cut_short)
+    found = with_joint_noise(plain, 15.0, WORKERS)
+    assert not climbs[0].converged and climbs[0].log_likelihood > plain.log_likelihood + 45.0
+    assert found.converged and found.log_likelihood == pytest.approx(whole.log_likelihood, abs=0.05)
 
 
 def test_the_ship_of_a_model_is_what_moves_her():
