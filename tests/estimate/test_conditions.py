@@ -8,6 +8,7 @@ import pytest
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.channels.signal import signal
+from kempf.pipeline.estimate.record import heel
 from kempf.pipeline.estimate.record.conditions import conditions
 from kempf.pipeline.estimate.record.grid_run import ShipConstants, make_run, plain_run
 from kempf.schemas.model_spec import ModelSpec
@@ -84,8 +85,11 @@ def heeled(time_s: Float) -> tuple[Instruments, Float, Float]:
     return changed(instruments_of(trial), "roll", roll), np.interp(time_s, fine, angles), wandering
 
 
-@pytest.mark.parametrize("yaw_rate", [True, False])
-def test_the_heel_of_a_turn_is_what_the_turn_lets_expect(yaw_rate: bool) -> None:
+@pytest.mark.parametrize(("yaw_rate", "chosen_by"), [(True, 4000), (False, 4000), (True, 500)])
+def test_the_heel_of_a_turn_is_what_the_turn_lets_expect(
+    yaw_rate: bool, chosen_by: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(heel, "_MOST", chosen_by)
     trial = sailed("ferry")
     record = record_of(trial) if yaw_rate else record_of(trial, "yaw_rate")
     fine = np.arange(0.0, record.time_s[-1], 0.25)

@@ -19,6 +19,8 @@ _PERIODS_S = np.geomspace(0.5, 40.0, 25)
 _DAMPINGS = (0.05, 0.15, 0.4)
 #: instants at which the turn is laid down, in periods of the roll's readings and in the shortest natural periods
 _OF_READING, _OF_PERIOD = 0.25, 0.1
+#: readings by which the oscillator is chosen
+_MOST = 4000
 
 
 def rolling(roll: Series, record: Record) -> Series:
@@ -42,7 +44,14 @@ def rolling(roll: Series, record: Record) -> Series:
     roll as a damped oscillator. Himeno (1981), "Prediction of ship roll damping: state of the art", Univ. of Michigan
     report 239: the damping.
     """
-    return signal(roll, _responses(roll, record)).series if len(roll) > 1 else roll
+    if len(roll) < 2:
+        return roll
+    shapes, every = _responses(roll, record), -(-len(roll) // _MOST)
+    if every > 1:
+        some = Series(roll.time_utc_ns[::every], roll.value[::every])
+        best = signal(some, [shape[::every] for shape in shapes]).shape
+        shapes = [] if best is None else [shapes[best]]
+    return signal(roll, shapes).series
 
 
 def _responses(roll: Series, record: Record) -> list[Float]:
