@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from types import SimpleNamespace
 from typing import cast
 
@@ -19,9 +20,10 @@ from kempf.schemas.effects import get
 from tests.diagnose.sailing import WORKERS, sailed
 
 
+@cache
 def fitted(*names: str) -> PooledFit:
     ship = sailed("rudder_lag")
-    return staged(ship.runs, ship.spec, [get(name) for name in names], WORKERS)[1][-1]
+    return staged(ship.runs[:3], ship.spec, [get(name) for name in names], WORKERS)[1][-1]
 
 
 def rung(fit: PooledFit, **alike: PooledFit) -> Step:
@@ -38,16 +40,16 @@ def rung(fit: PooledFit, **alike: PooledFit) -> Step:
 
 def test_a_size_is_that_of_the_last_model() -> None:
     plain, lag, dead, last = (
-        fitted(*names) for names in ((), ("rudder_lag",), ("dead_time",), ("rudder_lag", "waves"))
+        fitted(*names) for names in ((), ("rudder_lag",), ("dead_time",), ("rudder_lag", "yaw_quadratic"))
     )
-    steps = [rung(plain), rung(lag, rudder_lag=lag, dead_time=dead), rung(last, waves=last)]
+    steps = [rung(plain), rung(lag, rudder_lag=lag, dead_time=dead), rung(last, yaw_quadratic=last)]
     sizes = final_sizes(steps, WORKERS)
-    assert set(sizes) == {"rudder_lag", "dead_time", "waves"}
+    assert set(sizes) == {"rudder_lag", "dead_time", "yaw_quadratic"}
     assert sizes["rudder_lag"].values[0] == last.values[0] != lag.values[0]
     widened = agreement_of(last).widened
     assert sizes["rudder_lag"].std[0] == pytest.approx(widened * last.std[6]) and sizes["rudder_lag"].widened == widened
-    np.testing.assert_array_equal(sizes["waves"].values, last.values[1:])
-    beside = fitted("dead_time", "waves")
+    np.testing.assert_array_equal(sizes["yaw_quadratic"].values, last.values[1:])
+    beside = fitted("dead_time", "yaw_quadratic")
     assert sizes["dead_time"].values[0] == pytest.approx(beside.values[0], abs=0.1 * beside.std[6])
     assert sizes["dead_time"].values[0] != dead.values[0]
 
