@@ -53,9 +53,8 @@ def without_noise(rudder: Series, noise_std: float) -> Series:
     if len(rudder) < _FEWEST or not noise_std > 0.0:
         return rudder
     span = np.diff(rudder.time_utc_ns) / SECOND_NS
-    still = (np.abs(np.diff(rudder.value)) <= _NOISES * np.sqrt(2.0) * noise_std) & (
-        span <= _LONGEST * float(np.median(span))
-    )
+    gap = span > _LONGEST * float(np.median(span))
+    still = (np.abs(np.diff(rudder.value)) <= _NOISES * np.sqrt(2.0) * noise_std) & ~gap
     # one number for every stretch of readings without a move between them; at its ends the gear may be moving already
     moves = np.concatenate([[True], ~still, [True]])
     inside = ~moves[1:] & ~moves[:-1]
@@ -64,14 +63,14 @@ def without_noise(rudder: Series, noise_std: float) -> Series:
     mean = _means(chosen, stretch[inside], int(stretch[-1]) + 1, noise_std)[stretch]
     stands = inside & np.isfinite(mean)
     angle = np.where(stands, mean, rudder.value)
-    for number in np.unique(stretch[inside & ~stands]):
-        creeping = np.flatnonzero(inside & (stretch == number))
-        angle[creeping] = signal(Series(rudder.time_utc_ns[creeping], rudder.value[creeping])).series.value
-    gap = np.concatenate([[False], span > _LONGEST * float(np.median(span))])
-    return Series(rudder.time_utc_ns, _between_stands(angle, stands, gap, _NOISES * noise_std))
+    creeping = np.flatnonzero(inside & ~stands)
+    for own in np.split(creeping, np.flatnonzero(np.diff(stretch[creeping])) + 1):
+        angle[own] = signal(Series(rudder.time_utc_ns[own], rudder.value[own])).series.value
+    behind_gap = np.concatenate([[False], gap])
+    return Series(rudder.time_utc_ns, _between_stands(angle, stands, behind_gap, _NOISES * noise_std))
 
 
-def _between_stands(angle: Float, stands: NDArray[np.bool_], gap: NDArray[np.bool_], noise: float) -> Float:
+def _between_stands(angle: Float, stands: NDArray[np.bool_], behind_gap: NDArray[np.bool_], noise: float) -> Float:
     """Return the angle without what noise alone leads beyond the two stands that a move goes between.
 
     A gear goes from stand to stand without turning back. Where a play is between it and the rudder, one reading beyond
@@ -87,7 +86,7 @@ def _between_stands(angle: Float, stands: NDArray[np.bool_], gap: NDArray[np.boo
     low[between], high[between] = ends.min(axis=0), ends.max(axis=0)
     # of a move that did go further, and over a gap, nothing is known
     further = between & ((angle < low - noise) | (angle > high + noise))
-    unknown = np.bincount(move, further | gap, place.size + 1) > 0
+    unknown = np.bincount(move, further | behind_gap, place.size + 1) > 0
     return np.where(between & ~unknown[move], np.clip(angle, low, high), angle)
 
 

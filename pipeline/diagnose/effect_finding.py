@@ -10,11 +10,10 @@ import numpy as np
 
 from kempf.pipeline.diagnose.confirm import Confirmation, unpredicted
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
-from kempf.pipeline.diagnose.final_sizes import refitted_size
 from kempf.pipeline.diagnose.immaterial import Immaterial
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.screen import Candidate
-from kempf.pipeline.diagnose.sizes import sized, stated
+from kempf.pipeline.diagnose.sizes import sized_by_refit, stated
 from kempf.schemas.effect import Effect
 from kempf.schemas.enumeration import listed
 
@@ -73,12 +72,11 @@ def _refitted(diagnosis: Diagnosis, effect: Effect) -> EffectFinding | None:
     for step in diagnosis.imitating:
         for member, confirmation in step.chosen_from:
             if member.effect.name == effect.name:
-                return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized(effect, refitted_size(effect, confirmation))}")
+                return EffectFinding("absent", f"{NOT_EXPLAINED}: {sized_by_refit(effect, confirmation)}")
     for one in diagnosis.immaterial:
         for member, confirmation in one.chosen_from:
             if member.effect.name == effect.name:
-                size = sized(effect, refitted_size(effect, confirmation))
-                return EffectFinding("immaterial", f"{size}; {changes(one)}")
+                return EffectFinding("immaterial", f"{sized_by_refit(effect, confirmation)}; {changes(one)}")
     return None
 
 

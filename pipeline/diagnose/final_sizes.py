@@ -8,15 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confirm import Confirmation
+from kempf.pipeline.diagnose.forward_selection import refitted
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.unsure_instants import WithInstants, with_instants
-from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -60,10 +60,11 @@ def final_sizes(steps: Sequence[Step], workers: Executor, listener: Listener = S
     """
     last = steps[-1].fit
     sizes: dict[str, Size] = {}
-    whole = with_instants(last, workers) if len(steps) > 1 else None
+    if len(steps) == 1:
+        return sizes
+    whole = with_instants(last, workers)
     for step in steps[1:]:
         (chosen, confirmation), *others = step.chosen_from
-        assert whole is not None
         sizes[chosen.effect.name] = _in(whole, chosen.effect)
         for candidate, one in others:
             if last is not confirmation.fit:
@@ -81,19 +82,13 @@ def _in_place(
 ) -> PooledFit:
     """Fit a model with another effect in the place of one of its own."""
     model = EffectModel(tuple(other if one.name == effect.name else one for one in fit.model.effects))
-    known = {one.name: fit.values[_place(fit, one)] for one in fit.model.effects if one.name != effect.name}
-    known[other.name] = confirmation.fit.values[_place(confirmation.fit, other)]
+    chosen = confirmation.fit
+    known = {one.name: fit.values[fit.model.own(one.name)] for one in fit.model.effects}
+    known[other.name] = chosen.values[chosen.model.own(other.name)]
     values = np.concatenate([known[one.name] for one in model.effects])
-    runs = [replace(run, model=model) for run in fit.runs]
-    return pooled_fit.fit(runs, confirmation.fit.hull, fit.levels, values, workers, listener=listener)
+    return refitted(fit.runs, model, chosen.hull, fit.levels, values, workers, listener=listener)
 
 
 def _in(known: WithInstants, effect: Effect) -> Size:
-    at = _place(known.fit, effect)
+    at = known.fit.model.own(effect.name)
     return Size(known.fit.values[at], known.std(known.fit.values.size)[at], agreement_of(known.fit).widened)
-
-
-def _place(fit: PooledFit, effect: Effect) -> slice:
-    """Return where the parameters of an effect stand in the values of a fit."""
-    own = [number for number, (of, _) in enumerate(fit.model.parameters) if of.name == effect.name]
-    return slice(own[0], own[-1] + 1)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from concurrent.futures import Executor
 from dataclasses import replace
 
@@ -10,6 +11,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.screen import Candidate
 from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.level_bounds import level_bounds
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -115,9 +117,26 @@ def _climbed(
     wanted: float = -np.inf,
     listener: Listener = SILENT,
 ) -> PooledFit:
-    filtered = tuple(replace(run, model=model) for run in base.runs[chosen])
     values = np.concatenate([base.values, begin])
-    return pooled_fit.fit(filtered, hull, base.levels[chosen], values, workers, iterations, wanted, listener)
+    return refitted(base.runs[chosen], model, hull, base.levels[chosen], values, workers, iterations, wanted, listener)
+
+
+def refitted(
+    filtered: Sequence[RunFilter],
+    model: EffectModel,
+    hull: Float,
+    levels: Float,
+    values: Float,
+    workers: Executor,
+    max_iterations: int = pooled_fit.MAX_ITERATIONS,
+    wanted: float = -np.inf,
+    listener: Listener = SILENT,
+) -> PooledFit:
+    """Fit another model to runs that have one; the parameters are those of `kempf.pipeline.estimate.pooled_fit.fit`."""
+    runs = [replace(run, model=model) for run in filtered]
+    return pooled_fit.fit(
+        runs, hull, levels, values, workers, max_iterations=max_iterations, wanted=wanted, listener=listener
+    )
 
 
 def _begin(candidate: Candidate) -> Float:

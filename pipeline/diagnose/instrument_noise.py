@@ -13,10 +13,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from kempf.pipeline.diagnose.forward_selection import added
+from kempf.pipeline.diagnose.forward_selection import added, refitted
 from kempf.pipeline.diagnose.joint_noise import with_joint_noise
 from kempf.pipeline.diagnose.screen import screen
-from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effects import catalogue
@@ -75,8 +74,7 @@ def _some_of(fit: PooledFit) -> PooledFit:
 def _of_all(fit: PooledFit, some: PooledFit, found: PooledFit, workers: Executor, listener: Listener) -> PooledFit:
     """Fit all runs with the lasting noise that some of them show."""
     levels = fit.levels + np.mean(found.levels - some.levels, axis=0)
-    runs = [replace(run, model=found.model) for run in fit.runs]
-    made = pooled_fit.fit(runs, found.hull, levels, found.values, workers, listener=listener)
+    made = refitted(fit.runs, found.model, found.hull, levels, found.values, workers, listener=listener)
     return made if made.log_likelihood > fit.log_likelihood + _LEAST_GAIN else fit
 
 

@@ -8,13 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from concurrent.futures import Executor
-from dataclasses import replace
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
-from kempf.pipeline.diagnose.forward_selection import calm_levels
-from kempf.pipeline.estimate import pooled_fit
+from kempf.pipeline.diagnose.forward_selection import calm_levels, refitted
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.effect_model import EffectModel
@@ -51,10 +48,12 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     values = np.concatenate([fit.values, *([p.steps[0] for p in noise.parameters] for noise in missing)])
     wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
     hull = mariner_like(fit.runs[0].run.ship.length_m).array()
-    made = _fitted(fit, model, hull, calm_levels(fit), values, workers, wanted, listener)
+    made = refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener)
     if made.log_likelihood > wanted and not made.converged:
         # it came from far, and its iterations may have run out next to the top
-        made = _fitted(made, model, made.hull, made.levels, made.values, workers, wanted, listener)
+        made = refitted(
+            *(made.runs, model, made.hull, made.levels, made.values, workers), wanted=wanted, listener=listener
+        )
     # a fit that did not converge itself may ask no more of another
     if not (made.log_likelihood > wanted and (made.converged or not fit.converged)):
         return fit
@@ -67,22 +66,8 @@ def _without_idle(
     """Leave out the noises that gain nothing beside the others."""
     for noise in noises:
         model = EffectModel(tuple(effect for effect in fit.model.effects if effect.name != noise.name))
-        kept = np.array([effect.name != noise.name for effect, _ in fit.model.parameters])
-        fewer = _fitted(fit, model, fit.hull, fit.levels, fit.values[kept], workers, listener=listener)
+        kept = ~fit.model.own(noise.name)
+        fewer = refitted(fit.runs, model, fit.hull, fit.levels, fit.values[kept], workers, listener=listener)
         if fit.log_likelihood <= fewer.log_likelihood + least_gain:
             fit = fewer
     return fit
-
-
-def _fitted(
-    fit: PooledFit,
-    model: EffectModel,
-    hull: Float,
-    levels: Float,
-    values: Float,
-    workers: Executor,
-    wanted: float = -np.inf,
-    listener: Listener = SILENT,
-) -> PooledFit:
-    runs = [replace(run, model=model) for run in fit.runs]
-    return pooled_fit.fit(runs, hull, levels, values, workers, wanted=wanted, listener=listener)

@@ -9,11 +9,10 @@ import numpy as np
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
 from kempf.pipeline.diagnose.effect_finding import NOT_EXPLAINED, changes
-from kempf.pipeline.diagnose.final_sizes import refitted_size
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.pipeline.diagnose.remainder import reference_gains
 from kempf.pipeline.diagnose.remaining_misfit import said as remaining_said
-from kempf.pipeline.diagnose.sizes import sized, stated
+from kempf.pipeline.diagnose.sizes import sized_by_refit, stated
 from kempf.pipeline.diagnose.verdict import share_explained, verdict
 from kempf.pipeline.predict.free_run import FreeRun
 from kempf.schemas.enumeration import listed
@@ -42,12 +41,11 @@ def sentences(diagnosis: Diagnosis) -> list[str]:
         said.append(_fall(diagnosis.steps[0], diagnosis.steps[-1]))
     for step in diagnosis.imitating:
         (candidate, best), *_ = step.chosen_from
-        size = sized(candidate.effect, refitted_size(candidate.effect, best))
+        size = sized_by_refit(candidate.effect, best)
         said.append(f"{size[:1].upper()}{size[1:]}: {NOT_EXPLAINED}.")
     for one in diagnosis.immaterial:
         (candidate, best), *_ = one.chosen_from
-        size = sized(candidate.effect, refitted_size(candidate.effect, best))
-        said.append(f"Certain but immaterial: {size}; {changes(one)}.")
+        said.append(f"Certain but immaterial: {sized_by_refit(candidate.effect, best)}; {changes(one)}.")
     if what == "insufficient_data":
         said.append(
             "One manoeuvre alone cannot distinguish an effect from chance: sail at least three zigzags, to both sides, "

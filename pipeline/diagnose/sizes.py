@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.confirm import Confirmation
 from kempf.pipeline.diagnose.diagnosis import Diagnosis
-from kempf.pipeline.diagnose.final_sizes import Size
+from kempf.pipeline.diagnose.final_sizes import Size, refitted_size
 from kempf.pipeline.diagnose.ladder_step import Step
 from kempf.schemas.effect import Effect
 
@@ -22,7 +23,7 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
         return sized(effect, diagnosis.sizes[effect.name])
     if step.added is None or effect.name != step.added.name:
         return effect.title
-    own = [i for i, (of, _) in enumerate(ahead.model.parameters) if of.name == effect.name]
+    own = ahead.model.own(effect.name)
     std = np.sqrt(np.maximum(np.diag(ahead.fit.covariance), 0.0))[-ahead.fit.values.size :]
     return f"{_with_size(effect, ahead.fit.values[own], std[own])}, fitted to legs"
 
@@ -30,6 +31,11 @@ def stated(diagnosis: Diagnosis, step: Step, effect: Effect) -> str:
 def sized(effect: Effect, size: Size) -> str:
     """Return an effect's size with its standard errors, in the units people use."""
     return _with_size(effect, size.values, size.std)
+
+
+def sized_by_refit(effect: Effect, confirmation: Confirmation) -> str:
+    """Return the size of an effect in the refit that it was chosen or refused by."""
+    return sized(effect, refitted_size(effect, confirmation))
 
 
 def _with_size(effect: Effect, values: Float, std: Float) -> str:

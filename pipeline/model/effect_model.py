@@ -68,6 +68,10 @@ class EffectModel:
         """Every parameter with its effect, in the order of the parameter vector."""
         return tuple((effect, parameter) for effect in self.effects for parameter in effect.parameters)
 
+    def own(self, name: str) -> NDArray[np.bool_]:
+        """Return which parameters of the vector are those of an effect, shape (p,); none where the model lacks it."""
+        return np.array([effect.name == name for effect, _ in self.parameters], dtype=np.bool_)
+
     @property
     def names(self) -> tuple[str, ...]:
         """``effect.parameter`` of every parameter."""

@@ -41,7 +41,7 @@ class ShipEffects:
 
     def of(self, name: str) -> Float:
         """Return the parameters of one of them, shape (q,)."""
-        return self.values[[effect.name == name for effect, _ in self.model.parameters]]
+        return self.values[self.model.own(name)]
 
 
 @dataclass(frozen=True, eq=False)

@@ -328,8 +328,7 @@ def _before(rudder: Series | None, start_ns: int, fine: Float) -> Float:
         return np.zeros(0)
     back = np.round(fine[:0:-1] * SECOND_NS).astype(np.int64)
     earlier = rudder.between(start_ns - int(back[0]), start_ns + round(gap_limit_s(rudder) * SECOND_NS))
-    quiet = without_noise(earlier, float(np.nan_to_num(noise_std(earlier))))
-    course = quiet.at(start_ns - back, gap_limit_s(rudder))
+    course = without_noise(earlier, noise_std(earlier)).at(start_ns - back, gap_limit_s(rudder))
     unknown = np.flatnonzero(np.isnan(course))
     known: Float = course[unknown[-1] + 1 :] if unknown.size else course
     return known

@@ -12,6 +12,7 @@ from scipy.signal import cont2discrete, lfilter
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.record.record import MEASUREMENTS, Record
+from kempf.pipeline.estimate.record.water_speed import heading_rate
 
 #: natural periods of roll that are tried, s: a boat's to a large ship's, so close that a damped one is not missed
 _PERIODS_S = np.geomspace(0.5, 40.0, 25)
@@ -75,20 +76,19 @@ def _responses(roll: Series, record: Record) -> list[Float]:
 
 def _yaw_rate(record: Record, time_s: Float) -> Float:
     """Return the yaw rate without its noise, rad/s: as it was measured, or of the heading."""
-    still, slope = _without_noise(record, "yaw_rate"), 0
-    if still is None:
-        still, slope = _without_noise(record, "heading"), 1
-    if still is None or len(still) <= slope:
+    yaw_rate, heading = (_measured(record, of) for of in ("yaw_rate", "heading"))
+    if len(yaw_rate):
+        rate = signal(yaw_rate).series
+    elif len(heading) > 1:
+        rate = heading_rate(heading)
+    else:
         return np.zeros(time_s.size)
-    own = still.seconds_since(record.start_utc_ns)
-    result: Float = np.interp(time_s, own, np.gradient(still.value, own) if slope else still.value)
+    result: Float = np.interp(time_s, rate.seconds_since(record.start_utc_ns), rate.value)
     return result
 
 
-def _without_noise(record: Record, measurement: str) -> Series | None:
-    column = record.measured[:, MEASUREMENTS.index(measurement)]
+def _measured(record: Record, of: str) -> Series:
+    column = record.measured[:, MEASUREMENTS.index(of)]
     known = np.isfinite(column)
-    if not known.any():
-        return None
     time_ns = record.start_utc_ns + np.round(record.time_s[known] * SECOND_NS).astype(np.int64)
-    return signal(Series(time_ns, column[known])).series
+    return Series(time_ns, column[known])

@@ -50,8 +50,13 @@ def _yaw_rate(heading: Series, log: Series) -> Float:
     """Return the heading's rate at the log's instants, rad/s, its noise smoothed away."""
     if len(heading) < 2:
         return np.zeros(len(log))
+    rate, origin = heading_rate(heading), int(heading.time_utc_ns[0])
+    result: Float = np.interp(log.seconds_since(origin), rate.seconds_since(origin), rate.value)
+    return result
+
+
+def heading_rate(heading: Series) -> Series:
+    """Return the heading's rate at its own instants, rad/s, its noise smoothed away; of two readings or more."""
     still = signal(heading).series
-    origin = int(still.time_utc_ns[0])
-    own = still.seconds_since(origin)
-    rate: Float = np.interp(log.seconds_since(origin), own, np.gradient(still.value, own))
-    return rate
+    own = still.seconds_since(int(still.time_utc_ns[0]))
+    return Series(still.time_utc_ns, np.gradient(still.value, own))
