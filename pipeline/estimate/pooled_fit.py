@@ -287,7 +287,8 @@ class CommonLikelihood:
         # effects are counted in steps of a size that the search may take at once
         self.unit = np.array([_REACH * abs(p.steps[0]) for _, p in self.model.parameters])
         least, most = level_bounds(filtered[0].spec)
-        self.low = np.concatenate([np.full(N_HULL, -np.inf), self.model.low / self.unit, np.tile(least, runs)])
+        low = self.model.low_on(filtered[0].run.step_s) / self.unit
+        self.low = np.concatenate([np.full(N_HULL, -np.inf), low, np.tile(least, runs)])
         self.high = np.concatenate([np.full(N_HULL, np.inf), self.model.high / self.unit, np.tile(most, runs)])
         self.scale = np.concatenate([np.ones(N_HULL), self.unit])
         used: Mask = np.concatenate([np.ones(self.shared, dtype=np.bool_), *(f.levels_used() for f in filtered)])

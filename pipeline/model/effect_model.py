@@ -82,6 +82,21 @@ class EffectModel:
         """Lower bounds of the parameters, shape (p,)."""
         return np.array([p.low for _, p in self.parameters])
 
+    def low_on(self, step_s: float) -> Float:
+        """Return lower bounds where time goes by steps, shape (p,).
+
+        Noise that lasts no longer than a step is fresh at every reading, and its equation is stiff: a filter that
+        takes it in steps several times as long runs away.
+
+        Parameters
+        ----------
+        step_s : float
+            Of the grid, s.
+        """
+        shortest = [step_s if lasting(effect) and p.unit == "s" else -np.inf for effect, p in self.parameters]
+        low: Float = np.maximum(self.low, np.array(shortest))
+        return low
+
     @property
     def high(self) -> Float:
         """Upper bounds, shape (p,)."""

@@ -31,3 +31,22 @@ def test_a_parameter_that_begins_at_nothing_may_leave_it() -> None:
     # warnings are errors here: there is no reach to divide by
     assert found.converged
     np.testing.assert_allclose(found.theta, TOP, atol=1e-3)
+
+
+class Cliff(Hill):
+    """The same parabola, but that there is no likelihood where the first two parameters together exceed -2."""
+
+    def __init__(self) -> None:
+        self.asked = 0
+
+    def full(self, theta: Float) -> tuple[float, Float, Float]:
+        self.asked += 1
+        value, score, information = super().full(theta)
+        return value if theta[0] + theta[1] < -2.0 else -np.inf, score, information
+
+
+def test_a_climb_that_comes_to_where_the_likelihood_ends_says_so_soon() -> None:
+    cliff = Cliff()
+    found = climb(cliff, np.array([-3.0, -1.0, -1.0, -1.0, 1.0, 1.0]), 200, 1e-8)
+    assert not found.converged and found.reason == "it still rises where the likelihood ends"
+    assert -2.01 < found.theta[0] + found.theta[1] < -2.0 and cliff.asked < 100

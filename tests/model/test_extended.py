@@ -19,6 +19,7 @@ from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.terms.own import from_expression
 from kempf.schemas.effect import Effect, ExtraState, Parameter
 from kempf.schemas.errors import UsageError
+from kempf.schemas.instrument_noise import NAMES, lasting_noise
 from kempf.schemas.model_spec import ModelSpec
 
 HULL = np.array([-4.4e-3, -0.29, -1.7e-4, -2.66e-2, -2.4e-3, 1.19e-4])
@@ -117,6 +118,16 @@ def test_a_step_of_the_covariance_is_as_good_as_two_halves():
     row = np.column_stack([-np.sin(heading), np.cos(heading)])
     halves = replace(halves, inputs=inputs, current_row=np.vstack([row, row[-1:]]))
     assert passed(halves) == pytest.approx(passed(whole), abs=5e-3)
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("step", [0.05, 1.0])
+def test_noise_of_next_to_nothing_changes_next_to_nothing_however_short_it_lasts(name: str, step: float) -> None:
+    run, model = run_of(step), EffectModel((lasting_noise()[name],))
+    _, shortest = model.low_on(step)
+    filtered = RunFilter(run, model, SPEC)
+    none, little = (filtered.run_filter(HULL, LEVELS, np.array([c, shortest])).log_likelihood for c in (0.0, 1e-9))
+    assert little == pytest.approx(none, abs=1e-4)
 
 
 def _doubled(column: np.ndarray) -> np.ndarray:

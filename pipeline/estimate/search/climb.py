@@ -29,6 +29,9 @@ _SINKING, _LITTLE = 0.2, 0.05
 #: a climb that is to reach a height is given up where so many times its promise would not take it there: promises are
 #: kept within a factor of two or so, but for those of the first steps
 _HOPE, _FIRST = 4.0, 3
+#: so many steps in a row that leave the likelihood where it ends and come to less than this share of their promise say
+#: that it is highest there: beyond it ships answer faster than any vessel does
+_AT_THE_END, _VAIN = 4, 0.02
 _HULL = 6
 
 
@@ -160,6 +163,7 @@ def climb_by(
     converged, reason = False, "the iterations allowed ran out"
     passes = [Pass(theta, value, np.nan, damping)]
     report(passes[0])
+    vain = 0
     for _ in range(max_iterations):
         movable = free(objective, theta, score)
         # the log-likelihood that the quadratic model still promises
@@ -170,12 +174,16 @@ def climb_by(
         if len(passes) > _FIRST and value + _HOPE * gain < wanted:
             reason = "what is wanted is out of reach"
             break
-        found, far = None, gain > _NEAR
+        if vain == _AT_THE_END:
+            reason = "it still rises where the likelihood ends"
+            break
+        found, far, ends = None, gain > _NEAR, False
         low, high = objective.room(theta, far=far)
         while damping < 1e9:
             step = steps.within(score, curvature, movable, damping, (low, high))
             step = np.clip(_shortened(step, theta, scale), low, high)
-            found, there = _risen(objective, theta, value, step)
+            found, there, beyond = _risen(objective, theta, value, step)
+            ends = ends or beyond
             if found is not None:
                 break
             damping = max(10.0 * damping, _DAMPED)
@@ -183,6 +191,7 @@ def climb_by(
             converged, reason = gain < 1e-3, "no step raises the log-likelihood any more"
             break
         damping = damping / 10.0 if damping > 1e-9 else 0.0
+        vain = vain + 1 if ends and there[0] - value < _VAIN * gain else 0
         if gain < _LITTLE:
             found, there = _sunk(objective, theta, found, there)
         if far and there[0] - value > _KEPT * gain:
@@ -198,15 +207,20 @@ def climb_by(
 
 def _risen(
     objective: Objective[C], theta: Float, value: float, step: Float
-) -> tuple[Float | None, tuple[float, Float, C]]:
-    """Return where along a step the log-likelihood has risen, None if nowhere tried, and what it is there."""
+) -> tuple[Float | None, tuple[float, Float, C], bool]:
+    """Return where along a step the log-likelihood has risen, None if nowhere tried, and what it is there.
+
+    Then whether the step leads to where there is no likelihood.
+    """
+    ends = False
     for shortened in range(_TRIES + 1):
         candidate = np.clip(theta + _SHORTER**shortened * step, objective.low, objective.high)
         # with derivatives at once: nearly every step rises, and then they are wanted
         there = objective.full(candidate)
         if there[0] > value:
-            return candidate, there
-    return None, there
+            return candidate, there, ends
+        ends = ends or not np.isfinite(there[0])
+    return None, there, ends
 
 
 def _sunk(
