@@ -16,11 +16,14 @@ import numpy as np
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.schemas.instrument_noise import lasting
 
 _ROOT_2 = float(np.sqrt(2.0))
 N_HULL, N_LEVELS = 6, 6
 #: steps of the differences: of hull parameters and effects in parts of a typical value, of a noise level's logarithm
 _HULL_STEP, _EFFECT_STEP, _LEVEL_STEP = 1e-4, 1e-2, 1e-3
+#: of that of an effect, the least step of lasting noise
+_LEAST_STEP = 1e-2
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,8 +85,11 @@ def _steps(filtered: RunFilter, point: Point) -> Float:
     """Return the step of every number of `Point.vector`; away from a bound where one is near."""
     hull = _HULL_STEP * _typical(filtered, point)
     effects = []
-    for (_, parameter), value in zip(filtered.model.parameters, point.values, strict=True):
+    for (effect, parameter), value in zip(filtered.model.parameters, point.values, strict=True):
         step = _EFFECT_STEP * abs(parameter.steps[0])
+        if lasting(effect):
+            # an instrument's noise may be a small part of the usual, and what is measured goes with its square
+            step = min(step, max(_EFFECT_STEP * abs(value), _LEAST_STEP * step))
         effects.append(-step if value + step > parameter.high else step)
     return np.concatenate([hull, np.array(effects), np.full(N_LEVELS, _LEVEL_STEP)])
 

@@ -26,6 +26,8 @@ _PLACE = {
     "yaw_rate": dynamics.ON_YAW_RATE,
     "heading": dynamics.ON_HEADING,
 }
+#: part of a step of the grid that lasting noise lasts at least
+_SHORTEST = 0.5
 _INDEX = {name: i for i, name in enumerate(SYMBOLS)}
 
 Table = tuple[NDArray[np.int64], NDArray[np.int64], Float]
@@ -85,15 +87,17 @@ class EffectModel:
     def low_on(self, step_s: float) -> Float:
         """Return lower bounds where time goes by steps, shape (p,).
 
-        Noise that lasts no longer than a step is fresh at every reading, and its equation is stiff: a filter that
-        takes it in steps several times as long runs away.
+        Noise that lasts less than half a step is as good as fresh at every reading, and its equation is stiff: by the
+        series for the exponential it grows instead of dying out where a step is six times as long.
 
         Parameters
         ----------
         step_s : float
             Of the grid, s.
         """
-        shortest = [step_s if lasting(effect) and p.unit == "s" else -np.inf for effect, p in self.parameters]
+        shortest = [
+            _SHORTEST * step_s if lasting(effect) and p.unit == "s" else -np.inf for effect, p in self.parameters
+        ]
         low: Float = np.maximum(self.low, np.array(shortest))
         return low
 
