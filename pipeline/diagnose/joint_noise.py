@@ -11,7 +11,6 @@ from concurrent.futures import Executor
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.forward_selection import calm_levels, refitted
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
@@ -20,9 +19,6 @@ from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect
 from kempf.schemas.instrument_noise import lasting_noise
 
-#: column of the noise levels by measurement
-_LEVEL = {"lateral_speed": 3, "yaw_rate": 4, "heading": 5}
-_MEASURED = slice(3, 6)
 #: log-likelihood that a search which goes on may still find at its top
 _LEFT = 1.0
 
@@ -52,11 +48,10 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     present = {effect.name for effect in fit.model.effects}
     missing = [noise for name, noise in lasting_noise().items() if name not in present]
     model = EffectModel((*fit.model.effects, *missing))
-    levels = _fresh(fit)
-    values = np.concatenate([fit.values, *(_begun(noise, levels) for noise in missing)])
+    values = np.concatenate([fit.values, *([p.steps[0] for p in noise.parameters] for noise in missing)])
     wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
     hull = mariner_like(fit.runs[0].run.ship.length_m).array()
-    made = refitted(fit.runs, model, hull, levels, values, workers, wanted=wanted, listener=listener)
+    made = refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener)
     settled = made.converged
     if made.log_likelihood > wanted and not made.converged:
         # it came from far, and its iterations may have run out next to the top
@@ -69,31 +64,6 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     if not (made.log_likelihood > wanted and (settled or not fit.converged)):
         return fit
     return _without_idle(made, missing, least_gain, workers, listener)
-
-
-def _fresh(fit: PooledFit) -> Float:
-    """Return levels to begin with, shape (runs, 6): quiet weather, and fresh noise no smaller than the records show.
-
-    Where the hull follows an instrument's lasting noise, the fresh noise that is left of it is next to nothing.
-    """
-    levels, shown = calm_levels(fit), np.array([one.run.noise_start for one in fit.runs])
-    known = shown > 0.0
-    measured = levels[:, _MEASURED]
-    measured[known] = np.maximum(measured[known], np.log(shown[known]))
-    levels[:, _MEASURED] = measured
-    return levels
-
-
-def _begun(noise: Effect, levels: Float) -> list[float]:
-    """Return values to begin a noise with: as large as the fresh noise of its measurement, as long as the shortest.
-
-    Instruments of a towing tank and of a ship are two orders of magnitude apart: from the wrong side a search of three
-    noises at once may end anywhere.
-    """
-    (measurement,) = noise.terms
-    size, lasts = noise.parameters
-    level = float(np.exp(np.mean(levels[:, _LEVEL[measurement]])))
-    return [float(np.clip(level, 0.0, size.high)), lasts.steps[0]]
 
 
 def _without_idle(

@@ -27,7 +27,7 @@ _PLACE = {
     "heading": dynamics.ON_HEADING,
 }
 #: part of a step of the grid that lasting noise lasts at least
-_SHORTEST = 0.5
+_SHORTEST = 0.25
 _INDEX = {name: i for i, name in enumerate(SYMBOLS)}
 
 Table = tuple[NDArray[np.int64], NDArray[np.int64], Float]
@@ -87,8 +87,8 @@ class EffectModel:
     def low_on(self, step_s: float) -> Float:
         """Return lower bounds where time goes by steps, shape (p,).
 
-        Noise that lasts less than half a step is as good as fresh at every reading, and its equation is stiff: by the
-        series for the exponential it grows instead of dying out where a step is six times as long.
+        The equation of noise that lasts a small part of a step is stiff: by the series for the exponential it grows
+        instead of dying out where a step is six times as long.
 
         Parameters
         ----------
