@@ -32,6 +32,7 @@ ROOMS = {
     "shooting": {"compiled", "channels", "model", "estimate"},
     "diagnose": {"channels", "model", "estimate", "predict", "compare", "shooting"},
     "manoeuvre": {"compiled", "channels", "segment", "model", "estimate"},
+    "next_trial": {"channels", "model", "estimate", "manoeuvre"},
     "steering": {"channels", "model", "estimate", "predict"},
     "history": {"channels"},
     "simulate": set(),

@@ -13,7 +13,7 @@ import numpy as np
 
 from kempf.pipeline.manoeuvre import motion
 from kempf.pipeline.manoeuvre.sailed import Sailed, reach_of, thinned
-from kempf.pipeline.manoeuvre.ship import Ship
+from kempf.pipeline.manoeuvre.ship import Ship, Track
 
 #: a leg that takes longer, in ship lengths on the approach, does not end
 LONGEST_LEG = 150.0
@@ -33,14 +33,20 @@ class Zigzag:
     switched_rad: tuple[float, ...] = ()
     name: str = "zigzag"
 
-    def sailed(self, ship: Ship) -> Sailed | None:
-        """Sail it; the curve has columns time, s, heading and rudder, rad."""
+    def track(self, ship: Ship) -> Track:
+        """Return the track, of as many legs as there are overshoots and one more."""
         longest, legs = LONGEST_LEG * ship.waters.own_time_s, self.overshoots + 1
         targets = [*self.switched_rad, *[self.heading_rad] * legs][:legs]
-        sides = [self.side * (-1) ** k for k in range(legs)]
-        track = ship.sail(
-            np.array([[s * self.rudder_rad, s, s * t, longest] for s, t in zip(sides, targets, strict=True)])
-        )
+        phases = zip(self._sides(), targets, strict=True)
+        return ship.sail(np.array([[s * self.rudder_rad, s, s * t, longest] for s, t in phases]))
+
+    def _sides(self) -> list[int]:
+        """Return to which side the rudder lies in each leg."""
+        return [self.side * (-1) ** k for k in range(self.overshoots + 1)]
+
+    def sailed(self, ship: Ship) -> Sailed | None:
+        """Sail it; the curve has columns time, s, heading and rudder, rad."""
+        track, sides, legs = self.track(ship), self._sides(), self.overshoots + 1
         if track.how == motion.RAN_AWAY or track.ends[0] < 0:
             return None
         heading, first = track.column(motion.HEADING), int(track.ends[0])

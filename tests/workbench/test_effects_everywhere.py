@@ -171,6 +171,23 @@ def predicted(late: Late, tau: dict[str, Any]) -> None:
     assert lag["figures"]["overshoots_deg"][0]["value"] > plain["figures"]["overshoots_deg"][0]["value"]
 
 
+def proposed(late: Late, tau: dict[str, Any]) -> None:
+    found = late.json("next-trial", "--vessel", VESSEL, "--set", late.lag, "--parameter", NAME)
+    assert [one["effects"] for one in found["models"]] == [["rudder_lag"]] and found["aim"] == "narrow"
+    shares = [one["narrowed"][NAME] for one in found["trials"]]
+    assert shares == sorted(shares) and 0.0 < shares[0] < shares[-1] < 1.0
+    best = found["trials"][0]
+    angles = "{heading_deg:g}/{rudder_deg:g}".format(**best["manoeuvre"])
+    assert found["order"][0].startswith(f"Zigzag {angles}.") and found["sentences"][0].startswith(
+        f"One zigzag {angles} more"
+    )
+    assert len(found["expected"]["overshoots_deg"]) == 4 and best["duration_s"] > 60.0
+    words = late.text("next-trial", "--vessel", VESSEL, "--set", late.lag, "--parameter", NAME)
+    assert all(" ".join(words.split()).find(line) >= 0 for line in found["order"])
+    refused = late.run("next-trial", "--vessel", VESSEL, "--set", late.plain, "--parameter", NAME, "--json")
+    assert refused.code == 2 and refused.json["error"]["code"] == "parameter_unknown"
+
+
 def built_again(late: Late, tau: dict[str, Any]) -> None:
     assert late.json("rerun", late.lag)["verdict"] == "bit-identical"
 
@@ -201,6 +218,7 @@ CHECKS: dict[tuple[str, ...], Callable[[Late, dict[str, Any]], None]] = {
     ("explain",): explained,
     ("what-if",): moved,
     ("predict",): predicted,
+    ("next-trial",): proposed,
     ("rerun",): built_again,
 }
 #: these begin from a set's model and screen what it lacks: tests/flows/test_diagnose.py goes through them

@@ -11,7 +11,8 @@ from kempf.workbench.cli.entry import cli
 #: What reads a warehouse, or none, and stores nothing.
 READERS = {
     *("doctor", "segments", "segments corrections", "params list", "params show", "params diff", "params export"),
-    *("params steering", "history", "predict", "steer", "compare", "explain", "what-if", "ladder"),
+    *("params steering", "history", "predict", "steer", "compare", "explain", "what-if", "next-trial"),
+    "ladder",
     *("effects list", "effects show", "effects try", "verify", "vessels list", "vessels show", "profile draft"),
     *("export control", "export yaml", "export csv", "export mat", "export mcap", "export tables"),
     *("logs list", "logs show", "logs rejected", "logs quarantine", "config", "completion"),

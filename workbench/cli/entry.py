@@ -44,6 +44,7 @@ COMMANDS = {
     "compare": "Put what was measured beside what a parameter set predicts; say where it fails.",
     "explain": "Rank the effects by what they would explain of one stretch of a manoeuvre.",
     "what-if": "Move one parameter of a set: what a free run does, and what it costs in likelihood.",
+    "next-trial": "Say which zigzag to sail next, to part models that fit alike or to narrow intervals.",
     "effects": "List and show the physical effects that a model can be given.",
     "diagnose": "Find which physical effect a vessel's model lacks.",
     "ladder": "Show how the error fell from model to model.",

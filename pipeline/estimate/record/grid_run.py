@@ -298,7 +298,7 @@ def make_run(
         measured=measured,
         offset_s=offset,
         noise_start=record.noise_start,
-        current_row=_current_row(spec, coarse),
+        current_row=current_row(spec, coarse),
         heading_rad=coarse,
         approach_m_s=approach_speed(fine, inputs[:, 0]),
         approach_per_s=float(np.median(inputs[first, _SHAFT])) or 1.0,
@@ -334,7 +334,14 @@ def _before(rudder: Series | None, start_ns: int, fine: Float) -> Float:
     return known
 
 
-def _current_row(spec: ModelSpec, heading: Float) -> Float:
+def current_row(spec: ModelSpec, heading: Float) -> Float:
+    """Return what a unit of the current's two parts is of the lateral speed, shape (n, 2).
+
+    Parameters
+    ----------
+    heading : ndarray, shape (n,)
+        True, rad.
+    """
     if spec.current == "earth":
         return np.column_stack([-np.sin(heading), np.cos(heading)])
     return np.tile([1.0 if spec.current == "lateral" else 0.0, 0.0], (heading.size, 1))

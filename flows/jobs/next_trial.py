@@ -1,0 +1,330 @@
+"""The job that says which zigzag to sail next: what would part models that fit alike, or narrow the parameters most.
+
+Nothing is fitted or stored but models that fit as well as the set's and were not stored before.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import degrees, radians
+from typing import Any
+
+import numpy as np
+
+from kempf.flows.jobs.bound_runs import BoundRuns, bound
+from kempf.flows.jobs.predict_request import PredictRequest
+from kempf.flows.jobs.predict_vessel import ModelsOfSet, models_of_set, predict_with
+from kempf.flows.jobs.predicted import Predicted
+from kempf.flows.process.progress import Progress, silent
+from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose.confusion_sets import WINDOW
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.sensitivity import Point
+from kempf.pipeline.manoeuvre import motion
+from kempf.pipeline.manoeuvre.draws import Identified
+from kempf.pipeline.manoeuvre.ship import Track
+from kempf.pipeline.manoeuvre.zigzag import Zigzag
+from kempf.pipeline.next_trial.planned_run import as_predicted, planned
+from kempf.pipeline.next_trial.worth import Known, apart, information, narrowed, probability, times_to_halve
+from kempf.schemas.errors import DataRejected, UsageError
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+
+#: heading and rudder of the zigzags that are looked at, deg: those of the standards, then what else gears do
+ANGLES_DEG = (
+    (5.0, 5.0),
+    (10.0, 10.0),
+    (20.0, 20.0),
+    (10.0, 20.0),
+    (20.0, 10.0),
+    (15.0, 25.0),
+    (30.0, 30.0),
+    (35.0, 35.0),
+)
+#: a trial is proposed where its models are parted with this probability, or so many runs of it at most are needed
+_SURE = 0.9
+#: degrees of rudder beyond those that were sailed of which nothing is said
+_FURTHER_DEG = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Trial:
+    """A zigzag that could be sailed, and what it is worth."""
+
+    angles_deg: tuple[float, float]
+    #: From the first order until the last leg has ended, s.
+    duration_s: float
+    #: Along the approach and across it, m.
+    sea_room_m: tuple[float, float]
+    #: Standard error after it by that before, by parameter of the ship.
+    narrowed: dict[str, float]
+    #: How often it must be sailed to halve the parameter's standard error that is asked for; None: more than 64 times.
+    times_to_halve: int | None
+    #: Whether its rudder goes beyond what was sailed.
+    beyond: bool
+    #: Of every two models, true one first: the probability that the trial parts them.
+    parts: dict[tuple[str, str], float]
+
+    @property
+    def probability(self) -> float | None:
+        """That whichever model is true is parted from every other; None where there is but one."""
+        return min(self.parts.values(), default=None)
+
+    @property
+    def mean_narrowed(self) -> float:
+        """Geometric mean over the parameters."""
+        return float(np.exp(np.mean(np.log(list(self.narrowed.values())))))
+
+
+@dataclass(frozen=True, eq=False)
+class NextTrial:
+    """Which zigzag to sail next."""
+
+    vessel: str
+    parameter_set: ParameterSet
+    #: Effects by parameter set, that of the set first.
+    models: dict[str, tuple[str, ...]]
+    speed_m_s: float
+    #: Whose interval is to be halved; None where all count.
+    parameter: str | None
+    #: The best first.
+    trials: tuple[Trial, ...]
+    #: Of the best by the set's model and those that fit as well.
+    predicted: Predicted
+    #: What was taken for granted, sentences.
+    remarks: tuple[str, ...]
+
+    def show(self) -> dict[str, Any]:
+        """Return it as the command line's JSON object."""
+        return {
+            "vessel": self.vessel,
+            "parameter_set_id": self.parameter_set.parameter_set_id,
+            "aim": "part" if len(self.models) > 1 else "narrow",
+            "parameter": self.parameter,
+            "models": [{"parameter_set_id": name, "effects": list(own)} for name, own in self.models.items()],
+            "speed_m_s": self.speed_m_s,
+            "trials": [_show(one) for one in self.trials],
+            "order": self.order(),
+            "expected": self.predicted.show()["figures"],
+            "sentences": self.sentences(),
+        }
+
+    def order(self) -> list[str]:
+        """Return the best trial as a sailing order, one sentence a step."""
+        best = self.trials[0]
+        heading, rudder = best.angles_deg
+        along, across = best.sea_room_m
+        overshoots = [
+            f"{f.value:.1f} ({f.low:.1f} to {f.high:.1f})"
+            for name, f in self.predicted.prediction.figures.items()
+            if name.startswith("overshoots_deg.") and f.value is not None
+        ]
+        return [
+            f"Zigzag {heading:g}/{rudder:g}. Sea room of {_round(along)} m along the approach and {_round(across)} m "
+            "across it, current and wind not counted; deep water.",
+            f"Steady on a straight course at {self.speed_m_s:.3g} m/s through the water for a minute or more; the "
+            "engine is left as it is from then on.",
+            f"Rudder {rudder:g} deg to starboard. When the heading has changed by {heading:g} deg: rudder {rudder:g} "
+            "deg to port; when it is as far on the other side: to starboard again; five executes in all.",
+            f"It takes about {_minutes(best.duration_s)}. Overshoots to be expected, with 95 % intervals: "
+            f"{', '.join(overshoots)} deg."
+            if overshoots
+            else f"It takes about {_minutes(best.duration_s)}.",
+            "Log heading, yaw rate, rudder angle, speed through the water and GNSS velocity as in the trials before, "
+            "from a minute before the first order on.",
+        ]
+
+    def sentences(self) -> list[str]:
+        """Return what was found, the answer first."""
+        best = self.trials[0]
+        name = "{:g}/{:g}".format(*best.angles_deg)
+        said = []
+        if len(self.models) > 1:
+            count, sure = len(self.models), best.probability or 0.0
+            if sure >= _SURE:
+                said.append(
+                    f"One zigzag {name} more parts the {count} models that fit alike with a probability of "
+                    f"{100 * sure:.0f} %, whichever is true."
+                )
+            else:
+                said.append(
+                    f"None of the {len(self.trials)} zigzags parts the {count} models that fit alike with a "
+                    f"probability of {100 * _SURE:.0f} %; the best, {name}, with {100 * sure:.0f} %. Sail it more "
+                    "than once, or a turning circle, by which models are compared (`kempf predict --compare`)."
+                )
+        elif self.parameter is not None:
+            share = best.narrowed[self.parameter]
+            times = best.times_to_halve
+            said.append(
+                f"One zigzag {name} more brings the standard error of {self.parameter} to {100 * share:.0f} % of what "
+                f"it is; {'more than 64' if times is None else times} of them would halve it."
+            )
+        else:
+            said.append(
+                f"One zigzag {name} more brings the standard errors of the {len(best.narrowed)} parameters to "
+                f"{100 * best.mean_narrowed:.0f} % of what they are, their geometric mean; all trials are below."
+            )
+        if best.beyond:
+            said.append("Its rudder goes beyond what was sailed: what is expected of it is extrapolated.")
+        return [*said, *self.remarks]
+
+
+def next_trial(
+    warehouse: Warehouse,
+    vessel: str,
+    set_id: str | None = None,
+    parameter: str | None = None,
+    progress: Progress = silent,
+) -> NextTrial:
+    """Find the zigzag to sail next.
+
+    Parameters
+    ----------
+    set_id : str, optional
+        Parameter set, by id or alias; by default the current one.
+    parameter : str, optional
+        Whose interval is to be halved; by default models that fit alike are to be parted, or where there are none, all
+        parameters to be narrowed.
+
+    Raises
+    ------
+    UsageError
+        ``parameter_unknown``; what `kempf.flows.jobs.predict_vessel.predict_vessel` raises.
+    NotFound
+        ``no_parameter_set``, ``no_runs``.
+    DataRejected
+        ``predicts_no_ship``: by the set's model she can sail none of the zigzags; ``set_without_covariance``.
+    """
+    request = PredictRequest("zigzag", set_id)
+    hers = models_of_set(warehouse, vessel, request, progress)
+    bounds = [bound(warehouse, vessel, model.name, progress) for model in hers.models]
+    known = [_known(one) for one in bounds]
+    of_ship = [name for name in np.array(bounds[0].names)[list(known[0].index)] if "_noise." not in name]
+    if parameter is not None and parameter not in of_ship:
+        raise UsageError(
+            "parameter_unknown",
+            f"{parameter!r} is no parameter of {hers.parameter_set.parameter_set_id} with a standard error.",
+            f"Name one of {', '.join(of_ship)}.",
+            {"expected": of_ship},
+        )
+    trials = []
+    for done, angles in enumerate(ANGLES_DEG):
+        progress(done, len(ANGLES_DEG), "sailing zigzag {:g}/{:g}".format(*angles))
+        made = _trial(angles, hers, bounds, known, parameter, of_ship)
+        if made is not None:
+            trials.append(made)
+    if not trials:
+        raise DataRejected(
+            "predicts_no_ship",
+            f"By {hers.parameter_set.parameter_set_id} she runs away in every one of the {len(ANGLES_DEG)} zigzags.",
+            "Choose another set with --set; `kempf params list` names them.",
+        )
+    trials.sort(key=lambda one: _rank(one, parameter))
+    predicted = predict_with(hers, replace(request, angles_deg=trials[0].angles_deg), progress)
+    models = {model.name: tuple(effect.name for effect in model.waters.model.effects) for model in hers.models}
+    remarks = ("A turning circle or a pull-out is not among them: models are held against these, never fitted.",)
+    return NextTrial(vessel, hers.parameter_set, models, hers.speed_m_s, parameter, tuple(trials), predicted, remarks)
+
+
+def _rank(one: Trial, parameter: str | None) -> float:
+    if parameter is not None:
+        return one.narrowed[parameter]
+    return -one.probability if one.probability is not None else one.mean_narrowed
+
+
+def _known(one: BoundRuns) -> Known:
+    """Return what a set knows of its parameters; one without an error is taken as it is."""
+    stored = one.parameter_set
+    names = list(stored.covariance_names)
+    held = [
+        (k, names.index(name))
+        for k, name in enumerate(one.names)
+        if name in names and (stored.covariance[names.index(name)][names.index(name)] or 0.0) > 0.0
+    ]
+    rows = [row for _, row in held]
+    return Known(tuple(k for k, _ in held), np.array(stored.covariance, dtype=np.float64)[np.ix_(rows, rows)])
+
+
+def _trial(
+    angles: tuple[float, float],
+    hers: ModelsOfSet,
+    bounds: list[BoundRuns],
+    known: list[Known],
+    parameter: str | None,
+    of_ship: list[str],
+) -> Trial | None:
+    """Return what one zigzag is worth; None where the ship of the set cannot sail it."""
+    zigzag = Zigzag(radians(angles[0]), radians(angles[1]))
+    tracks = [_sailed(zigzag, model) for model in hers.models]
+    if tracks[0] is None:
+        return None
+    over = [
+        None if track is None else _over(track, model, one)
+        for track, model, one in zip(tracks, hers.models, bounds, strict=True)
+    ]
+    own = over[0]
+    assert own is not None
+    gained = information(own, _point(bounds[0]))
+    shares = dict(zip(np.array(bounds[0].names)[list(known[0].index)], narrowed(known[0], gained), strict=True))
+    which = None if parameter is None else list(shares).index(parameter)
+    parts = {}
+    for true, run in zip(hers.models, over, strict=True):
+        for k, other in enumerate(hers.models):
+            if run is not None and other is not true:
+                believed = replace(bounds[k].runs[0].filtered, run=run.run)
+                D = apart(believed, _point(bounds[k]), known[k])
+                parts[true.name, other.name] = probability(D, WINDOW)
+    track = tracks[0]
+    return Trial(
+        angles_deg=angles,
+        duration_s=float(track.column(motion.TIME)[-1]),
+        sea_room_m=(float(np.ptp(track.column(motion.NORTH))), float(np.ptp(track.column(motion.EAST)))),
+        narrowed={name: float(shares[name]) for name in of_ship},
+        times_to_halve=None if which is None else times_to_halve(known[0], gained, which),
+        beyond=degrees(zigzag.rudder_rad - hers.basis.logs.rudder_rad) > _FURTHER_DEG,
+        parts=parts,
+    )
+
+
+def _sailed(zigzag: Zigzag, model: Identified) -> Track | None:
+    track = zigzag.track(model.ship)
+    return track if track.how == motion.SAILED else None
+
+
+def _over(track: Track, model: Identified, one: BoundRuns) -> RunFilter:
+    """Return the filter of a model over a planned run as the model itself predicts it."""
+    like = max((each.filtered for each in one.runs), key=lambda each: each.run.measured.shape[0])
+    filtered = replace(like, run=planned(track, model.ship, like.run, like.spec))
+    return replace(filtered, run=as_predicted(filtered, _point(one)))
+
+
+def _point(one: BoundRuns) -> Point:
+    """Return where a set stands, with the mean levels of its runs."""
+    levels: Float = np.mean(
+        [each.levels.own for each in one.runs if not each.held_out] or [one.runs[0].levels.own], axis=0
+    )
+    return Point(one.hull, one.values, levels)
+
+
+def _show(one: Trial) -> dict[str, Any]:
+    return {
+        "manoeuvre": {"kind": "zigzag", "heading_deg": one.angles_deg[0], "rudder_deg": one.angles_deg[1]},
+        "duration_s": one.duration_s,
+        "sea_room_m": list(one.sea_room_m),
+        "probability": one.probability,
+        "parts": [{"true": a, "other": b, "probability": p} for (a, b), p in one.parts.items()],
+        "narrowed": one.narrowed,
+        "mean_narrowed": one.mean_narrowed,
+        "times_to_halve": one.times_to_halve,
+        "beyond_what_was_sailed": one.beyond,
+    }
+
+
+def _round(metres: float) -> str:
+    """Return a length to two digits, upwards."""
+    unit = 10.0 ** np.floor(np.log10(max(metres, 1.0)) - 1.0)
+    return f"{np.ceil(metres / unit) * unit:g}"
+
+
+def _minutes(seconds: float) -> str:
+    return f"{seconds / 60.0:.0f} minutes" if seconds >= 90.0 else f"{seconds:.0f} s"
