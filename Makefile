@@ -12,7 +12,7 @@ RIVALS := $(VENV)/.rivals
 QUICK := test_layers.py test_docstrings.py package/test_import.py docs/test_documents.py docs/test_model.py \
 	$(addprefix ingest/test_, cells.py delimited.py nmea.py cdr.py) channels segment/test_imo.py \
 	$(addprefix model/test_, ship.py expression.py effects.py) $(addprefix estimate/test_, arrow.py record.py uncertainty.py) \
-	predict/test_prediction.py manoeuvre/test_motion.py shooting/test_ahead.py $(addprefix compare/test_, overshoot.py where.py) diagnose/test_formula.py \
+	predict/test_prediction.py manoeuvre/test_motion.py next_trial/test_worth.py shooting/test_ahead.py $(addprefix compare/test_, overshoot.py where.py) diagnose/test_formula.py \
 	$(addprefix steering/test_, nomoto.py stability.py) $(addprefix history/test_, contrasts.py pooled.py) \
 	$(addprefix simulate/test_, disturbances.py manoeuvre.py) $(addprefix warehouse/test_, store.py vessels.py segments.py) \
 	flows/test_fleet_plan.py $(addprefix workbench/test_, names.py effects.py)

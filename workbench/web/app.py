@@ -35,6 +35,7 @@ from kempf.workbench.web.pages import (
     log,
     manoeuvre,
     model,
+    next_trial,
     notes,
     parameter_set,
     predict,
@@ -118,7 +119,12 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
         lambda r: model.gather(desk, hers(r), *(r.query_params.get(name) for name in ("set", "h", "run", "beside"))),
         lambda r: model.document(desk, hers(r), r.query_params.get("set"), r.query_params.get("h")),
     )
-    for place, page in (("predict", predict), ("explain", explain), ("what-if", what_if)):
+    for place, page in (
+        ("predict", predict),
+        ("explain", explain),
+        ("what-if", what_if),
+        ("next-trial", next_trial),
+    ):
         serve_answer(place, page.gather, page.document)
     serve("/compare", lambda r: compare.gather(desk, *_both(r)), lambda r: compare.document(desk, *_both(r)))
     app.add_route("/logs/{log_id}/series", lambda r: _series(desk, r))

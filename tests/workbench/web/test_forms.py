@@ -165,6 +165,17 @@ def test_a_manoeuvre_is_predicted_as_the_command_predicts_it(working: Working, o
     assert client.get(place.replace("predict?", "predict.json?")).json() == printed
 
 
+def test_the_next_trial_is_the_one_that_the_command_proposes(working: Working, own: Path):
+    client, _, _ = working
+    page = client.get("/v/mariner/next-trial?parameter=b2").text
+    job = asked(client, "next_trial", **hidden(page, "Find the next trial"))
+    page = client.get(job["result"]["to"])
+    assert page.status_code == 200 and len(page.content) < 100_000 and "Sailing order" in page.text
+    found = client.get(job["result"]["to"].replace("next-trial?", "next-trial.json?")).json()
+    printed = kempf("next-trial", "--parameter", "b2", "--vessel", "mariner", "--warehouse", own, "--json").json
+    assert found == printed and all(step in page.text for step in found["order"])
+
+
 def test_a_parameter_is_moved_and_its_price_has_its_least_at_the_estimate(working: Working, own: Path):
     client, _, _ = working
     job = asked(client, "what_if", **hidden(client.get("/v/mariner/what-if?parameter=b1").text, "Move it"))

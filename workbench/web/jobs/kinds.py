@@ -185,6 +185,15 @@ def explain(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pro
     return {"to": f"{of_vessel(vessel)}/explain?{urlencode(asked)}", "document": found.show()}
 
 
+def propose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Find the zigzag to sail next; the result is what `kempf next-trial --json` prints."""
+    from kempf.flows.jobs.next_trial import next_trial
+
+    vessel, asked = arguments["vessel"], {name: arguments[name] for name in ("set", "parameter")}
+    found = next_trial(warehouse, vessel, arguments["set"], arguments["parameter"] or None, progress)
+    return {"to": f"{of_vessel(vessel)}/next-trial?{urlencode(asked)}", "document": found.show()}
+
+
 class Kind(NamedTuple):
     """What a form may ask for."""
 
@@ -204,6 +213,7 @@ KINDS: Mapping[str, Kind] = {
     "explain": Kind(explain, "Explain a stretch", ("from", "to", "set")),
     "what_if": Kind(move, "Move a parameter", ("parameter", "set", "segment")),
     "sail": Kind(sail, "Predict a manoeuvre", ("set", "manoeuvre", "rudder", "angles", "side", "speed")),
+    "next_trial": Kind(propose, "Find the next trial", ("set", "parameter")),
     "diagnose": Kind(diagnose, "Diagnose", ()),
     "try": Kind(try_formula, "Try a formula", ("formula", "name")),
     "add": Kind(add, "Add the effect", ("effect", "formula"), changes=True),

@@ -145,6 +145,7 @@ _SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
     "predict": _predict,
     "explain": _stretch,
     "what_if": _name_the_set,
+    "next_trial": _name_the_set,
     "sail": _sail,
     "try": _formula,
     "add": _add,
