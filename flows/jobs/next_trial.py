@@ -94,12 +94,17 @@ class NextTrial:
     #: What was taken for granted, sentences.
     remarks: tuple[str, ...]
 
+    @property
+    def parting(self) -> bool:
+        """Whether models are to be parted, not an interval to be halved."""
+        return len(self.models) > 1 and self.parameter is None
+
     def show(self) -> dict[str, Any]:
         """Return it as the command line's JSON object."""
         return {
             "vessel": self.vessel,
             "parameter_set_id": self.parameter_set.parameter_set_id,
-            "aim": "part" if len(self.models) > 1 else "narrow",
+            "aim": "part" if self.parting else "narrow",
             "parameter": self.parameter,
             "models": [{"parameter_set_id": name, "effects": list(own)} for name, own in self.models.items()],
             "speed_m_s": self.speed_m_s,
@@ -139,7 +144,7 @@ class NextTrial:
         best = self.trials[0]
         name = "{:g}/{:g}".format(*best.angles_deg)
         said = []
-        if len(self.models) > 1:
+        if self.parting:
             count, sure = len(self.models), best.probability or 0.0
             if sure >= _SURE:
                 said.append(
@@ -152,6 +157,7 @@ class NextTrial:
                     f"probability of {100 * _SURE:.0f} %; the best, {name}, with {100 * sure:.0f} %. Sail it more "
                     "than once, or a turning circle, by which models are compared (`kempf predict --compare`)."
                 )
+            said.append("The probability holds where one of the models is the whole truth; where neither is, less.")
         elif self.parameter is not None:
             share = best.narrowed[self.parameter]
             times = best.times_to_halve
@@ -222,14 +228,17 @@ def next_trial(
     trials.sort(key=lambda one: _rank(one, parameter))
     predicted = predict_with(hers, replace(request, angles_deg=trials[0].angles_deg), progress)
     models = {model.name: tuple(effect.name for effect in model.waters.model.effects) for model in hers.models}
-    remarks = ("A turning circle or a pull-out is not among them: models are held against these, never fitted.",)
+    remarks = (
+        *(f"{remark[0].upper()}{remark[1:]}." for remark in hers.remarks),
+        "A turning circle or a pull-out is not among them: models are held against these, never fitted.",
+    )
     return NextTrial(vessel, hers.parameter_set, models, hers.speed_m_s, parameter, tuple(trials), predicted, remarks)
 
 
 def _rank(one: Trial, parameter: str | None) -> float:
     if parameter is not None:
         return one.narrowed[parameter]
-    return -one.probability if one.probability is not None else one.mean_narrowed
+    return one.mean_narrowed if one.probability is None else -one.probability
 
 
 def _known(one: BoundRuns) -> Known:

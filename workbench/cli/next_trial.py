@@ -34,7 +34,7 @@ def command(vessel: str, set_id: str | None, parameter: str | None, uri: str, as
     print_paragraph("")
     for step, line in enumerate(found["order"], start=1):
         print_paragraph(f"{step}. {line}")
-    parting = found["aim"] == "part"
+    parting = found["trials"][0]["probability"] is not None
     head = ["zigzag", "takes, s", "sea room, m", "errors become, %"]
     head += ["parts the models, %"] if parting else []
     head += [f"{parameter} becomes, %", "to halve it"] if parameter is not None else []
