@@ -135,15 +135,17 @@ def of_vessel(warehouse: Warehouse, vessel: str | None = None) -> list[Note]:
     ]
 
 
-def carry(warehouse: Warehouse, subject: Literal["vessel", "log"], subject_id: str, vessel: str, to: str) -> None:
-    """Write the notes on a vessel, or on a log, again for the vessel that takes her place; the old ones stay.
+def carry(
+    warehouse: Warehouse, subject: Literal["vessel", "log", "segment"], subject_id: str, vessel: str, to: str
+) -> None:
+    """Write the notes on a vessel, a log or a manoeuvre again for the vessel that takes her place; the old ones stay.
 
     What is written again already is left out, so that an interrupted move goes on.
 
     Parameters
     ----------
     subject_id : str
-        The vessel's old name, or the id of the log.
+        The vessel's old name, or the id of the log or segment.
     vessel : str
         Whose notes they are.
     to : str

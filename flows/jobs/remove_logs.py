@@ -14,7 +14,7 @@ from kempf.flows.jobs.given_reason import require_reason
 from kempf.flows.jobs.ingest_logs import look_through, settle_vessel, store
 from kempf.flows.jobs.spool import spooled
 from kempf.schemas.errors import NotFound, UsageError
-from kempf.warehouse import aliases, corrections, logs, notes, purges, raw, vessels
+from kempf.warehouse import aliases, corrections, logs, notes, purges, raw, segments, vessels
 from kempf.warehouse.deposit import description
 from kempf.warehouse.equivalents import codes_of
 from kempf.warehouse.logs import LogRow
@@ -126,9 +126,18 @@ def move(
         read = look_through(whose, row.file_name, log, profile, readings, said, codes_of(warehouse))
         # first: once the log is hers the same command has nothing to go on with
         notes.carry(warehouse, "log", row.log_id, row.vessel, whose)
+        for segment_id in _noted_segments(warehouse, row):
+            notes.carry(warehouse, "segment", segment_id, row.vessel, whose)
         found = remove(warehouse, [row], f"moved to {whose!r}: {reason}") if row.removed is None else None
         store(warehouse, [read])
     return found, logs.by_prefix(warehouse, row.log_id)
+
+
+def _noted_segments(warehouse: Warehouse, row: LogRow) -> list[str]:
+    """Return the manoeuvres of a log that notes of its vessel are on; their ids stay whosever the log is."""
+    names = {one.subject_id for one in notes.of_vessel(warehouse, row.vessel) if one.subject == "segment"}
+    found = segments.by_ids(warehouse, row.vessel, names) if names else {}
+    return sorted(name for name, one in found.items() if one.log_id == row.log_id)
 
 
 def _on_their_way(warehouse: Warehouse, vessel: str, to: str) -> list[LogRow]:

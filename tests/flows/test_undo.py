@@ -15,7 +15,7 @@ from kempf.flows.jobs.ingest_logs import ingest
 from kempf.flows.jobs.remove_logs import move, remove, remove_vessel, rename_vessel, restore
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.schemas.errors import DataRejected, NotFound, UsageError
-from kempf.warehouse import aliases, history, logs, parameter_sets, segments, vessels
+from kempf.warehouse import aliases, history, logs, notes, parameter_sets, segments, vessels
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh
@@ -142,7 +142,13 @@ def _end(*arguments: object, **named: object) -> None:
 
 def test_a_vessel_is_renamed_and_removed(warehouse: Warehouse) -> None:
     held = {row.log_id for row in logs.current(warehouse)}
+    zigzag = segments.current(warehouse, "mariner")[0]
+    noted = notes.add(warehouse, "mariner", "segment", zigzag.segment_id, "gusty")
     rows = rename_vessel(warehouse, "mariner", "sailor", "sold")
+    (carried,) = notes.of_vessel(warehouse, "sailor")
+    assert (carried.subject, carried.subject_id) == ("segment", zigzag.segment_id)
+    assert carried.text == f"gusty [mariner, note {noted.number}]"
+    assert zigzag.segment_id in {one.segment_id for one in segments.current(warehouse, "sailor")}
     assert {row.log_id for row in rows} == held and vessels.names(warehouse) == ["sailor"]
     assert vessels.current(warehouse, "sailor").length_m is not None
     with pytest.raises(NotFound):
