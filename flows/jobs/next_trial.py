@@ -139,23 +139,28 @@ class NextTrial:
             "from a minute before the first order on.",
         ]
 
+    def _alike(self) -> str:
+        """Return what is to be parted, in words: by the effects that not all models have."""
+        shared = set.intersection(*(set(own) for own in self.models.values()))
+        own = [" + ".join(name for name in effects if name not in shared) for effects in self.models.values()]
+        return f"the {len(own)} models that fit alike ({' or '.join(one or 'none beside' for one in own)})"
+
     def sentences(self) -> list[str]:
         """Return what was found, the answer first."""
         best = self.trials[0]
         name = "{:g}/{:g}".format(*best.angles_deg)
         said = []
         if self.parting:
-            count, sure = len(self.models), best.probability or 0.0
+            alike, sure = self._alike(), best.probability or 0.0
             if sure >= _SURE:
                 said.append(
-                    f"One zigzag {name} more parts the {count} models that fit alike with a probability of "
-                    f"{100 * sure:.0f} %, whichever is true."
+                    f"One zigzag {name} more parts {alike} with a probability of {_percent(sure)}, whichever is true."
                 )
             else:
                 said.append(
-                    f"None of the {len(self.trials)} zigzags parts the {count} models that fit alike with a "
-                    f"probability of {100 * _SURE:.0f} %; the best, {name}, with {100 * sure:.0f} %. Sail it more "
-                    "than once, or a turning circle, by which models are compared (`kempf predict --compare`)."
+                    f"None of the {len(self.trials)} zigzags parts {alike} with a probability of {_percent(_SURE)}; "
+                    f"the best, {name}, with {_percent(sure)}. Sail it more than once, or a turning circle, by which "
+                    "models are compared (`kempf predict --compare`)."
                 )
             said.append("The probability holds where one of the models is the whole truth; where neither is, less.")
         elif self.parameter is not None:
@@ -333,6 +338,10 @@ def _round(metres: float) -> str:
     """Return a length to two digits, upwards."""
     unit = 10.0 ** np.floor(np.log10(max(metres, 1.0)) - 1.0)
     return f"{np.ceil(metres / unit) * unit:g}"
+
+
+def _percent(share: float) -> str:
+    return "more than 99 %" if share > 0.995 else f"{100.0 * share:.0f} %"
 
 
 def _minutes(seconds: float) -> str:
