@@ -168,7 +168,7 @@ class NextTrial:
             times = best.times_to_halve
             said.append(
                 f"One zigzag {name} more brings the standard error of {self.parameter} to {100 * share:.0f} % of what "
-                f"it is; {'more than 64' if times is None else times} of them would halve it."
+                f"it is; {_halving(times)}."
             )
         else:
             said.append(
@@ -338,6 +338,12 @@ def _round(metres: float) -> str:
     """Return a length to two digits, upwards."""
     unit = 10.0 ** np.floor(np.log10(max(metres, 1.0)) - 1.0)
     return f"{np.ceil(metres / unit) * unit:g}"
+
+
+def _halving(times: int | None) -> str:
+    if times == 1:
+        return "that one halves it"
+    return f"{'more than 64' if times is None else times} of them would halve it"
 
 
 def _percent(share: float) -> str:
