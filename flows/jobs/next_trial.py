@@ -5,6 +5,7 @@ Nothing is fitted or stored but models that fit as well as the set's and were no
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import degrees, radians
 from typing import Any
@@ -13,8 +14,9 @@ import numpy as np
 
 from kempf.flows.jobs.bound_runs import BoundRuns, bound
 from kempf.flows.jobs.predict_request import PredictRequest
-from kempf.flows.jobs.predict_vessel import ModelsOfSet, models_of_set, predict_with
+from kempf.flows.jobs.predict_vessel import models_of_set, predict_with
 from kempf.flows.jobs.predicted import Predicted
+from kempf.flows.jobs.ship_model import covariance_of
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confusion_sets import WINDOW
@@ -27,6 +29,7 @@ from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.next_trial.planned_run import as_predicted, planned
 from kempf.pipeline.next_trial.worth import Known, apart, information, narrowed, probability, times_to_halve
 from kempf.schemas.errors import DataRejected, UsageError
+from kempf.schemas.model_spec import HULL_PARAMETERS
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 
@@ -41,9 +44,9 @@ ANGLES_DEG = (
     (30.0, 30.0),
     (35.0, 35.0),
 )
-#: a trial is proposed where its models are parted with this probability, or so many runs of it at most are needed
+#: probability with which a trial that is said to part models does
 _SURE = 0.9
-#: degrees of rudder beyond those that were sailed of which nothing is said
+#: rudder beyond that which was sailed of which nothing is said, deg
 _FURTHER_DEG = 1.0
 
 
@@ -208,9 +211,8 @@ def next_trial(
     """
     request = PredictRequest("zigzag", set_id)
     hers = models_of_set(warehouse, vessel, request, progress)
-    bounds = [bound(warehouse, vessel, model.name, progress) for model in hers.models]
-    known = [_known(one) for one in bounds]
-    of_ship = [name for name in np.array(bounds[0].names)[list(known[0].index)] if "_noise." not in name]
+    models = [_model(bound(warehouse, vessel, model.name, progress), model) for model in hers.models]
+    of_ship = [name for name in models[0].known_names if name in _names_of_ship(hers.models[0])]
     if parameter is not None and parameter not in of_ship:
         raise UsageError(
             "parameter_unknown",
@@ -221,7 +223,7 @@ def next_trial(
     trials = []
     for done, angles in enumerate(ANGLES_DEG):
         progress(done, len(ANGLES_DEG), "sailing zigzag {:g}/{:g}".format(*angles))
-        made = _trial(angles, hers, bounds, known, parameter, of_ship)
+        made = _trial(angles, models, hers.basis.logs.rudder_rad, parameter, of_ship)
         if made is not None:
             trials.append(made)
     if not trials:
@@ -232,12 +234,12 @@ def next_trial(
         )
     trials.sort(key=lambda one: _rank(one, parameter))
     predicted = predict_with(hers, replace(request, angles_deg=trials[0].angles_deg), progress)
-    models = {model.name: tuple(effect.name for effect in model.waters.model.effects) for model in hers.models}
+    effects = {model.name: tuple(effect.name for effect in model.waters.model.effects) for model in hers.models}
     remarks = (
         *(f"{remark[0].upper()}{remark[1:]}." for remark in hers.remarks),
         "A turning circle or a pull-out is not among them: models are held against these, never fitted.",
     )
-    return NextTrial(vessel, hers.parameter_set, models, hers.speed_m_s, parameter, tuple(trials), predicted, remarks)
+    return NextTrial(vessel, hers.parameter_set, effects, hers.speed_m_s, parameter, tuple(trials), predicted, remarks)
 
 
 def _rank(one: Trial, parameter: str | None) -> float:
@@ -246,78 +248,82 @@ def _rank(one: Trial, parameter: str | None) -> float:
     return one.mean_narrowed if one.probability is None else -one.probability
 
 
-def _known(one: BoundRuns) -> Known:
-    """Return what a set knows of its parameters; one without an error is taken as it is."""
-    stored = one.parameter_set
-    names = list(stored.covariance_names)
-    held = [
-        (k, names.index(name))
-        for k, name in enumerate(one.names)
-        if name in names and (stored.covariance[names.index(name)][names.index(name)] or 0.0) > 0.0
-    ]
-    rows = [row for _, row in held]
-    return Known(tuple(k for k, _ in held), np.array(stored.covariance, dtype=np.float64)[np.ix_(rows, rows)])
+@dataclass(frozen=True, eq=False)
+class _Model:
+    """A model of the ship, ready to sail and to be filtered over what another one sails."""
+
+    identified: Identified
+    #: Over the longest of her runs.
+    like: RunFilter
+    #: Where it stands, with the mean levels of the runs that it was fitted to.
+    point: Point
+    #: A parameter without an error is taken as it is.
+    known: Known
+    #: Of the parameters in ``known``.
+    known_names: tuple[str, ...]
+
+    def over(self, track: Track) -> RunFilter:
+        """Return its filter over a planned run as it predicts that itself."""
+        run = planned(track, self.identified.ship, self.like.run, self.like.spec)
+        filtered = replace(self.like, run=run)
+        return replace(filtered, run=as_predicted(filtered, self.point))
+
+
+def _model(one: BoundRuns, identified: Identified) -> _Model:
+    covariance = covariance_of(one.parameter_set, one.names)
+    index = np.flatnonzero(np.diag(covariance) > 0.0)
+    levels: Float = np.mean(
+        [each.levels.own for each in one.runs if not each.held_out] or [one.runs[0].levels.own], axis=0
+    )
+    return _Model(
+        identified,
+        max((each.filtered for each in one.runs), key=lambda each: each.run.measured.shape[0]),
+        Point(one.hull, one.values, levels),
+        Known(tuple(index.tolist()), covariance[np.ix_(index, index)]),
+        tuple(one.names[k] for k in index),
+    )
+
+
+def _names_of_ship(model: Identified) -> tuple[str, ...]:
+    """Return the parameters that are the ship's and not those of an instrument's lasting noise."""
+    return (*HULL_PARAMETERS, *model.waters.model.names)
 
 
 def _trial(
-    angles: tuple[float, float],
-    hers: ModelsOfSet,
-    bounds: list[BoundRuns],
-    known: list[Known],
-    parameter: str | None,
-    of_ship: list[str],
+    angles: tuple[float, float], models: Sequence[_Model], sailed_rad: float, parameter: str | None, of_ship: list[str]
 ) -> Trial | None:
-    """Return what one zigzag is worth; None where the ship of the set cannot sail it."""
+    """Return what one zigzag is worth; None where the ship of the first model cannot sail it.
+
+    Parameters
+    ----------
+    sailed_rad : float
+        Largest rudder that was sailed.
+    """
     zigzag = Zigzag(radians(angles[0]), radians(angles[1]))
-    tracks = [_sailed(zigzag, model) for model in hers.models]
-    if tracks[0] is None:
+    tracks = [zigzag.track(model.identified.ship) for model in models]
+    over = [model.over(t) if t.how == motion.SAILED else None for model, t in zip(models, tracks, strict=True)]
+    first, track = models[0], tracks[0]
+    if over[0] is None:
         return None
-    over = [
-        None if track is None else _over(track, model, one)
-        for track, model, one in zip(tracks, hers.models, bounds, strict=True)
-    ]
-    own = over[0]
-    assert own is not None
-    gained = information(own, _point(bounds[0]))
-    shares = dict(zip(np.array(bounds[0].names)[list(known[0].index)], narrowed(known[0], gained), strict=True))
-    which = None if parameter is None else list(shares).index(parameter)
+    gained = information(over[0], first.point)
+    shares = dict(zip(first.known_names, narrowed(first.known, gained).tolist(), strict=True))
     parts = {}
-    for true, run in zip(hers.models, over, strict=True):
-        for k, other in enumerate(hers.models):
+    for true, run in zip(models, over, strict=True):
+        for other in models:
             if run is not None and other is not true:
-                believed = replace(bounds[k].runs[0].filtered, run=run.run)
-                D = apart(believed, _point(bounds[k]), known[k])
-                parts[true.name, other.name] = probability(D, WINDOW)
-    track = tracks[0]
+                D = apart(replace(other.like, run=run.run), other.point, other.known)
+                parts[true.identified.name, other.identified.name] = probability(D, WINDOW)
     return Trial(
         angles_deg=angles,
         duration_s=float(track.column(motion.TIME)[-1]),
         sea_room_m=(float(np.ptp(track.column(motion.NORTH))), float(np.ptp(track.column(motion.EAST)))),
-        narrowed={name: float(shares[name]) for name in of_ship},
-        times_to_halve=None if which is None else times_to_halve(known[0], gained, which),
-        beyond=degrees(zigzag.rudder_rad - hers.basis.logs.rudder_rad) > _FURTHER_DEG,
+        narrowed={name: shares[name] for name in of_ship},
+        times_to_halve=None
+        if parameter is None
+        else times_to_halve(first.known, gained, first.known_names.index(parameter)),
+        beyond=degrees(zigzag.rudder_rad - sailed_rad) > _FURTHER_DEG,
         parts=parts,
     )
-
-
-def _sailed(zigzag: Zigzag, model: Identified) -> Track | None:
-    track = zigzag.track(model.ship)
-    return track if track.how == motion.SAILED else None
-
-
-def _over(track: Track, model: Identified, one: BoundRuns) -> RunFilter:
-    """Return the filter of a model over a planned run as the model itself predicts it."""
-    like = max((each.filtered for each in one.runs), key=lambda each: each.run.measured.shape[0])
-    filtered = replace(like, run=planned(track, model.ship, like.run, like.spec))
-    return replace(filtered, run=as_predicted(filtered, _point(one)))
-
-
-def _point(one: BoundRuns) -> Point:
-    """Return where a set stands, with the mean levels of its runs."""
-    levels: Float = np.mean(
-        [each.levels.own for each in one.runs if not each.held_out] or [one.runs[0].levels.own], axis=0
-    )
-    return Point(one.hull, one.values, levels)
 
 
 def _show(one: Trial) -> dict[str, Any]:

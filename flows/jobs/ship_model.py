@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -99,7 +100,7 @@ def ship_of_set(warehouse: Warehouse, one: ParameterSet, speed_m_s: float | None
     warnings = [*one.warnings, *assumed, *remarks]
     if not one.convergence.get("converged"):
         warnings.insert(0, f"the set did not converge: {one.convergence.get('reason')}")
-    covariance = _covariance(one, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
+    covariance = covariance_of(one, [*HULL_PARAMETERS, *(effects.model.names if effects else ())])
     numbers = (float(speed), arm or 0.0, profile.length_m)
     return ShipOfSet(one, hull, effects, covariance, spec, *numbers, noise, remarks, tuple(warnings))
 
@@ -132,8 +133,8 @@ def _last_load(one: ParameterSet) -> float:
     return list(loads_of_logs(named, inputs.get("draughts_m", {})).values())[-1]
 
 
-def _covariance(one: ParameterSet, wanted: list[str]) -> Float:
-    """Pick parameters out of the covariance; NaN for what it does not hold."""
+def covariance_of(one: ParameterSet, wanted: Sequence[str]) -> Float:
+    """Pick parameters out of a set's covariance, shape (n, n); NaN for what it does not hold."""
     found = np.full((len(wanted), len(wanted)), np.nan)
     names = list(one.covariance_names)
     held = [(i, names.index(name)) for i, name in enumerate(wanted) if name in names]

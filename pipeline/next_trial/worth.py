@@ -16,6 +16,7 @@ from scipy.stats import norm
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.search.block_arrow import inverse
 from kempf.pipeline.estimate.sensitivity import N_HULL, Point, active, columns, passed, whitened
 
 #: so often a manoeuvre may be repeated
@@ -39,17 +40,15 @@ def information(filtered: RunFilter, point: Point) -> Float:
     J = np.column_stack(columns(filtered, point, base, wanted))
     whole, shared = J.T @ J, N_HULL + point.values.size
     across, levels = whole[:shared, shared:], whole[shared:, shared:]
-    found: Float = whole[:shared, :shared] - across @ np.linalg.pinv(levels, hermitian=True) @ across.T
+    found: Float = whole[:shared, :shared] - across @ inverse(levels) @ across.T
     return found
 
 
 def narrowed(known: Known, information_of_run: Float, times: int = 1) -> Float:
     """Return standard errors after a run has been sailed so many times, as shares of those before, shape (k,)."""
-    at = np.ix_(known.index, known.index)
-    std = np.sqrt(np.diag(known.covariance))
-    scale = np.outer(std, std)
-    after = np.linalg.inv(np.linalg.inv(known.covariance / scale) + times * information_of_run[at] * scale)
-    shares: Float = np.sqrt(np.diag(after))
+    own = information_of_run[np.ix_(known.index, known.index)]
+    after = inverse(inverse(known.covariance) + times * own)
+    shares: Float = np.sqrt(np.diag(after) / np.diag(known.covariance))
     return shares
 
 
@@ -83,11 +82,8 @@ def apart(filtered: RunFilter, point: Point, known: Known) -> float:
     # the mean of what is measured differs, its spread hardly
     z = u[:m]
     J = np.column_stack(columns(filtered, point, base, known.index))[:m]
-    std = np.sqrt(np.diag(known.covariance))
-    J = J * std
-    prior = np.linalg.inv(known.covariance / np.outer(std, std))
     pull = J.T @ z
-    left = float(z @ z - pull @ np.linalg.solve(J.T @ J + prior, pull))
+    left = float(z @ z - pull @ inverse(J.T @ J + inverse(known.covariance)) @ pull)
     return max(left, 0.0)
 
 

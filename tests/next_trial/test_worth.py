@@ -30,10 +30,10 @@ def test_the_information_of_runs_is_that_of_the_fit_to_them() -> None:
 def test_another_run_like_those_before_narrows_as_one_run_more() -> None:
     ship = sailed()
     fit = fit_plain(ship.runs[:3], ship.spec, WORKERS).fit
-    told = narrowed(Known(HULL, fit.covariance), information(fit.runs[1], fit.point(1)))
+    shares = narrowed(Known(HULL, fit.covariance), information(fit.runs[1], fit.point(1)))
     again = fit_plain([*ship.runs[:3], replace(ship.runs[1], name="again")], ship.spec, WORKERS).fit
-    np.testing.assert_allclose(told, again.std / fit.std, rtol=0.1)
-    assert np.all(told < 1.0)
+    np.testing.assert_allclose(shares, again.std / fit.std, rtol=0.1)
+    assert np.all(shares < 1.0)
 
 
 def test_a_model_that_lacks_an_effect_falls_behind_by_what_the_effect_is_worth() -> None:
