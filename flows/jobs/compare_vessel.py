@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from kempf.flows.jobs.bound_runs import BoundRuns, bound
 from kempf.flows.process.progress import Progress, silent
-from kempf.pipeline.channels.series import SECOND_NS
+from kempf.pipeline.channels.series import SECOND_NS, Mask
 from kempf.pipeline.compare.compared_run import compare_run
-from kempf.pipeline.compare.comparison import ComparedRun, judged, summary
+from kempf.pipeline.compare.comparison import FITTED, HELD_OUT, ComparedRun, judged, summary
+from kempf.pipeline.compare.evidence import Evidence
+from kempf.pipeline.compare.marks import marks
 from kempf.pipeline.compare.misfit import where
 from kempf.pipeline.compare.overshoot import Turn, turns_of
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.predict.horizon import Horizon, horizon_of
-from kempf.pipeline.predict.run_residuals import phases_s
+from kempf.pipeline.predict.run_residuals import Looked, phases_s
 from kempf.schemas.errors import DataRejected
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment
@@ -67,10 +70,21 @@ class Comparison:
     def where(self) -> dict[str, Any]:
         """Say where the model fails, on fitted and on held-out runs apart; None where there are no such runs."""
         found: dict[str, Any] = {}
-        for sample in ("fitted", "held_out"):
-            looked = [run.looked for run in self.runs if run.sample == sample]
+        for sample in (FITTED, HELD_OUT):
+            looked = self._of(sample)
             found[sample] = where(looked) if looked else None
         return found
+
+    def marks(self, evidence: Sequence[Evidence]) -> dict[str, dict[str, Mask]]:
+        """Return at which instants what speaks against the model shows, see `kempf.pipeline.compare.marks.marks`."""
+        found: dict[str, dict[str, Mask]] = {}
+        for sample in (FITTED, HELD_OUT):
+            own = [one for one in evidence if one.sample == sample]
+            found |= marks(self._of(sample), own) if own else {}
+        return found
+
+    def _of(self, sample: str) -> list[Looked]:
+        return [run.looked for run in self.runs if run.sample == sample]
 
 
 def compare_vessel(

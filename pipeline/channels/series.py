@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 Float = NDArray[np.float64]
 Nanoseconds = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 SECOND_NS = 1_000_000_000
 

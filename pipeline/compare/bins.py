@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.group import group
 from kempf.pipeline.predict.run_residuals import Samples
 
@@ -18,28 +19,48 @@ _AMIDSHIPS = 0.1
 _PHASES = ("approach", "execute", "yaw_build_up", "overshoot", "counter_rudder", "steady_yaw")
 
 
-def by_phase(samples: Samples) -> dict[str, Any]:
-    """Return a group for each phase that there is, in the order of a leg."""
-    return {name: group(samples, samples.phase == name) for name in _PHASES if np.any(samples.phase == name)}
+@dataclass(frozen=True, eq=False)
+class Bin:
+    """Instants at which something was within bounds."""
+
+    #: low, high: None where it is open.
+    low: float | None
+    high: float | None
+    unit: str
+    #: Shape (N,).
+    inside: Mask
+
+    @property
+    def words(self) -> str:
+        """Its bounds in words."""
+        if self.low is None or self.high is None:
+            return f"below {self.high:g} {self.unit}" if self.low is None else f"above {self.low:g} {self.unit}"
+        return f"{self.low:g} to {self.high:g} {self.unit}"
 
 
-def by_side(samples: Samples) -> dict[str, Any]:
-    """Return a group for the rudder to starboard, to port, and amidships."""
+def phases(samples: Samples) -> dict[str, Mask]:
+    """Return the instants of each phase that there is, shape (N,) each, in the order of a leg."""
+    found = {name: samples.phase == name for name in _PHASES}
+    return {name: inside for name, inside in found.items() if inside.any()}
+
+
+def sides(samples: Samples) -> dict[str, Mask]:
+    """Return the instants with the rudder to starboard, to port, and amidships, shape (N,) each."""
     rudder = samples.rudder_rad
     small = _AMIDSHIPS * float(np.max(np.abs(rudder)))
-    sides = {"starboard": rudder > small, "port": rudder < -small, "amidships": np.abs(rudder) <= small}
-    return {name: group(samples, inside) for name, inside in sides.items() if inside.any()}
+    found = {"starboard": rudder > small, "port": rudder < -small, "amidships": np.abs(rudder) <= small}
+    return {name: inside for name, inside in found.items() if inside.any()}
 
 
-def by_run(samples: Samples) -> dict[str, Any]:
-    """Return a group for each run."""
-    return {str(name): group(samples, samples.run == name) for name in dict.fromkeys(samples.run.tolist())}
+def runs(samples: Samples) -> dict[str, Mask]:
+    """Return the instants of each run, shape (N,) each."""
+    return {str(name): samples.run == name for name in dict.fromkeys(samples.run.tolist())}
 
 
-def by_bin(samples: Samples) -> dict[str, list[dict[str, Any]]]:
-    """Return groups by bins of lateral speed, yaw rate, rudder, heading and speed; ``low`` and ``high`` in ``unit``.
+def bins(samples: Samples) -> dict[str, list[Bin]]:
+    """Return bins of lateral speed, yaw rate, rudder, speed and heading, none of them empty.
 
-    The outermost bins are open (None); those of the heading are sectors of the compass round N, NE, ...
+    The outermost are open; those of the heading are sectors of the compass round N, NE, ...
     """
     degrees = float(np.rad2deg(1.0))
     asked: tuple[tuple[str, Float, str, Callable[[Float], Float]], ...] = (
@@ -53,19 +74,24 @@ def by_bin(samples: Samples) -> dict[str, list[dict[str, Any]]]:
         inner = edges_of(value)
         place = np.searchsorted(inner, value, side="right")
         bounds = [None, *inner.tolist(), None]
-        found[name] = [
-            {"low": bounds[k], "high": bounds[k + 1], "unit": unit, **group(samples, place == k)}
-            for k in range(len(bounds) - 1)
-            if np.any(place == k)
-        ]
+        found[name] = [Bin(bounds[k], bounds[k + 1], unit, place == k) for k in range(len(bounds) - 1)]
     sector = 360.0 / _COURSES
     place = (np.floor((degrees * samples.heading_rad) / sector + 0.5) % _COURSES).astype(np.int64)
-    found["heading"] = [
-        {"low": (k - 0.5) * sector % 360.0, "high": (k + 0.5) * sector, "unit": "deg", **group(samples, place == k)}
-        for k in range(_COURSES)
-        if np.any(place == k)
-    ]
-    return found
+    found["heading"] = [Bin((k - 0.5) * sector % 360.0, (k + 0.5) * sector, "deg", place == k) for k in range(_COURSES)]
+    return {name: [one for one in made if one.inside.any()] for name, made in found.items()}
+
+
+def grouped(samples: Samples, of: dict[str, Mask]) -> dict[str, Any]:
+    """Return a group for each of some sets of instants, see `kempf.pipeline.compare.group.group`."""
+    return {name: group(samples, inside) for name, inside in of.items()}
+
+
+def binned(samples: Samples, of: dict[str, list[Bin]]) -> dict[str, list[dict[str, Any]]]:
+    """Return groups by bins, with ``low`` and ``high`` in ``unit``."""
+    return {
+        name: [{"low": one.low, "high": one.high, "unit": one.unit, **group(samples, one.inside)} for one in made]
+        for name, made in of.items()
+    }
 
 
 def _round(value: float) -> float:

@@ -41,7 +41,7 @@ def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
     """
     step = looked[0].filtered.run.step_s
     most = int(min(_LONGEST_S / step, _MOST))
-    given = [_given(one.filtered.run) for one in looked]
+    given = [given_to(one.filtered.run) for one in looked]
     names = [name for name in given[0] if all(name in one for one in given)]
     found: dict[str, Any] = {}
     for i, channel in enumerate(CHANNELS):
@@ -61,7 +61,7 @@ def correlations(looked: Sequence[Looked]) -> dict[str, Any]:
     return found
 
 
-def _given(run: GridRun) -> dict[str, Float]:
+def given_to(run: GridRun) -> dict[str, Float]:
     """Return what a run was given, without its mean, shape (n,) each; what does not change is left out."""
     given = {
         "rudder": run.rudder_rad,

@@ -11,7 +11,7 @@ from typing import Any
 from scipy.stats import chi2
 
 from kempf.pipeline.compare.bands import by_band
-from kempf.pipeline.compare.bins import by_bin, by_phase, by_run, by_side
+from kempf.pipeline.compare.bins import Bin, binned, bins, grouped, phases, runs, sides
 from kempf.pipeline.compare.correlations import correlations
 from kempf.pipeline.compare.group import BAND
 from kempf.pipeline.compare.worst_windows import worst
@@ -38,23 +38,27 @@ def where(looked: Sequence[Looked]) -> dict[str, Any]:
         with ``of``, ``which``, ``channel``, ``n``, ``whitened_rms``, ``band``, ``p_adjusted``.
     """
     samples = samples_of(looked)
-    groups = {"by_phase": by_phase(samples), "by_side": by_side(samples)}
-    bins, runs = by_bin(samples), by_run(samples)
+    groups = {"by_phase": grouped(samples, phases(samples)), "by_side": grouped(samples, sides(samples))}
+    of_bins, of_runs = bins(samples), grouped(samples, runs(samples))
+    by_bin = binned(samples, of_bins)
     return {
         "band_probability": BAND,
         **groups,
-        "by_bin": bins,
-        "by_run": runs,
+        "by_bin": by_bin,
+        "by_run": of_runs,
         "by_band": by_band(looked),
         "correlations": correlations(looked),
         "worst": worst(looked),
-        "stands_out": _stands_out({**groups, "by_run": runs}, bins),
+        "stands_out": _stands_out({**groups, "by_run": of_runs}, of_bins, by_bin),
     }
 
 
-def _stands_out(named: dict[str, dict[str, Any]], bins: dict[str, list[dict[str, Any]]]) -> list[dict[str, Any]]:
+def _stands_out(
+    named: dict[str, dict[str, Any]], of_bins: dict[str, list[Bin]], by_bin: dict[str, list[dict[str, Any]]]
+) -> list[dict[str, Any]]:
     entries = [(of, which, one) for of, groups in named.items() for which, one in groups.items()]
-    entries += [(f"by_bin {of}", _interval(one), one) for of, groups in bins.items() for one in groups]
+    for name, groups in by_bin.items():
+        entries += [(f"by_bin {name}", b.words, one) for b, one in zip(of_bins[name], groups, strict=True)]
     tested = [(of, which, *pair) for of, which, one in entries for pair in one["channels"].items() if pair[1]["n"]]
     found = []
     for of, which, channel, reading in tested:
@@ -65,10 +69,3 @@ def _stands_out(named: dict[str, dict[str, Any]], bins: dict[str, list[dict[str,
             rank = float(chi2.logsf(square, reading["n"]))
             found.append((rank, {"of": of, "which": which, "channel": channel, **kept, "p_adjusted": adjusted}))
     return [entry for _, entry in sorted(found, key=lambda pair: pair[0])[:_NAMED]]
-
-
-def _interval(one: dict[str, Any]) -> str:
-    low, high = one["low"], one["high"]
-    if low is None or high is None:
-        return f"below {high:g} {one['unit']}" if low is None else f"above {low:g} {one['unit']}"
-    return f"{low:g} to {high:g} {one['unit']}"

@@ -18,7 +18,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from scipy.stats import chi2
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.diagnose.confusion_sets import ALIKE
 from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
 from kempf.pipeline.diagnose.effect_score import (
@@ -34,7 +34,6 @@ from kempf.pipeline.diagnose.effect_score import (
 )
 from kempf.pipeline.diagnose.stretch_rows import Rows, rows_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
-from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.schemas.effect import Effect
 
 #: instants below which nothing is said: scores of fewer are not chi-squared

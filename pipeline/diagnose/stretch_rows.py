@@ -11,10 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.diagnose.nuisance import Nuisance, columns_of, nuisance, orthonormal, without_levels
 from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
-from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.estimate.sensitivity import N_HULL
 
 #: part of a variance below which rounding made it

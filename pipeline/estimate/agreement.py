@@ -13,10 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
 from kempf.pipeline.estimate.search.block_arrow import inverse
-from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.estimate.sensitivity import N_HULL
 
 #: with a smaller probability under one set of parameters the runs are said not to share it

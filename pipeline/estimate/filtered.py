@@ -6,13 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.estimate.filters.ekf import extended
 from kempf.pipeline.estimate.level_bounds import SIGMA_HIGH, SIGMA_LOW
 from kempf.pipeline.estimate.likelihood import INITIAL_STD, Likelihood
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.estimate.record.rudder_inflow import with_rudder_inflow
-from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.model.batch import LANES, MOST, ONE
 from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
 from kempf.pipeline.model.effect_model import EffectModel

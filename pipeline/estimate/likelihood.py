@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.estimate.filters.linear_kernel import (
     ERROR,
     LOG_F,
@@ -17,7 +17,6 @@ from kempf.pipeline.estimate.filters.linear_kernel import (
     no_trace,
 )
 from kempf.pipeline.estimate.record.record import Instants
-from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.model.discretise import LONGEST
 from kempf.schemas.model_spec import ModelSpec
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.iteration import SILENT, Iteration, Listener
@@ -16,7 +16,6 @@ from kempf.pipeline.estimate.level_bounds import level_bounds, to_intensities
 from kempf.pipeline.estimate.record.grid_run import GridRun, spread
 from kempf.pipeline.estimate.search.block_arrow import Arrow, inverse
 from kempf.pipeline.estimate.search.climb import Pass, Search, free, nobody
-from kempf.pipeline.estimate.search.scoring import Mask
 from kempf.pipeline.estimate.search.variances import climb_in_variances
 from kempf.pipeline.estimate.sensitivity import N_HULL, N_LEVELS, Point
 from kempf.pipeline.model.batch import MOST

@@ -11,11 +11,11 @@ from typing import Literal
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float, Nanoseconds
+from kempf.pipeline.channels.series import Float, Mask, Nanoseconds
 from kempf.pipeline.history import effects
 from kempf.pipeline.history.power import smallest_steps
 from kempf.pipeline.history.scan import Stretch, judge, stretch
-from kempf.pipeline.history.sets import Mask, ParameterHistory, occasions
+from kempf.pipeline.history.sets import ParameterHistory, occasions
 from kempf.pipeline.history.settings import ChangeSettings
 
 Kind = Literal["step", "drift"]

@@ -8,12 +8,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
+from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Nanoseconds
 from kempf.schemas.errors import DataRejected
-
-Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)

@@ -114,12 +114,8 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
     serve("/v/{vessel}/logs", None, lambda r: vessel.logs_document(desk, hers(r)))
     serve("/v/{vessel}/sets", None, lambda r: vessel.sets_document(desk, hers(r)))
     serve("/v/{vessel}", lambda r: vessel.gather(desk, hers(r)), lambda r: vessel.document(desk, hers(r)))
-    serve(
-        "/v/{vessel}/model",
-        lambda r: model.gather(desk, hers(r), *(r.query_params.get(name) for name in ("set", "h", "run", "beside"))),
-        lambda r: model.document(desk, hers(r), r.query_params.get("set"), r.query_params.get("h")),
-    )
     for place, page in (
+        ("model", model),
         ("predict", predict),
         ("explain", explain),
         ("what-if", what_if),
@@ -131,7 +127,7 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
     serve("/logs/{log_id}", lambda r: log.gather(desk, log_id(r), *_window(r)), lambda r: log.document(desk, log_id(r)))
     serve(
         "/segments/{segment_id}",
-        lambda r: manoeuvre.gather(desk, segment_id(r), *_window(r)),
+        lambda r: manoeuvre.gather(desk, segment_id(r), r.query_params),
         lambda r: manoeuvre.document(desk, segment_id(r)),
     )
     serve(

@@ -11,8 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.search.scoring import Mask
+from kempf.pipeline.channels.series import Float, Mask
 
 #: eigenvalues of a block with a unit diagonal below this count for nothing, their directions get no step
 _NOTHING = 1e-13

@@ -12,8 +12,8 @@ from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
-from kempf.pipeline.estimate.search.scoring import DenseSteps, Mask
+from kempf.pipeline.channels.series import Float, Mask
+from kempf.pipeline.estimate.search.scoring import DenseSteps
 
 #: with less log-likelihood than this to gain, steps tell more of the curvature than the expected information
 _NEAR = 5.0

@@ -6,11 +6,9 @@ Reference: Nocedal & Wright (2006), Numerical Optimization, ch. 6 and 10.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 
-Mask = NDArray[np.bool_]
 #: smallest pivot of a matrix with a unit diagonal that is solved as it is
 _DETERMINED = 1e-5
 

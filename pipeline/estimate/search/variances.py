@@ -14,10 +14,9 @@ from typing import Protocol
 
 import numpy as np
 
-from kempf.pipeline.channels.series import Float
+from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.estimate.search.block_arrow import Arrow, ArrowSteps
 from kempf.pipeline.estimate.search.climb import Pass, Search, climb_by, nobody
-from kempf.pipeline.estimate.search.scoring import Mask
 
 _HULL = 6
 #: share of itself by which a variance falls at most in a step far from the top: of several that are too large together

@@ -94,32 +94,58 @@ def opened(browser: Any, server: Server, **options: Any) -> Any:
     return tab
 
 
-def test_from_the_log_to_the_missing_effect_and_back(browser: Any, empty: Server, late_ingested: Path):
+def reach(tab: Any, selector: str, key: str = "Enter") -> None:
+    """Go to an element as one who has no mouse does, by the tab key, and press it."""
+    wanted = tab.wait_for_selector(selector)
+    for _ in range(400):
+        if wanted.evaluate("node => node === document.activeElement"):
+            tab.keyboard.press(key)
+            return
+        tab.keyboard.press("Tab")
+    raise AssertionError(f"the tab key does not reach {selector} on {tab.url}")
+
+
+def test_from_the_log_to_the_missing_effect_and_back_by_keyboard_alone(
+    browser: Any, empty: Server, late_ingested: Path
+):
     server = empty
     tab = opened(browser, server)
     tab.goto(server.start)
     assert "token" not in tab.url
-    tab.click("main a:has-text('take logs in')")
+    reach(tab, "main a:has-text('take logs in')")
     tab.set_input_files("[name=log]", late_ingested / "day.mcap")
     tab.set_input_files("[name=profile]", late_ingested / "late.yaml")
-    tab.check("[name=new_vessel]")
-    tab.click("button:has-text('Take them in')")
-    tab.click(f"main a:has-text('Go to {VESSEL}')")
-    tab.click("button:has-text('Identify')")
+    reach(tab, "[name=new_vessel]", "Space")
+    reach(tab, "button:has-text('Take them in')")
+    reach(tab, f"main a:has-text('Go to {VESSEL}')")
+    reach(tab, "button:has-text('Identify')")
     tab.wait_for_url(f"**/v/{VESSEL}")
-    tab.click("text=Model beside measurement")
-    # the worst stretch is one click away, and its window is in the address
-    tab.click("ol li a >> nth=0")
+    reach(tab, "text=Model beside measurement")
+    tab.wait_for_url("**/model")
+    # what the errors go with is shaded where it shows, in the run drawn and in the strips
+    assert tab.query_selector(".shade") is None
+    reach(tab, "a:has-text('go with rudder rate') >> nth=0")
+    tab.wait_for_selector("#drawn .shade")
+    assert "mark=" in tab.url and tab.query_selector("td .shade") is not None
+    accessible(tab)
+    # the worst stretch is one key away, and its window is in the address
+    tab.keyboard.press("n")
     tab.wait_for_selector("body[data-ready=yes]")
-    assert re.search(r"/segments/seg-\w+\?from=20.*&to=20", tab.url)
-    tab.go_back()
-    tab.click("button:has-text('Diagnose')")
+    assert re.search(r"/segments/seg-\w+\?from=20.*&to=20.*&worst=1", tab.url)
+    assert "1 of the" in tab.inner_text("main") and tab.query_selector("figure .line-predicted") is not None
+    accessible(tab)
+    tab.keyboard.press("n")
+    tab.wait_for_url("**&worst=2")
+    tab.keyboard.press("p")
+    tab.wait_for_url("**&worst=1")
+    reach(tab, "text=All of them")
+    reach(tab, "button:has-text('Diagnose')")
     tab.wait_for_url("**/jobs/job-**")
     tab.reload()  # in the middle of it
     tab.wait_for_url("**/diagnoses/dx-**")
     assert "rudder_lag" in tab.inner_text("main")
     found = tab.url
-    tab.click("button:has-text('Add rudder lag')")
+    reach(tab, "button:has-text('Add rudder lag')")
     tab.wait_for_url("**/ladder")
     rungs = server.json(f"/v/{VESSEL}/ladder.json")
     assert [rung["added"] for rung in rungs] == [None, "rudder_lag"]
@@ -127,26 +153,29 @@ def test_from_the_log_to_the_missing_effect_and_back(browser: Any, empty: Server
     assert len(tab.query_selector_all("tbody tr")) == 2
     accessible(tab)
     # before and after over one manoeuvre, flipped
-    tab.click("text=Model before and after")
+    reach(tab, "text=Model before and after")
+    tab.wait_for_url("**beside=**")
     accessible(tab)
     for words in ("after", "before", "both"):
         tab.keyboard.press("f")
         assert words in tab.inner_text("#flipped")
+    # what the errors went with is gone
+    assert tab.query_selector("a:has-text('errors of yaw rate go with rudder rate')") is None
     # her model lacks nothing any more: there is nothing to add
-    tab.click("button:has-text('Diagnose')")
+    reach(tab, "button:has-text('Diagnose')")
     tab.wait_for_url("**/diagnoses/dx-**")
     assert tab.url != found and tab.query_selector("button:has-text('Add')") is None
     accessible(tab)
     tab.goto(server.base + f"/v/{VESSEL}/ladder")
-    tab.click("button:has-text('Undo')")
+    reach(tab, "button:has-text('Undo')")
     tab.wait_for_url("**/ladder")
     tab.wait_for_selector("text=Only the plain model so far")
     assert [rung["added"] for rung in server.json(f"/v/{VESSEL}/ladder.json")] == [None]
     # added and undone once more: nothing is taken for done that was changed back since
     tab.goto(found)
-    tab.click("button:has-text('Add rudder lag')")
+    reach(tab, "button:has-text('Add rudder lag')")
     tab.wait_for_url("**/ladder")
-    tab.click("button:has-text('Undo')")
+    reach(tab, "button:has-text('Undo')")
     tab.wait_for_selector("text=Only the plain model so far")
     # the address of the diagnosis, opened by somebody who may only read: no button
     other = opened(browser, server)
@@ -226,4 +255,63 @@ def test_a_chart_is_zoomed_and_the_window_is_in_the_address(browser: Any, server
     again.goto(address)
     again.wait_for_selector("body[data-ready=yes]")
     assert again.inner_text(".state") == zoomed
+    assert server.complaints == []
+
+
+def test_two_instants_of_a_chart_are_compared_and_are_in_the_address(browser: Any, server: Server):
+    tab = opened(browser, server)
+    log = server.json(f"/v/{VESSEL}/logs.json")[0]["log_id"]
+    tab.goto(server.base + f"/logs/{log}?ch=heading,yaw_rate")
+    tab.wait_for_selector("body[data-ready=yes]")
+    tab.keyboard.press("ArrowRight")
+    tab.keyboard.press("a")
+    tab.wait_for_url("**at=20**")
+    tab.wait_for_selector("body[data-ready=yes]")
+    for _ in range(3):
+        tab.keyboard.press("Shift+ArrowRight")
+    tab.keyboard.press("b")
+    tab.wait_for_url("**at2=20**")
+    tab.wait_for_selector("body[data-ready=yes]")
+    head = tab.locator(".readout th[scope=col]").all_inner_texts()
+    row = dict(zip(head, tab.locator(".readout tbody tr").first.locator("th, td").all_inner_texts(), strict=True))
+    first, second, apart = (
+        float(next(v for k, v in row.items() if k.startswith(name))) for name in ("A,", "B,", "B - A")
+    )
+    assert row["channel"] == "heading" and 0.0 <= first < 360.0
+    assert apart == pytest.approx(second - first, abs=2e-2)
+    accessible(tab)
+    shown, address = tab.inner_text(".readout"), tab.url
+    again = opened(browser, server)
+    again.goto(address)
+    again.wait_for_selector("body[data-ready=yes]")
+    again.keyboard.press("t")
+    assert again.inner_text(".readout") == shown
+    assert server.complaints == []
+
+
+def test_keys_are_listed_and_can_be_switched_off(browser: Any, server: Server):
+    tab = opened(browser, server)
+    segment = server.json(f"/v/{VESSEL}/segments.json")[0]["segment_id"]
+    tab.goto(server.base + f"/segments/{segment}")
+    tab.wait_for_selector("body[data-ready=yes]")
+    tab.keyboard.press("?")
+    listed = tab.locator("#keys dt").all_inner_texts()
+    assert {"/", "0", "+", "-", "u", "a", "b", "]"} <= set(listed) and len(listed) == len(set(listed))
+    accessible(tab)
+    tab.keyboard.press("Escape")
+    tab.keyboard.press("]")
+    tab.wait_for_url(lambda url: segment not in url)
+    tab.wait_for_selector("body[data-ready=yes]")
+    # for those whom single letters get in the way, such as one who dictates
+    tab.click("#show-keys")
+    tab.check("#keys input")
+    tab.click("#keys button")
+    address = tab.url
+    for key in ("[", "?"):
+        tab.keyboard.press(key)
+    tab.reload()
+    tab.wait_for_selector("body[data-ready=yes]")
+    tab.keyboard.press("[")
+    tab.wait_for_timeout(300)
+    assert tab.url == address and not tab.is_visible("#keys")
     assert server.complaints == []

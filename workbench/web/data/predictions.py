@@ -9,19 +9,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from kempf.flows.fleet.state import VesselState, responsible_code
-from kempf.pipeline.channels.series import Float, Nanoseconds
+from kempf.flows.fleet.state import VesselState, fleet_state, responsible_code
+from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.pipeline.channels.series import Float, Mask
+from kempf.pipeline.compare.evidence import evidence_in
+from kempf.pipeline.predict.horizon import horizon_of
 from kempf.warehouse.canonical import canonical_json, sha256
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
+    from kempf.workbench.web.desk import Desk
 
 #: Horizons that the pages offer: as asked for, and in words.
 HORIZONS = (("1", "one step"), ("10s", "10 s ahead"), ("60s", "60 s ahead"), ("free", "free run"))
 #: predictions kept: the ones made longest ago go first
 _MOST = 200
-_CHANNELS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
+#: what the name of a column begins with that holds at which instants evidence shows
+MARK = "mark "
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,9 +39,18 @@ class KeptPrediction:
     #: By segment and column, shape (n,) each; see `kempf.pipeline.compare.run_series`.
     columns: dict[str, dict[str, Float]]
 
-    def time_utc_ns(self, segment_id: str) -> Nanoseconds:
-        """Return the instants of a manoeuvre, shape (n,)."""
-        return self.columns[segment_id]["time_utc_ns"].astype(np.int64)
+    def series(self, segment_id: str) -> dict[str, Float]:
+        """Return what was measured and predicted of a manoeuvre by column, without marks, shape (n,) each."""
+        return {name: values for name, values in self.columns[segment_id].items() if not name.startswith(MARK)}
+
+    def shows(self, evidence: str) -> bool:
+        """Return whether a piece of evidence shows at instants of its own."""
+        return any(f"{MARK}{evidence}" in columns for columns in self.columns.values())
+
+    def marked(self, segment_id: str, evidence: str | None) -> Mask | None:
+        """Return at which instants of a manoeuvre a piece of evidence shows, shape (n,); None where it is not its."""
+        found = self.columns[segment_id].get(f"{MARK}{evidence}")
+        return None if found is None else found.astype(np.bool_)
 
 
 def key_of(state: VesselState, set_id: str, horizon: str) -> str:
@@ -50,8 +65,13 @@ def keep(state: Path, key: str, found: Comparison) -> None:
 
     folder = state / "predictions"
     folder.mkdir(parents=True, exist_ok=True)
-    document = json.dumps({**found.show(), "where": found.where()})
-    columns = {f"{run.name}/{name}": values for run in found.runs for name, values in run_series(run).items()}
+    where = found.where()
+    document = json.dumps({**found.show(), "where": where})
+    columns: dict[str, NDArray[Any]] = {
+        f"{run.name}/{name}": values for run in found.runs for name, values in run_series(run).items()
+    }
+    for evidence, by_run in found.marks(evidence_in(where)).items():
+        columns |= {f"{name}/{MARK}{evidence}": inside for name, inside in by_run.items()}
     part = folder / f"{key}.{os.getpid()}.part"
     with part.open("wb") as file:
         np.savez(file, allow_pickle=False, document=np.frombuffer(document.encode(), dtype=np.uint8), **columns)
@@ -59,6 +79,24 @@ def keep(state: Path, key: str, found: Comparison) -> None:
     held = sorted(folder.glob("*.npz"), key=lambda one: (one.stat().st_mtime_ns, one.name))
     for one in held[:-_MOST]:
         one.unlink()
+
+
+def kept_of(
+    desk: Desk, vessel: str, asked_set: str | None, asked_horizon: str | None
+) -> tuple[str, str, KeptPrediction | None]:
+    """Return which set and horizon of a vessel are asked for, and the prediction with them; None where none is kept.
+
+    Raises
+    ------
+    NotFound
+        ``no_parameter_set``.
+    UsageError
+        ``set_of_another_vessel``, ``horizon_unknown``.
+    """
+    chosen, _ = chosen_set(desk.warehouse, vessel, asked_set or None)
+    horizon = horizon_of(asked_horizon or "free").name
+    state = fleet_state(desk.warehouse, [vessel])[vessel]
+    return chosen.parameter_set_id, horizon, kept(desk.state, key_of(state, chosen.parameter_set_id, horizon))
 
 
 def kept(state: Path, key: str) -> KeptPrediction | None:

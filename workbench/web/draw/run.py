@@ -7,8 +7,10 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 from markupsafe import Markup
 
-from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
+from kempf.workbench.web.data.turns import within_a_turn
 from kempf.workbench.web.draw.scale import ticks
+from kempf.workbench.web.draw.shades import shades
 from kempf.workbench.web.draw.svg import drawing, element
 
 _WIDTH, _PANEL, _LEFT, _GAP = 760.0, 78.0, 62.0, 20.0
@@ -24,7 +26,9 @@ _SHOWN = (
 )
 
 
-def draw_run(columns: Mapping[str, Float], before: Mapping[str, Float] | None = None) -> Markup:
+def draw_run(
+    columns: Mapping[str, Float], before: Mapping[str, Float] | None = None, marked: Mask | None = None
+) -> Markup:
     """Return the figure of a run.
 
     Parameters
@@ -33,24 +37,35 @@ def draw_run(columns: Mapping[str, Float], before: Mapping[str, Float] | None = 
         See `kempf.pipeline.compare.run_series.run_series`.
     before : mapping, optional
         The same run predicted with another set; left out where its instants are other ones.
+    marked : ndarray of bool, shape (n,), optional
+        Instants that are shaded in every panel.
     """
     if before is not None and not np.array_equal(before["time_utc_ns"], columns["time_utc_ns"]):
         before = None
     time = (columns["time_utc_ns"] - columns["time_utc_ns"][0]).astype(np.float64) / SECOND_NS
     panels = []
     for name, unit, words, factor in _SHOWN:
-        measured, predicted = columns[f"{name}_{unit}"] * factor, columns[f"{name}_predicted_{unit}"] * factor
+        measured, predicted = _shown(columns, name, unit, factor)
         lines = [(measured, "measured")]
         if before is not None:
-            lines.append((before[f"{name}_predicted_{unit}"] * factor, "before"))
+            lines.append((_shown(before, name, unit, factor)[1], "before"))
         lines.append((predicted, "predicted"))
         if name != "heading":
             # what is left beside a heading of 300 deg would lie off the panel
             lines.append((measured - predicted, "left"))
         panels.append((words, lines))
     beside = ", predicted by the other set (dashed)" if before is not None else ""
-    title = f"Measured (dots), predicted (line){beside} and the difference (thin line)"
-    return _figure(time, columns["rudder_angle_rad"], panels, title)
+    shaded = "" if marked is None else ", the instants of the evidence shaded"
+    title = f"Measured (dots), predicted (line){beside} and the difference (thin line){shaded}"
+    return _figure(time, columns["rudder_angle_rad"], panels, title, marked)
+
+
+def _shown(columns: Mapping[str, Float], name: str, unit: str, factor: float) -> tuple[Float, Float]:
+    """Return what was measured and what is predicted in the unit shown."""
+    measured, predicted = columns[f"{name}_{unit}"], columns[f"{name}_predicted_{unit}"]
+    if name == "heading":
+        measured, predicted = within_a_turn(measured), within_a_turn(predicted, measured)
+    return factor * measured, factor * predicted
 
 
 def draw_panels(
@@ -77,12 +92,20 @@ def draw_panels(
     return _figure(time_s, measured["rudder_angle_rad"], panels, words)
 
 
-def _figure(time: Float, rudder_rad: Float, panels: Sequence[tuple[str, list[Line]]], title: str) -> Markup:
+def _figure(
+    time: Float,
+    rudder_rad: Float,
+    panels: Sequence[tuple[str, list[Line]]],
+    title: str,
+    marked: Mask | None = None,
+) -> Markup:
     """Draw the rudder and below it every panel whose first line was measured."""
     end = float(time[-1])
     shown = [(words, lines) for words, lines in panels if np.isfinite(lines[0][0]).any()]
     parts, top = [], 0.0
     for words, lines in (("rudder, deg", [(_DEG * rudder_rad, "rudder")]), *shown):
+        if marked is not None:
+            parts += shades(time, marked, _LEFT, (_WIDTH - _LEFT - 12.0) / max(end, 1e-9), top, _PANEL)
         parts += _panel(top, words, time, end, lines)
         top += _PANEL + _GAP
     return drawing(_WIDTH, top + 4.0, title, *parts, *_seconds(top, end))

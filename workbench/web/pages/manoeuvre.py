@@ -2,20 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
+
+import numpy as np
+from markupsafe import Markup
 
 from kempf.warehouse import aliases, logs, notes, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.data.predictions import KeptPrediction, kept_of
 from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.draw.run import draw_run
 from kempf.workbench.web.pages.log import span_of
+from kempf.workbench.web.pages.model import stretch_address, worst_stretches
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.pages.series import offered
 from kempf.workbench.web.window import window
 
 #: of a manoeuvre's length, shown before and after it
 _MARGIN = 0.05
+#: instants that make a drawing
+_FEWEST = 3
 
 
 def document(desk: Desk, segment_id: str) -> dict[str, Any]:
@@ -25,8 +34,15 @@ def document(desk: Desk, segment_id: str) -> dict[str, Any]:
     return next(entry for entry in listed.documents if entry["segment_id"] == one.segment_id)
 
 
-def gather(desk: Desk, segment_id: str, asked_from: str | None, asked_to: str | None) -> Page:
-    """Return the page of a manoeuvre."""
+def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
+    """Return the page of a manoeuvre.
+
+    Parameters
+    ----------
+    asked : mapping
+        ``from`` and ``to``; ``set`` and ``h``, the model beside it and its horizon; ``worst``, which of the worst
+        stretches of that model this window is, from 1.
+    """
     shown = document(desk, segment_id)
     row = logs.of_ingest(desk.warehouse, shown["ingest_id"])
     listed = segments.found_in(desk.warehouse, row.vessel)
@@ -34,7 +50,8 @@ def gather(desk: Desk, segment_id: str, asked_from: str | None, asked_to: str | 
     one = listed[place]
     beyond = int(_MARGIN * (one.end_utc_ns - one.start_utc_ns))
     first, last = max(one.start_utc_ns - beyond, row.start_utc_ns), min(one.end_utc_ns + beyond, row.end_utc_ns)
-    begin, end = window(asked_from, asked_to, first, last)
+    begin, end = window(asked.get("from"), asked.get("to"), first, last)
+    current = aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel)
     content = {
         "one": shown,
         "log_id": row.log_id,
@@ -42,11 +59,48 @@ def gather(desk: Desk, segment_id: str, asked_from: str | None, asked_to: str | 
         "spans": [span_of(one)],
         "window": (iso_utc(begin), iso_utc(end)),
         "whole": (iso_utc(first), iso_utc(last)),
-        "current": aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel),
+        "current": current,
+        "drawn": None,
+        "stretch": None,
         "notes": [n.show() for n in notes.of_vessel(desk.warehouse, row.vessel) if n.subject_id == one.segment_id],
         "before": listed[place - 1].segment_id if place else None,
         "after": listed[place + 1].segment_id if place + 1 < len(listed) else None,
     }
+    if current:
+        set_id, horizon, made = kept_of(desk, row.vessel, asked.get("set"), asked.get("h"))
+        content |= {"set_id": set_id, "horizon": horizon, "drawn": _drawn(made, one.segment_id, begin, end)}
+        if made is not None:
+            content["stretch"] = _stretch(made, set_id, horizon, asked.get("worst", ""))
     title = f"{span_of(one)['words']}, {iso_utc(one.start_utc_ns)[:16].replace('T', ' ')} UTC"
     above = ((row.vessel, of_vessel(row.vessel)), (row.file_name, f"/logs/{row.log_id}"))
     return Page("manoeuvre.html", title, content, above)
+
+
+def _drawn(made: KeptPrediction | None, segment_id: str, begin: int, end: int) -> Markup | None:
+    """Return what was measured and what is predicted of a window; None where it is not predicted there."""
+    if made is None or segment_id not in made.columns:
+        return None
+    columns = made.series(segment_id)
+    inside = (columns["time_utc_ns"] >= begin) & (columns["time_utc_ns"] <= end)
+    if np.count_nonzero(inside) < _FEWEST:
+        return None
+    return draw_run({name: values[inside] for name, values in columns.items()})
+
+
+def _stretch(made: KeptPrediction, set_id: str, horizon: str, asked: str) -> dict[str, Any] | None:
+    """Return which of a model's worst stretches is shown, with the ways to the ones beside it."""
+    listed = worst_stretches(made.document["where"])
+    if not (asked.isdigit() and 1 <= int(asked) <= len(listed)):
+        return None
+    place = int(asked) - 1
+    ways = [stretch_address(one, set_id, horizon, k + 1) for k, one in enumerate(listed)]
+    one = listed[place]
+    return {
+        "words": f"{one['channel'].replace('_', ' ')}, {one['measure']} ({one['sample']})",
+        "number": place + 1,
+        "of": len(listed),
+        "set": set_id,
+        "horizon": horizon,
+        "before": ways[place - 1] if place else None,
+        "after": ways[place + 1] if place + 1 < len(ways) else None,
+    }

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.schemas.channels import CHANNELS
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import logs
-from kempf.workbench.web.data.bins import reduced
+from kempf.workbench.web.data.bins import Shown, reduced
 from kempf.workbench.web.data.frames import encoded
+from kempf.workbench.web.data.turns import within_a_turn
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.window import window
 
@@ -56,7 +58,12 @@ def frame(desk: Desk, log_id: str, channels: str, asked_from: str | None, asked_
             "Choose among these.",
         )
     few = max(1, min(bins, MOST_BINS))
-    return encoded(begin, end, {name: reduced(found.series[name], begin, end, few) for name in names})
+    return encoded(begin, end, {name: _within(name, reduced(found.series[name], begin, end, few)) for name in names})
+
+
+def _within(name: str, shown: Shown) -> Shown:
+    circle = CHANNELS[name].wrap == "circle"
+    return replace(shown, value=within_a_turn(shown.value)) if circle else shown
 
 
 def offered(found: Instruments) -> list[dict[str, Any]]:

@@ -45,8 +45,7 @@
       for (const form of document.querySelectorAll("form[data-window]")) {
         form.querySelector("[data-take]").addEventListener("click", () => { form.elements.from.value = iso(this.span[0]); form.elements.to.value = iso(this.span[1]); });
       }
-      for (const button of node.querySelectorAll("button[data-do]")) button.addEventListener("click", () => this.do(button.dataset.do));
-      document.addEventListener("keydown", event => this.key(event));
+      for (const button of node.querySelectorAll("button[data-do]")) button.addEventListener("click", () => { const far = button.dataset.shift === "yes"; button.dataset.shift = ""; this.do(button.dataset.do, far); });
       addEventListener("popstate", () => { this.fromAddress(); this.load(); });
       this.width = this.panels.clientWidth;
       new ResizeObserver(() => {
@@ -64,6 +63,7 @@
         for (const box of this.boxes) box.checked = wanted.includes(box.value);
       }
       this.si = asked.get("units") === "si";
+      this.at = ["at", "at2"].map(name => asked.get(name) ? seconds(asked.get(name)) : null);
     }
 
     moved(replace = false) {
@@ -72,6 +72,7 @@
       asked.set("to", iso(this.span[1]));
       asked.set("ch", this.channels().join(","));
       if (this.si) asked.set("units", "si"); else asked.delete("units");
+      ["at", "at2"].forEach((name, k) => { if (this.at[k] === null) asked.delete(name); else asked.set(name, iso(this.at[k])); });
       history[replace ? "replaceState" : "pushState"](null, "", "?" + asked.toString().replaceAll("%2C", ",").replaceAll("%3A", ":"));
       this.load();
     }
@@ -173,6 +174,18 @@
           context.stroke();
         }
       }
+      context.setLineDash([]);
+      this.at.forEach((at, k) => {
+        if (at === null) return;
+        const x = Math.round(u.valToPos(at, "x", true)) + 0.5;
+        context.strokeStyle = context.fillStyle = colour("--limit");
+        context.beginPath();
+        context.moveTo(x, top);
+        context.lineTo(x, top + height);
+        context.stroke();
+        context.font = `bold ${11 * devicePixelRatio}px system-ui, sans-serif`;
+        context.fillText("AB"[k], x + 3 * devicePixelRatio, top + height - 4 * devicePixelRatio);
+      });
       context.restore();
     }
 
@@ -185,31 +198,58 @@
 
     zoom(from, to) { this.span = [from, to]; this.clip(); this.moved(); }
 
-    do(what) {
+    do(what, far = false) {
       const [from, to] = this.span, width = to - from, middle = (from + to) / 2;
       if (what === "all") this.zoom(...this.whole);
       else if (what === "in") this.zoom(middle - width / 4, middle + width / 4);
       else if (what === "out") this.zoom(middle - width, middle + width);
       else if (what === "earlier") this.zoom(from - width / 2, to - width / 2);
       else if (what === "later") this.zoom(from + width / 2, to + width / 2);
+      else if (what === "left" || what === "right") this.step((what === "left" ? -1 : 1) * (far ? 10 : 1));
+      else if (what === "a" || what === "b") this.set(what === "a" ? 0 : 1);
       else if (what === "units") { this.si = !this.si; this.moved(true); }
       else if (what === "table") { if (this.readout.hasChildNodes()) this.readout.replaceChildren(); else this.table(); }
     }
 
+    // the instant of the cursor, null where it is not in the panels
+    cursor() {
+      const plot = this.plots[0], k = plot ? plot.cursor.idx : null;
+      return k === null || k === undefined ? null : plot.data[0][k];
+    }
+
+    set(which) {
+      const at = this.cursor();
+      // by whole milliseconds, as the address has it
+      this.at[which] = Math.floor(1000 * (at === null ? (this.span[0] + this.span[1]) / 2 : at)) / 1000;
+      if (!this.readout.hasChildNodes()) this.table();
+      this.moved(true);
+    }
+
+    // samples as they are, never in between: the one at or next after an instant
+    value(one, at) {
+      if (at === null) return null;
+      let k = one.x.findIndex(x => x >= at);
+      if (k < 0) k = one.x.length - 1;
+      return one.y[k] === undefined ? null : one.y[k];
+    }
+
     table() {
       const table = document.createElement("table"), head = table.createTHead().insertRow(), body = table.createTBody();
-      const at = this.plots[0] && this.plots[0].cursor.idx !== null && this.plots[0].cursor.idx !== undefined ? this.plots[0].data[0][this.plots[0].cursor.idx] : null;
-      const titles = ["channel", "unit", at === null ? "first value" : `at ${iso(at).slice(11, 23)}`, "smallest", "largest", "values"];
+      const now = this.cursor(), [a, b] = this.at, clock = at => iso(at).slice(11, 23);
+      const titles = ["channel", "unit", ...(now === null ? [] : [`at ${clock(now)}`]), ...(a === null ? [] : [`A, ${clock(a)}`]), ...(b === null ? [] : [`B, ${clock(b)}`]), ...(a === null || b === null ? [] : [`B - A, in ${short(b - a)} s`]), "mean", "rms", "smallest", "largest", "values"];
       for (const words of titles) { const th = document.createElement("th"); th.scope = "col"; th.textContent = words; head.append(th); }
       for (const one of this.series) {
         const [factor, unit] = this.unit(one.name), row = body.insertRow(), inside = one.y.filter((v, k) => v !== null && one.x[k] >= this.span[0] && one.x[k] <= this.span[1]).map(v => v * factor);
-        let k = at === null ? 0 : one.x.findIndex(x => x >= at);
-        if (k < 0) k = one.x.length - 1;
+        const [here, first, second] = [now, a, b].map(at => { const v = this.value(one, at); return v === null ? null : v * factor; });
+        // the smallest and largest of stretches are drawn where there are too many: no mean goes by them
+        const whole = one.total < 1.5 * one.drawn && inside.length > 0, sum = power => inside.reduce((t, v) => t + v ** power, 0) / inside.length;
         const name = document.createElement("th");
         name.scope = "row";
         name.textContent = one.name.replaceAll("_", " ");
         row.append(name);
-        for (const words of [unit, one.y[k] === null || one.y[k] === undefined ? "-" : short(one.y[k] * factor), inside.length ? short(Math.min(...inside)) : "-", inside.length ? short(Math.max(...inside)) : "-", String(one.total)]) row.insertCell().textContent = words;
+        const apart = first === null || second === null ? null : second - first;
+        const cells = [unit, ...(now === null ? [] : [short(here)]), ...(a === null ? [] : [short(first)]), ...(b === null ? [] : [short(second)]), ...(a === null || b === null ? [] : [short(apart)]), whole ? short(sum(1)) : "zoom in", whole ? short(Math.sqrt(sum(2))) : "zoom in", inside.length ? short(Math.min(...inside)) : "-", inside.length ? short(Math.max(...inside)) : "-", String(one.total)];
+        for (const words of cells) row.insertCell().textContent = words;
       }
       this.readout.replaceChildren(table);
     }
@@ -220,13 +260,6 @@
       const x = plot.data[0], now = plot.cursor.idx === null || plot.cursor.idx === undefined ? 0 : plot.cursor.idx;
       const next = Math.min(x.length - 1, Math.max(0, now + by));
       plot.setCursor({ left: plot.valToPos(x[next], "x"), top: 10 }, true, true);
-    }
-
-    key(event) {
-      if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName) && event.target.type !== "checkbox") return;
-      const body = document.body.dataset;
-      const does = { "+": () => this.do("in"), "-": () => this.do("out"), "0": () => this.do("all"), "u": () => this.do("units"), "ArrowLeft": () => this.step(event.shiftKey ? -10 : -1), "ArrowRight": () => this.step(event.shiftKey ? 10 : 1), "[": () => { if (body.before) location.assign(body.before); }, "]": () => { if (body.after) location.assign(body.after); }, "/": () => document.getElementById("go").focus() }[event.key];
-      if (does) { event.preventDefault(); does(); }
     }
   }
 

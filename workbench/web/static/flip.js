@@ -1,5 +1,5 @@
 "use strict";
-// Shows the prediction after an effect was added, before it, or both; the key f does it too.
+// Shows the prediction after an effect was added, before it, or both.
 (() => {
   const button = document.getElementById("flip"), figure = document.getElementById("drawn"), said = document.getElementById("flipped");
   if (!button) return;
@@ -7,8 +7,4 @@
   let at = 0;
   function flip() { at = (at + 1) % states.length; figure.className = states[at][0]; said.textContent = states[at][1]; }
   button.addEventListener("click", flip);
-  document.addEventListener("keydown", event => {
-    if (event.key !== "f" || event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|TEXTAREA|SELECT)$/.test(event.target.tagName)) return;
-    flip();
-  });
 })();
