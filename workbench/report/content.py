@@ -102,6 +102,21 @@ class PictureBlock:
 
 
 @dataclass(frozen=True)
+class ChartBlock:
+    """A figure that can be zoomed where scripts run; elsewhere, and in print, the picture."""
+
+    label: str
+    picture: PictureBlock
+    #: As `kempf.workbench.web.data.frames.encoded` makes it.
+    frame: bytes
+    #: ``name``, ``unit``, ``words``, ``source``, ``shown``.
+    channels: Sequence[Mapping[str, Any]]
+    #: First and last instant, UTC in ISO 8601.
+    window: tuple[str, str]
+    kind: Literal["chart"] = "chart"
+
+
+@dataclass(frozen=True)
 class TableBlock:
     """A table; the columns ``numeric`` are set to the right."""
 
@@ -129,4 +144,4 @@ class TextBlock:
     kind: Literal["text"] = "text"
 
 
-Block = PictureBlock | TableBlock | HeadingBlock | TextBlock
+Block = PictureBlock | ChartBlock | TableBlock | HeadingBlock | TextBlock

@@ -19,6 +19,7 @@ from kempf.workbench.figures import (
     diagnosis_zigzag,
 )
 from kempf.workbench.figures.diagnosis_style import bytes_of
+from kempf.workbench.report.charts import chart_of
 from kempf.workbench.report.content import (
     Block,
     Cell,
@@ -146,10 +147,15 @@ def prediction(content: ReportContent) -> list[Block]:
     for one in _held_out_first(content):
         made += [
             HeadingBlock(one.label, SampleBadge(one.evidence.held_out)),
-            _picture(
-                diagnosis_overlay.draw_overlay(one.evidence, first, last),
-                diagnosis_overlay.describe_overlay(one.evidence, one.label, first, last),
-                f"{one.short}, measured over predicted, horizon free run; the rudder beneath.",
+            chart_of(
+                one.evidence,
+                one.label,
+                _picture(
+                    diagnosis_overlay.draw_overlay(one.evidence, first, last),
+                    diagnosis_overlay.describe_overlay(one.evidence, one.label, first, last),
+                    f"{one.short}, measured (dots) over predicted, horizon free run, with the rudder: "
+                    f"by the {last} (line){f', by the {first} (dashed)' if one.evidence.after is not None else ''}.",
+                ),
             ),
         ]
     return made

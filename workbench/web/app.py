@@ -124,6 +124,7 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
         serve_answer(place, page.gather, page.document)
     serve("/compare", lambda r: compare.gather(desk, *_both(r)), lambda r: compare.document(desk, *_both(r)))
     app.add_route("/logs/{log_id}/series", lambda r: _series(desk, r))
+    app.add_route("/segments/{segment_id}/predicted", lambda r: _predicted(desk, r))
     serve("/logs/{log_id}", lambda r: log.gather(desk, log_id(r), *_window(r)), lambda r: log.document(desk, log_id(r)))
     serve(
         "/segments/{segment_id}",
@@ -208,12 +209,22 @@ def _window(request: Request) -> tuple[str | None, str | None]:
 
 
 def _series(desk: Desk, request: Request) -> Response:
-    asked = request.query_params
-    bins = asked.get("bins", "1000")
+    wanted = request.query_params.get("ch", "")
+    content = series.frame(desk, request.path_params["log_id"], wanted, *_window(request), _bins(request))
+    return Response(content, media_type="application/octet-stream")
+
+
+def _predicted(desk: Desk, request: Request) -> Response:
+    name = request.path_params["segment_id"]
+    content = series.predicted_frame(desk, name, request.query_params, _bins(request))
+    return Response(content, media_type="application/octet-stream")
+
+
+def _bins(request: Request) -> int:
+    bins = request.query_params.get("bins", "1000")
     if not (bins.isdigit() and len(bins) < 6):
         raise UsageError("bins_unreadable", f"{bins[:40]!r} is no number of bins.", "Give a whole number.")
-    content = series.frame(desk, request.path_params["log_id"], asked.get("ch", ""), *_window(request), int(bins))
-    return Response(content, media_type="application/octet-stream")
+    return int(bins)
 
 
 def _shown(request: Request, page: Page) -> Response:
@@ -240,7 +251,7 @@ def _refused(request: Request, error: Exception) -> Response:
     if found.code == "internal":
         traceback.print_exception(found, file=sys.stderr)
     status = _STATUS_OF_CODE.get(found.code, _STATUS[found.exit_code])
-    if request.url.path.endswith((".json", "/series")):
+    if request.url.path.endswith((".json", "/series", "/predicted")):
         return Response(json_text(found.to_json()) + "\n", status, media_type="application/json")
     page = Page("error.html", "That did not work", {"error": found, "status": status})
     return HTMLResponse(_html(request, page), status)

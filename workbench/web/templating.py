@@ -19,6 +19,11 @@ def rendered(template: str, **content: Any) -> str:
     return _templates().get_template(template).render(**content)
 
 
+def words(name: str) -> str:
+    """Return a name of the code in words."""
+    return name.replace("_", " ")
+
+
 @cache
 def _templates() -> Environment:
     made = Environment(
@@ -31,7 +36,7 @@ def _templates() -> Environment:
     filters: dict[str, Callable[..., Any]] = {
         "number": number,
         "minute": lambda iso: iso[:16].replace("T", " "),
-        "words": lambda name: name.replace("_", " "),
+        "words": words,
         "percent": lambda share: "-" if share is None else number(100.0 * share, 3),
         "vessel_address": of_vessel,
         "as_asked": as_asked,

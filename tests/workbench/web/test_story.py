@@ -17,7 +17,10 @@ from typing import Any
 import httpx
 import pytest
 
-from tests.late import VESSEL
+from kempf.flows.jobs.standing_model import PLAIN, Own
+from kempf.warehouse.store import Warehouse
+from kempf.workbench.report.build import make_report
+from tests.late import VESSEL, some_effects
 from tests.workbench.driving import START, environment
 
 BROWSERS = ("chromium", "chromium-browser", "google-chrome", "chrome")
@@ -132,7 +135,8 @@ def test_from_the_log_to_the_missing_effect_and_back_by_keyboard_alone(
     tab.keyboard.press("n")
     tab.wait_for_selector("body[data-ready=yes]")
     assert re.search(r"/segments/seg-\w+\?from=20.*&to=20.*&worst=1", tab.url)
-    assert "1 of the" in tab.inner_text("main") and tab.query_selector("figure .line-predicted") is not None
+    assert "1 of the" in tab.inner_text("main")
+    assert tab.query_selector(".panel[aria-label^='yaw rate, deg/s (measured, predicted)']") is not None
     accessible(tab)
     tab.keyboard.press("n")
     tab.wait_for_url("**&worst=2")
@@ -315,3 +319,41 @@ def test_keys_are_listed_and_can_be_switched_off(browser: Any, server: Server):
     tab.wait_for_timeout(300)
     assert tab.url == address and not tab.is_visible("#keys")
     assert server.complaints == []
+
+
+@pytest.mark.parametrize(("scheme", "width"), [("light", 1280), ("dark", 390)])
+def test_a_report_zooms_without_a_network_and_is_printed_with_its_pictures(
+    browser: Any, late_diagnosed: Path, tmp_path: Path, scheme: str, width: int
+):
+    file = tmp_path / "late.html"
+    with some_effects():
+        report = make_report(Warehouse(str(copytree(late_diagnosed / "w", tmp_path / "w"))), VESSEL, PLAIN, Own())
+    file.write_text(report.html, encoding="utf-8")
+    size = {"width": width, "height": 900}
+    tab = browser.new_context(viewport=size, color_scheme=scheme, offline=True).new_page()
+    asked: list[str] = []
+    complaints: list[str] = []
+    tab.on("request", lambda request: asked.append(request.url))
+    tab.on("console", lambda message: complaints.append(message.text))
+    tab.on("pageerror", lambda error: complaints.append(str(error)))
+    tab.goto(file.as_uri())
+    first = tab.locator(".zoomable").first
+    first.scroll_into_view_if_needed()
+    first.locator(".uplot").first.wait_for()
+    labels = first.locator(".panel").evaluate_all("all => all.map(one => one.getAttribute('aria-label'))")
+    assert ["(measured, before, predicted)" in label for label in labels] == [False, True, True, True]
+    whole = first.locator(".state").inner_text()
+    panel = first.locator(".u-over").first.bounding_box()
+    tab.mouse.move(panel["x"] + 0.25 * panel["width"], panel["y"] + 40)
+    tab.mouse.down()
+    tab.mouse.move(panel["x"] + 0.5 * panel["width"], panel["y"] + 40, steps=4)
+    tab.mouse.up()
+    assert first.locator(".state").inner_text() != whole
+    first.locator("button:has-text('Show all')").click()
+    assert first.locator(".state").inner_text() == whole and tab.url == file.as_uri()
+    accessible(tab)
+    picture = first.locator("img")
+    assert not picture.is_visible()
+    tab.emulate_media(media="print")
+    assert picture.is_visible() and not first.locator(".chart").is_visible()
+    assert complaints == [] and [url for url in asked if not url.startswith(("file:", "data:"))] == []

@@ -5,26 +5,20 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-from markupsafe import Markup
-
 from kempf.warehouse import aliases, logs, notes, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel
-from kempf.workbench.web.data.predictions import KeptPrediction, kept_of
+from kempf.workbench.web.data.predictions import HORIZONS, KeptPrediction, kept_of
 from kempf.workbench.web.desk import Desk
-from kempf.workbench.web.draw.run import draw_run
 from kempf.workbench.web.pages.log import span_of
 from kempf.workbench.web.pages.model import stretch_address, worst_stretches
 from kempf.workbench.web.pages.page import Page
-from kempf.workbench.web.pages.series import offered
+from kempf.workbench.web.pages.series import derived, offered
 from kempf.workbench.web.window import window
 
 #: of a manoeuvre's length, shown before and after it
 _MARGIN = 0.05
-#: instants that make a drawing
-_FEWEST = 3
 
 
 def document(desk: Desk, segment_id: str) -> dict[str, Any]:
@@ -52,7 +46,7 @@ def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
     first, last = max(one.start_utc_ns - beyond, row.start_utc_ns), min(one.end_utc_ns + beyond, row.end_utc_ns)
     begin, end = window(asked.get("from"), asked.get("to"), first, last)
     current = aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel)
-    content = {
+    content: dict[str, Any] = {
         "one": shown,
         "log_id": row.log_id,
         "channels": offered(desk.channels.of(row.ingest_id)),
@@ -60,7 +54,7 @@ def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
         "window": (iso_utc(begin), iso_utc(end)),
         "whole": (iso_utc(first), iso_utc(last)),
         "current": current,
-        "drawn": None,
+        "predicted": None,
         "stretch": None,
         "notes": [n.show() for n in notes.of_vessel(desk.warehouse, row.vessel) if n.subject_id == one.segment_id],
         "before": listed[place - 1].segment_id if place else None,
@@ -68,23 +62,14 @@ def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
     }
     if current:
         set_id, horizon, made = kept_of(desk, row.vessel, asked.get("set"), asked.get("h"))
-        content |= {"set_id": set_id, "horizon": horizon, "drawn": _drawn(made, one.segment_id, begin, end)}
-        if made is not None:
+        if made is not None and one.segment_id in made.columns:
+            beside = f"/segments/{one.segment_id}/predicted?set={set_id}&h={horizon}"
+            content |= {"predicted": beside, "set_id": set_id, "horizon": dict(HORIZONS)[horizon]}
+            content |= {"channels": [*content["channels"], derived()]}
             content["stretch"] = _stretch(made, set_id, horizon, asked.get("worst", ""))
     title = f"{span_of(one)['words']}, {iso_utc(one.start_utc_ns)[:16].replace('T', ' ')} UTC"
     above = ((row.vessel, of_vessel(row.vessel)), (row.file_name, f"/logs/{row.log_id}"))
     return Page("manoeuvre.html", title, content, above)
-
-
-def _drawn(made: KeptPrediction | None, segment_id: str, begin: int, end: int) -> Markup | None:
-    """Return what was measured and what is predicted of a window; None where it is not predicted there."""
-    if made is None or segment_id not in made.columns:
-        return None
-    columns = made.series(segment_id)
-    inside = (columns["time_utc_ns"] >= begin) & (columns["time_utc_ns"] <= end)
-    if np.count_nonzero(inside) < _FEWEST:
-        return None
-    return draw_run({name: values[inside] for name, values in columns.items()})
 
 
 def _stretch(made: KeptPrediction, set_id: str, horizon: str, asked: str) -> dict[str, Any] | None:

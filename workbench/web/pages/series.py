@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.series import Series
 from kempf.schemas.channels import CHANNELS
-from kempf.schemas.errors import UsageError
-from kempf.warehouse import logs
+from kempf.schemas.errors import NotFound, UsageError
+from kempf.warehouse import logs, segments
 from kempf.workbench.web.data.bins import Shown, reduced
 from kempf.workbench.web.data.frames import encoded
+from kempf.workbench.web.data.predictions import kept_of
 from kempf.workbench.web.data.turns import within_a_turn
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.window import window
@@ -19,6 +24,9 @@ from kempf.workbench.web.window import window
 MOST_BINS, MOST_CHANNELS = 1500, 12
 #: those that a page begins with, as far as the log has them
 FIRST = ("rudder_angle", "rudder_order", "heading", "yaw_rate", "speed_through_water", "speed_over_ground")
+#: what a model predicts, with the unit of its columns; the last in no log
+LATERAL = "lateral_speed"
+PREDICTED = {"yaw_rate": "rad_s", "heading": "rad", LATERAL: "m_s"}
 #: in a track and not in a chart
 _PLACES = ("latitude", "longitude")
 
@@ -61,6 +69,41 @@ def frame(desk: Desk, log_id: str, channels: str, asked_from: str | None, asked_
     return encoded(begin, end, {name: _within(name, reduced(found.series[name], begin, end, few)) for name in names})
 
 
+def predicted_frame(desk: Desk, segment_id: str, asked: Mapping[str, str], bins: int) -> bytes:
+    """Return what a kept prediction says of a manoeuvre over a window, as ``channel:predicted``.
+
+    With it the lateral speed as it was measured, which no log holds (eq. (18) of the paper).
+
+    Parameters
+    ----------
+    asked : mapping
+        ``set``, ``h`` (horizon), ``from``, ``to``.
+
+    Raises
+    ------
+    NotFound
+        ``no_segment``, ``no_prediction``.
+    UsageError
+        ``instant_unreadable``, ``window_empty``.
+    """
+    one = segments.by_prefix(desk.warehouse, segment_id)
+    _, _, made = kept_of(desk, one.vessel, asked.get("set"), asked.get("h"))
+    if made is None or one.segment_id not in made.columns:
+        raise NotFound("no_prediction", "This manoeuvre is not predicted.", "Predict on the model's page.")
+    row = logs.of_ingest(desk.warehouse, one.ingest_id)
+    begin, end = window(asked.get("from"), asked.get("to"), row.start_utc_ns, row.end_utc_ns)
+    few, columns = max(1, min(bins, MOST_BINS)), made.series(one.segment_id)
+    names = {LATERAL: f"{LATERAL}_{PREDICTED[LATERAL]}"}
+    names |= {f"{name}:predicted": f"{name}_predicted_{unit}" for name, unit in PREDICTED.items()}
+    shown = {}
+    for name, column in names.items():
+        known = np.isfinite(columns[column])
+        series = Series(columns["time_utc_ns"][known].astype(np.int64), columns[column][known])
+        if len(series):
+            shown[name] = reduced(series, begin, end, few)
+    return encoded(begin, end, shown)
+
+
 def _within(name: str, shown: Shown) -> Shown:
     circle = CHANNELS[name].wrap == "circle"
     return replace(shown, value=within_a_turn(shown.value)) if circle else shown
@@ -81,3 +124,9 @@ def offered(found: Instruments) -> list[dict[str, Any]]:
         }
         for name in names
     ]
+
+
+def derived() -> dict[str, Any]:
+    """Return the lateral speed as a channel that a chart can show beside those of a log."""
+    words = "lateral speed through the water from GNSS and heading, eq. (18) of the paper"
+    return {"name": LATERAL, "unit": "m/s", "words": words, "source": "GNSS", "shown": True, "derived": True}

@@ -1,5 +1,6 @@
 "use strict";
-// Linked charts of a log: one window and one cursor for all panels, the window in the address.
+// Linked charts: one window and one cursor for all panels. On a page the window is in the address and the series come from
+// there; in a report they are in the file, see `.frame`.
 (() => {
   const SHIP = { "rad": [180 / Math.PI, "deg"], "rad/s": [180 / Math.PI, "deg/s"], "m/s": [3600 / 1852, "kn"], "1/s": [60, "rpm"] };
   const SMALLEST_S = 0.05;
@@ -18,15 +19,46 @@
     for (const one of head.series) {
       const t = new Float32Array(buffer, at, one.count), v = new Float32Array(buffer, at + 4 * one.count, one.count);
       at += 8 * one.count;
+      [one.panel, one.kind = "measured"] = one.name.split(":");
       one.x = Array.from(t, s => origin + s);
       one.y = Array.from(v, value => Number.isNaN(value) ? null : value);
     }
     return head.series;
   }
 
+  const named = one => one.panel.replaceAll("_", " ") + (one.kind === "measured" ? "" : `, ${one.kind}`);
+
+  // measured is dots where something is predicted beside it, as in every figure
+  function style(one, beside) {
+    if (one.kind === "before") return { stroke: colour("--plain"), width: 1.5, dash: [6, 3], points: { show: false } };
+    if (one.kind !== "measured") return { stroke: colour("--full"), width: 1.75, points: { show: false } };
+    if (beside) return { stroke: colour("--ink"), paths: () => null, points: { show: true, size: 3, width: 0, fill: colour("--ink") } };
+    return { stroke: colour("--full"), width: 1.25, points: { show: one.total <= 60 } };
+  }
+
+  // what is predicted of an angle lies within the same turn as what was measured
+  function turned(series) {
+    for (const one of series) {
+      const first = values => values.find(v => v !== null), beside = series.find(other => other.panel === one.panel && other.kind === "measured");
+      if (!/heading|course/.test(one.panel) || one.kind === "measured" || !beside || first(one.y) === undefined || first(beside.y) === undefined) continue;
+      const by = 2 * Math.PI * Math.round((first(one.y) - first(beside.y)) / (2 * Math.PI));
+      if (by) one.y = one.y.map(v => v === null ? null : v - by);
+    }
+    return series;
+  }
+
+  async function frame(address) {
+    const answer = await fetch(address);
+    if (!answer.ok) throw new Error((await answer.json()).error.message);
+    return decoded(await answer.arrayBuffer());
+  }
+
   class Chart {
-    constructor(node) {
+    constructor(node, number) {
       this.node = node;
+      this.number = number;
+      const frame = node.querySelector(".frame");
+      this.held = frame ? turned(decoded(Uint8Array.from(atob(frame.textContent.trim()), c => c.charCodeAt(0)).buffer)) : null;
       this.panels = node.querySelector(".panels");
       this.state = node.querySelector(".state");
       this.readout = node.querySelector(".readout");
@@ -40,13 +72,14 @@
         executes: li.dataset.executes ? li.dataset.executes.split(" ").map(seconds) : [],
       }));
       this.boxes = Array.from(node.querySelectorAll("input[name=ch]"));
-      this.fromAddress();
+      this.at = [null, null];
+      if (!this.held) this.fromAddress();
       for (const box of this.boxes) box.addEventListener("change", () => this.moved());
       for (const form of document.querySelectorAll("form[data-window]")) {
         form.querySelector("[data-take]").addEventListener("click", () => { form.elements.from.value = iso(this.span[0]); form.elements.to.value = iso(this.span[1]); });
       }
       for (const button of node.querySelectorAll("button[data-do]")) button.addEventListener("click", () => { const far = button.dataset.shift === "yes"; button.dataset.shift = ""; this.do(button.dataset.do, far); });
-      addEventListener("popstate", () => { this.fromAddress(); this.load(); });
+      if (!this.held) addEventListener("popstate", () => { this.fromAddress(); this.load(); });
       this.width = this.panels.clientWidth;
       new ResizeObserver(() => {
         if (this.panels.clientWidth !== this.width) { this.width = this.panels.clientWidth; this.draw(); }
@@ -67,6 +100,7 @@
     }
 
     moved(replace = false) {
+      if (this.held) { this.load(); return; }
       const asked = new URLSearchParams(location.search);
       asked.set("from", iso(this.span[0]));
       asked.set("to", iso(this.span[1]));
@@ -81,15 +115,17 @@
 
     async load() {
       const number = ++this.asked, channels = this.channels();
+      if (this.held) { this.series = this.held.filter(one => channels.includes(one.panel)); this.draw(); return; }
       if (channels.length === 0) { this.series = []; this.draw(); return; }
-      const asked = new URLSearchParams({ ch: channels.join(","), from: iso(this.span[0]), to: iso(this.span[1]), bins: String(Math.min(1500, Math.max(100, this.panels.clientWidth))) });
+      const window = { from: iso(this.span[0]), to: iso(this.span[1]), bins: String(Math.min(1500, Math.max(100, this.panels.clientWidth))) };
+      const logged = this.boxes.filter(box => box.checked && !box.dataset.derived).map(box => box.value), asked = [];
+      if (logged.length) asked.push(`/logs/${this.node.dataset.log}/series?${new URLSearchParams({ ch: logged.join(","), ...window })}`);
+      if (this.node.dataset.predicted) asked.push(`${this.node.dataset.predicted}&${new URLSearchParams(window)}`);
       document.body.removeAttribute("data-ready");
       try {
-        const answer = await fetch(`/logs/${this.node.dataset.log}/series?${asked}`);
-        if (!answer.ok) throw new Error((await answer.json()).error.message);
-        const buffer = await answer.arrayBuffer();
+        const found = await Promise.all(asked.map(frame));
         if (number !== this.asked) return;
-        this.series = decoded(buffer);
+        this.series = turned(channels.flatMap(name => found.flat().filter(one => one.panel === name)));
         this.draw();
       } catch (error) {
         if (number === this.asked) { this.state.textContent = `The channels cannot be shown: ${error.message}`; document.body.dataset.ready = "error"; }
@@ -105,39 +141,42 @@
       for (const plot of this.plots) plot.destroy();
       this.plots = [];
       this.panels.replaceChildren();
-      for (const one of this.series) this.panel(one, one === this.series[this.series.length - 1]);
-      const reduced = this.series.filter(one => one.total >= 1.5 * one.drawn).map(one => `1 of ${Math.round(one.total / one.drawn)} of ${one.name.replaceAll("_", " ")}`);
-      this.state.textContent = `${iso(this.span[0]).replace("T", " ")} to ${iso(this.span[1]).slice(11)}: ${this.series.length} channels` + (reduced.length ? `; shown: ${reduced.join(", ")} (smallest and largest of each stretch)` : "");
+      const panels = this.boxes.map(box => this.series.filter(one => one.panel === box.value)).filter(found => found.length);
+      panels.forEach((found, k) => this.panel(found, k === panels.length - 1));
+      const reduced = this.series.filter(one => one.total >= 1.5 * one.drawn).map(one => `1 of ${Math.round(one.total / one.drawn)} of ${named(one)}`);
+      this.state.textContent = `${iso(this.span[0]).replace("T", " ")} to ${iso(this.span[1]).slice(11)}: ${panels.length} channels` + (reduced.length ? `; shown: ${reduced.join(", ")} (smallest and largest of each stretch)` : "");
       this.node.querySelector("[data-do=units]").textContent = this.si ? "Units: SI" : "Units: deg, kn";
       if (!this.readout.hidden && this.readout.hasChildNodes()) this.table();
       document.body.dataset.ready = "yes";
     }
 
-    panel(one, last) {
-      const [factor, unit] = this.unit(one.name), y = one.y.map(v => v === null ? null : v * factor);
-      const words = one.name.replaceAll("_", " "), label = unit === "1" ? words : `${words}, ${unit}`;
-      const known = y.filter(v => v !== null);
+    panel(found, last) {
+      const [factor, unit] = this.unit(found[0].panel), words = found[0].panel.replaceAll("_", " "), label = unit === "1" ? words : `${words}, ${unit}`;
+      const y = found.map(one => one.y.map(v => v === null ? null : v * factor)), known = y.flat().filter(v => v !== null), total = found.reduce((sum, one) => sum + one.total, 0);
       const holder = document.createElement("div");
       holder.className = "panel";
       holder.tabIndex = 0;
       holder.setAttribute("role", "img");
-      holder.setAttribute("aria-label", known.length ? `${label}: from ${short(Math.min(...known))} to ${short(Math.max(...known))}, ${one.total} values` : `${label}: no values here`);
+      const kinds = found.length > 1 ? ` (${found.map(one => one.kind).join(", ")})` : "";
+      holder.setAttribute("aria-label", known.length ? `${label}${kinds}: from ${short(Math.min(...known))} to ${short(Math.max(...known))}, ${total} values` : `${label}: no values here`);
       this.panels.append(holder);
       const ink = colour("--ink"), faint = colour("--line");
       const axis = { stroke: ink, grid: { stroke: faint, width: 1 }, ticks: { stroke: faint, width: 1 }, font: "12px system-ui, sans-serif" };
       const clock = (u, splits, _, __, step) => splits.map(s => iso(s).slice(11, step < 1 ? 22 : step < 60 ? 19 : 16));
       const time = last ? { ...axis, values: clock, space: 80 } : { ...axis, values: (u, splits) => splits.map(() => ""), size: 8, space: 80 };
+      const drawn = found.map(one => ({ label: found.length > 1 ? `${label}, ${one.kind}` : label, value: (_, v) => short(v), ...style(one, found.length > 1) }));
       const plot = new uPlot({
         width: Math.max(200, this.panels.clientWidth), height: last ? 150 : 124, tzDate: s => uPlot.tzDate(new Date(s * 1000), "Etc/UTC"),
         scales: { x: { time: true, range: () => this.span } },
         axes: [time, { ...axis, size: 64, space: 24 }],
-        series: [{ label: "UTC", value: (_, s) => s === null || s === undefined ? "-" : iso(s).slice(11, 23) }, { label, stroke: colour("--full"), width: 1.25, points: { show: one.total <= 60 }, value: (_, v) => short(v) }],
-        cursor: { sync: { key: "all" }, drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => this.do("all") } },
+        series: [{ label: "UTC", value: (_, s) => s === null || s === undefined ? "-" : iso(s).slice(11, 23) }, ...drawn],
+        cursor: { sync: { key: `chart ${this.number}` }, drag: { x: true, y: false, setScale: false }, bind: { dblclick: () => () => this.do("all") } },
         hooks: {
           setSelect: [u => { if (u.select.width > 3) this.zoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")); }],
           drawClear: [u => this.shade(u)],
         },
-      }, [one.x, y], holder);
+      // gaps (null) stay gaps; where only the other series has an instant, a line goes on
+      }, found.length > 1 ? uPlot.join(found.map((one, k) => [one.x, y[k]]), found.map(() => [0, 2])) : [found[0].x, y[0]], holder);
       plot.over.addEventListener("wheel", event => {
         event.preventDefault();
         const at = plot.posToVal(event.offsetX, "x"), by = event.deltaY < 0 ? 0.8 : 1.25;
@@ -239,13 +278,13 @@
       const titles = ["channel", "unit", ...(now === null ? [] : [`at ${clock(now)}`]), ...(a === null ? [] : [`A, ${clock(a)}`]), ...(b === null ? [] : [`B, ${clock(b)}`]), ...(a === null || b === null ? [] : [`B - A, in ${short(b - a)} s`]), "mean", "rms", "smallest", "largest", "values"];
       for (const words of titles) { const th = document.createElement("th"); th.scope = "col"; th.textContent = words; head.append(th); }
       for (const one of this.series) {
-        const [factor, unit] = this.unit(one.name), row = body.insertRow(), inside = one.y.filter((v, k) => v !== null && one.x[k] >= this.span[0] && one.x[k] <= this.span[1]).map(v => v * factor);
+        const [factor, unit] = this.unit(one.panel), row = body.insertRow(), inside = one.y.filter((v, k) => v !== null && one.x[k] >= this.span[0] && one.x[k] <= this.span[1]).map(v => v * factor);
         const [here, first, second] = [now, a, b].map(at => { const v = this.value(one, at); return v === null ? null : v * factor; });
         // the smallest and largest of stretches are drawn where there are too many: no mean goes by them
         const whole = one.total < 1.5 * one.drawn && inside.length > 0, sum = power => inside.reduce((t, v) => t + v ** power, 0) / inside.length;
         const name = document.createElement("th");
         name.scope = "row";
-        name.textContent = one.name.replaceAll("_", " ");
+        name.textContent = named(one);
         row.append(name);
         const apart = first === null || second === null ? null : second - first;
         const cells = [unit, ...(now === null ? [] : [short(here)]), ...(a === null ? [] : [short(first)]), ...(b === null ? [] : [short(second)]), ...(a === null || b === null ? [] : [short(apart)]), whole ? short(sum(1)) : "zoom in", whole ? short(Math.sqrt(sum(2))) : "zoom in", inside.length ? short(Math.min(...inside)) : "-", inside.length ? short(Math.max(...inside)) : "-", String(one.total)];
@@ -263,5 +302,15 @@
     }
   }
 
-  for (const node of document.querySelectorAll(".chart")) new Chart(node);
+  // a report has many: each is made when it comes near
+  const near = new IntersectionObserver(seen => {
+    for (const one of seen.filter(entry => entry.isIntersecting)) {
+      near.unobserve(one.target);
+      const node = one.target.querySelector(".chart");
+      node.hidden = false;
+      new Chart(node, charts.indexOf(node));
+    }
+  }, { rootMargin: "600px" });
+  const charts = Array.from(document.querySelectorAll(".chart"));
+  charts.forEach((node, number) => { if (node.hidden) near.observe(node.parentElement); else new Chart(node, number); });
 })();

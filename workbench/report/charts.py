@@ -1,0 +1,55 @@
+"""A manoeuvre as linked charts that can be zoomed in the report itself: measured, and predicted by both models."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from kempf.pipeline.channels.series import SECOND_NS, Float
+from kempf.schemas.channels import CHANNELS
+from kempf.schemas.diagnosis_evidence import ManoeuvreEvidence
+from kempf.warehouse.instant import iso_utc
+from kempf.workbench.report.content import ChartBlock, PictureBlock
+from kempf.workbench.web.data.bins import Shown
+from kempf.workbench.web.data.frames import encoded
+from kempf.workbench.web.pages.series import LATERAL, derived
+
+_RUDDER = "rudder_angle"
+#: columns of what a model predicts
+_PREDICTED = (LATERAL, "yaw_rate", "heading")
+
+
+def chart_of(shown: ManoeuvreEvidence, label: str, picture: PictureBlock) -> ChartBlock:
+    """Return the charts of a manoeuvre; the heading is that from the first one.
+
+    Parameters
+    ----------
+    label : str
+        Of the manoeuvre.
+    picture : PictureBlock
+        What is seen where no script runs, and in print.
+    """
+    series = {_RUDDER: shown.rudder}
+    models = (shown.before,) if shown.after is None else (shown.before, shown.after)
+    for i, name in enumerate(_PREDICTED):
+        measured = shown.measured[:, i]
+        if not np.isfinite(measured).any():
+            continue
+        series[name] = measured
+        for kind, one in zip(("predicted",) if len(models) == 1 else ("before", "predicted"), models, strict=True):
+            series[f"{name}:{kind}"] = one.free_run[:, i]
+    begin, end = shown.start_utc_ns, shown.start_utc_ns + round(float(shown.time_s[-1]) * SECOND_NS)
+    frame = encoded(begin, end, {name: _whole(shown.time_s, values) for name, values in series.items()})
+    panels = [name for name in (_RUDDER, "heading", "yaw_rate", LATERAL) if name in series]
+    return ChartBlock(label, picture, frame, [_offered(name) for name in panels], (iso_utc(begin), iso_utc(end)))
+
+
+def _whole(time_s: Float, values: Float) -> Shown:
+    known = int(np.count_nonzero(np.isfinite(values)))
+    return Shown(time_s, values, known, known)
+
+
+def _offered(name: str) -> dict[str, object]:
+    if name == LATERAL:
+        return derived()
+    channel = CHANNELS[name]
+    return {"name": name, "unit": channel.unit, "words": channel.words, "source": "the log", "shown": True}
