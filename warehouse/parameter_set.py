@@ -271,7 +271,12 @@ def compare(first: ParameterSet, second: ParameterSet) -> dict[str, dict[str, An
         difference over its standard error, the two sets taken as independent; None where it is unknown, or where only
         one of the sets has the parameter.
     """
-    here, there = ({p.name: p for p in one.parameters} for one in (first, second))
+    return differences(first.parameters, second.parameters)
+
+
+def differences(first: Sequence[StoredValue], second: Sequence[StoredValue]) -> dict[str, dict[str, Any]]:
+    """Return how two lists of values differ, by name, see `compare`."""
+    here, there = ({p.name: p for p in values} for values in (first, second))
     found: dict[str, dict[str, Any]] = {}
     for name in dict.fromkeys([*here, *there]):
         p, q = here.get(name), there.get(name)

@@ -16,7 +16,6 @@ from kempf.flows.jobs.bound_runs import BoundRuns, bound
 from kempf.flows.jobs.predict_request import PredictRequest
 from kempf.flows.jobs.predict_vessel import models_of_set, predict_with
 from kempf.flows.jobs.predicted import Predicted
-from kempf.flows.jobs.ship_model import covariance_of
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.confusion_sets import WINDOW
@@ -30,6 +29,7 @@ from kempf.pipeline.next_trial.planned_run import as_predicted, planned
 from kempf.pipeline.next_trial.worth import Known, apart, information, narrowed, probability, times_to_halve
 from kempf.schemas.errors import DataRejected, UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.warehouse.covariance import covariance_of
 from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.store import Warehouse
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,6 +18,7 @@ from kempf.schemas.errors import UsageError
 from kempf.schemas.model_spec import HULL_PARAMETERS, ModelSpec
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import vessels
+from kempf.warehouse.covariance import covariance_of
 from kempf.warehouse.parameter_set import Bounds, ParameterSet, StoredValue
 from kempf.warehouse.store import Warehouse
 
@@ -131,17 +131,6 @@ def _last_load(one: ParameterSet) -> float:
     inputs = one.provenance["inputs"]
     named = [("", Bounds(**bounds)) for bounds in inputs["segments"]]
     return list(loads_of_logs(named, inputs.get("draughts_m", {})).values())[-1]
-
-
-def covariance_of(one: ParameterSet, wanted: Sequence[str]) -> Float:
-    """Pick parameters out of a set's covariance, shape (n, n); NaN for what it does not hold."""
-    found = np.full((len(wanted), len(wanted)), np.nan)
-    names = list(one.covariance_names)
-    held = [(i, names.index(name)) for i, name in enumerate(wanted) if name in names]
-    for i, row in held:
-        for j, column in held:
-            found[i, j] = one.covariance[row][column]
-    return found
 
 
 def _noise(one: ParameterSet, spec: ModelSpec) -> tuple[NoiseLevels, list[str]]:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from math import hypot
 from typing import Any
 
 import pytest
 import yaml
 
-from kempf.warehouse import aliases
+from kempf.warehouse import aliases, parameter_sets
 from kempf.warehouse.store import Warehouse
+from kempf.workbench.documents.compared_sets import without_dimension
 from tests.conftest import Ship
 from tests.workbench.driving import kempf, refused
+from tests.workbench.web.conftest import client_of
 
 #: two vessels, and which log of the one simulated ship is hers
 FLEET = {"cutter": "csv", "sloop": "nmea"}
@@ -56,3 +60,47 @@ def test_the_others_take_a_vessel_too(fleet: Any) -> None:
     assert kempf("rerun", "current", "--vessel", "cutter", *fleet).json["parameter_set_id"] == wanted
     refused(kempf("params", "show", "as-built", "--vessel", "sloop", *fleet), 4, "no_parameter_set")
     refused(kempf("rerun", "current", "--vessel", "cutter", "--vessel", "sloop", *fleet), 2, "only_with_all")
+
+
+def test_two_vessels_are_compared_without_dimension_too(fleet: Any) -> None:
+    warehouse = Warehouse(str(fleet[1]))
+    one, other = (aliases.of_vessel(warehouse, name)["current"] for name in FLEET)
+    found = kempf("params", "diff", one, other, *fleet).json["nondimensional"]
+    assert list(found) == ["a11'", "a12'", "a21'", "a22'", "b1'", "b2'", "K'", "T'"]
+    said = kempf("params", "steering", one, *fleet).json["nomoto"]["constants"]
+    for name in ("K'", "T'"):
+        assert found[name]["first"] == pytest.approx(said[name]["value"], rel=1e-9)
+        assert found[name]["difference"] / found[name]["in_std"] == pytest.approx(
+            hypot(
+                said[name]["std"], kempf("params", "steering", other, *fleet).json["nomoto"]["constants"][name]["std"]
+            )
+        )
+    printed = kempf("params", "diff", one, other, *fleet[:-1]).out
+    assert "Without their dimension" in printed and "K'" in printed
+    assert "K'" not in kempf("params", "diff", one, one, *fleet[:-1]).out
+    with client_of(fleet[1], fleet[1].parent / "state") as client:
+        page = client.get(f"/compare?a={one}&b={other}").text
+        assert "K&#39;" in page and "ships of one form" in page
+
+
+def test_a_ship_twice_as_long_of_the_same_form_is_the_same_without_dimension(fleet: Any) -> None:
+    warehouse = Warehouse(str(fleet[1]))
+    one = parameter_sets.get(warehouse, aliases.of_vessel(warehouse, "cutter")["current"])
+    # a21 and b2 go with the second power of the length, a12 with none
+    by = {name: 2.0**-power for name, power in zip(one.covariance_names, (1, 0, 2, 1, 1, 2), strict=False)}
+    long = replace(
+        one,
+        parameters=tuple(
+            replace(p, value=by[p.name] * p.value, std=None if p.std is None else by[p.name] * p.std)
+            for p in one.parameters
+        ),
+        covariance=tuple(
+            tuple(by[a] * by[b] * v for b, v in zip(one.covariance_names, row, strict=True))
+            for a, row in zip(one.covariance_names, one.covariance, strict=True)
+        ),
+    )
+    short, other = without_dimension(one, 60.0), without_dimension(long, 120.0)
+    assert short is not None and other is not None and len(short) == 8
+    for p, q in zip(short, other, strict=True):
+        assert (p.value, p.std) == pytest.approx((q.value, q.std), rel=1e-9)
+    assert without_dimension(one, None) is None

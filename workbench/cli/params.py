@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -96,7 +97,8 @@ def show(set_id: str | None, vessel: str | None, verbose: bool, uri: str, as_jso
 def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -> None:
     """Compare the parameters of two sets: difference, and the same in standard errors of the difference.
 
-    A parameter that only one of the sets has is shown with a dash for the other.
+    A parameter that only one of the sets has is shown with a dash for the other. Sets of two vessels are compared
+    without dimension too, with K' = K L/V and T' = T V/L of their hulls.
     """
     from kempf.flows.jobs.chosen_set import named_set
     from kempf.flows.jobs.out_of_date import said_of_sets
@@ -105,16 +107,23 @@ def diff(first: str, second: str, vessel: str | None, uri: str, as_json: bool) -
 
     warehouse = Warehouse(uri)
     one, other = named_set(warehouse, first, vessel), named_set(warehouse, second, vessel)
-    document = compared_sets(one, other)
+    document = compared_sets(warehouse, one, other)
     print_note(said_of_sets(warehouse, [one, other]))
     if as_json:
         print_json(document)
         return
-    rows = [
+    head = ["", "first", "second", "difference", "in std errors", "unit"]
+    print_table(head, _difference_rows(document["parameters"]))
+    if one.vessel != other.vessel and document["nondimensional"] is not None:
+        words = "Without their dimension, as ships of other sizes are compared; K' and T' of the hull alone:"
+        print_table(head, _difference_rows(document["nondimensional"]), words)
+
+
+def _difference_rows(differences: Mapping[str, Mapping[str, Any]]) -> list[list[str]]:
+    return [
         [name, number(d["first"]), number(d["second"]), number(d["difference"]), number(d["in_std"], 3), d["unit"]]
-        for name, d in document["parameters"].items()
+        for name, d in differences.items()
     ]
-    print_table(["", "first", "second", "difference", "in std errors", "unit"], rows)
 
 
 @command.command("export")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from kempf.flows.fleet.state import fleet_state
@@ -21,7 +21,7 @@ _HORIZON = "free"
 
 def document(desk: Desk, a: str, b: str) -> dict[str, Any]:
     """Return what `kempf params diff A B --json` prints."""
-    return compared_sets(*_both(desk, a, b))
+    return compared_sets(desk.warehouse, *_both(desk, a, b))
 
 
 def gather(desk: Desk, a: str, b: str) -> Page:
@@ -31,10 +31,10 @@ def gather(desk: Desk, a: str, b: str) -> Page:
         known = [(name, pointed[aliases.CURRENT]) for name, pointed in held if aliases.CURRENT in pointed]
         return Page("compare.html", "Compare", {"a": a, "b": b, "known": known, "made": None})
     one, other = _both(desk, a, b)
-    made = compared_sets(one, other)
-    rows = [{"name": name, **row} for name, row in made["parameters"].items()]
-    rows.sort(key=lambda row: -abs(row["in_std"]) if row["in_std"] is not None else 0.0)
+    made = compared_sets(desk.warehouse, one, other)
     same_vessel = one.vessel == other.vessel
+    scaled = {} if same_vessel else made["nondimensional"] or {}
+    rows = _rows(made["parameters"])
     content = {
         "a": one.parameter_set_id,
         "b": other.parameter_set_id,
@@ -42,13 +42,20 @@ def gather(desk: Desk, a: str, b: str) -> Page:
         "made": made,
         "sets": (one, other),
         "rows": rows,
-        "drawn": draw_differences(rows),
+        "scaled": _rows(scaled),
+        "drawn": draw_differences(_rows(scaled) or rows),
         "stale": said_of_sets(desk.warehouse, [one, other]),
         "inputs": list(_inputs(one, other)),
         "same_vessel": same_vessel,
         "runs": _runs(desk, one, other) if same_vessel else None,
     }
     return Page("compare.html", "Compare", content)
+
+
+def _rows(differences: Mapping[str, Mapping[str, Any]]) -> list[dict[str, Any]]:
+    """Return a row a parameter, the most different first."""
+    rows = [{"name": name, **row} for name, row in differences.items()]
+    return sorted(rows, key=lambda row: -abs(row["in_std"]) if row["in_std"] is not None else 0.0)
 
 
 def _both(desk: Desk, a: str, b: str) -> tuple[ParameterSet, ParameterSet]:
