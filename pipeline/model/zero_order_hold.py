@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import expm
 
 from kempf.pipeline.channels.series import Float
 
@@ -23,6 +22,9 @@ def zero_order_hold(A: Float, B: Float, step_s: float) -> tuple[Float, Float]:
     ndarray, shape (..., n, n)
     ndarray, shape (..., n, m)
     """
+    # what only reads parameters, such as the pages, needs no scipy
+    from scipy.linalg import expm
+
     n, m = B.shape[-2:]
     block = np.zeros((*B.shape[:-2], n + m, n + m))
     block[..., :n, :n], block[..., :n, n:] = A * step_s, B * step_s

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from kempf.pipeline.channels.series import SECOND_NS, Series
-from kempf.workbench.web.data.bins import reduced
+from kempf.workbench.web.data.bins import _BLOCKS, reduced
 from kempf.workbench.web.data.frames import decoded, encoded
 
 START = 1_746_258_421_000_000_000
@@ -26,7 +26,7 @@ def test_few_values_are_all_drawn_at_their_instants():
     np.testing.assert_allclose(shown.time_s, one.seconds_since(START))
 
 
-@given(st.integers(0, 2**31), st.integers(500, 5000), st.integers(5, 200))
+@given(st.integers(0, 2**31), st.integers(500, 5000), st.integers(40, 200))
 def test_the_smallest_and_the_largest_of_every_bin_are_drawn(seed: int, count: int, bins: int):
     values = np.random.default_rng(seed).normal(size=count).round(1)  # rounded, so that equal ones occur
     one = series(values)
@@ -42,6 +42,23 @@ def test_the_smallest_and_the_largest_of_every_bin_are_drawn(seed: int, count: i
     pairs = set(zip(one.seconds_since(START).tolist(), values.tolist(), strict=True))
     assert set(zip(shown.time_s.tolist(), shown.value.tolist(), strict=True)) <= pairs
     assert np.all(np.diff(shown.time_s) > 0.0)
+
+
+@given(st.integers(0, 2**31), st.integers(100, 20_000), st.integers(1, 12))
+def test_no_peak_is_lost_where_a_bin_holds_many(seed: int, count: int, bins: int):
+    values = np.random.default_rng(seed).normal(size=count).round(1)
+    one = series(values)
+    end = int(one.time_utc_ns[-1])
+    shown = reduced(one, START, end, bins)
+    assert shown.drawn <= max(2 * bins, min(count, 2 * bins)) and np.all(np.diff(shown.time_s) > 0.0)
+    place = np.searchsorted(one.time_utc_ns, START + np.rint(shown.time_s * SECOND_NS).astype(np.int64))
+    np.testing.assert_array_equal(values[place], shown.value)
+    length = next((n for n in _BLOCKS if count >= 2 * n * bins), 1)
+    # a bin begins with a block
+    number = np.repeat((one.time_utc_ns[::length] - START) * bins // (end - START + 1), length)[:count]
+    for k in np.unique(number):
+        drawn = shown.value[number[place] == k]
+        assert drawn.min() == values[number == k].min() and drawn.max() == values[number == k].max()
 
 
 def test_one_value_beyond_each_edge_so_that_lines_leave_the_window():

@@ -11,6 +11,8 @@ from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
 Places = NDArray[np.int64]
+#: lengths of blocks whose extremes alone are looked at, where two of them fit into a bin; short ones cost more
+_BLOCKS = (256, 64)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,17 +65,45 @@ def _limit_s(series: Series, start_utc_ns: int, end_utc_ns: int, total: int, bin
 
 
 def _extremes(time: Nanoseconds, value: Float, start_utc_ns: int, end_utc_ns: int, bins: int) -> Places:
-    """Return the places of the smallest and the largest value of every bin that has any, in the order of time."""
-    number = (time - start_utc_ns) * bins // max(end_utc_ns - start_utc_ns + 1, 1)
-    begins = np.flatnonzero(np.concatenate(([True], number[1:] != number[:-1])))
+    """Return the places of the smallest and the largest value of every bin that has any, in the order of time.
+
+    A bin begins with a block of values where it holds several, and is of equal length but for that.
+    """
+    length = next((n for n in _BLOCKS if value.size >= 2 * n * bins), 1)
+    low, high = _of_blocks(value, length)
+    width = end_utc_ns - start_utc_ns + 1
+    edges = start_utc_ns - (-np.arange(bins) * width) // bins
+    begins = np.unique(np.searchsorted(time[::length], edges))
+    begins = begins[begins < low.size]
+    first = low[_first(np.minimum, value[low], begins)]
+    return _in_order(first, high[_first(np.maximum, value[high], begins)])
+
+
+def _of_blocks(value: Float, length: int) -> tuple[Places, Places]:
+    """Return the places of the smallest and of the largest value of blocks of equal length, the last one shorter."""
+    if length == 1:
+        return np.arange(value.size), np.arange(value.size)
+    whole = value.size // length
+    blocks, begin, rest = value[: whole * length].reshape(whole, length), length * np.arange(whole), whole * length
+    low, high = begin + blocks.argmin(axis=1), begin + blocks.argmax(axis=1)
+    if rest == value.size:
+        return low, high
+    return np.append(low, rest + value[rest:].argmin()), np.append(high, rest + value[rest:].argmax())
+
+
+def _first(extreme: np.ufunc, value: Float, begins: Places) -> Places:
+    """Return the place of the extreme of every stretch that begins at some places, the first of equal ones."""
     counts = np.diff(np.append(begins, value.size))
-    places = []
-    for extreme in (np.minimum.reduceat(value, begins), np.maximum.reduceat(value, begins)):
-        at = np.flatnonzero(value == np.repeat(extreme, counts))
-        # the first of a bin that has it
-        owner = np.repeat(np.arange(begins.size), counts)[at]
-        places.append(at[np.concatenate(([True], owner[1:] != owner[:-1]))])
-    return np.unique(np.concatenate(places))
+    at = np.flatnonzero(value == np.repeat(extreme.reduceat(value, begins), counts))
+    result: Places = at[np.searchsorted(at, begins)]
+    return result
+
+
+def _in_order(first: Places, second: Places) -> Places:
+    """Return pairs of places in order, the same place once."""
+    pairs = np.stack([np.minimum(first, second), np.maximum(first, second)], axis=1)
+    result: Places = pairs[np.stack([np.ones(first.size, dtype=np.bool_), first != second], axis=1)]
+    return result
 
 
 def _broken(seconds: Float, value: Float, limit_s: float) -> tuple[Float, Float]:
