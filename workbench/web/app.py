@@ -5,6 +5,7 @@ from __future__ import annotations
 import sys
 import traceback
 from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 from urllib.parse import parse_qsl
@@ -232,7 +233,15 @@ def _shown(request: Request, page: Page) -> Response:
 
 
 def _html(request: Request, page: Page) -> str:
-    return rendered(page.template, page=page, may_write=getattr(request.state, "may_write", False), **page.content)
+    return rendered(
+        page.template,
+        page=page,
+        may_write=getattr(request.state, "may_write", False),
+        # on every sheet that is printed
+        address=str(request.url.remove_query_params("token")),
+        today=datetime.now(UTC).date().isoformat(),
+        **page.content,
+    )
 
 
 def _json(content: Any) -> Response:

@@ -14,13 +14,18 @@ from pathlib import Path
 import pytest
 from starlette.testclient import TestClient
 
-from kempf.warehouse import delta
+from kempf.pipeline.channels.series import SECOND_NS
+from kempf.pipeline.ingest.decoded import LostStretch
+from kempf.warehouse import delta, logs, notes
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.store import Warehouse
 from kempf.workbench.cli.entry import main
 from kempf.workbench.web import static_files
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.frames import decoded
+from kempf.workbench.web.pages.spans import spans_of_lost
 from tests.workbench.driving import environment, kempf
-from tests.workbench.web.conftest import client_of
+from tests.workbench.web.conftest import TOKEN, client_of
 
 
 def ids(client: TestClient) -> dict[str, str]:
@@ -98,6 +103,33 @@ def test_series_are_those_of_the_log_at_every_zoom(client: TestClient):
     begin = one["start"][:19] + "Z"
     inside, _ = decoded(client.get(f"/logs/{log}/series?ch=heading&from={begin}&to={one['end']}").content)
     assert int(inside["to_utc_ns"]) - int(inside["from_utc_ns"]) > 60 * 10**9
+
+
+def test_notes_and_lost_stretches_are_behind_the_channels(own: Path, tmp_path: Path):
+    warehouse = Warehouse(str(own))
+    row = logs.current(warehouse, "mariner")[0]
+    day = 24 * 3600 * SECOND_NS
+    for at, text in ((row.start_utc_ns - 30 * day, "docked"), (row.start_utc_ns + 60 * SECOND_NS, "tug lets go")):
+        notes.add(warehouse, "mariner", "vessel", "mariner", text, event_utc_ns=at)
+    notes.add(warehouse, "mariner", "vessel", "mariner", "docked again", event_utc_ns=row.end_utc_ns + day)
+    with client_of(own, tmp_path / "state") as client:
+        page = client.get(f"/logs/{row.log_id}").text
+        segment = client.get(f"/segments/{ids(client)['segment']}").text
+    for text in (page, segment):
+        assert re.findall(r'data-kind="note"[^>]*>([^<]*)<', text) == ["docked", "tug lets go"]
+    assert page.count('data-kind="manoeuvre"') >= 1
+    lost = [LostStretch(None, row.start_utc_ns + SECOND_NS, 3, "cut"), LostStretch(row.end_utc_ns, None, None, "cut")]
+    spans = spans_of_lost(lost, row.start_utc_ns, row.end_utc_ns)
+    assert [(one["from"], one["to"]) for one in spans] == [
+        (iso_utc(row.start_utc_ns), iso_utc(row.start_utc_ns + SECOND_NS)),
+        (iso_utc(row.end_utc_ns), iso_utc(row.end_utc_ns)),
+    ]
+
+
+def test_a_printed_sheet_says_where_it_is_from_and_gives_no_token_away(client: TestClient):
+    page = client.get(f"/effects?token={TOKEN}", follow_redirects=True)
+    (sheet,) = re.findall(r'<footer class="sheet">(.*)</footer>', page.text)
+    assert re.fullmatch(r"http://127\.0\.0\.1/effects, printed 20\d\d-\d\d-\d\d", sheet)
 
 
 def test_a_log_is_read_once_however_often_it_is_looked_at(client: TestClient, monkeypatch: pytest.MonkeyPatch):
@@ -220,7 +252,7 @@ def test_pages_load_no_engine(filled: Path, tmp_path: Path):
     ask = (
         "import sys\n"
         "from pathlib import Path\n"
-        "from tests.workbench.web.conftest import client_of\n"
+        "from tests.workbench.web.conftest import TOKEN, client_of\n"
         "from tests.workbench.web.test_pages import pages\n"
         f"with client_of(Path({str(filled)!r}), Path({str(tmp_path)!r})) as client:\n"
         "    for path in pages(client):\n"

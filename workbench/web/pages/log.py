@@ -13,6 +13,7 @@ from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.draw.track import draw_track
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.pages.series import offered
+from kempf.workbench.web.pages.spans import span_of, spans_of_lost, spans_of_notes
 from kempf.workbench.web.window import window
 
 
@@ -28,29 +29,22 @@ def gather(desk: Desk, log_id: str, asked_from: str | None, asked_to: str | None
     channels = desk.channels.of(row.ingest_id)
     found = [one for one in segments.found_in(desk.warehouse, row.vessel) if one.ingest_id == row.ingest_id]
     gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
+    hers = notes.of_vessel(desk.warehouse, row.vessel)
     shown = log_document(desk.warehouse, row)
     content = {
         "log": shown,
         "channels": offered(channels),
         "notes": dict.fromkeys((*shown["notes"], *channels.notes)),
-        "remarks": [n.show() for n in notes.of_vessel(desk.warehouse, row.vessel) if n.subject_id == row.log_id],
+        "remarks": [note.show() for note in hers if note.subject_id == row.log_id],
         "manoeuvres": [one.show(row.file_name) for one in found],
-        "spans": [span_of(one) for one in found],
+        "spans": [
+            *(span_of(one) for one in found),
+            *spans_of_lost(gone, row.start_utc_ns, row.end_utc_ns),
+            *spans_of_notes(hers, row.end_utc_ns),
+        ],
         "lost": lost_as_json(gone),
         "track": draw_track(channels, [(one.start_utc_ns, one.end_utc_ns) for one in found]),
         "window": (iso_utc(begin), iso_utc(end)),
         "whole": (iso_utc(row.start_utc_ns), iso_utc(row.end_utc_ns)),
     }
     return Page("log.html", row.file_name, content, ((row.vessel, of_vessel(row.vessel)),))
-
-
-def span_of(one: segments.Segment) -> dict[str, Any]:
-    """Return what a chart draws of a manoeuvre: its span and its executes."""
-    name = (f"{one.psi0_deg:g}/{one.delta0_deg:g} " if one.is_zigzag else "") + one.kind.replace("_", " ")
-    return {
-        "id": one.segment_id,
-        "words": name + (" (excluded)" if one.excluded is not None else ""),
-        "from": iso_utc(one.start_utc_ns),
-        "to": iso_utc(one.end_utc_ns),
-        "executes": [iso_utc(t) for t in one.executes_utc_ns],
-    }

@@ -5,16 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from kempf.warehouse import aliases, logs, notes, segments
+from kempf.warehouse import aliases, logs, lost, notes, segments
 from kempf.warehouse.instant import iso_utc
 from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import HORIZONS, KeptPrediction, kept_of
 from kempf.workbench.web.desk import Desk
-from kempf.workbench.web.pages.log import span_of
 from kempf.workbench.web.pages.model import stretch_address, worst_stretches
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.pages.series import derived, offered
+from kempf.workbench.web.pages.spans import span_of, spans_of_lost, spans_of_notes
 from kempf.workbench.web.window import window
 
 #: of a manoeuvre's length, shown before and after it
@@ -45,18 +45,20 @@ def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
     beyond = int(_MARGIN * (one.end_utc_ns - one.start_utc_ns))
     first, last = max(one.start_utc_ns - beyond, row.start_utc_ns), min(one.end_utc_ns + beyond, row.end_utc_ns)
     begin, end = window(asked.get("from"), asked.get("to"), first, last)
+    hers = notes.of_vessel(desk.warehouse, row.vessel)
+    gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
     current = aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel)
     content: dict[str, Any] = {
         "one": shown,
         "log_id": row.log_id,
         "channels": offered(desk.channels.of(row.ingest_id)),
-        "spans": [span_of(one)],
+        "spans": [span_of(one), *spans_of_lost(gone, first, last), *spans_of_notes(hers, last)],
         "window": (iso_utc(begin), iso_utc(end)),
         "whole": (iso_utc(first), iso_utc(last)),
         "current": current,
         "predicted": None,
         "stretch": None,
-        "notes": [n.show() for n in notes.of_vessel(desk.warehouse, row.vessel) if n.subject_id == one.segment_id],
+        "notes": [note.show() for note in hers if note.subject_id == one.segment_id],
         "before": listed[place - 1].segment_id if place else None,
         "after": listed[place + 1].segment_id if place + 1 < len(listed) else None,
     }

@@ -68,7 +68,7 @@
       this.series = [];
       this.asked = 0;
       this.spans = Array.from(node.querySelectorAll(".spans li"), li => ({
-        from: seconds(li.dataset.from), to: seconds(li.dataset.to), words: li.textContent,
+        kind: li.dataset.kind, from: seconds(li.dataset.from), to: seconds(li.dataset.to), words: li.textContent,
         executes: li.dataset.executes ? li.dataset.executes.split(" ").map(seconds) : [],
       }));
       this.boxes = Array.from(node.querySelectorAll("input[name=ch]"));
@@ -174,6 +174,7 @@
         hooks: {
           setSelect: [u => { if (u.select.width > 3) this.zoom(u.posToVal(u.select.left, "x"), u.posToVal(u.select.left + u.select.width, "x")); }],
           drawClear: [u => this.shade(u)],
+          draw: [u => this.mark(u)],
         },
       // gaps (null) stay gaps; where only the other series has an instant, a line goes on
       }, found.length > 1 ? uPlot.join(found.map((one, k) => [one.x, y[k]]), found.map(() => [0, 2])) : [found[0].x, y[0]], holder);
@@ -189,42 +190,82 @@
       this.plots.push(plot);
     }
 
-    shade(u) {
+    // calls with what a panel is drawn on, clipped to it
+    inside(u, draw) {
       const context = u.ctx, { left, top, width, height } = u.bbox;
       context.save();
       context.beginPath();
       context.rect(left, top, width, height);
       context.clip();
-      for (const one of this.spans) {
-        const a = u.valToPos(one.from, "x", true), b = u.valToPos(one.to, "x", true);
-        if (b < left || a > left + width) continue;
-        context.fillStyle = colour("--band");
-        context.fillRect(a, top, b - a, height);
-        context.fillStyle = colour("--ink");
-        context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
-        if (u === this.plots[0] || this.plots.length === 0) context.fillText(one.words, Math.max(a, left) + 4, top + 13 * devicePixelRatio);
-        context.strokeStyle = colour("--plain");
-        context.setLineDash([4, 4]);
-        for (const execute of one.executes) {
-          const x = Math.round(u.valToPos(execute, "x", true)) + 0.5;
-          context.beginPath();
-          context.moveTo(x, top);
-          context.lineTo(x, top + height);
-          context.stroke();
+      context.font = `${11 * devicePixelRatio}px system-ui, sans-serif`;
+      draw(context, left, top, width, height, u === this.plots[0] || this.plots.length === 0);
+      context.restore();
+    }
+
+    // behind the channels: manoeuvres, and what of the log is lost
+    shade(u) {
+      this.inside(u, (context, left, top, width, height, first) => {
+        for (const one of this.spans.filter(span => span.kind !== "note")) {
+          const a = u.valToPos(one.from, "x", true), b = u.valToPos(one.to, "x", true);
+          if (a > left + width || b < left) continue;
+          context.setLineDash([]);
+          if (one.kind === "lost") this.hatch(context, Math.max(a, left), Math.min(b, left + width), top, height);
+          else { context.fillStyle = colour("--band"); context.fillRect(a, top, b - a, height); }
+          context.fillStyle = colour("--ink");
+          if (first) context.fillText(one.words, Math.max(a, left) + 4, top + 13 * devicePixelRatio);
+          context.strokeStyle = colour("--plain");
+          context.setLineDash([4, 4]);
+          for (const execute of one.executes) this.upright(context, u.valToPos(execute, "x", true), top, height);
         }
-      }
-      context.setLineDash([]);
-      this.at.forEach((at, k) => {
-        if (at === null) return;
-        const x = Math.round(u.valToPos(at, "x", true)) + 0.5;
-        context.strokeStyle = context.fillStyle = colour("--limit");
-        context.beginPath();
-        context.moveTo(x, top);
-        context.lineTo(x, top + height);
-        context.stroke();
-        context.font = `bold ${11 * devicePixelRatio}px system-ui, sans-serif`;
-        context.fillText("AB"[k], x + 3 * devicePixelRatio, top + height - 4 * devicePixelRatio);
       });
+    }
+
+    // over them: notes, and the two instants that are compared
+    mark(u) {
+      this.inside(u, (context, left, top, width, height, first) => {
+        const line = 13 * devicePixelRatio;
+        this.spans.filter(span => span.kind === "note").forEach((one, row) => {
+          const at = u.valToPos(one.from, "x", true), before = at < left, words = before ? `\u2190 ${one.words}, ${iso(one.from).slice(0, 10)}` : one.words;
+          if (at > left + width) return;
+          context.strokeStyle = colour("--ink");
+          context.setLineDash([2, 2]);
+          if (!before) this.upright(context, at, top, height);
+          if (!first) return;
+          const x = Math.max(at, left) + 4, y = top + height - line * (row % 4 + 1.3);
+          context.fillStyle = colour("--page");
+          context.fillRect(x - 2, y - line + 3, context.measureText(words).width + 4, line);
+          context.fillStyle = colour("--ink");
+          context.fillText(words, x, y);
+        });
+        context.setLineDash([]);
+        context.strokeStyle = context.fillStyle = colour("--limit");
+        context.font = `bold ${context.font}`;
+        this.at.forEach((at, k) => {
+          if (at === null) return;
+          const x = u.valToPos(at, "x", true);
+          this.upright(context, x, top, height);
+          context.fillText("AB"[k], x + 3 * devicePixelRatio, top + height - 4 * devicePixelRatio);
+        });
+      });
+    }
+
+    upright(context, at, top, height) {
+      const x = Math.round(at) + 0.5;
+      context.beginPath();
+      context.moveTo(x, top);
+      context.lineTo(x, top + height);
+      context.stroke();
+    }
+
+    hatch(context, from, to, top, height) {
+      context.save();
+      context.beginPath();
+      context.rect(from, top, Math.max(2, to - from), height);
+      context.clip();
+      context.strokeStyle = colour("--plain");
+      context.beginPath();
+      for (let x = from - height; x < to + height; x += 7) { context.moveTo(x, top + height); context.lineTo(x + height, top); }
+      context.stroke();
       context.restore();
     }
 

@@ -1,0 +1,56 @@
+"""What a chart draws behind its channels: manoeuvres, stretches that could not be read, and notes."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+from kempf.pipeline.ingest.decoded import LostStretch
+from kempf.warehouse.instant import iso_utc
+from kempf.warehouse.notes import Note
+from kempf.warehouse.segments import Segment
+
+#: letters of a note that a chart has room for
+_MOST = 40
+
+
+def span_of(one: Segment) -> dict[str, Any]:
+    """Return what a chart draws of a manoeuvre: its span and its executes."""
+    name = (f"{one.psi0_deg:g}/{one.delta0_deg:g} " if one.is_zigzag else "") + one.kind.replace("_", " ")
+    return {
+        "kind": "manoeuvre",
+        "words": name + (" (excluded)" if one.excluded is not None else ""),
+        "from": iso_utc(one.start_utc_ns),
+        "to": iso_utc(one.end_utc_ns),
+        "executes": [iso_utc(t) for t in one.executes_utc_ns],
+    }
+
+
+def spans_of_lost(lost: Sequence[LostStretch], start_utc_ns: int, end_utc_ns: int) -> list[dict[str, Any]]:
+    """Return the stretches of a log that could not be read; one whose ends are not known reaches to the log's."""
+    return [
+        {
+            "kind": "lost",
+            "words": "cannot be read",
+            "from": iso_utc(start_utc_ns if one.since_ns is None else one.since_ns),
+            "to": iso_utc(end_utc_ns if one.until_ns is None else one.until_ns),
+            "executes": [],
+        }
+        for one in lost
+    ]
+
+
+def spans_of_notes(notes: Iterable[Note], end_utc_ns: int) -> list[dict[str, Any]]:
+    """Return the notes that state when something happened, those of earlier too: what was done then still holds."""
+    dated = [(one.event_utc_ns, one) for one in notes if one.event_utc_ns is not None]
+    return [
+        {
+            "kind": "note",
+            "words": one.text if len(one.text) <= _MOST else f"{one.text[: _MOST - 3]}...",
+            "from": iso_utc(at),
+            "to": iso_utc(at),
+            "executes": [],
+        }
+        for at, one in sorted(dated, key=lambda pair: pair[0])
+        if at <= end_utc_ns
+    ]
