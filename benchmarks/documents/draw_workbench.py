@@ -5,22 +5,16 @@
 
 from __future__ import annotations
 
-import os
-import re
-import shutil
-import signal
 import subprocess
-import sys
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from playwright.sync_api import Page, sync_playwright
+from playwright.sync_api import Page
 
 from benchmarks.diagnose import late_rudder
+from benchmarks.pages.browser import KEMPF, Opened, opened
 
 FIGURES = Path(__file__).parents[2] / "docs" / "figures"
-KEMPF = (sys.executable, "-c", "from kempf.workbench.cli import main; main()")
-WAIT_MS = 180_000
 
 
 def shot(tab: Page, name: str, height: int) -> None:
@@ -30,50 +24,79 @@ def shot(tab: Page, name: str, height: int) -> None:
     print(path)
 
 
-def story(tab: Page, start: str) -> None:
+def story(page: Opened) -> None:
     """Go through the pages as an engineer would."""
-    vessel = late_rudder.VESSEL
-    tab.goto(start)
-    base = tab.url.rstrip("/")
-    tab.click(f"th a:has-text('{vessel}')")
-    log = tab.get_attribute("th a[href^='/logs/']", "href")
-    tab.goto(f"{base}{log}")
+    tab, base, vessel = page.tab, page.base, late_rudder.VESSEL
+    hers = f"{base}/v/{vessel}"
+    log = page.json(f"/v/{vessel}/logs.json")[0]["log_id"]
+    tab.goto(f"{base}/logs/{log}")
     tab.wait_for_selector("body[data-ready=yes]")
     shot(tab, "log", 840)
-    tab.goto(f"{base}/v/{vessel}")
+    tab.goto(hers)
     tab.click("button:has-text('Identify')")
     tab.wait_for_url(f"**/v/{vessel}")
     tab.click("text=Model beside measurement")
-    tab.click("button:has-text('Predict')")
-    tab.wait_for_url("**/model?**")
-    shot(tab, "model", 1240)
-    tab.click("button:has-text('Diagnose')")
+    tab.click("a:has-text('go with rudder rate') >> nth=0")
+    tab.wait_for_selector("#drawn .shade")
+    shot(tab, "model", 1560)
+    tab.keyboard.press("n")
+    tab.wait_for_selector("body[data-ready=yes]")
+    shot(tab, "manoeuvre", 1240)
+    tab.click("button:has-text('Explain this stretch')")
+    tab.click("main button:has-text('Explain it')")
+    tab.wait_for_url("**/explain?**")
+    shot(tab, "explain", 620)
+    tab.goto(hers)
+    tab.click("button:has-text('Diagnose') >> nth=0")
+    tab.wait_for_selector("#climb:not([hidden])")
+    tab.wait_for_timeout(4000)
+    shot(tab, "job", 700)
     tab.wait_for_url("**/diagnoses/**")
     shot(tab, "diagnosis", 900)
     tab.click("button:has-text('Add rudder lag')")
     tab.wait_for_url("**/ladder")
     shot(tab, "ladder", 480)
+    tab.click("text=Compare the two sets")
+    tab.wait_for_url("**/compare?**")
+    shot(tab, "compare", 900)
+    tab.goto(f"{hers}/ladder")
+    tab.click("text=Model before and after")
+    tab.wait_for_url("**beside=**")
+    tab.locator("#drawn").scroll_into_view_if_needed()
+    tab.locator("#drawn").screenshot(path=FIGURES / "workbench_flip.png")
+    asked(page, f"{hers}/what-if?parameter=rudder_lag.tau", "what_if", 860)
+    asked(page, f"{hers}/predict?manoeuvre=zigzag&angles=20/20", "predict", 900)
+    asked(page, f"{hers}/next-trial?parameter=b2", "next_trial", 760)
+    tab.goto(f"{base}/sets/{page.json(f'/v/{vessel}/ladder.json')[-1]['parameter_set_id']}")
+    shot(tab, "set", 980)
+    tab.goto(hers)
+    shot(tab, "vessel", 900)
+    tab.goto(base)
+    shot(tab, "fleet", 420)
+    tab.goto(f"{base}/effects/rudder_lag")
+    shot(tab, "effect", 560)
+
+
+def asked(page: Opened, address: str, name: str, height: int) -> None:
+    """Open a page whose answer has to be made, let it be made, and take its picture."""
+    tab = page.tab
+    tab.goto(address)
+    made = tab.locator("main form.job button")
+    if made.count():
+        made.first.click()
+        tab.wait_for_url(f"**{address.partition('?')[0].rpartition('/')[2]}?**")
+    shot(tab, name, height)
 
 
 def main() -> None:
     """Draw them."""
-    browser = os.environ.get("KEMPF_CHROMIUM") or shutil.which("chromium") or shutil.which("google-chrome")
-    with TemporaryDirectory() as place, sync_playwright() as playwright:
+    with TemporaryDirectory() as place:
         folder = Path(place)
         late_rudder.write(folder)
         files = (folder / "day.mcap", "--profile", folder / "late.yaml")
         subprocess.run([*KEMPF, "ingest", *files, "--warehouse", folder / "w"], check=True)
-        command = [*KEMPF, "workbench", "--warehouse", folder / "w", "--state", folder / "state", "--port", "0"]
-        with subprocess.Popen(command, stderr=subprocess.PIPE, text=True) as server:
-            assert server.stderr is not None
-            found = re.search(r"http://\S+", server.stderr.readline())
-            assert found is not None
-            one = playwright.chromium.launch(executable_path=browser, args=["--no-sandbox"])
-            tab = one.new_context(viewport={"width": 1000, "height": 800}, color_scheme="light").new_page()
-            tab.set_default_timeout(WAIT_MS)
-            story(tab, found.group())
-            one.close()
-            server.send_signal(signal.SIGINT)
+        with opened(folder / "w", folder / "state", width=1000) as page:
+            story(page)
 
 
 if __name__ == "__main__":

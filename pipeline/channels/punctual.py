@@ -20,8 +20,9 @@ from kempf.pipeline.channels.series import SECOND_NS, Series
 
 #: time before and after a segment in which its instruments are looked at, s
 _AROUND_S = 1800
-#: standard errors of a lateness below which it is none, and periods: finer than its readings no velocity is known
-_SURE, _FINEST = 3.0, 0.2
+#: standard errors of a lateness above which it is undone, and may be there; periods: finer than its readings no
+#: velocity is known
+_SURE, _POSSIBLE, _FINEST = 3.0, 1.645, 0.2
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +33,7 @@ class Punctual:
     instruments: Instruments
     #: A sentence for each speed that was, and for instants that are not known.
     said: tuple[str, ...]
-    #: What is not known of the instants, with what is not known of a lateness that was undone.
+    #: What is not known of the instants, with what is not known of a lateness, whether it was undone or not.
     errors: InstantErrors
 
 
@@ -52,11 +53,20 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
     said = []
     # of a velocity that was turned out of the ship's frame it is not known what was smoothed
     late = _velocity_lateness(own) if "velocity_forward" not in own else None
-    if late is not None:
+    late_std_s = 0.0
+    if late is not None and late.late_s > _SURE * late.std_s:
+        late_std_s = late.std_s
         changed |= unsmoothed(own["speed_over_ground"], own["course_over_ground"], late.late_s)
         said.append(
             f"the GNSS velocity is {late.late_s:.2g} ± {late.std_s:.1g} s (1 s.e.) late beside the fixes, as where it "
             "is smoothed: undone"
+        )
+    elif late is not None:
+        # it may not be late at all, and is off by so much where it is
+        late_std_s = late.late_s
+        said.append(
+            f"the GNSS velocity may be {late.late_s:.2g} ± {late.std_s:.1g} s (1 s.e.) late beside the fixes: too "
+            "little to be undone, and among what is not known of its instants"
         )
     log = own.get("speed_through_water")
     many = readings_averaged(log) if log is not None else 1.0
@@ -66,19 +76,19 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
             f"the speed log shows means over {many * log.period_s:.2g} s: taken at their middle, one after the other"
         )
     whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
-    errors = instant_errors(instruments.instant_std_s, 0.0 if late is None else late.std_s)
+    errors = instant_errors(instruments.instant_std_s, late_std_s)
     return Punctual(whole, (*said, *said_of(instruments.instant_std_s)), errors)
 
 
 def _velocity_lateness(series: dict[str, Series]) -> Lateness | None:
-    """Return by how much the velocity over ground is late beside the fixes; None where nothing shows that it is."""
+    """Return by how much the velocity over ground is late beside the fixes; None where nothing shows that it may be."""
     log = Log(series)
     track, velocity = log.track(), log.velocity("course")
     if track is None or velocity is None:
         return None
     found = velocity_lateness(track, velocity)
     least = _FINEST * series["course_over_ground"].period_s
-    return found if found is not None and found.late_s > max(_SURE * found.std_s, least) else None
+    return found if found is not None and found.late_s > max(_POSSIBLE * found.std_s, least) else None
 
 
 def unsmoothed(speed: Series, course: Series, late_s: float) -> dict[str, Series]:

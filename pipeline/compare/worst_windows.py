@@ -16,6 +16,7 @@ from kempf.pipeline.predict.run_residuals import Looked
 #: a window in instants, and how many windows are shown of each kind
 _WINDOW, _SHOWN = 20, 5
 _FEWEST = 4
+_MS_NS = 1_000_000
 
 
 def worst(looked: Sequence[Looked]) -> list[dict[str, Any]]:
@@ -90,14 +91,16 @@ def _window(one: Looked, at: int) -> dict[str, Any]:
     start_s, end_s = float(run.time_s[at]), float(run.time_s[end])
     return {
         "run": run.name,
-        "start": _iso(run.start_utc_ns, start_s),
-        "end": _iso(run.start_utc_ns, end_s),
+        "start": _iso(run.start_utc_ns, start_s, up=False),
+        # whoever asks for this window gets its last instant too
+        "end": _iso(run.start_utc_ns, end_s, up=True),
         "start_s": start_s,
         "end_s": end_s,
         "phase": str(names[int(np.argmax(counts))]) or None,
     }
 
 
-def _iso(start_utc_ns: int, seconds: float) -> str:
-    instant = np.datetime64(start_utc_ns + round(seconds * SECOND_NS), "ns")
-    return f"{np.datetime_as_string(instant, unit='ms')}Z"
+def _iso(start_utc_ns: int, seconds: float, *, up: bool) -> str:
+    instant_ns = start_utc_ns + round(seconds * SECOND_NS)
+    whole_ms = -(-instant_ns // _MS_NS) if up else instant_ns // _MS_NS
+    return f"{np.datetime_as_string(np.datetime64(whole_ms, 'ms'), unit='ms')}Z"

@@ -84,6 +84,26 @@ def test_what_is_not_late_stays_as_it_is() -> None:
         assert found.errors == IN_THE_LOG
 
 
+def test_what_may_be_late_is_left_and_not_known() -> None:
+    """A receiver that smooths over 0.1 s, in boats that show it less surely than three standard errors."""
+    kinds = set()
+    for seed in range(40):
+        ship = boat(smoothed_s=0.1, seed=seed)
+        late_s, std_s = of_velocity(ship)
+        found = punctual(ship, 0, int(LONG_S * SECOND_NS))
+        same = found.instruments is ship
+        if late_s > 3.0 * std_s:
+            kinds.add("undone")
+            assert not same and found.errors.velocity_s == std_s and "undone" in found.said[0]
+        elif late_s > max(1.645 * std_s, 0.2 * PERIOD_S):
+            kinds.add("may be")
+            assert same and found.errors.velocity_s == late_s and "may be" in found.said[0]
+        else:
+            kinds.add("none")
+            assert same and found.errors == IN_THE_LOG and found.said == ()
+    assert kinds == {"undone", "may be", "none"}
+
+
 def test_a_log_of_means_is_read_at_their_middle_one_after_the_other() -> None:
     ship = boat()
     log = ship.series["speed_through_water"]

@@ -131,3 +131,13 @@ def test_the_band_holds_99_percent(n: int) -> None:
     rms = np.sqrt(np.mean(np.random.default_rng(n).standard_normal((20000, n if n < 1000 else 200)) ** 2, axis=1))
     low, high = rms_band(n if n < 1000 else 200)
     assert np.mean((rms >= low) & (rms <= high)) == pytest.approx(0.99, abs=0.004)
+
+
+def test_a_window_that_is_asked_for_again_holds_all_its_instants() -> None:
+    # a log whose instants lie between milliseconds
+    odd = replace(RUN, start_utc_ns=RUN.start_utc_ns + 613_457)
+    filtered = sailed_by_model(odd, HULL, seed=1, late_s=4 * RUN.step_s)
+    for one in where([looked_at(filtered, HULL, phases())])["worst"]:
+        begin, end = (np.datetime64(one[key][:-1], "ns").astype(np.int64) for key in ("start", "end"))
+        instants = odd.start_utc_ns + np.round(odd.time_s * 1e9).astype(np.int64)
+        assert np.count_nonzero((instants >= begin) & (instants <= end)) == 20

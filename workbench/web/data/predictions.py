@@ -17,10 +17,10 @@ from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.compare.evidence import evidence_in
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.warehouse.canonical import canonical_json, sha256
+from kempf.warehouse.store import Warehouse
 
 if TYPE_CHECKING:
     from kempf.flows.jobs.compare_vessel import Comparison
-    from kempf.workbench.web.desk import Desk
 
 #: Horizons that the pages offer: as asked for, and in words.
 HORIZONS = (("1", "one step"), ("10s", "10 s ahead"), ("60s", "60 s ahead"), ("free", "free run"))
@@ -82,7 +82,7 @@ def keep(state: Path, key: str, found: Comparison) -> None:
 
 
 def kept_of(
-    desk: Desk, vessel: str, asked_set: str | None, asked_horizon: str | None
+    warehouse: Warehouse, state: Path, vessel: str, asked_set: str | None, asked_horizon: str | None
 ) -> tuple[str, str, KeptPrediction | None]:
     """Return which set and horizon of a vessel are asked for, and the prediction with them; None where none is kept.
 
@@ -93,10 +93,10 @@ def kept_of(
     UsageError
         ``set_of_another_vessel``, ``horizon_unknown``.
     """
-    chosen, _ = chosen_set(desk.warehouse, vessel, asked_set or None)
+    chosen, _ = chosen_set(warehouse, vessel, asked_set or None)
     horizon = horizon_of(asked_horizon or "free").name
-    state = fleet_state(desk.warehouse, [vessel])[vessel]
-    return chosen.parameter_set_id, horizon, kept(desk.state, key_of(state, chosen.parameter_set_id, horizon))
+    rests_on = fleet_state(warehouse, [vessel])[vessel]
+    return chosen.parameter_set_id, horizon, kept(state, key_of(rests_on, chosen.parameter_set_id, horizon))
 
 
 def kept(state: Path, key: str) -> KeptPrediction | None:

@@ -59,10 +59,17 @@ def _keep_those_of_current(warehouse: Warehouse, state: Path, vessel: str, progr
     """Keep what a vessel's current set predicts, so that the page of her model need not wait."""
     from kempf.warehouse import aliases
 
-    current = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
-    if current is not None:
+    _keep_those_of(warehouse, state, vessel, aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT), progress)
+
+
+def _keep_those_of(warehouse: Warehouse, state: Path, vessel: str, name: str | None, progress: Progress) -> None:
+    """Keep what a set predicts, where there is a set and it is not kept."""
+    from kempf.workbench.web.data.predictions import kept_of
+
+    if name is not None:
         with suppress(KempfError):  # the page says why when it is asked for
-            _keep_predictions(warehouse, state, vessel, current, progress)
+            if kept_of(warehouse, state, vessel, name, None)[2] is None:
+                _keep_predictions(warehouse, state, vessel, name, progress)
 
 
 def diagnose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
@@ -72,6 +79,7 @@ def diagnose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pr
 
     spec, own = standing_model(warehouse, arguments["vessel"])
     made, _ = diagnose_vessel(warehouse, arguments["vessel"], spec, own, progress=progress)
+    _keep_those_of(warehouse, state, arguments["vessel"], made.parameter_set_id, progress)
     return {"to": f"/diagnoses/{made.diagnosis_id}"}
 
 
@@ -84,7 +92,9 @@ def add(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progres
     name, formula = arguments["effect"], arguments["formula"]
     own = formula_of_ones_own(name, formula) if formula else NONE_OF_ONES_OWN
     made = add_effect(warehouse, arguments["vessel"], name, own, progress=progress)
-    _keep_those_of_current(warehouse, state, arguments["vessel"], progress)
+    # before and after are looked at beside each other
+    for each in (made.parameter_set_id, made.parent):
+        _keep_those_of(warehouse, state, arguments["vessel"], each, progress)
     return {"to": f"{of_vessel(arguments['vessel'])}/ladder", "parameter_set_id": made.parameter_set_id}
 
 

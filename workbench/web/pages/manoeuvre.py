@@ -63,7 +63,7 @@ def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
         "after": listed[place + 1].segment_id if place + 1 < len(listed) else None,
     }
     if current:
-        set_id, horizon, made = kept_of(desk, row.vessel, asked.get("set"), asked.get("h"))
+        set_id, horizon, made = kept_of(desk.warehouse, desk.state, row.vessel, asked.get("set"), asked.get("h"))
         if made is not None and one.segment_id in made.columns:
             beside = f"/segments/{one.segment_id}/predicted?set={set_id}&h={horizon}"
             content |= {"predicted": beside, "set_id": set_id, "horizon": dict(HORIZONS)[horizon]}

@@ -24,7 +24,7 @@ _CHANNEL = "yaw_rate"
 
 def document(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any] | None:
     """Return what `kempf compare --where --json` prints, where it is kept; else None."""
-    made = kept_of(desk, vessel, asked.get("set"), asked.get("h"))[2]
+    made = kept_of(desk.warehouse, desk.state, vessel, asked.get("set"), asked.get("h"))[2]
     return None if made is None else made.document
 
 
@@ -42,7 +42,7 @@ def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
     NotFound
         ``no_run``, ``no_parameter_set``, ``no_evidence``.
     """
-    set_id, horizon, made = kept_of(desk, vessel, asked.get("set"), asked.get("h"))
+    set_id, horizon, made = kept_of(desk.warehouse, desk.state, vessel, asked.get("set"), asked.get("h"))
     made_before: KeptPrediction | None = None
     content: dict[str, Any] = {
         "vessel": vessel,
@@ -53,7 +53,7 @@ def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
         "beside": None,
     }
     if beside := asked.get("beside"):
-        other, _, made_before = kept_of(desk, vessel, beside, horizon)
+        other, _, made_before = kept_of(desk.warehouse, desk.state, vessel, beside, horizon)
         content |= {"beside": other, "before": None if made_before is None else made_before.document}
     if made is not None:
         runs = sorted(made.document["runs"], key=lambda run: (not run["held_out"], run["start"]))

@@ -87,7 +87,7 @@ def predicted_frame(desk: Desk, segment_id: str, asked: Mapping[str, str], bins:
         ``instant_unreadable``, ``window_empty``.
     """
     one = segments.by_prefix(desk.warehouse, segment_id)
-    _, _, made = kept_of(desk, one.vessel, asked.get("set"), asked.get("h"))
+    _, _, made = kept_of(desk.warehouse, desk.state, one.vessel, asked.get("set"), asked.get("h"))
     if made is None or one.segment_id not in made.columns:
         raise NotFound("no_prediction", "This manoeuvre is not predicted.", "Predict on the model's page.")
     row = logs.of_ingest(desk.warehouse, one.ingest_id)
