@@ -28,8 +28,8 @@ _SEED = 20261127
 
 
 @dataclass(frozen=True)
-class Told:
-    """What became of one ship."""
+class Passage:
+    """What was seen on the way through the pages with one ship."""
 
     ship: str
     hidden: str
@@ -116,12 +116,12 @@ def gone_through(page: Opened, vessel: str, logs: list[Path], profile: Path) -> 
     return {**seen, "evidence": before, "violations": violations}
 
 
-def told(words: str, hidden: str, vessel: str, logs: list[Path], profile: Path) -> Told:
+def passage(words: str, hidden: str, vessel: str, logs: list[Path], profile: Path) -> Passage:
     """Go through the pages of a new warehouse with one ship."""
     with TemporaryDirectory() as place, opened(Path(place) / "w", Path(place) / "state", "--new") as page:
         seen = gone_through(page, vessel, logs, profile)
         complaints = len(page.complaints)
-    return Told(
+    return Passage(
         ship=words,
         hidden=hidden,
         verdict=seen["verdict"],
@@ -134,7 +134,7 @@ def told(words: str, hidden: str, vessel: str, logs: list[Path], profile: Path) 
     )
 
 
-def every(seed: int, data: Path) -> Iterator[Told]:
+def every(seed: int, data: Path) -> Iterator[Passage]:
     """Go through the pages with every ship."""
     for words, case in simulated(seed):
         with TemporaryDirectory() as place:
@@ -142,12 +142,12 @@ def every(seed: int, data: Path) -> Iterator[Told]:
             for name, content in logs_of(case)[0].items():
                 (folder / name).write_bytes(content)
             logs = sorted(path for path in folder.iterdir() if path.name != "profile.yaml")
-            yield told(words, case.effect, case.case_id, logs, folder / "profile.yaml")
+            yield passage(words, case.effect, case.case_id, logs, folder / "profile.yaml")
     tank = measured_ships.tank(data)
-    yield told("the towing tank's, measured", "not known", tank.name, list(tank.logs), tank.profiles[0])
+    yield passage("the towing tank's, measured", "not known", tank.name, list(tank.logs), tank.profiles[0])
 
 
-def row(one: Told) -> list[str]:
+def row(one: Passage) -> list[str]:
     """Return a ship as a row of the page."""
     first, then = one.evidence
     return [

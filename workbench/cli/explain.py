@@ -38,7 +38,8 @@ def command(vessel: str, start: str, end: str, set_id: str | None, uri: str, as_
             sizes = (
                 f"{name} {number(s['value'])} ± {number(s['std'], 2)} {s['unit']}" for name, s in one["size"].items()
             )
-            explained = None if one["explained"] is None else 100.0 * one["explained"]
+            share = one["explained_of_misfit"]
+            explained = None if share is None else 100.0 * share
             rows.append(
                 [
                     one["effect"],
@@ -50,6 +51,6 @@ def command(vessel: str, start: str, end: str, set_id: str | None, uri: str, as_
             )
     title = f"{document['segment_id']} of {vessel}, {document['from'][11:19]} to {document['to'][11:19]}"
     if rows:
-        print_table(["effect", "score", "p, adjusted", "explained, %", "size, ± 1 s.e."], rows[:12], title)
+        print_table(["effect", "score", "p, adjusted", "of the misfit, %", "size, ± 1 s.e."], rows[:12], title)
     for sentence in document["sentences"]:
         print_paragraph(sentence)
