@@ -28,6 +28,14 @@ class Lineage(BaseModel):
     url: str | None = Field(default=None, description="address of a server that takes OpenLineage events")
 
 
+class Workbench(BaseModel):
+    """Where the pages are that reports of runs link to."""
+
+    model_config = ConfigDict(extra="forbid", frozen=True)
+
+    url: str | None = Field(default=None, description="address at which `kempf workbench` is served")
+
+
 class Configuration(BaseModel):
     """The settings; None where nothing is said."""
 
@@ -39,6 +47,7 @@ class Configuration(BaseModel):
     log_level: LogLevel | None = Field(default=None, description="from which level on a command says what it does")
     metrics: Metrics = Field(default_factory=Metrics, description="where the figures of a run go, for Prometheus")
     lineage: Lineage = Field(default_factory=Lineage, description="where the OpenLineage events of a run go")
+    workbench: Workbench = Field(default_factory=Workbench, description="the pages that reports of runs link to")
 
 
 def value_of(configuration: Configuration, name: str) -> str | None:

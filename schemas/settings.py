@@ -13,5 +13,6 @@ VARIABLES = {
     "metrics.textfile": "KEMPF_METRICS_TEXTFILE",
     "metrics.pushgateway": "KEMPF_METRICS_PUSHGATEWAY",
     "lineage.url": "OPENLINEAGE_URL",
+    "workbench.url": "KEMPF_WORKBENCH_URL",
 }
 LogLevel = Literal["debug", "info", "warning", "error"]

@@ -11,6 +11,7 @@ from kempf.warehouse.canonical import canonical_json, sha256
 
 #: Characters of a name that a person reads in a key.
 _MOST_LETTERS = 24
+_PLAIN = re.compile(r"[A-Za-z0-9_-]+")
 
 
 def vessel_key(vessel: str) -> str:
@@ -30,6 +31,17 @@ def vessel_key(vessel: str) -> str:
     ('ferry-one-cb9e2d73', 'etc-74ccf3c5')
     """
     return f"{_readable(vessel)}-{_hash(vessel)[:8]}"
+
+
+def segment_of_address(vessel: str) -> str:
+    """Return what stands for a vessel in an address: her name where that is a plain word, else ``~`` and her key.
+
+    Examples
+    --------
+    >>> segment_of_address("ferry"), segment_of_address("Ferry One")
+    ('ferry', '~ferry-one-cb9e2d73')
+    """
+    return vessel if _PLAIN.fullmatch(vessel) else f"~{vessel_key(vessel)}"
 
 
 def earlier_key(vessel: str) -> str:

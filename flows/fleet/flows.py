@@ -38,6 +38,7 @@ from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.pool_vessel import not_pooled, pool_vessel
 from kempf.flows.jobs.take_inbox import InboxRun, NeedsAPerson, take_inbox
 from kempf.flows.jobs.vessel_report import VesselReport
+from kempf.flows.process.configuration import setting
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
 from kempf.schemas.model_spec import ModelSpec
@@ -279,7 +280,8 @@ def reprocess(
     ordered = [reports[name] for name in sorted(reports)]
     sentence = fleet_report.sentence(ordered, limits)
     create_table_artifact(key="kempf-reprocess", table=fleet_report.table(ordered), description=sentence)
-    create_markdown_artifact(key="kempf-fleet", markdown=fleet_report.markdown(ordered, limits), description=sentence)
+    page = fleet_report.markdown(ordered, limits, setting("workbench.url"))
+    create_markdown_artifact(key="kempf-fleet", markdown=page, description=sentence)
     if any(fleet_report.needs_a_person(report, limits) for report in ordered):
         return Failed(message=sentence, data=fleet_report.VesselsFailed(ordered, limits))
     return Completed(message=sentence, data=ordered)

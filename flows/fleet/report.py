@@ -8,6 +8,7 @@ from typing import Any
 
 from kempf.schemas.errors import DataRejected
 from kempf.schemas.quality import FINDINGS, NO_LIMITS, Quality, in_words
+from kempf.warehouse.keys import segment_of_address
 
 #: Rows of a table that a page can still show; of a larger fleet those where nothing happened are left out.
 MOST_ROWS = 1000
@@ -103,8 +104,14 @@ def counted(report: Mapping[str, Any]) -> str:
     return _in_words(_counts([report]))
 
 
-def markdown(reports: Reports, quality: Quality = NO_LIMITS) -> str:
-    """Return the summary of a run as Markdown: what was done, who failed with what, what is wrong with the models."""
+def markdown(reports: Reports, quality: Quality = NO_LIMITS, pages: str | None = None) -> str:
+    """Return the summary of a run as Markdown: what was done, who failed with what, what is wrong with the models.
+
+    Parameters
+    ----------
+    pages : str, optional
+        Address at which `kempf workbench` is served: vessels link to their pages there.
+    """
     keys = ("logs", "reread", "searched", "segments", "new_sets", "kept_sets")
     totals = {key: sum(int(r[key]) for r in reports) for key in keys}
     verified: Counter[str] = sum((Counter(r["verified"]) for r in reports), Counter())
@@ -123,14 +130,14 @@ def markdown(reports: Reports, quality: Quality = NO_LIMITS) -> str:
         first, *others = sorted(report["failures"], key=lambda f: f["known"])
         more = f" (and {len(others)} more)" if others else ""
         since = "before" if first["known"] else "this run"
-        cells = (report["vessel"], f"{first['what']}: {first['error']['message']}{more}", since)
-        lines.append(f"| {' | '.join(map(_cell, (*cells, first['error']['next_step'])))} |")
+        cells = (f"{first['what']}: {first['error']['message']}{more}", since, first["error"]["next_step"])
+        lines.append(f"| {' | '.join((_vessel(report, pages), *map(_cell, cells)))} |")
     if failed[_MOST_TOLD:]:
         lines += ["", f"... and {len(failed) - _MOST_TOLD} more, in the table `kempf-reprocess`."]
-    return "\n".join(lines + _quality(reports, quality))
+    return "\n".join(lines + _quality(reports, quality, pages))
 
 
-def _quality(reports: Reports, quality: Quality) -> list[str]:
+def _quality(reports: Reports, quality: Quality, pages: str | None) -> list[str]:
     """Return what is wrong with logs and models: how much in the fleet, and each of those who are beyond the limits."""
     totals = _counts(reports)
     if not totals:
@@ -142,11 +149,18 @@ def _quality(reports: Reports, quality: Quality) -> list[str]:
     for report in bad[:_MOST_TOLD]:
         over = _over(report, quality)
         example = next(str(one["words"]) for one in report["findings"] if one["kind"] in over)
-        cells = (str(report["vessel"]), ", ".join(beyond(report, quality)), example)
-        lines.append(f"| {' | '.join(map(_cell, cells))} |")
+        cells = (", ".join(beyond(report, quality)), example)
+        lines.append(f"| {' | '.join((_vessel(report, pages), *map(_cell, cells)))} |")
     if bad[_MOST_TOLD:]:
         lines += ["", f"... and {len(bad) - _MOST_TOLD} more, in the table `kempf-reprocess`."]
     return lines
+
+
+def _vessel(report: Mapping[str, Any], pages: str | None) -> str:
+    name = _cell(str(report["vessel"]))
+    if pages is None:
+        return name
+    return f"[{name}]({pages.rstrip('/')}/v/{segment_of_address(str(report['vessel']))})"
 
 
 def _cell(text: str) -> str:

@@ -21,6 +21,7 @@ from kempf.schemas.errors import DataRejected, KempfError
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import aliases, runs, vessels
 from kempf.warehouse.store import Warehouse
+from kempf.workbench.web.addresses import of_vessel
 from tests.conftest import Ship
 from tests.flows.content import fresh, versions
 
@@ -201,6 +202,15 @@ def test_a_large_fleet_has_a_table_of_those_where_something_happened() -> None:
     loud.fail("a|b", KempfError("x", "Two\nlines.", "Do."))
     assert [row["vessel"] for row in fleet_report.table([*calm, loud.show()])] == ["loud"]
     assert "| loud | a\\|b: Two lines. | this run | Do. |" in fleet_report.markdown([*calm, loud.show()])
+
+
+def test_vessels_of_a_summary_link_to_their_pages() -> None:
+    reports = [VesselReport(name) for name in ("Ferry One", "loud")]
+    for one in reports:
+        one.fail("reading", KempfError("x", "Broken.", "Do."))
+    text = fleet_report.markdown([one.show() for one in reports], pages="http://ship:8899/")
+    assert "| [loud](http://ship:8899/v/loud) | reading: Broken." in text
+    assert f"[Ferry One](http://ship:8899{of_vessel('Ferry One')})" in text and "/v/~ferry-one-" in text
 
 
 def test_a_run_is_remembered_under_one_name(own: Warehouse) -> None:

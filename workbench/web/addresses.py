@@ -6,10 +6,9 @@ import re
 
 from kempf.schemas.errors import NotFound
 from kempf.warehouse import vessels
-from kempf.warehouse.keys import vessel_key
+from kempf.warehouse.keys import segment_of_address, vessel_key
 from kempf.warehouse.store import Warehouse
 
-_PLAIN = re.compile(r"[A-Za-z0-9_-]+")
 #: What an id looks like, by what it begins with; a log's is the SHA-256 of its bytes.
 _KINDS = (
     (re.compile(r"seg-[0-9a-f]{4,16}"), "/segments/"),
@@ -29,7 +28,7 @@ def of_vessel(name: str) -> str:
     >>> of_vessel("../etc").startswith("/v/~")
     True
     """
-    return "/v/" + (name if _PLAIN.fullmatch(name) else "~" + vessel_key(name))
+    return "/v/" + segment_of_address(name)
 
 
 def vessel_at(warehouse: Warehouse, segment: str) -> str:
