@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from types import EllipsisType, MappingProxyType
 
 import polars as pl
 
@@ -18,8 +19,21 @@ CURRENT = "current"
 _NAME = re.compile(r"[A-Za-z][A-Za-z0-9._-]{0,63}")
 
 
-def point(warehouse: Warehouse, vessel: str, parameter_set_id: str, alias: str = CURRENT) -> bool:
+def point(
+    warehouse: Warehouse,
+    vessel: str,
+    parameter_set_id: str,
+    alias: str = CURRENT,
+    *,
+    expected: str | EllipsisType | None = ...,
+) -> bool:
     """Let an alias of a vessel point to one of her parameter sets; the latest call wins.
+
+    Parameters
+    ----------
+    expected : str, optional
+        Id of the set that it is taken to point to now, None for none; where it points elsewhere nothing is changed.
+        Whatever it is, where nothing is expected.
 
     Returns
     -------
@@ -31,7 +45,7 @@ def point(warehouse: Warehouse, vessel: str, parameter_set_id: str, alias: str =
     NotFound
         ``no_warehouse``, ``no_parameter_set``.
     UsageError
-        ``set_of_another_vessel``.
+        ``set_of_another_vessel``, ``moved_meanwhile``.
     """
     found = parameter_sets.get(warehouse, parameter_set_id)
     if found.vessel != vessel:
@@ -41,16 +55,33 @@ def point(warehouse: Warehouse, vessel: str, parameter_set_id: str, alias: str =
             f"List hers with `kempf params list --vessel {vessel!r}`.",
             {"parameter_set_id": found.parameter_set_id, "vessel": found.vessel},
         )
-    return bool(point_all(warehouse, {(vessel, alias): found.parameter_set_id}))
+    before = {} if isinstance(expected, EllipsisType) else {(vessel, alias): expected}
+    return bool(point_all(warehouse, {(vessel, alias): found.parameter_set_id}, before))
 
 
-def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tuple[tuple[str, str], ...]:
+def moved_meanwhile(vessel: str, now: str | None, shown: str | None) -> UsageError:
+    """Return the error of a change to another model than the one that was looked at."""
+    return UsageError(
+        "moved_meanwhile",
+        f"The model of {vessel!r} is {now or 'none'} now, and was {shown or 'none'} when this was begun.",
+        "Look at her model again, then ask once more.",
+        {"standing": now, "shown": shown},
+    )
+
+
+def point_all(
+    warehouse: Warehouse,
+    wanted: Mapping[tuple[str, str], str],
+    expected: Mapping[tuple[str, str], str | None] = MappingProxyType({}),
+) -> tuple[tuple[str, str], ...]:
     """Let aliases of several vessels point to sets that are stored, in at most one commit.
 
     Parameters
     ----------
     wanted : mapping of (str, str) to str
         Whole ids of the vessels' own parameter sets, by vessel and alias.
+    expected : mapping of (str, str) to str or None, optional
+        Where some of them are taken to point now, None for nowhere.
 
     Returns
     -------
@@ -69,6 +100,10 @@ def point_all(warehouse: Warehouse, wanted: Mapping[tuple[str, str], str]) -> tu
             keys = sorted({row["vessel_key"] for row in rows.values()})
             known = delta.rows(table, "aliases", {"vessel_key": keys}).rows(named=True)
             stored = {(row["vessel"], row["alias"]): row["parameter_set_id"] for row in known}
+            for (vessel, alias), before in expected.items():
+                now = stored.get((vessel, alias))
+                if now not in (before, wanted[vessel, alias]):
+                    raise moved_meanwhile(vessel, now, before)
             changed = tuple(key for key in rows if stored.get(key) != wanted[key])
             if changed:
                 # of one name only: several would also name what is not among them

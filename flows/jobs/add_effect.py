@@ -9,6 +9,7 @@ from kempf.flows.jobs.standing_model import (
     known_effects,
     named,
     point,
+    require_current,
     standing_model,
     stored_model,
 )
@@ -31,6 +32,7 @@ def add_effect(
     *,
     begin: tuple[ModelSpec, Own] | None = None,
     force: bool = False,
+    shown: str | None = None,
 ) -> ParameterSet:
     """Add an effect to a vessel's model, refit, and make the result her model; its parent is the one before.
 
@@ -46,17 +48,20 @@ def add_effect(
         The model that it is added to; the vessel's current one by default.
     force : bool, optional
         Make it her model though it predicts worse.
+    shown : str, optional
+        Id of the set that was taken to be her current one when this was asked for.
 
     Raises
     ------
     NotFound
         ``effect_unknown``, ``no_vessel``, ``no_segments``, ``no_runs``.
     UsageError
-        ``effect_there``, ``effect_name``.
+        ``effect_there``, ``effect_name``; ``moved_meanwhile``: somebody gave her another model in between, which stays.
     DataRejected
         ``effect_worsens``: with the errors before and after.
     """
     named((name,), known_effects(own))
+    now = require_current(warehouse, vessel, shown)
     spec, before = begin or standing_model(warehouse, vessel)
     if name in spec.effects:
         raise UsageError(
@@ -80,7 +85,7 @@ def add_effect(
             "Add it all the same with --force, or see what `kempf diagnose` names.",
             {"effect": name, "parameter_set_id": made.parameter_set_id, "worse": worse},
         )
-    point(warehouse, made)
+    point(warehouse, made, now)
     return made
 
 

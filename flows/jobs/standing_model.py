@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from types import EllipsisType
 from typing import Any
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen
@@ -139,9 +140,33 @@ def effect_settings(spec: ModelSpec, own: Own) -> dict[str, Any]:
     return {"effects": {effect.name: effect.sha256 for effect in used}, "own": mine.as_json()}
 
 
-def point(warehouse: Warehouse, model: ParameterSet) -> None:
-    """Make a model the vessel's current one."""
-    aliases.point(warehouse, model.vessel, model.parameter_set_id)
+def point(warehouse: Warehouse, model: ParameterSet, expected: str | EllipsisType | None = ...) -> None:
+    """Make a model the vessel's current one in place of a set; errors are those of `kempf.warehouse.aliases.point`."""
+    aliases.point(warehouse, model.vessel, model.parameter_set_id, expected=expected)
+
+
+def current_id(warehouse: Warehouse, vessel: str) -> str | None:
+    """Return the id of a vessel's current set, None where she has none."""
+    return aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+
+
+def require_current(warehouse: Warehouse, vessel: str, shown: str | None) -> str | None:
+    """Return the id of a vessel's current set, which must be the one that was shown.
+
+    Parameters
+    ----------
+    shown : str or None
+        Empty where it was shown that she has none, None where nobody looked.
+
+    Raises
+    ------
+    UsageError
+        ``moved_meanwhile``.
+    """
+    now = current_id(warehouse, vessel)
+    if shown is not None and shown != (now or ""):
+        raise aliases.moved_meanwhile(vessel, now, shown)
+    return now
 
 
 def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
@@ -162,15 +187,23 @@ def standing_model(warehouse: Warehouse, vessel: str) -> tuple[ModelSpec, Own]:
     return model_of(now) if now else (default_model_of(warehouse, vessel), Own())
 
 
-def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
+def undo(warehouse: Warehouse, vessel: str, shown: str | None = None) -> ParameterSet:
     """Make the parent of a vessel's current model the current one; nothing is deleted.
+
+    Parameters
+    ----------
+    shown : str, optional
+        Id of the set that was taken to be her current one.
 
     Raises
     ------
     NotFound
         ``no_vessel``, ``no_parent``.
+    UsageError
+        ``moved_meanwhile``.
     """
     vessels.require(warehouse, vessel)
+    require_current(warehouse, vessel, shown)
     now = standing(warehouse, vessel)
     if now is None or now.parent is None:
         raise NotFound(
@@ -179,7 +212,7 @@ def undo(warehouse: Warehouse, vessel: str) -> ParameterSet:
             f"See `kempf ladder --vessel {vessel}`.",
         )
     before = parameter_sets.get(warehouse, now.parent, vessel)
-    point(warehouse, before)
+    point(warehouse, before, now.parameter_set_id)
     return before
 
 

@@ -41,7 +41,8 @@ def test_a_worse_model_is_pointed_to_by_force_only(monkeypatch: pytest.MonkeyPat
     worse = made(fitted=(-0.5, -4.0))
     monkeypatch.setattr(job, "choose_refreshed", lambda *_: None)
     monkeypatch.setattr(job, "stored_model", lambda *_: worse)
-    monkeypatch.setattr(job, "point", lambda _, one: pointed.append(one))
+    monkeypatch.setattr(job, "require_current", lambda *_: None)
+    monkeypatch.setattr(job, "point", lambda _, one, expected: pointed.append(one))
     place, begin = cast("Warehouse", None), (ModelSpec(), job.NONE_OF_ONES_OWN)
     with pytest.raises(DataRejected) as caught:
         job.add_effect(place, "late", "gyro_scale", begin=begin)

@@ -91,7 +91,7 @@ def add(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progres
 
     name, formula = arguments["effect"], arguments["formula"]
     own = formula_of_ones_own(name, formula) if formula else NONE_OF_ONES_OWN
-    made = add_effect(warehouse, arguments["vessel"], name, own, progress=progress)
+    made = add_effect(warehouse, arguments["vessel"], name, own, progress=progress, shown=arguments["standing"] or None)
     # before and after are looked at beside each other
     for each in (made.parameter_set_id, made.parent):
         _keep_those_of(warehouse, state, arguments["vessel"], each, progress)
@@ -102,7 +102,7 @@ def undo(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progre
     """Make the model before a vessel's current one the current one again."""
     from kempf.flows.jobs import standing_model
 
-    before = standing_model.undo(warehouse, arguments["vessel"])
+    before = standing_model.undo(warehouse, arguments["vessel"], arguments["standing"] or None)
     return {"to": f"{of_vessel(arguments['vessel'])}/ladder", "parameter_set_id": before.parameter_set_id}
 
 
@@ -226,8 +226,8 @@ KINDS: Mapping[str, Kind] = {
     "next_trial": Kind(propose, "Find the next trial", ("set", "parameter")),
     "diagnose": Kind(diagnose, "Diagnose", ()),
     "try": Kind(try_formula, "Try a formula", ("formula", "name")),
-    "add": Kind(add, "Add the effect", ("effect", "formula"), changes=True),
-    "undo": Kind(undo, "Undo the last effect", (), changes=True),
+    "add": Kind(add, "Add the effect", ("effect", "formula", "standing"), changes=True),
+    "undo": Kind(undo, "Undo the last effect", ("standing",), changes=True),
     "reprocess": Kind(reprocess, "Bring up to date", (), changes=True),
     "preview": Kind(preview, "Preview a correction", ("action", "segment", "log", "from", "to", "reason")),
     "correct": Kind(correct, "Correct a manoeuvre", ("action", "segment", "log", "from", "to", "reason"), changes=True),

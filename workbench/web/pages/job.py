@@ -8,10 +8,11 @@ from typing import Any
 
 from kempf.flows.fleet.state import fleet_state
 from kempf.flows.jobs.chosen_set import chosen_set
+from kempf.flows.jobs.standing_model import require_current
 from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.effects import get
 from kempf.schemas.errors import UsageError
-from kempf.warehouse import aliases, vessels
+from kempf.warehouse import vessels
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import key_of
 from kempf.workbench.web.data.sailed import MANOEUVRES, SIDES, request_of
@@ -72,7 +73,7 @@ def ask(desk: Desk, form: Mapping[str, str]) -> Job:
     if kind not in KINDS or kind == "ingest":
         raise UsageError("job_unknown", f"There is no job {kind[:40]!r}.", f"Ask for one of {', '.join(KINDS)}.")
     vessels.require(desk.warehouse, vessel)
-    _require_standing(desk, vessel, form.get("standing"))
+    require_current(desk.warehouse, vessel, form.get("standing"))
     arguments, digest = settled(desk, kind, vessel, form)
     return desk.queue.ask(kind, arguments, digest, again=KINDS[kind].changes)
 
@@ -152,15 +153,3 @@ _SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
     "preview": _correction,
     "correct": _correction,
 }
-
-
-def _require_standing(desk: Desk, vessel: str, shown: str | None) -> None:
-    """Refuse what is asked for on a page that showed another model than the vessel has now."""
-    now = aliases.of_vessel(desk.warehouse, vessel).get(aliases.CURRENT, "")
-    if shown is not None and shown != now:
-        raise UsageError(
-            "moved_meanwhile",
-            f"The model of {vessel!r} is {now or 'none'} now, and was {shown or 'none'} when the page was opened.",
-            "Look at her page again, then ask once more.",
-            {"standing": now, "shown": shown},
-        )
