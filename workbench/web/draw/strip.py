@@ -13,7 +13,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
 from kempf.workbench.web.draw.shades import shades
 from kempf.workbench.web.draw.svg import element
 
-_WIDTH, _HEIGHT, _POINTS = 320.0, 36.0, 150
+_WIDTH, _HEIGHT, _POINTS = 320.0, 36.0, 100
 _DEG = 180.0 / np.pi
 #: Unit of a column and what it is shown in, by channel.
 _UNITS = {
@@ -63,7 +63,7 @@ def _strip(columns: Mapping[str, Float], left: Float, reach: float, marked: Mask
     scale, middle = _WIDTH / max(float(time_s[-1]), 1e-9), 0.5 * _HEIGHT
     at = _extremes(left)
     places = zip((scale * time_s[at]).tolist(), (middle - (middle - 1.0) * left[at] / reach).tolist(), strict=True)
-    path = "M" + " ".join(f"{a:.1f} {b:.1f}" for a, b in places) if at.size else ""
+    path = "M" + " ".join(f"{a:.0f} {b:.1f}" for a, b in places) if at.size else ""
     size = float(np.sqrt(np.mean(left[np.isfinite(left)] ** 2))) if at.size else 0.0
     return element(
         "svg",

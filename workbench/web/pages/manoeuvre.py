@@ -66,7 +66,11 @@ def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
         set_id, horizon, made = kept_of(desk.warehouse, desk.state, row.vessel, asked.get("set"), asked.get("h"))
         if made is not None and one.segment_id in made.columns:
             beside = f"/segments/{one.segment_id}/predicted?set={set_id}&h={horizon}"
-            content |= {"predicted": beside, "set_id": set_id, "horizon": dict(HORIZONS)[horizon]}
+            content |= {
+                "predicted": beside,
+                "set_id": set_id,
+                "horizon": dict(HORIZONS).get(horizon, f"{horizon} ahead"),
+            }
             content |= {"channels": [*content["channels"], derived()]}
             content["stretch"] = _stretch(made, set_id, horizon, asked.get("worst", ""))
     title = f"{span_of(one)['words']}, {iso_utc(one.start_utc_ns)[:16].replace('T', ' ')} UTC"
