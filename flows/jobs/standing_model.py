@@ -171,7 +171,7 @@ def require_current(warehouse: Warehouse, vessel: str, shown: str | None) -> str
 
 def standing(warehouse: Warehouse, vessel: str) -> ParameterSet | None:
     """Return a vessel's current model, None where her current set is of no model of this kind."""
-    pointed = aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT)
+    pointed = current_id(warehouse, vessel)
     current = parameter_sets.get(warehouse, pointed, vessel) if pointed else None
     return current if current is not None and current.estimator in (POOLED, WITH_EFFECTS) else None
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from kempf.pipeline.channels.series import SECOND_NS, Float
-from kempf.schemas.channels import CHANNELS
 from kempf.schemas.diagnosis_evidence import ManoeuvreEvidence
 from kempf.warehouse.instant import iso_utc
 from kempf.workbench.report.content import ChartBlock, PictureBlock
 from kempf.workbench.web.data.bins import Shown
 from kempf.workbench.web.data.frames import encoded
-from kempf.workbench.web.pages.series import LATERAL, derived
+from kempf.workbench.web.pages.series import LATERAL, derived, entry
 
 _RUDDER = "rudder_angle"
 #: columns of what a model predicts
@@ -39,17 +38,11 @@ def chart_of(shown: ManoeuvreEvidence, label: str, picture: PictureBlock) -> Cha
             series[f"{name}:{kind}"] = one.free_run[:, i]
     begin, end = shown.start_utc_ns, shown.start_utc_ns + round(float(shown.time_s[-1]) * SECOND_NS)
     frame = encoded(begin, end, {name: _whole(shown.time_s, values) for name, values in series.items()})
-    panels = [name for name in (_RUDDER, "heading", "yaw_rate", LATERAL) if name in series]
-    return ChartBlock(label, picture, frame, [_offered(name) for name in panels], (iso_utc(begin), iso_utc(end)))
+    logged = [name for name in (_RUDDER, "heading", "yaw_rate") if name in series]
+    offered = [*(entry(name, "the log", shown=True) for name in logged), *([derived()] if LATERAL in series else [])]
+    return ChartBlock(label, picture, frame, offered, (iso_utc(begin), iso_utc(end)))
 
 
 def _whole(time_s: Float, values: Float) -> Shown:
     known = int(np.count_nonzero(np.isfinite(values)))
     return Shown(time_s, values, known, known)
-
-
-def _offered(name: str) -> dict[str, object]:
-    if name == LATERAL:
-        return derived()
-    channel = CHANNELS[name]
-    return {"name": name, "unit": channel.unit, "words": channel.words, "source": "the log", "shown": True}

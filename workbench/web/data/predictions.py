@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 HORIZONS = (("1", "one step"), ("10s", "10 s ahead"), ("60s", "60 s ahead"), ("free", "free run"))
 #: predictions kept: the ones made longest ago go first
 _MOST = 200
+#: what a model predicts, with the unit that its columns end with
+UNITS = {"yaw_rate": "rad_s", "heading": "rad", "lateral_speed": "m_s"}
 #: what the name of a column begins with that holds at which instants evidence shows
 MARK = "mark "
 

@@ -8,7 +8,7 @@ from kempf.pipeline.channels.series import Float
 
 
 def within_a_turn(angle_rad: Float, by: Float | None = None) -> Float:
-    """Return an angle whose first value lies from 0 to a full turn; where it goes on from there is kept.
+    """Return an angle whose first value is between 0 and a full turn; where it goes on from there is kept.
 
     Parameters
     ----------

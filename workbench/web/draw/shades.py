@@ -17,7 +17,7 @@ def shades(time_s: Float, marked: Mask, left: float, per_second: float, top: flo
     time_s : ndarray, shape (n,)
     marked : ndarray of bool, shape (n,)
     left, per_second, top, height : float
-        Where the first instant lies, how far a second reaches, and the panel, in units of the drawing.
+        Where the first instant is, how far a second reaches, and the panel, in units of the drawing.
     """
     # an instant reaches half way to the next ones
     half = 0.5 * float(np.median(np.diff(time_s))) if time_s.size > 1 else 0.5

@@ -10,17 +10,14 @@ from markupsafe import Markup
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Mask
+from kempf.workbench.web.data.predictions import UNITS
 from kempf.workbench.web.draw.shades import shades
 from kempf.workbench.web.draw.svg import element
 
 _WIDTH, _HEIGHT, _POINTS = 320.0, 36.0, 100
 _DEG = 180.0 / np.pi
-#: Unit of a column and what it is shown in, by channel.
-_UNITS = {
-    "yaw_rate": ("rad_s", "deg/s", _DEG),
-    "heading": ("rad", "deg", _DEG),
-    "lateral_speed": ("m_s", "m/s", 1.0),
-}
+#: What a channel is shown in, with the factor from SI.
+_SHOWN_IN = {"yaw_rate": ("deg/s", _DEG), "heading": ("deg", _DEG), "lateral_speed": ("m/s", 1.0)}
 
 
 @dataclass(frozen=True)
@@ -48,7 +45,7 @@ def draw_strips(
     marked : mapping
         By manoeuvre the instants that are shaded, shape (n,).
     """
-    of, unit, factor = _UNITS[channel]
+    of, (unit, factor) = UNITS[channel], _SHOWN_IN[channel]
     left = {name: factor * (one[f"{channel}_{of}"] - one[f"{channel}_predicted_{of}"]) for name, one in columns.items()}
     known = [np.abs(values[np.isfinite(values)]) for values in left.values()]
     reach = float(max((np.max(values) for values in known if values.size), default=0.0))

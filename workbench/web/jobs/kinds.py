@@ -57,9 +57,9 @@ def _keep_predictions(
 
 def _keep_those_of_current(warehouse: Warehouse, state: Path, vessel: str, progress: Progress) -> None:
     """Keep what a vessel's current set predicts, so that the page of her model need not wait."""
-    from kempf.warehouse import aliases
+    from kempf.flows.jobs.standing_model import current_id
 
-    _keep_those_of(warehouse, state, vessel, aliases.of_vessel(warehouse, vessel).get(aliases.CURRENT), progress)
+    _keep_those_of(warehouse, state, vessel, current_id(warehouse, vessel), progress)
 
 
 def _keep_those_of(warehouse: Warehouse, state: Path, vessel: str, name: str | None, progress: Progress) -> None:

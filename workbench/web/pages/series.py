@@ -15,7 +15,7 @@ from kempf.schemas.errors import NotFound, UsageError
 from kempf.warehouse import logs, segments
 from kempf.workbench.web.data.bins import Shown, reduced
 from kempf.workbench.web.data.frames import encoded
-from kempf.workbench.web.data.predictions import kept_of
+from kempf.workbench.web.data.predictions import UNITS, kept_of
 from kempf.workbench.web.data.turns import within_a_turn
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.window import window
@@ -24,9 +24,8 @@ from kempf.workbench.web.window import window
 MOST_BINS, MOST_CHANNELS = 1500, 12
 #: those that a page begins with, as far as the log has them
 FIRST = ("rudder_angle", "rudder_order", "heading", "yaw_rate", "speed_through_water", "speed_over_ground")
-#: what a model predicts, with the unit of its columns; the last in no log
+#: what a model predicts and no log holds
 LATERAL = "lateral_speed"
-PREDICTED = {"yaw_rate": "rad_s", "heading": "rad", LATERAL: "m_s"}
 #: in a track and not in a chart
 _PLACES = ("latitude", "longitude")
 
@@ -93,8 +92,8 @@ def predicted_frame(desk: Desk, segment_id: str, asked: Mapping[str, str], bins:
     row = logs.of_ingest(desk.warehouse, one.ingest_id)
     begin, end = window(asked.get("from"), asked.get("to"), row.start_utc_ns, row.end_utc_ns)
     few, columns = max(1, min(bins, MOST_BINS)), made.series(one.segment_id)
-    names = {LATERAL: f"{LATERAL}_{PREDICTED[LATERAL]}"}
-    names |= {f"{name}:predicted": f"{name}_predicted_{unit}" for name, unit in PREDICTED.items()}
+    names = {LATERAL: f"{LATERAL}_{UNITS[LATERAL]}"}
+    names |= {f"{name}:predicted": f"{name}_predicted_{unit}" for name, unit in UNITS.items()}
     shown = {}
     for name, column in names.items():
         known = np.isfinite(columns[column])
@@ -113,17 +112,13 @@ def offered(found: Instruments) -> list[dict[str, Any]]:
     """Return the channels of a log that a chart can show, those that a page begins with first."""
     names = [name for name in FIRST if name in found.series]
     names += [name for name in CHANNELS if name in found.series and name not in (*FIRST, *_PLACES)]
-    return [
-        {
-            "name": name,
-            "unit": CHANNELS[name].unit,
-            "words": CHANNELS[name].words,
-            "source": found.sources[name],
-            "count": len(found.series[name]),
-            "shown": name in FIRST,
-        }
-        for name in names
-    ]
+    return [entry(name, found.sources[name], shown=name in FIRST) for name in names]
+
+
+def entry(name: str, source: str, *, shown: bool) -> dict[str, Any]:
+    """Return a channel as a chart offers it."""
+    channel = CHANNELS[name]
+    return {"name": name, "unit": channel.unit, "words": channel.words, "source": source, "shown": shown}
 
 
 def derived() -> dict[str, Any]:
