@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import astuple, dataclass
-from math import hypot
 
 from kempf.schemas.enumeration import listed
 
@@ -20,14 +19,16 @@ _OTHERS = ("heading", "yaw_rate", "rudder_angle")
 class InstantErrors:
     """Standard errors of the instants at which the instruments of a log measured, s; 0 where they are in the log.
 
-    A velocity that is smoothed is late by what is taken from it (decision 0045), a value that rows repeat was measured
-    somewhere within the row before it first shows (decision 0073). Both are off by as much in all manoeuvres of a log.
+    A value that rows repeat was measured somewhere within the row before it first shows (decision 0073), and a velocity
+    that is smoothed comes late (decision 0045). Both are off by as much in all manoeuvres of a log.
     """
 
     velocity_s: float = 0.0
     heading_s: float = 0.0
     yaw_rate_s: float = 0.0
     rudder_s: float = 0.0
+    #: Of the lateness of a velocity that may be smoothed, whether it was undone or not.
+    smoothing_s: float = 0.0
 
     @property
     def known(self) -> bool:
@@ -47,10 +48,11 @@ def instant_errors(instant_std_s: Mapping[str, float], late_std_s: float) -> Ins
     instant_std_s : mapping of str to float
         See `kempf.pipeline.channels.instruments.Instruments`.
     late_std_s : float
-        Standard error of the lateness that was taken from the velocity, s.
+        Standard error of the lateness of a smoothed velocity, s.
     """
     velocity = max(instant_std_s.get(name, 0.0) for name in _VELOCITY)
-    return InstantErrors(hypot(velocity, late_std_s), *(instant_std_s.get(name, 0.0) for name in _OTHERS))
+    heading, yaw_rate, rudder = (instant_std_s.get(name, 0.0) for name in _OTHERS)
+    return InstantErrors(velocity, heading, yaw_rate, rudder, late_std_s)
 
 
 def said_of(instant_std_s: Mapping[str, float]) -> tuple[str, ...]:

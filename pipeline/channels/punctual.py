@@ -11,18 +11,30 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from kempf.pipeline.channels.averaging import readings_averaged
-from kempf.pipeline.channels.doctor.log import Log
+from kempf.pipeline.channels.doctor.log import Complex, Log
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instant_errors import InstantErrors, instant_errors, said_of
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateness import Lateness, velocity_lateness
-from kempf.pipeline.channels.series import SECOND_NS, Series
+from kempf.pipeline.channels.series import SECOND_NS, Nanoseconds, Series
 
 #: time before and after a segment in which its instruments are looked at, s
 _AROUND_S = 1800
 #: standard errors of a lateness above which it is undone, and may be there; periods: finer than its readings no
 #: velocity is known
-_SURE, _POSSIBLE, _FINEST = 3.0, 1.645, 0.2
+_SURE, _POSSIBLE, _FINEST = 2.326, 1.645, 0.2
+
+
+@dataclass(frozen=True, eq=False)
+class VelocitySlope:
+    """How fast a velocity changes from one reading to the next: what a second more of lateness takes from it."""
+
+    #: Shape (n,). Of the readings.
+    time_utc_ns: Nanoseconds
+    #: shown, slope: Shape (n,). The velocity, towards north plus i times towards east, m/s, and its change since the
+    #: reading before, m/s^2; 0 behind a gap.
+    shown: Complex
+    slope: Complex
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +47,10 @@ class Punctual:
     said: tuple[str, ...]
     #: What is not known of the instants, with what is not known of a lateness, whether it was undone or not.
     errors: InstantErrors
+    #: Of a velocity that may be late; None of one that is not.
+    velocity: VelocitySlope | None = None
+    #: Time over which each value of the speed log is a mean, about its instant, s; 0 where it is of the instant.
+    log_mean_s: float = 0.0
 
 
 def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Punctual:
@@ -53,7 +69,9 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
     said = []
     # of a velocity that was turned out of the ship's frame it is not known what was smoothed
     late = _velocity_lateness(own) if "velocity_forward" not in own else None
-    late_std_s = 0.0
+    late_std_s, slope = 0.0, None
+    if late is not None:
+        slope = velocity_slope(own["speed_over_ground"], own["course_over_ground"])
     if late is not None and late.late_s > _SURE * late.std_s:
         late_std_s = late.std_s
         changed |= unsmoothed(own["speed_over_ground"], own["course_over_ground"], late.late_s)
@@ -77,7 +95,8 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
         )
     whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
     errors = instant_errors(instruments.instant_std_s, late_std_s)
-    return Punctual(whole, (*said, *said_of(instruments.instant_std_s)), errors)
+    mean_s = many * log.period_s if log is not None and many > 1.0 else 0.0
+    return Punctual(whole, (*said, *said_of(instruments.instant_std_s)), errors, slope, mean_s)
 
 
 def _velocity_lateness(series: dict[str, Series]) -> Lateness | None:
@@ -106,18 +125,30 @@ def unsmoothed(speed: Series, course: Series, late_s: float) -> dict[str, Series
     A receiver that goes from fix to fix has y_k = y_{k-1} + (w_k - y_{k-1}) / (1 + tau / T), tau being its lateness and
     T the time between two fixes; so w_k = y_k + tau (y_k - y_{k-1}) / T.
     """
+    before = velocity_slope(speed, course)
+    value = before.shown + late_s * before.slope
+    known = np.isin(course.time_utc_ns, before.time_utc_ns)
+    return {
+        "speed_over_ground": Series(before.time_utc_ns, np.abs(value)),
+        "course_over_ground": Series(before.time_utc_ns, course.value[known] + np.angle(value * np.conj(before.shown))),
+    }
+
+
+def velocity_slope(speed: Series, course: Series) -> VelocitySlope:
+    """Return how fast a velocity over ground changes.
+
+    Parameters
+    ----------
+    speed, course : Series
+        m/s and rad, unwrapped.
+    """
     beside = speed.at(course.time_utc_ns, gap_limit_s(speed))
     known = np.isfinite(beside)
     time, shown = course.time_utc_ns[known], beside[known] * np.exp(1j * course.value[known])
     step = np.diff(time) / SECOND_NS
-    near = step <= gap_limit_s(course)
-    value = shown.copy()
-    value[1:] += np.where(near, late_s / step, 0.0) * np.diff(shown)
-    turned = np.angle(value * np.conj(shown))
-    return {
-        "speed_over_ground": Series(time, np.abs(value)),
-        "course_over_ground": Series(time, course.value[known] + turned),
-    }
+    slope = np.zeros(time.size, dtype=np.complex128)
+    slope[1:] = np.where(step <= gap_limit_s(course), np.diff(shown) / step, 0.0)
+    return VelocitySlope(time, shown, slope)
 
 
 def apart(log: Series, many: float) -> Series:

@@ -39,8 +39,9 @@ class Signal:
     error_std: float
     #: Its correlation time, s: that of the first-order process with as much variance and as much power at frequency 0.
     error_time_s: float
-    #: Number of the shape that it goes with, from 0; None where it goes with none.
+    #: Number of the shape that it goes with, from 0, and the multiple of it; None where it goes with none.
     shape: int | None = None
+    multiple: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -98,6 +99,7 @@ def signal(series: Series, shapes: Sequence[Float] = ()) -> Signal:
         float(np.hypot(noise_std * np.sqrt(left), around)),
         0.5 * series.period_s / left,
         best.shape - 1 if best.shape else None,
+        best.multiple,
     )
 
 

@@ -1,17 +1,22 @@
 """A fit whose instruments measured at instants that are not quite known: what it would be with them free.
 
-The lateness that is taken from a velocity (`kempf.pipeline.channels.punctual`) is known to some hundredths of a second,
-and so are the instants of values that a log repeats (`kempf.pipeline.channels.holds`). A fit believes them, and its
-hull is off by what they are off, in every manoeuvre of the log to one side. Here they are parameters of each log, with
-what is known of them as a normal distribution, and are found together with hull and effects by one step of Gauss and
-Newton: hundredths of a second move a hull so little that it is linear in them.
+The instants of values that a log repeats (`kempf.pipeline.channels.holds`) are known to some hundredths of a second. A
+fit believes them, and its hull is off by what they are off, in every manoeuvre of the log to one side. Here they are
+parameters of each log, with what is known of them as a normal distribution, and are found together with hull and
+effects by one step of Gauss and Newton: hundredths of a second move a hull so little that it is linear in them.
+
+The lateness of a velocity that may be smoothed (`kempf.pipeline.channels.punctual`) is known no better, and is not
+found: a hull imitates it nearly to the last, and the rest goes by the shape of the noise. It moves nothing, and what it
+may do to the hull counts among the errors (Schmidt 1966, "Application of state-space methods to navigation problems",
+Advances in Control Systems 3: parameters that are considered, not estimated).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from concurrent.futures import Executor
 from dataclasses import dataclass, replace
+from math import hypot
 from types import MappingProxyType
 
 import numpy as np
@@ -22,6 +27,7 @@ from kempf.pipeline.diagnose.nuisance import columns_of, orthonormal
 from kempf.pipeline.estimate.agreement import agreement_of
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.search.block_arrow import inverse
+from kempf.pipeline.estimate.sensitivity import difference
 from kempf.schemas.effect import Effect
 from kempf.schemas.effects import get
 from kempf.schemas.model_spec import HULL_PARAMETERS
@@ -70,11 +76,13 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
         Share the passes; nothing depends on it.
     """
     known = np.nan_to_num(fit.covariance)
-    columns, std_s, foreign = _columns(fit, workers)
-    if not std_s.size:
+    rows, std_s, foreign = _rows(fit, workers)
+    smoothed, lateness_s = _smoothed(fit, workers)
+    if not std_s.size and not lateness_s.size:
         return WithInstants(fit, np.zeros_like(known))
-    shared = known.shape[0]
-    across, own, score = np.zeros((shared, std_s.size)), np.diag(std_s**-2.0), np.zeros(std_s.size)
+    shared, m, parts = known.shape[0], std_s.size, std_s.size + lateness_s.size
+    columns = np.column_stack([rows, smoothed])
+    across, own, score = np.zeros((shared, parts)), np.zeros((m, parts)), np.zeros(m)
     first = 0
     for line in fit.linearised:
         late = columns[first : first + line.u.size]
@@ -83,14 +91,18 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
         basis = orthonormal(levels)
         late = late - basis @ (basis.T @ late)
         across[[i for i in line.index if i < shared]] += common.T @ late
-        own += late.T @ late
-        score += foreign * (late.T @ line.u)
-    late_covariance = inverse(own - across.T @ known @ across)
+        own += late[:, :m].T @ late
+        score += foreign * (late[:, :m].T @ line.u)
+    # what every column does beside the hull, and each to the hull
+    beside, to_hull = own - across[:, :m].T @ known @ across, known @ across
+    late_covariance = inverse(beside[:, :m] + np.diag(std_s**-2.0))
     late_s = np.clip(late_covariance @ score, -_MOST * std_s, _MOST * std_s)
     # at the maximum the scores of what is shared are zero
-    moved = np.concatenate([fit.hull, fit.values]) - known @ across @ late_s
+    moved = np.concatenate([fit.hull, fit.values]) - to_hull[:, :m] @ late_s
     hull, values = np.split(moved, [len(HULL_PARAMETERS)])
-    added: Float = known @ across @ late_covariance @ across.T @ known
+    # the instants of rows follow a lateness that is only considered
+    considered = (to_hull[:, m:] - to_hull[:, :m] @ late_covariance @ beside[:, m:]) * lateness_s
+    added: Float = to_hull[:, :m] @ late_covariance @ to_hull[:, :m].T + considered @ considered.T
     return WithInstants(replace(fit, hull=hull, values=np.clip(values, fit.model.low, fit.model.high)), added)
 
 
@@ -99,11 +111,12 @@ def within_rows(fit: PooledFit, effect: Effect) -> bool:
     of = next((field for field, name in _LATE.items() if name == effect.name), None)
     if of is None:
         return False
-    std_s = max(getattr(one.run.instant_errors, of) for one in fit.runs)
+    own = (of, "smoothing_s") if of == "velocity_s" else (of,)
+    std_s = max(hypot(*(getattr(one.run.instant_errors, field) for field in own)) for one in fit.runs)
     return bool(abs(fit.values[-1]) < _APART * std_s)
 
 
-def _columns(fit: PooledFit, workers: Executor) -> tuple[Float, Float, Float]:
+def _rows(fit: PooledFit, workers: Executor) -> tuple[Float, Float, Float]:
     """Return what a second of lateness does to the innovations, shape (N, m), and what it is off by, s, shape (m,).
 
     There is one for every instrument and log whose instants are not known. The last of shape (m,) is 0 where the model
@@ -114,18 +127,60 @@ def _columns(fit: PooledFit, workers: Executor) -> tuple[Float, Float, Float]:
     has = [effect.name for effect in fit.model.effects]
     tried = [effect for effect in unsure if effect not in has]
     found = dict(zip(tried, responses(fit, [EffectTrial(get(one), (_STEP_S,)) for one in tried], workers), strict=True))
-    day = np.repeat([one.run.day for one in fit.runs], [line.u.size for line in fit.linearised])
-    columns, std_s, foreign = [], [], []
+    columns, std_s, foreign = [np.zeros((sum(line.u.size for line in fit.linearised), 0))], [np.zeros(0)], []
     for effect, std in unsure.items():
         column = _own(fit, has.index(effect)) if effect in has else found[effect]
         if column is None:
             continue
-        of_day = {one.run.day: s for one, s in zip(fit.runs, std, strict=True)}
-        for number in sorted(number for number, s in of_day.items() if s > 0.0):
-            columns.append(np.where(day == number, column.ravel(), 0.0))
-            std_s.append(of_day[number])
-            foreign.append(float(effect not in has))
-    return np.column_stack(columns) if columns else np.zeros((day.size, 0)), np.array(std_s), np.array(foreign)
+        own, known_to = _by_log(fit, column, std)
+        columns.append(own)
+        std_s.append(known_to)
+        foreign += [float(effect not in has)] * known_to.size
+    return np.column_stack(columns), np.concatenate(std_s), np.array(foreign)
+
+
+def _smoothed(fit: PooledFit, workers: Executor) -> tuple[Float, Float]:
+    """Return what a second more of lateness does to the innovations, (N, m), and its standard error, s, shape (m,).
+
+    There is one for every log with a velocity that may be late. The readings themselves change, so that what they are
+    late by as a signal and what they have lost of their noise is in it.
+    """
+    errors = [one.run.instant_errors.smoothing_s for one in fit.runs]
+    size = sum(line.u.size for line in fit.linearised)
+    if not any(errors):
+        return np.zeros((size, 0)), np.zeros(0)
+    column = np.concatenate(list(workers.map(lambda number: _less_late(fit, number), range(len(fit.runs)))))
+    return _by_log(fit, column, errors)
+
+
+def _less_late(fit: PooledFit, number: int) -> Float:
+    """Return what a second more of lateness, undone, does to the innovations of a run, shape (2 m,)."""
+    filtered, line = fit.runs[number], fit.linearised[number]
+    run = filtered.run
+    if run.lateral_by_late is None:
+        return np.zeros(line.u.size)
+    measured = run.measured.copy()
+    measured[:, 0] += _STEP_S * run.lateral_by_late
+    other = replace(filtered, run=replace(run, measured=measured))
+    passed = other.run_filter(fit.hull, np.exp(fit.levels[number]), fit.values)
+    return difference(line.passed, passed, _STEP_S)
+
+
+def _by_log(fit: PooledFit, column: Float, errors: Sequence[float]) -> tuple[Float, Float]:
+    """Return a column for every log of which something is not known, and by how much, s.
+
+    Parameters
+    ----------
+    column : ndarray, shape (N,)
+        Of all runs.
+    errors : sequence of float
+        Of every run.
+    """
+    day = np.repeat([one.run.day for one in fit.runs], [line.u.size for line in fit.linearised])
+    of_day = {one.run.day: s for one, s in zip(fit.runs, errors, strict=True) if s > 0.0}
+    logs = sorted(of_day)
+    columns = np.where(day[:, None] == logs, column.reshape(-1, 1), 0.0)
+    return columns, np.array([of_day[number] for number in logs])
 
 
 def _own(fit: PooledFit, number: int) -> Float | None:

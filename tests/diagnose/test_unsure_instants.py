@@ -47,6 +47,39 @@ def test_a_hull_is_as_if_the_instants_were_right() -> None:
     assert np.all(np.abs(found.fit.hull - right.hull) < 2.0 * np.sqrt(np.diag(found.covariance)) + 0.1 * right.std[:6])
 
 
+def test_a_lateness_of_smoothing_is_considered_and_moves_nothing() -> None:
+    """A hull fitted to velocities from which too little was taken is off by what is stated for it."""
+    ship = sailed(name="usv")
+    runs = [with_slope(run) for run in ship.runs[:3]]
+    right = fit_plain(runs, ship.spec, WORKERS).fit
+    missed_s, off = 0.02, []
+    for by in (-missed_s, missed_s):
+        late_runs = [replace(run, measured=run.measured + by * slope_of(run)) for run in runs]
+        off.append(fit_plain(late_runs, ship.spec, WORKERS).fit.hull)
+    found = with_instants(_unsure(right, InstantErrors(smoothing_s=missed_s), (0,)), WORKERS)
+    assert found.fit.hull == pytest.approx(right.hull, abs=0.0)
+    moved, stated = 0.5 * np.abs(off[1] - off[0]), np.sqrt(np.diag(found.covariance))
+    # all logs late by as much: the covariance has one direction, and its size is the move
+    seen = moved > 0.3 * right.std[:6]
+    assert np.count_nonzero(seen) >= 3
+    assert stated[seen] == pytest.approx(moved[seen], rel=0.25)
+    assert np.linalg.matrix_rank(found.covariance / np.outer(stated, stated), tol=1e-6) == 1
+
+
+def with_slope(run: GridRun) -> GridRun:
+    """A run whose lateral speed may be late: what a second more takes from it, as the means of her readings show it."""
+    lateral = run.measured[:, 0]
+    seen = np.isfinite(lateral)
+    slope = np.full(lateral.size, np.nan)
+    slope[seen] = np.gradient(lateral[seen], run.time_s[seen])
+    return replace(run, lateral_by_late=slope)
+
+
+def slope_of(run: GridRun) -> Float:
+    assert run.lateral_by_late is not None
+    return np.column_stack([np.nan_to_num(run.lateral_by_late), np.zeros((run.lateral_by_late.size, 2))])
+
+
 def test_what_is_known_is_left_alone() -> None:
     ship = sailed()
     fit = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit

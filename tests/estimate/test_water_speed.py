@@ -62,3 +62,23 @@ def test_without_a_turn_it_is_the_spline_alone() -> None:
     log, heading, _, _ = sailed(loss=80.0, seed=0)
     still = Series(log.time_utc_ns, np.zeros(len(log)))
     np.testing.assert_array_equal(water_speed(log, heading, still).series.value, signal(log).series.value)
+
+
+def test_means_are_taken_for_the_curve_that_they_are_of() -> None:
+    """Means over a third of a leg: what the turns cost is as large as without them, and at its time."""
+    dips, off = [], []
+    for seed in range(6):
+        log, heading, rudder, truth = sailed(loss=80.0, seed=seed)
+        many = round(LEG_S / 3.0)
+        middle = np.arange(many // 2, len(log) - many // 2, many)
+        value = np.array([np.mean(log.value[k - many // 2 : k + many // 2 + 1]) for k in middle])
+        means = Series(log.time_utc_ns[middle], value)
+        found = water_speed(means, heading, rudder, float(many)).series
+        at = log.seconds_since(0)
+        inside = (at > LEG_S) & (at < at[-1] - LEG_S)
+        dip = truth[inside] - truth[inside].mean()
+        for errors, series_of in ((dips, found), (off, means)):
+            error = np.interp(at, series_of.seconds_since(0), series_of.value)[inside] - truth[inside]
+            errors.append(error @ dip / (dip @ dip))
+    assert abs(np.mean(dips)) < 0.05
+    assert np.mean(off) < -0.15

@@ -11,7 +11,7 @@ from kempf.pipeline.channels.doctor.log import Log
 from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
-from kempf.pipeline.channels.punctual import punctual
+from kempf.pipeline.channels.punctual import Punctual, VelocitySlope, punctual
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 from kempf.pipeline.channels.spikes import without_spikes
 from kempf.pipeline.channels.standing import without_noise
@@ -81,8 +81,8 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
     instants = np.unique(np.concatenate(timed))
     inside = (instants >= rudder.time_utc_ns[0]) & (instants <= rudder.time_utc_ns[-1])
     instants = instants[inside]
-    log = _cut_log(instruments, as_delivered, start_utc_ns, end_utc_ns)
-    speed, error_std, error_time_s = _speed(log, lateral, heading, rudder, instants, warnings)
+    log = _cut_log(on_time, as_delivered, start_utc_ns, end_utc_ns)
+    speed, error_std, error_time_s = _speed(*log, lateral, heading, rudder, instants, warnings)
     instants, speed = _trimmed(instants, speed, warnings)
     delta = moved.at(instants, gap_limit_s(rudder))
     _check(instants, delta, rudder)
@@ -105,7 +105,20 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         noise_start=noise,
         warnings=tuple(warnings),
         instant_errors=on_time.errors,
+        lateral_by_late=None
+        if on_time.velocity is None
+        else _by_late(on_time.velocity, heading, instants, measured[:, 0]),
     )
+
+
+def _by_late(velocity: VelocitySlope | None, heading: Series, instants: Nanoseconds, lateral: Float) -> Float | None:
+    """Return `Record.lateral_by_late`: eq. (18) of the velocity's change, NaN where no lateral speed was measured."""
+    if velocity is None:
+        return None
+    heads = heading.at(velocity.time_utc_ns, gap_limit_s(heading))
+    column = np.zeros((instants.size, 1))
+    _place(column, 0, instants, velocity.time_utc_ns, np.nan_to_num((velocity.slope * np.exp(-1j * heads)).imag))
+    return np.where(np.isfinite(lateral), column[:, 0], np.nan)
 
 
 def _measured(instants: Nanoseconds, lateral: LateralSpeed, yaw: Series | None, heading: Series) -> Float:
@@ -164,6 +177,7 @@ def _need(instruments: Instruments, channel: str, start_ns: int, end_ns: int) ->
 
 def _speed(
     log: Series | None,
+    mean_s: float,
     lateral: LateralSpeed,
     heading: Series,
     rudder: Series,
@@ -181,7 +195,7 @@ def _speed(
     log, spikes = without_spikes(log)
     if spikes:
         warnings.append(f"{spikes} spikes of the speed left out")
-    slow = water_speed(log, heading, rudder)
+    slow = water_speed(log, heading, rudder, mean_s)
     speed = slow.series.at(instants, _MAX_SPEED_GAP_S)
     if np.nanmax(np.abs(speed), initial=0.0) < 0.05:
         raise DataRejected(
@@ -192,17 +206,17 @@ def _speed(
     return speed, slow.error_std, slow.error_time_s
 
 
-def _cut_log(on_time: Instruments, as_delivered: Instruments, start_ns: int, end_ns: int) -> Series | None:
-    """Return the speed log about the segment, None where too little of it was delivered."""
+def _cut_log(on_time: Punctual, as_delivered: Instruments, start_ns: int, end_ns: int) -> tuple[Series | None, float]:
+    """Return the speed log about the segment, None where it has too little; and what its values are means over, s."""
     name, margin = "speed_through_water", round(_BEYOND_S * SECOND_NS)
     delivered = _cut(as_delivered, name, start_ns - margin, end_ns + margin)
-    sparse = on_time.series.get(name)
-    if delivered is None or sparse is None or sparse is as_delivered.series.get(name):
-        return delivered
+    sparse = on_time.instruments.series.get(name)
+    if delivered is None or sparse is None or not on_time.log_mean_s > 0.0:
+        return delivered, 0.0
     # means that share no reading are few: so that some stand before and behind the segment
     beyond = max(margin, round(2.0 * np.nan_to_num(sparse.period_s) * SECOND_NS))
-    apart = _cut(on_time, name, start_ns - beyond, end_ns + beyond, _FEWEST_OF_LOG)
-    return delivered if apart is None else apart
+    apart = _cut(on_time.instruments, name, start_ns - beyond, end_ns + beyond, _FEWEST_OF_LOG)
+    return (delivered, 0.0) if apart is None else (apart, on_time.log_mean_s)
 
 
 def _without_jumps(lateral: LateralSpeed, warnings: list[str]) -> LateralSpeed:

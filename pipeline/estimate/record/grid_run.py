@@ -83,6 +83,8 @@ class GridRun:
     day: int
     #: See `kempf.pipeline.estimate.record.record.Record`.
     instant_errors: InstantErrors = IN_THE_LOG
+    #: Shape (n,). Of the means of the lateral speed, see `kempf.pipeline.estimate.record.record.Record`.
+    lateral_by_late: Float | None = None
     #: See `kempf.pipeline.estimate.record.loads`.
     load: float = 0.0
 
@@ -264,6 +266,7 @@ def make_run(
     measured, offset = np.full((n, 3), np.nan), np.zeros((n, 3))
     for i, column in enumerate(record.measured.T):
         measured[:, i], offset[:, i] = cell_means(record.time_s, column, step_s, n)
+    by_late = record.lateral_by_late
     fine: Float = step_s / ROWS * np.arange(ROWS * (n - 1) + 1, dtype=np.float64)
     known = np.isfinite(record.heading_rad)
     inputs = np.zeros((fine.size, N_INPUT))
@@ -307,6 +310,7 @@ def make_run(
         day=day,
         load=load,
         instant_errors=record.instant_errors,
+        lateral_by_late=None if by_late is None else cell_means(record.time_s, by_late, step_s, n)[0],
     )
 
 

@@ -68,3 +68,6 @@ class Record(Instants):
     warnings: tuple[str, ...]
     #: What is not known of the instants at which the instruments measured.
     instant_errors: InstantErrors = IN_THE_LOG
+    #: Shape (n,). What a second more of lateness takes from the lateral speed, m/s^2, where that was measured; None of
+    #: a velocity that is not late.
+    lateral_by_late: Float | None = None

@@ -7,19 +7,24 @@ the loss. So the loss has one number to find, and what is left for the spline ch
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from scipy.signal import lfilter
 
-from kempf.pipeline.channels.series import Float, Series
+from kempf.pipeline.channels.means import curve_of_means, mean_about
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 from kempf.pipeline.channels.signal import Signal, signal
 from kempf.pipeline.estimate.record.moves import moves
 
 #: times in which a ship wins her speed back that are tried, in legs of the manoeuvre
 _LEGS = (0.3, 1.0, 3.0)
+#: instants of the speed between means, in the time that each goes over
+_STEP = 0.1
 
 
-def water_speed(log: Series, heading: Series, rudder: Series) -> Signal:
-    """Return the speed at the log's instants, and how large and how slow its error is.
+def water_speed(log: Series, heading: Series, rudder: Series, mean_s: float = 0.0) -> Signal:
+    """Return the speed, and how large and how slow its error is.
 
     Parameters
     ----------
@@ -27,6 +32,13 @@ def water_speed(log: Series, heading: Series, rudder: Series) -> Signal:
         m/s, without spikes.
     heading, rudder : Series
         rad.
+    mean_s : float, optional
+        Time over which each value of the log is a mean, about its instant, s; 0 where it is of the instant.
+
+    Returns
+    -------
+    Signal
+        At the log's instants; where its values are means, at ten instants of each.
 
     References
     ----------
@@ -34,24 +46,46 @@ def water_speed(log: Series, heading: Series, rudder: Series) -> Signal:
     confined waters", SSPA 68: the speed lost in a turn goes with v r and r^2.
     """
     turns = moves(rudder.value)
-    if not turns or len(log) < 2:
+    if len(log) < 2:
         return signal(log)
-    leg_s = (log.time_utc_ns[-1] - log.time_utc_ns[0]) * 1e-9 / turns
-    square = _yaw_rate(heading, log) ** 2
+    leg_s = (log.time_utc_ns[-1] - log.time_utc_ns[0]) * 1e-9 / turns if turns else 0.0
+    instants = _between(log, mean_s) if mean_s > 0.0 else log.time_utc_ns
+    shapes = _lost(heading, instants, leg_s) if turns else []
+    if not mean_s > 0.0:
+        return signal(log, shapes)
+    means = [mean_about(Series(instants, shape), log.time_utc_ns, mean_s) for shape in shapes]
+    found = signal(log, means)
+    turning = 0.0 if found.shape is None else found.multiple * means[found.shape]
+    slow = curve_of_means(Series(log.time_utc_ns, found.series.value - turning), instants)
+    whole = slow if found.shape is None else slow + found.multiple * shapes[found.shape]
+    return replace(found, series=Series(instants, whole))
+
+
+def _lost(heading: Series, instants: Nanoseconds, leg_s: float) -> list[Float]:
+    """Return what turning takes from the speed, but for its size: one shape for every time to win it back."""
+    square = _yaw_rate(heading, instants) ** 2
+    period_s = float(np.median(np.diff(instants))) / SECOND_NS
     shapes = []
     for legs in _LEGS:
-        kept = float(np.exp(-log.period_s / (legs * leg_s)))
+        kept = float(np.exp(-period_s / (legs * leg_s)))
         # at rest in the mean: what came before the segment is the spline's
         shapes.append(np.asarray(lfilter([1.0 - kept], [1.0, -kept], square - np.mean(square))))
-    return signal(log, [shape for shape in shapes if np.ptp(shape) > 0.0])
+    return [shape for shape in shapes if np.ptp(shape) > 0.0]
 
 
-def _yaw_rate(heading: Series, log: Series) -> Float:
-    """Return the heading's rate at the log's instants, rad/s, its noise smoothed away."""
+def _between(log: Series, mean_s: float) -> Nanoseconds:
+    """Return instants from the first to the last that means of a log say something of."""
+    half, step = (round(part * mean_s * SECOND_NS) for part in (0.5, _STEP))
+    return np.arange(log.time_utc_ns[0] - half, log.time_utc_ns[-1] + half + 1, step)
+
+
+def _yaw_rate(heading: Series, instants: Nanoseconds) -> Float:
+    """Return the heading's rate at some instants, rad/s, its noise smoothed away."""
     if len(heading) < 2:
-        return np.zeros(len(log))
+        return np.zeros(instants.size)
     rate, origin = heading_rate(heading), int(heading.time_utc_ns[0])
-    result: Float = np.interp(log.seconds_since(origin), rate.seconds_since(origin), rate.value)
+    at = (instants - origin).astype(np.float64) / SECOND_NS
+    result: Float = np.interp(at, rate.seconds_since(origin), rate.value)
     return result
 
 

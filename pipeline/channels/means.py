@@ -1,0 +1,58 @@
+"""A channel whose values are means over a time: what a curve means over it, and the curve that has such means."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.interpolate import CubicSpline
+
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+
+
+def mean_about(series: Series, instants: Nanoseconds, over_s: float) -> Float:
+    """Return the mean of a series about some instants, shape (n,).
+
+    Parameters
+    ----------
+    series : Series
+        Straight between its values, and nothing but its ends beyond them.
+    instants : ndarray, shape (n,)
+        UTC ns.
+    over_s : float
+        The time about each instant that its mean goes over, s.
+    """
+    origin = int(series.time_utc_ns[0])
+    own = series.seconds_since(origin)
+    total = np.concatenate([[0.0], np.cumsum(0.5 * (series.value[1:] + series.value[:-1]) * np.diff(own))])
+    at = (instants - origin).astype(np.float64) / SECOND_NS
+    first, last = np.clip(at - 0.5 * over_s, own[0], own[-1]), np.clip(at + 0.5 * over_s, own[0], own[-1])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        mean = (np.interp(last, own, total) - np.interp(first, own, total)) / (last - first)
+    return np.where(last > first, mean, np.interp(at, own, series.value))
+
+
+def curve_of_means(means: Series, instants: Nanoseconds) -> Float:
+    """Return the smooth curve that has these means, at some instants, shape (n,).
+
+    A straight line between means flattens what rises and sinks within a few of them, by the mean and by the line. The
+    sum of the means is known where one ends and the next begins; the curve is the slope of a cubic spline through it.
+
+    Parameters
+    ----------
+    means : Series
+        Each about its instant, from half way to the one before to half way to the next.
+    instants : ndarray, shape (n,)
+        UTC ns; beyond the last mean the curve stays where it is.
+
+    References
+    ----------
+    Boneva, Kendall & Stefanov (1971), "Spline transformations: three new diagnostic aids for the statistical
+    data-analyst", JRSS B 33: the histospline.
+    """
+    origin = int(means.time_utc_ns[0])
+    own = means.seconds_since(origin)
+    middle = 0.5 * (own[1:] + own[:-1])
+    edge = np.concatenate([[1.5 * own[0] - 0.5 * own[1]], middle, [1.5 * own[-1] - 0.5 * own[-2]]])
+    total = np.concatenate([[0.0], np.cumsum(means.value * np.diff(edge))])
+    at = np.clip((instants - origin).astype(np.float64) / SECOND_NS, edge[0], edge[-1])
+    curve: Float = CubicSpline(edge, total).derivative()(at)
+    return curve

@@ -1,0 +1,54 @@
+"""Means over a time, and the curve that has them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from kempf.pipeline.channels.means import curve_of_means, mean_about
+from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+
+
+def utc(time_s: Float) -> Nanoseconds:
+    return np.rint(time_s * SECOND_NS).astype(np.int64)
+
+
+def swing(time_s: Float) -> Float:
+    """The speed of a boat: it sinks in every turn, here every 8 s."""
+    return 1.8 + 0.2 * np.sin(2.0 * np.pi * time_s / 8.0)
+
+
+def test_the_mean_of_a_straight_line_is_its_middle() -> None:
+    time = np.arange(0.0, 10.0, 0.25)
+    line = Series(utc(time), 3.0 + 0.5 * time)
+    at = np.array([1.3, 4.0, 8.7])
+    np.testing.assert_allclose(mean_about(line, utc(at), 2.0), 3.0 + 0.5 * at, atol=1e-9)
+
+
+def test_at_its_ends_a_mean_goes_over_what_there_is() -> None:
+    line = Series(utc(np.arange(11.0)), np.arange(11.0))
+    assert mean_about(line, utc(np.array([0.0, 10.0])), 4.0) == pytest.approx([1.0, 9.0])
+    # beyond them nothing is known but the end
+    assert mean_about(line, utc(np.array([-5.0, 15.0])), 2.0) == pytest.approx([0.0, 10.0])
+
+
+def test_the_curve_is_what_the_means_are_of() -> None:
+    """Means over 2 s of a swing of 8 s: a straight line between them loses a quarter of it."""
+    fine = np.arange(0.0, 60.0, 0.05)
+    truth = Series(utc(fine), swing(fine))
+    middle = np.arange(1.0, 60.0, 2.0)
+    means = Series(utc(middle), mean_about(truth, utc(middle), 2.0))
+    inside = (fine > 4.0) & (fine < 56.0)
+    curve = curve_of_means(means, utc(fine))[inside]
+    straight = np.interp(fine[inside], middle, means.value)
+    off = [np.std(one - swing(fine[inside])) / np.std(swing(fine[inside])) for one in (curve, straight)]
+    assert off[0] < 0.06
+    assert off[1] > 0.2
+
+
+def test_the_curve_keeps_the_means_that_it_was_made_of() -> None:
+    middle = np.arange(1.0, 40.0, 2.0)
+    means = Series(utc(middle), np.random.default_rng(2).standard_normal(middle.size))
+    fine = np.arange(0.0, 40.005, 0.01)
+    again = mean_about(Series(utc(fine), curve_of_means(means, utc(fine))), means.time_utc_ns, 2.0)
+    np.testing.assert_allclose(again, means.value, atol=1e-3)
