@@ -25,6 +25,8 @@ _ONE_STEP = 0.9
 #: standard deviation of what lies anywhere between 0 and 1; share of the scatter on either side that is left out;
 #: part of a row that is never known
 _WITHIN, _SCATTER, _BENT = 12.0**-0.5, 0.025, 0.3
+#: part of a row by which scatter must lean to one side before it says that few measurements cross an edge
+_LOPSIDED = 0.1
 #: samples over which an instrument's clock is taken for steady
 _BLOCK = 400
 
@@ -138,8 +140,13 @@ def _steady(middle: Nanoseconds, period_ns: float, row_ns: float) -> tuple[Nanos
     steady = slope * ticks + offset
     if np.max(np.abs(steady - elapsed)) > 1.2 * row_ns:
         return middle, row_ns * _WITHIN
-    result: Nanoseconds = middle[0] + np.round(steady).astype(np.int64)
     # a message that came late for once says nothing of the clock
     low, high = np.quantile(elapsed - steady, [_SCATTER, 1.0 - _SCATTER])
     # and a clock that crosses one edge only, in all its time, bends the line
-    return result, max(_BENT * row_ns, row_ns - float(high - low)) * _WITHIN
+    std_ns = max(_BENT * row_ns, row_ns - float(high - low)) * _WITHIN
+    edge = 0.5 * float(low + high)
+    if abs(edge) > _LOPSIDED * row_ns:
+        # few measurements cross an edge: jitter over a whole row puts the clock on the line, none at all on the edge
+        steady, std_ns = steady + 0.5 * edge, float(np.hypot(std_ns, edge * _WITHIN))
+    result: Nanoseconds = middle[0] + np.round(steady).astype(np.int64)
+    return result, std_ns

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import polars as pl
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from kempf.pipeline.channels.holds import find_held
@@ -67,6 +67,7 @@ def test_one_row_a_measurement_within_a_row_of_its_instant(
     jitter=st.floats(0.0, 0.1),
     seed=st.integers(0, 2**16),
 )
+@example(period=3, phase=0.03125, drift=0.0, jitter=0.046875, seed=0)
 def test_the_instants_are_as_far_off_as_is_said(
     period: int, phase: float, drift: float, jitter: float, seed: int
 ) -> None:
