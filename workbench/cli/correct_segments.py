@@ -9,8 +9,8 @@ import click
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.confirm import confirm, reason_option, yes_option
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.instants import utc_ns_of
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.instants import utc_ns_of
 from kempf.workbench.terminal import counted, one_line, print_json, print_table
 
 if TYPE_CHECKING:

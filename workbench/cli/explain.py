@@ -5,8 +5,8 @@ from __future__ import annotations
 import click
 
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.instants import utc_ns_of
 from kempf.workbench.cli.options import json_option, vessel_option, warehouse_option
+from kempf.workbench.instants import utc_ns_of
 from kempf.workbench.terminal import number, print_json, print_paragraph, print_table, progress_bar
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,16 +11,17 @@ import click
 
 from kempf.schemas.errors import UsageError
 from kempf.workbench.cli.given_once import GivenOnce
-from kempf.workbench.cli.instants import end_of
 from kempf.workbench.cli.options import figure_option, json_option, output_option, vessel_option, warehouse_option
+from kempf.workbench.instants import end_of
 from kempf.workbench.new_file import require_figures, require_new, writing
 from kempf.workbench.terminal import counted, number, print_json, print_note, print_paragraph, print_table, short_ids
 
 if TYPE_CHECKING:
     from datetime import datetime
 
-    from kempf.warehouse.history import Comparable, History
+    from kempf.warehouse.history import History
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.changes import Examined
 
 
 #: Smaller p-values are not written out.
@@ -73,6 +73,7 @@ def command(
     from kempf.flows.jobs.out_of_date import said_of_vessel
     from kempf.warehouse import history, vessels
     from kempf.warehouse.store import Warehouse
+    from kempf.workbench.documents.changes import changes_document, examined
 
     _require_sense(file_format, output, figure, changes=changes, as_json=as_json)
     warehouse, instant = Warehouse(uri), end_of(as_of, "--as-of") if as_of is not None else None
@@ -96,10 +97,10 @@ def command(
     kinds = {name: history.comparable(warehouse, name, instant) for name in histories}
     # each kind of sets has a figure of its own
     figures = iter(require_figures(figure, sum(map(len, kinds.values()))))
-    documents: list[dict[str, Any]] = []
+    documents = []
     for name, found in histories.items():
-        examined = [_examine(kind, occasion_h, next(figures, None), name) for kind in kinds[name]]
-        documents.append({"vessel": name, "history": _rows(name, found), "changes": examined})
+        tested = [_drawn(examined(kind, occasion_h), next(figures, None), name) for kind in kinds[name]]
+        documents.append(changes_document(name, found, tested))
     if as_json:
         print_json(documents[0] if len(documents) == 1 else documents)
         return
@@ -194,41 +195,17 @@ def _show_notes(warehouse: Warehouse, names: Sequence[str], as_of: datetime | No
                 click.echo(f"note: {words_of(one)}")
 
 
-def _examine(kind: Comparable, occasion_h: float, figure: Path | None, vessel: str) -> dict[str, Any]:
-    """Put the sets of one model and estimator to the tests."""
-    import numpy as np
+def _drawn(examined: Examined, figure: Path | None, vessel: str) -> dict[str, Any]:
+    """Return what the tests say of one model and estimator, drawn where a figure is asked for."""
+    if figure is None or not len(examined.history):
+        return examined.show()
+    from kempf.workbench.figures.history import draw_history
 
-    from kempf.pipeline.history.changes import find_changes
-    from kempf.pipeline.history.pooled import pool
-    from kempf.pipeline.history.report import report
-    from kempf.pipeline.history.sets import ParameterHistory, usable
-    from kempf.pipeline.history.settings import ChangeSettings
-
-    n, p = len(kind.parameter_set_ids), len(kind.names)
-    time = np.array(kind.starts_utc_ns, dtype=np.int64)
-    value = np.array(kind.values, dtype=np.float64).reshape(n, p)
-    covariance = np.array(kind.covariances, dtype=np.float64).reshape(n, p, p)
-    good = usable(value, covariance)
-    history = ParameterHistory(kind.names, kind.units, time[good], value[good], covariance[good])
-    left_out = dict(kind.left_out)
-    if not bool(np.all(good)):
-        left_out["covariance not positive definite"] = int(np.sum(~good))
-    changes = find_changes(history, replace(ChangeSettings(), occasion_s=3600.0 * occasion_h))
-    if figure is not None and len(history):
-        from kempf.workbench.figures.history import draw_history
-
-        title = f"{vessel}, model {kind.model}, estimator {kind.estimator}: {changes.verdict}"
-        with writing(figure):
-            draw_history(history, changes, figure, title)
-    return {
-        "model": kind.model,
-        "model_sha256": kind.model_sha256,
-        "estimator": kind.estimator,
-        "parameter_set_ids": [name for name, ok in zip(kind.parameter_set_ids, good, strict=True) if ok],
-        "left_out": left_out,
-        **report(history, pool(history.value, history.covariance) if len(history) else None, changes),
-        "figure": str(figure) if figure is not None and len(history) else None,
-    }
+    kind = examined.kind
+    title = f"{vessel}, model {kind.model}, estimator {kind.estimator}: {examined.changes.verdict}"
+    with writing(figure):
+        draw_history(examined.history, examined.changes, figure, title)
+    return examined.show(str(figure))
 
 
 #: Why a set is left out, of those that no history of single manoeuvres could take.

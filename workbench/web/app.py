@@ -25,6 +25,7 @@ from kempf.workbench.web.addresses import address_of, vessel_at
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.guard import Guard
 from kempf.workbench.web.pages import (
+    changes,
     compare,
     diagnosis,
     effects,
@@ -121,6 +122,7 @@ def _serve_pages(app: FastAPI, desk: Desk) -> None:
         ("explain", explain),
         ("what-if", what_if),
         ("next-trial", next_trial),
+        ("changes", changes),
     ):
         serve_answer(place, page.gather, page.document)
     serve("/compare", lambda r: compare.gather(desk, *_both(r)), lambda r: compare.document(desk, *_both(r)))

@@ -208,6 +208,7 @@ def test_every_page_is_accessible_and_fits(browser: Any, server: Server, scheme:
         "/ingest",
         "/compare",
         f"/v/{VESSEL}",
+        f"/v/{VESSEL}/changes",
         f"/logs/{log}",
         f"/segments/{segment}",
         "/effects",

@@ -1,4 +1,4 @@
-"""Parameters over time: a panel each, a point a parameter set, its 95 % interval as a line."""
+"""Parameters over time: a panel each, a point a parameter set, its 95 % interval as a line; changes are bands."""
 
 from __future__ import annotations
 
@@ -9,19 +9,28 @@ from typing import Any
 from markupsafe import Markup
 
 from kempf.schemas.model_spec import HULL_PARAMETERS
+from kempf.warehouse.notes import Note
 from kempf.workbench.web.draw.scale import ticks
 from kempf.workbench.web.draw.svg import drawing, element
+from kempf.workbench.web.window import instant
 
-_WIDTH, _PANEL, _LEFT, _GAP = 640.0, 92.0, 64.0, 14.0
+#: sizes; a panel's words stand in the gap above it
+_WIDTH, _PANEL, _LEFT, _GAP = 640.0, 92.0, 64.0, 20.0
 
 
-def draw_history(rows: Sequence[Mapping[str, Any]]) -> Markup | None:
+def draw_history(
+    rows: Sequence[Mapping[str, Any]], examined: Sequence[Mapping[str, Any]] = (), noted: Sequence[Note] = ()
+) -> Markup | None:
     """Return the hull's parameters of the model and estimator that most sets are of; None where none has an interval.
 
     Parameters
     ----------
     rows : sequence of mapping
         Of `kempf.warehouse.history.History.rows`.
+    examined : sequence of mapping, optional
+        Of `kempf.workbench.documents.changes.Examined.show`: where a parameter moved its panel says so.
+    noted : sequence of Note, optional
+        A line where each says that something happened.
     """
     usable = [row for row in rows if row["low"] is not None and not row["superseded"] and row["converged"]]
     usable = [row for row in usable if row["parameter"] in HULL_PARAMETERS]
@@ -34,10 +43,18 @@ def draw_history(rows: Sequence[Mapping[str, Any]]) -> Markup | None:
     times = [row["start_utc_ns"] for row in shown]
     first, last = min(times), max(times)
     parts: list[Markup] = []
+    changes = [one for of in examined if (of["model"], of["estimator"]) == kind for one in of["changes"]]
+    bottom = len(names) * (_PANEL + _GAP) + 14.0
     for k, name in enumerate(names):
-        own = [row for row in shown if row["parameter"] == name]
-        parts += _panel(name, own, k * (_PANEL + _GAP) + 6.0, first, max(last, first + 1))
-    bottom = len(names) * (_PANEL + _GAP) + 10.0
+        own, top = [row for row in shown if row["parameter"] == name], k * (_PANEL + _GAP) + 16.0
+        bands, words = _bands(changes, name, top, first, last)
+        parts += [*bands, *_panel(name, own, top, first, max(last, first + 1)), *words]
+    for one in noted:
+        if one.event_utc_ns is not None and first <= one.event_utc_ns <= last:
+            x = _x(one.event_utc_ns, first, last)
+            line = element("line", x1=x, x2=x, y1=16.0, y2=bottom - 4.0, class_="noted")
+            word = element("text", f"note {one.number}", x=x, y=bottom + 5.0, text_anchor="middle", class_="label")
+            parts.append(element("g", element("title", one.text), line, word))
     starts = sorted({row["start"][:10]: row["start_utc_ns"] for row in shown}.items())
     for word, at in (starts[0], starts[-1]) if len(starts) > 1 else starts:
         anchor = "start" if at == first else "end"
@@ -48,6 +65,28 @@ def draw_history(rows: Sequence[Mapping[str, Any]]) -> Markup | None:
 
 def _x(at: int, first: int, last: int) -> float:
     return _LEFT + 12.0 + (_WIDTH - _LEFT - 28.0) * (at - first) / max(last - first, 1)
+
+
+def _bands(
+    changes: Sequence[Mapping[str, Any]], name: str, top: float, first: int, last: int
+) -> tuple[list[Markup], list[Markup]]:
+    """Return where a ship changed as bands of a parameter's panel, and what that was for the parameter in words."""
+    bands: list[Markup] = []
+    words: list[str] = []
+    for change in changes:
+        at = [_x(instant(one), first, last) for one in change["between"]]
+        own = change["parameters"].get(name)
+        moved = own is not None and own["moved"]
+        room = {"x": at[0], "width": max(at[1] - at[0], 1.0), "y": top, "height": _PANEL}
+        bands.append(element("rect", **room, class_="changed moved" if moved else "changed"))
+        if moved:
+            a_year = " a year" if change["kind"] == "drift" else ""
+            said = f"{change['kind']} {own['percent']:+.1f} ± {own['percent_std']:.1f} %{a_year}"
+            words.append(said)
+    if words:
+        at_end = {"x": _WIDTH - 4.0, "y": top - 5.0, "text_anchor": "end", "class_": "label strong"}
+        return bands, [element("text", "; ".join(words), **at_end)]
+    return bands, []
 
 
 def _panel(name: str, rows: Sequence[Mapping[str, Any]], top: float, first: int, last: int) -> list[Markup]:
@@ -63,7 +102,7 @@ def _panel(name: str, rows: Sequence[Mapping[str, Any]], top: float, first: int,
         parts.append(element("line", x1=_LEFT, x2=_WIDTH - 4.0, y1=y(tick), y2=y(tick), class_="grid"))
         parts.append(element("text", f"{tick:g}", x=_LEFT - 6.0, y=y(tick) + 3.5, text_anchor="end", class_="label"))
     unit = "" if rows[0]["unit"] in ("", "1") else f", {rows[0]['unit']}"
-    parts.append(element("text", name + unit, x=_LEFT + 8.0, y=top + 14.0, class_="label strong"))
+    parts.append(element("text", name + unit, x=_LEFT, y=top - 5.0, class_="label strong"))
     for row in rows:
         x = _x(row["start_utc_ns"], first, last)
         words = (

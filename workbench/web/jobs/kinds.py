@@ -16,6 +16,7 @@ from kempf.flows.process.progress import Progress
 from kempf.schemas.errors import DataRejected, KempfError
 from kempf.warehouse.instant import iso_utc
 from kempf.warehouse.store import Warehouse
+from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.uploads import paths_of
 
@@ -204,6 +205,23 @@ def propose(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], pro
     return {"to": f"{of_vessel(vessel)}/next-trial?{urlencode(asked)}", "document": found.show()}
 
 
+def examine(warehouse: Warehouse, state: Path, arguments: Mapping[str, Any], progress: Progress) -> dict[str, Any]:
+    """Put a vessel's parameters to the tests; the result is what `kempf history --changes --json` prints."""
+    from kempf.warehouse import history
+    from kempf.workbench.documents.changes import changes_document, examined
+
+    vessel, asked = arguments["vessel"], arguments["as_of"]
+    then = end_of(asked, "as_of") if asked else None
+    kinds = history.comparable(warehouse, vessel, then)
+    found = []
+    for done, kind in enumerate(kinds):
+        progress(done, len(kinds), f"testing the sets of model {kind.model}, {kind.estimator}")
+        found.append(examined(kind).show())
+    of = history.of_vessel(warehouse, vessel, as_of=then)
+    to = f"{of_vessel(vessel)}/changes" + (f"?{urlencode({'as_of': asked})}" if asked else "")
+    return {"to": to, "document": changes_document(vessel, of, found)}
+
+
 class Kind(NamedTuple):
     """What a form may ask for."""
 
@@ -224,6 +242,7 @@ KINDS: Mapping[str, Kind] = {
     "what_if": Kind(move, "Move a parameter", ("parameter", "set", "segment")),
     "sail": Kind(sail, "Predict a manoeuvre", ("set", "manoeuvre", "rudder", "angles", "side", "speed")),
     "next_trial": Kind(propose, "Find the next trial", ("set", "parameter")),
+    "changes": Kind(examine, "Look for changes", ("as_of",)),
     "diagnose": Kind(diagnose, "Diagnose", ()),
     "try": Kind(try_formula, "Try a formula", ("formula", "name")),
     "add": Kind(add, "Add the effect", ("effect", "formula", "standing"), changes=True),

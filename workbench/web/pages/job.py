@@ -13,6 +13,7 @@ from kempf.pipeline.predict.horizon import horizon_of
 from kempf.schemas.effects import get
 from kempf.schemas.errors import UsageError
 from kempf.warehouse import vessels
+from kempf.workbench.instants import end_of
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import key_of
 from kempf.workbench.web.data.sailed import MANOEUVRES, SIDES, request_of
@@ -127,6 +128,12 @@ def _stretch(desk: Desk, arguments: Arguments) -> None:
     arguments["window_utc_ns"] = [begin, end]
 
 
+def _then(desk: Desk, arguments: Arguments) -> None:
+    arguments["as_of"] = arguments["as_of"].strip()
+    if arguments["as_of"]:
+        end_of(arguments["as_of"], "as_of")
+
+
 def _correction(desk: Desk, arguments: Arguments) -> None:
     if arguments["action"] not in _ACTIONS:
         raise UsageError(
@@ -148,6 +155,7 @@ _SETTLE: Mapping[str, Callable[[Desk, Arguments], str | None]] = {
     "what_if": _name_the_set,
     "next_trial": _name_the_set,
     "sail": _sail,
+    "changes": _then,
     "try": _formula,
     "add": _add,
     "preview": _correction,

@@ -11,7 +11,7 @@ from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.documents.parameter_sets import listed_sets
 from kempf.workbench.documents.vessel import vessel_document
 from kempf.workbench.web.desk import Desk
-from kempf.workbench.web.draw.history import draw_history
+from kempf.workbench.web.pages import changes
 from kempf.workbench.web.pages.page import Page
 
 #: entries of a list that the page shows
@@ -28,6 +28,7 @@ def gather(desk: Desk, vessel: str) -> Page:
     warehouse = desk.warehouse
     sets = listed_sets(warehouse, vessel)
     standing = set(history.standing(warehouse, vessel))
+    over_time = changes.content(desk, vessel, {}) if sets else {}
     content = {
         "vessel": vessel,
         "profile": document(desk, vessel)["profile"],
@@ -40,7 +41,8 @@ def gather(desk: Desk, vessel: str) -> Page:
         "notes": [one.show() for one in notes.of_vessel(warehouse, vessel)],
         "current": any("current" in one["aliases"] for one in sets),
         "stale": said_of_vessel(warehouse, vessel),
-        "history": draw_history(history.of_vessel(warehouse, vessel).rows()) if sets else None,
+        "history": over_time.get("drawn"),
+        "tested": over_time.get("tested"),
     }
     return Page("vessel.html", vessel, content)
 

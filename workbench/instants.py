@@ -1,4 +1,4 @@
-"""Instants as a person writes them on the command line: ISO 8601, in UTC where no zone is said."""
+"""Instants as a person writes them: ISO 8601, in UTC where no zone is said."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def instant_of(text: str, option: str) -> datetime:
     text : str
         What was given.
     option : str
-        With which option, for the message.
+        Where it was given, such as an option, for the message.
 
     Raises
     ------

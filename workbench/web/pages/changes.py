@@ -1,0 +1,49 @@
+"""Whether a vessel changed: steps and drifts of her parameters, and what would have been seen."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+from kempf.warehouse import history, notes
+from kempf.workbench.instants import end_of
+from kempf.workbench.web.addresses import of_vessel
+from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.draw.history import draw_history
+from kempf.workbench.web.pages.answer import answer
+from kempf.workbench.web.pages.page import Page
+
+
+def document(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any] | None:
+    """Return what `kempf history --vessel NAME --changes --json` prints, where it was made; else None."""
+    return answer(desk, "changes", vessel, asked).document
+
+
+def gather(desk: Desk, vessel: str, asked: Mapping[str, str]) -> Page:
+    """Return the page of a vessel's changes.
+
+    Parameters
+    ----------
+    asked : mapping of str to str
+        ``as_of``, an instant: what was known then.
+    """
+    return Page("changes.html", "Changes", content(desk, vessel, asked), ((vessel, of_vessel(vessel)),))
+
+
+def content(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any]:
+    """Return a vessel's parameters over time, as known now or then, with the changes that were found."""
+    found = answer(desk, "changes", vessel, asked)
+    then = end_of(found.arguments["as_of"], "as_of") if found.arguments["as_of"] else None
+    written = notes.of_vessel(desk.warehouse, vessel)
+    noted = [one for one in written if then is None or (one.written is not None and one.written <= then)]
+    of = history.of_vessel(desk.warehouse, vessel, as_of=then)
+    kinds = [] if found.document is None else found.document["changes"]
+    return {
+        "vessel": vessel,
+        "as_of": found.arguments["as_of"],
+        "nothing": of.note,
+        "drawn": draw_history(of.rows(), kinds, noted),
+        "made": found.document,
+        "tested": [one for one in kinds if one["sets"]],
+        "job": found.waiting,
+    }
