@@ -21,6 +21,14 @@ KEMPF = (sys.executable, "-c", "from kempf.workbench.cli import main; main()")
 WAIT_MS = 1_200_000
 
 
+#: When the page was painted and when it asked for series, ms since its address was asked for.
+FIRST_PAINT_AND_SERIES = """() => {
+  const asked = performance.getEntriesByType("resource").filter(e => e.name.includes("/series"));
+  const painted = performance.getEntriesByName("first-contentful-paint")[0];
+  return [painted.startTime, Math.min(...asked.map(e => e.startTime))];
+}"""
+
+
 @dataclass
 class Opened:
     """A tab that may write, and the address of the pages."""

@@ -21,7 +21,7 @@ import yaml
 from playwright.sync_api import Page
 
 from benchmarks import result_page
-from benchmarks.pages.browser import KEMPF, Opened, opened
+from benchmarks.pages.browser import FIRST_PAINT_AND_SERIES, KEMPF, Opened, opened
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.workbench.web.data.bins import reduced
 
@@ -51,11 +51,6 @@ _ZOOM = """async by => {
   await Promise.resolve();
   for (const one of document.querySelectorAll(".chart canvas")) one.getContext("2d").getImageData(0, 0, 1, 1);
   return performance.now() - begun;
-}"""
-_FIRST = """() => {
-  const asked = performance.getEntriesByType("resource").filter(e => e.name.includes("/series"));
-  const painted = performance.getEntriesByName("first-contentful-paint")[0];
-  return [painted.startTime, Math.min(...asked.map(e => e.startTime))];
 }"""
 
 
@@ -167,7 +162,7 @@ def measured() -> list[list[str]]:
             page.tab.goto(f"{page.base}/logs/{log}?ch={channels}")
             page.tab.wait_for_selector("body[data-ready=yes]")
             assert page.tab.locator(".panel").count() == len(_CHANNELS) + len(_MORE)
-            painted, asked = page.tab.evaluate(_FIRST)
+            painted, asked = page.tab.evaluate(FIRST_PAINT_AND_SERIES)
             zoom = zoomed(page.tab)
             paths = ["/", "/v/hour", f"/logs/{log}", "/effects"]
             one = cpu_of_pages(page, _server_of(folder / "state"), paths)

@@ -237,6 +237,10 @@ def test_a_chart_is_zoomed_and_the_window_is_in_the_address(browser: Any, server
     tab.goto(server.base + f"/logs/{log}")
     tab.wait_for_selector("body[data-ready=yes]")
     assert len(asked) <= 12 and all(url.startswith(server.base) for url in asked)
+    from benchmarks.pages.browser import FIRST_PAINT_AND_SERIES
+
+    painted, series = tab.evaluate(FIRST_PAINT_AND_SERIES)
+    assert painted <= series  # words first, whatever the log holds
     tab.wait_for_timeout(500)
     seen = len(asked)
     tab.wait_for_timeout(1500)

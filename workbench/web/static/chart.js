@@ -47,7 +47,14 @@
     return series;
   }
 
+  // words first: series are asked for once the page is painted, or will not say that it was
+  const painted = new Promise(done => {
+    setTimeout(done, document.hidden || !PerformanceObserver.supportedEntryTypes.includes("paint") ? 0 : 1000);
+    new PerformanceObserver(seen => { if (seen.getEntriesByName("first-contentful-paint").length) done(); }).observe({ type: "paint", buffered: true });
+  });
+
   async function frame(address) {
+    await painted;
     const answer = await fetch(address);
     if (!answer.ok) throw new Error((await answer.json()).error.message);
     return decoded(await answer.arrayBuffer());
