@@ -2,8 +2,13 @@
 
 from __future__ import annotations
 
-import gzip
 import os
+
+# before numpy is imported, as `kempf.flows` does: threads that wait for their share of small matrices take a quarter
+# of the processors from the tests beside them
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import gzip
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
