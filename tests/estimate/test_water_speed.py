@@ -82,3 +82,15 @@ def test_means_are_taken_for_the_curve_that_they_are_of() -> None:
             errors.append(error @ dip / (dip @ dip))
     assert abs(np.mean(dips)) < 0.05
     assert np.mean(off) < -0.15
+
+
+def test_between_means_that_are_lost_nothing_is_made_up() -> None:
+    log, heading, rudder, _ = sailed(loss=80.0, seed=0)
+    means = Series(log.time_utc_ns[2::5], np.convolve(log.value, np.full(5, 0.2), mode="valid")[::5])
+    at = means.seconds_since(0)
+    kept = (at < 300.0) | (at > 400.0)
+    gappy = Series(means.time_utc_ns[kept], means.value[kept])
+    whole, found = (water_speed(one, heading, rudder, 5.0).series for one in (means, gappy))
+    assert np.max(np.diff(whole.seconds_since(0))) < 1.0
+    assert np.max(np.diff(found.seconds_since(0))) > 85.0
+    assert len(found) < 0.9 * len(whole)

@@ -232,7 +232,8 @@ def averaged(record: Record, spec: ModelSpec, arm_per_m: float, length_m: float 
     length_m : float or None
         Of the ship, for the grid's step.
     """
-    return replace(record, **vars(plain_run("", record, spec, arm_per_m, length_m).instants()))
+    means = plain_run("", record, spec, arm_per_m, length_m).instants()
+    return replace(record, **vars(means), lateral_by_late=None)
 
 
 def make_run(

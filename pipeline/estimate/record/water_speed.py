@@ -13,7 +13,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from kempf.pipeline.channels.means import curve_of_means, mean_about
-from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
+from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Nanoseconds, Series
 from kempf.pipeline.channels.signal import Signal, signal
 from kempf.pipeline.estimate.record.moves import moves
 
@@ -58,7 +58,8 @@ def water_speed(log: Series, heading: Series, rudder: Series, mean_s: float = 0.
     turning = 0.0 if found.shape is None else found.multiple * means[found.shape]
     slow = curve_of_means(Series(log.time_utc_ns, found.series.value - turning), instants)
     whole = slow if found.shape is None else slow + found.multiple * shapes[found.shape]
-    return replace(found, series=Series(instants, whole))
+    known = _within(instants, log)
+    return replace(found, series=Series(instants[known], whole[known]))
 
 
 def _lost(heading: Series, instants: Nanoseconds, leg_s: float) -> list[Float]:
@@ -77,6 +78,15 @@ def _between(log: Series, mean_s: float) -> Nanoseconds:
     """Return instants from the first to the last that means of a log say something of."""
     half, step = (round(part * mean_s * SECOND_NS) for part in (0.5, _STEP))
     return np.arange(log.time_utc_ns[0] - half, log.time_utc_ns[-1] + half + 1, step)
+
+
+def _within(instants: Nanoseconds, log: Series) -> Mask:
+    """Return which instants lie within the time of a mean, and not where the log has a gap."""
+    later = np.clip(np.searchsorted(log.time_utc_ns, instants), 1, len(log) - 1)
+    beside = np.stack([log.time_utc_ns[later - 1], log.time_utc_ns[later]])
+    # a reading that is lost now and then is bridged
+    known: Mask = np.min(np.abs(beside - instants), axis=0) <= log.period_s * SECOND_NS
+    return known
 
 
 def _yaw_rate(heading: Series, instants: Nanoseconds) -> Float:
