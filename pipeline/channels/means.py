@@ -7,6 +7,9 @@ from scipy.interpolate import CubicSpline
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
+#: times between two means beyond which some are lost
+_LOST = 1.5
+
 
 def mean_about(series: Series, instants: Nanoseconds, over_s: float) -> Float:
     """Return the mean of a series about some instants, shape (n,).
@@ -35,13 +38,14 @@ def curve_of_means(means: Series, instants: Nanoseconds) -> Float:
 
     A straight line between means flattens what rises and sinks within a few of them, by the mean and by the line. The
     sum of the means is known where one ends and the next begins; the curve is the slope of a cubic spline through it.
+    Where some are lost, the means on either side have curves of their own.
 
     Parameters
     ----------
     means : Series
         Each about its instant, from half way to the one before to half way to the next.
     instants : ndarray, shape (n,)
-        UTC ns; beyond the last mean the curve stays where it is.
+        UTC ns; beyond the time of a last mean the curve stays where it is.
 
     References
     ----------
@@ -49,10 +53,14 @@ def curve_of_means(means: Series, instants: Nanoseconds) -> Float:
     data-analyst", JRSS B 33: the histospline.
     """
     origin = int(means.time_utc_ns[0])
-    own = means.seconds_since(origin)
-    middle = 0.5 * (own[1:] + own[:-1])
-    edge = np.concatenate([[1.5 * own[0] - 0.5 * own[1]], middle, [1.5 * own[-1] - 0.5 * own[-2]]])
-    total = np.concatenate([[0.0], np.cumsum(means.value * np.diff(edge))])
-    at = np.clip((instants - origin).astype(np.float64) / SECOND_NS, edge[0], edge[-1])
-    curve: Float = CubicSpline(edge, total).derivative()(at)
+    own, at = means.seconds_since(origin), (instants - origin).astype(np.float64) / SECOND_NS
+    step, curve = means.period_s, np.empty(at.size)
+    ends = np.flatnonzero(np.diff(own) > _LOST * step) + 1
+    first_of = np.concatenate([[-np.inf], 0.5 * (own[ends - 1] + own[ends]), [np.inf]])
+    for k, part in enumerate(np.split(np.arange(own.size), ends)):
+        middle, value = own[part], means.value[part]
+        edge = np.concatenate([[middle[0] - 0.5 * step], 0.5 * (middle[1:] + middle[:-1]), [middle[-1] + 0.5 * step]])
+        total = np.concatenate([[0.0], np.cumsum(value * np.diff(edge))])
+        near = (at >= first_of[k]) & (at < first_of[k + 1])
+        curve[near] = CubicSpline(edge, total).derivative()(np.clip(at[near], edge[0], edge[-1]))
     return curve

@@ -89,18 +89,14 @@ def signal(series: Series, shapes: Sequence[Float] = ()) -> Signal:
     best = search.best
     width = float(np.exp(best.log_width))
     noise_std = float(np.sqrt(best.noise_variance))
+    goes_with = best.shape - 1 if best.shape else None, best.multiple
     if width <= _EXACT:
-        return Signal(series, noise_std, 0.5 * series.period_s)
+        return Signal(series, noise_std, 0.5 * series.period_s, *goes_with)
     value, around = search.laid(best)
     left = min(_LEFT[best.order] / width, 1.0)
     # white noise of the readings: all of its power at frequency 0 passes
-    return Signal(
-        Series(series.time_utc_ns, value),
-        float(np.hypot(noise_std * np.sqrt(left), around)),
-        0.5 * series.period_s / left,
-        best.shape - 1 if best.shape else None,
-        best.multiple,
-    )
+    error_std = float(np.hypot(noise_std * np.sqrt(left), around))
+    return Signal(Series(series.time_utc_ns, value), error_std, 0.5 * series.period_s / left, *goes_with)
 
 
 class _Search:

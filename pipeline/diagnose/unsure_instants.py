@@ -77,10 +77,10 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
     """
     known = np.nan_to_num(fit.covariance)
     rows, std_s, foreign = _rows(fit, workers)
-    smoothed, lateness_s = _smoothed(fit, workers)
-    if not std_s.size and not lateness_s.size:
+    smoothed = _smoothed(fit, workers)
+    if not std_s.size and not smoothed.size:
         return WithInstants(fit, np.zeros_like(known))
-    shared, m, parts = known.shape[0], std_s.size, std_s.size + lateness_s.size
+    shared, m, parts = known.shape[0], std_s.size, std_s.size + smoothed.shape[1]
     columns = np.column_stack([rows, smoothed])
     across, own, score = np.zeros((shared, parts)), np.zeros((m, parts)), np.zeros(m)
     first = 0
@@ -101,7 +101,7 @@ def with_instants(fit: PooledFit, workers: Executor) -> WithInstants:
     moved = np.concatenate([fit.hull, fit.values]) - to_hull[:, :m] @ late_s
     hull, values = np.split(moved, [len(HULL_PARAMETERS)])
     # the instants of rows follow a lateness that is only considered
-    considered = (to_hull[:, m:] - to_hull[:, :m] @ late_covariance @ beside[:, m:]) * lateness_s
+    considered = to_hull[:, m:] - to_hull[:, :m] @ late_covariance @ beside[:, m:]
     added: Float = to_hull[:, :m] @ late_covariance @ to_hull[:, :m].T + considered @ considered.T
     return WithInstants(replace(fit, hull=hull, values=np.clip(values, fit.model.low, fit.model.high)), added)
 
@@ -139,22 +139,23 @@ def _rows(fit: PooledFit, workers: Executor) -> tuple[Float, Float, Float]:
     return np.column_stack(columns), np.concatenate(std_s), np.array(foreign)
 
 
-def _smoothed(fit: PooledFit, workers: Executor) -> tuple[Float, Float]:
-    """Return what a second more of lateness does to the innovations, (N, m), and its standard error, s, shape (m,).
+def _smoothed(fit: PooledFit, workers: Executor) -> Float:
+    """Return what a lateness that is a standard error larger does to the innovations, shape (N, m).
 
-    There is one for every log with a velocity that may be late. The readings themselves change, so that what they are
-    late by as a signal and what they have lost of their noise is in it.
+    There is one for every log with a velocity that may be late, in each run by the error that it has there. The
+    readings themselves change, so that what they are late by as a signal and what they have lost of their noise is in
+    it.
     """
-    errors = [one.run.instant_errors.smoothing_s for one in fit.runs]
+    late = [float(one.run.instant_errors.smoothing_s > 0.0) for one in fit.runs]
     size = sum(line.u.size for line in fit.linearised)
-    if not any(errors):
-        return np.zeros((size, 0)), np.zeros(0)
+    if not any(late):
+        return np.zeros((size, 0))
     column = np.concatenate(list(workers.map(lambda number: _less_late(fit, number), range(len(fit.runs)))))
-    return _by_log(fit, column, errors)
+    return _by_log(fit, column, late)[0]
 
 
 def _less_late(fit: PooledFit, number: int) -> Float:
-    """Return what a second more of lateness, undone, does to the innovations of a run, shape (2 m,)."""
+    """Return what a standard error more of lateness, undone, does to the innovations of a run, shape (2 m,)."""
     filtered, line = fit.runs[number], fit.linearised[number]
     run = filtered.run
     if run.lateral_by_late is None:
@@ -163,7 +164,7 @@ def _less_late(fit: PooledFit, number: int) -> Float:
     measured[:, 0] += _STEP_S * run.lateral_by_late
     other = replace(filtered, run=replace(run, measured=measured))
     passed = other.run_filter(fit.hull, np.exp(fit.levels[number]), fit.values)
-    return difference(line.passed, passed, _STEP_S)
+    return run.instant_errors.smoothing_s * difference(line.passed, passed, _STEP_S)
 
 
 def _by_log(fit: PooledFit, column: Float, errors: Sequence[float]) -> tuple[Float, Float]:

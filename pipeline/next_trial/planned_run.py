@@ -82,6 +82,7 @@ def planned(track: Track, ship: Ship, like: GridRun, spec: ModelSpec) -> GridRun
         current_row=current_row(spec, heading[::ROWS]),
         heading_rad=heading[::ROWS],
         approach_m_s=waters.approach_m_s,
+        lateral_by_late=None,
     )
 
 

@@ -52,3 +52,18 @@ def test_the_curve_keeps_the_means_that_it_was_made_of() -> None:
     fine = np.arange(0.0, 40.005, 0.01)
     again = mean_about(Series(utc(fine), curve_of_means(means, utc(fine))), means.time_utc_ns, 2.0)
     np.testing.assert_allclose(again, means.value, atol=1e-3)
+
+
+def test_beside_a_hole_each_side_has_a_curve_of_its_own() -> None:
+    """One curve through a hole would take the mean before it for one over half of the hole."""
+    fine = np.arange(0.0, 80.0, 0.05)
+    truth = Series(utc(fine), swing(fine))
+    middle = np.concatenate([np.arange(1.0, 30.0, 2.0), np.arange(47.0, 80.0, 2.0)])
+    means = Series(utc(middle), mean_about(truth, utc(middle), 2.0))
+    beside = ((fine > 24.0) & (fine < 30.0)) | ((fine > 46.0) & (fine < 52.0))
+    curve = curve_of_means(means, utc(fine))[beside]
+    whole = np.arange(1.0, 80.0, 2.0)
+    without = curve_of_means(Series(utc(whole), mean_about(truth, utc(whole), 2.0)), utc(fine))[beside]
+    off = [np.max(np.abs(one - swing(fine[beside]))) for one in (curve, without)]
+    # at an end a spline is worse than inside, and no more
+    assert off[1] < off[0] < 0.13

@@ -9,6 +9,7 @@ import pytest
 
 from kempf.pipeline.channels.instant_errors import IN_THE_LOG, InstantErrors
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.diagnose import unsure_instants
 from kempf.pipeline.diagnose.unsure_instants import with_instants, within_rows
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.plain_fit import fit_plain
@@ -137,3 +138,31 @@ def _without_yaw(measured: Float) -> Float:
     made = measured.copy()
     made[:, 1] = np.nan
     return made
+
+
+def test_instants_of_rows_follow_a_lateness_that_is_only_considered() -> None:
+    """Beside the one joint inverse of hull, rows and lateness, the lateness held at what is known of it."""
+    ship = sailed(name="usv")
+    fit = fit_plain([with_slope(run) for run in ship.runs[:2]], ship.spec, WORKERS).fit
+    unsure = _unsure(fit, InstantErrors(heading_s=0.05, smoothing_s=0.03), (0,))
+    found = with_instants(unsure, WORKERS)
+    rows, std_s, _ = unsure_instants._rows(unsure, WORKERS)
+    smoothed = unsure_instants._smoothed(unsure, WORKERS)
+    assert (rows.shape[1], smoothed.shape[1]) == (1, 1)
+    parts = []
+    first = 0
+    for line in unsure.linearised:
+        own = np.column_stack([line.J, rows[first : first + line.u.size], smoothed[first : first + line.u.size]])
+        levels = [k for k, i in enumerate(line.index) if i >= 6]
+        basis = np.linalg.qr(own[:, levels])[0]
+        parts.append((own - basis @ (basis.T @ own))[:, [k for k in range(own.shape[1]) if k not in levels]])
+        first += line.u.size
+    J = np.concatenate(parts)
+    estimated = J[:, :7].T @ J[:, :7] + np.diag([0.0] * 6 + [std_s[0] ** -2.0])
+    estimated[:6, :6] = np.linalg.inv(unsure.covariance)
+    # of parameters that are estimated: their own errors, and what the considered one makes of them
+    own = np.linalg.inv(estimated)
+    moved = own @ (J[:, :7].T @ J[:, 7])
+    wanted = (own + np.outer(moved, moved))[:6, :6] - unsure.covariance
+    size = np.sqrt(np.abs(np.diag(wanted)))
+    np.testing.assert_allclose(found.covariance / np.outer(size, size), wanted / np.outer(size, size), atol=1e-5)

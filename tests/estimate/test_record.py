@@ -7,7 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
+from kempf.pipeline.channels import punctual
 from kempf.pipeline.channels.instruments import Instruments
+from kempf.pipeline.channels.lateness import Lateness
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.grid_run import plain_run
@@ -184,3 +186,28 @@ def test_channels_that_never_meet_are_refused() -> None:
     with pytest.raises(DataRejected) as caught:
         make_record(apart, start, end)
     assert caught.value.code in {"no_lateral_speed", "channel_missing"}
+
+
+def test_what_lateness_takes_is_the_difference_of_two_records(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of a velocity that is found late, and of the same found a little later."""
+    records = []
+    for late_s in (0.3, 0.3 + 1e-4):
+        found = Lateness(late_s, 0.05)
+        monkeypatch.setattr(punctual, "_velocity_lateness", lambda series, found=found: found)
+        records.append(make_record(LOG, START, END))
+    first, second = records
+    assert first.lateral_by_late is not None
+    assert first.instant_errors.smoothing_s == 0.05
+    moved = (second.measured[:, 0] - first.measured[:, 0]) / 1e-4
+    np.testing.assert_array_equal(np.isnan(first.lateral_by_late), np.isnan(moved))
+    np.testing.assert_allclose(np.nan_to_num(first.lateral_by_late), np.nan_to_num(moved), atol=1e-6)
+    assert np.nanstd(moved) > 1e-3
+    # and of the means of a run
+    runs = [plain_run("", one, ModelSpec(), 0.0, 100.0) for one in records]
+    by_late = runs[0].lateral_by_late
+    assert by_late is not None
+    means = (runs[1].measured[:, 0] - runs[0].measured[:, 0]) / 1e-4
+    seen = np.isfinite(means)
+    np.testing.assert_allclose(by_late[seen], means[seen], atol=1e-6)
+    monkeypatch.undo()
+    assert make_record(LOG, START, END).lateral_by_late is None

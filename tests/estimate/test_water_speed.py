@@ -94,3 +94,31 @@ def test_between_means_that_are_lost_nothing_is_made_up() -> None:
     assert np.max(np.diff(whole.seconds_since(0))) < 1.0
     assert np.max(np.diff(found.seconds_since(0))) > 85.0
     assert len(found) < 0.9 * len(whole)
+    inside = np.isin(whole.time_utc_ns, found.time_utc_ns)
+    truth = np.interp(whole.seconds_since(0)[inside], log.seconds_since(0), sailed(loss=80.0, seed=0)[3])
+    assert np.max(np.abs(np.interp(whole.seconds_since(0)[inside], found.seconds_since(0), found.value) - truth)) < 0.15
+
+
+def test_what_turning_costs_is_kept_where_the_means_hardly_scatter() -> None:
+    """Means of a boat whose legs are as short as three of them, and no noise for a spline to leave out."""
+    fine = np.arange(0.0, 120.0, 0.01)
+    rate = 0.5 * np.tanh(3.0 * np.sin(np.pi * fine / 6.0))
+    speed = np.empty(fine.size)
+    v = 1.8
+    for k in range(fine.size):
+        speed[k] = v
+        v += 0.01 * ((1.8 - v) / 2.0 - 0.6 * rate[k] ** 2)
+    every = slice(None, None, 10)
+    at, truth = fine[every], speed[every]
+    psi = series(at, (np.cumsum(rate) * 0.01)[every])
+    rudder = series(at, 0.3 * np.sign(np.sin(np.pi * (at + 0.6) / 6.0)))
+    middle = np.arange(1.0, 119.0, 2.0)
+    means = series(middle, np.array([np.mean(speed[(fine >= t - 1.0) & (fine < t + 1.0)]) for t in middle]))
+    found = water_speed(means, psi, rudder, 2.0)
+    assert found.shape is not None
+    inside = (at > 6.0) & (at < 112.0)
+    error = np.interp(at, found.series.seconds_since(0), found.series.value)[inside] - truth[inside]
+    straight = np.interp(at, middle, means.value)[inside] - truth[inside]
+    assert np.std(error) < 0.3 * np.std(straight)
+    # and what is said of the error is of its size
+    assert 0.3 * found.error_std < np.std(error) < 3.0 * found.error_std

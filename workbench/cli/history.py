@@ -132,13 +132,15 @@ def _write(histories: dict[str, History], file_format: str, output: Path | None)
     """Write histories to a file, a row a parameter of a set."""
     import polars as pl
 
+    from kempf.workbench.documents.changes import history_rows
+
     assert output is not None
     schema = {
         **{"vessel": pl.String, "start": pl.String, "parameter": pl.String, "value": pl.Float64, "std": pl.Float64},
         **{"low": pl.Float64, "high": pl.Float64, "unit": pl.String, "model": pl.String, "estimator": pl.String},
         **{"converged": pl.Boolean, "superseded": pl.Boolean, "parameter_set_id": pl.String},
     }
-    rows = [row for name, history in histories.items() for row in _rows(name, history)]
+    rows = [row for name, history in histories.items() for row in history_rows(name, history)]
     frame = pl.DataFrame([{key: row[key] for key in schema} for row in rows], schema=schema, orient="row")
     time = pl.col("start").str.to_datetime("%+", time_unit="us", time_zone="UTC")
     with writing(output, "--output"):
@@ -151,12 +153,10 @@ def _write(histories: dict[str, History], file_format: str, output: Path | None)
     click.echo(f"{output}: {counted(frame.height, 'row')} of {counted(len(histories), 'vessel')}")
 
 
-def _rows(vessel: str, history: History) -> list[dict[str, Any]]:
-    return [{"vessel": vessel, **row} for row in history.rows()]
-
-
 def _show(histories: dict[str, History], *, as_json: bool) -> None:
-    listed = [row for name, history in histories.items() for row in _rows(name, history)]
+    from kempf.workbench.documents.changes import history_rows
+
+    listed = [row for name, history in histories.items() for row in history_rows(name, history)]
     if as_json:
         print_json(listed)
     if not listed or as_json:

@@ -88,4 +88,9 @@ def changes_document(vessel: str, of: History, changes: list[dict[str, Any]]) ->
     changes : list of dict
         Of each model and estimator, see `Examined.show`.
     """
-    return {"vessel": vessel, "history": [{"vessel": vessel, **row} for row in of.rows()], "changes": changes}
+    return {"vessel": vessel, "history": history_rows(vessel, of), "changes": changes}
+
+
+def history_rows(vessel: str, of: History) -> list[dict[str, Any]]:
+    """Return a vessel's parameters over time as `kempf history --json` prints them."""
+    return [{"vessel": vessel, **row} for row in of.rows()]

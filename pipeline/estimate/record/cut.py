@@ -105,9 +105,7 @@ def make_record(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         noise_start=noise,
         warnings=tuple(warnings),
         instant_errors=on_time.errors,
-        lateral_by_late=None
-        if on_time.velocity is None
-        else _by_late(on_time.velocity, heading, instants, measured[:, 0]),
+        lateral_by_late=_by_late(on_time.velocity, heading, instants, measured[:, 0]),
     )
 
 

@@ -21,6 +21,9 @@ from kempf.pipeline.estimate.record.moves import moves
 _LEGS = (0.3, 1.0, 3.0)
 #: instants of the speed between means, in the time that each goes over
 _STEP = 0.1
+#: of what the curve between means departs from straight lines, the part by which it misses a swing over three of them;
+#: of slower ones it misses less
+_MISSED = 1.0 / 3.0
 
 
 def water_speed(log: Series, heading: Series, rudder: Series, mean_s: float = 0.0) -> Signal:
@@ -56,10 +59,14 @@ def water_speed(log: Series, heading: Series, rudder: Series, mean_s: float = 0.
     means = [mean_about(Series(instants, shape), log.time_utc_ns, mean_s) for shape in shapes]
     found = signal(log, means)
     turning = 0.0 if found.shape is None else found.multiple * means[found.shape]
-    slow = curve_of_means(Series(log.time_utc_ns, found.series.value - turning), instants)
+    slow_means = found.series.value - turning
+    slow = curve_of_means(Series(log.time_utc_ns, slow_means), instants)
     whole = slow if found.shape is None else slow + found.multiple * shapes[found.shape]
-    known = _within(instants, log)
-    return replace(found, series=Series(instants[known], whole[known]))
+    known = _within(instants, log, mean_s)
+    straight = np.interp(instants.astype(np.float64), log.time_utc_ns.astype(np.float64), slow_means)
+    missed = _MISSED * float(np.sqrt(np.mean((slow - straight)[known] ** 2)))
+    error_std = float(np.hypot(found.error_std, missed))
+    return replace(found, series=Series(instants[known], whole[known]), error_std=error_std)
 
 
 def _lost(heading: Series, instants: Nanoseconds, leg_s: float) -> list[Float]:
@@ -80,12 +87,11 @@ def _between(log: Series, mean_s: float) -> Nanoseconds:
     return np.arange(log.time_utc_ns[0] - half, log.time_utc_ns[-1] + half + 1, step)
 
 
-def _within(instants: Nanoseconds, log: Series) -> Mask:
-    """Return which instants lie within the time of a mean, and not where the log has a gap."""
+def _within(instants: Nanoseconds, log: Series, mean_s: float) -> Mask:
+    """Return which instants some mean of a log goes over: none of where it has a gap."""
     later = np.clip(np.searchsorted(log.time_utc_ns, instants), 1, len(log) - 1)
     beside = np.stack([log.time_utc_ns[later - 1], log.time_utc_ns[later]])
-    # a reading that is lost now and then is bridged
-    known: Mask = np.min(np.abs(beside - instants), axis=0) <= log.period_s * SECOND_NS
+    known: Mask = np.min(np.abs(beside - instants), axis=0) <= 0.5 * mean_s * SECOND_NS + 1.0
     return known
 
 

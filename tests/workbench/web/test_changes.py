@@ -14,6 +14,7 @@ from starlette.testclient import TestClient
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse import notes, vessels
 from kempf.warehouse.store import Warehouse
+from kempf.workbench.web.draw.history import draw_history
 from kempf.workbench.web.jobs.keeper import Keeper
 from tests.history.made import step
 from tests.workbench.driving import kempf
@@ -100,7 +101,28 @@ def test_what_was_known_then_is_what_the_command_says_of_then(opened: Open, tmp_
     asked = ("history", "--vessel", VESSEL, "--changes", "--warehouse", place, "--json")
     assert of_then == kempf(*asked, "--as-of", then).json and len(of_then["history"]) == 8 * 6
     assert len(kempf(*asked).json["history"]) > len(of_then["history"])
-    assert "as known now" in client.get(PAGE, params={"as_of": then}).text
+    at_ns = made_sets(16)[4].start_utc_ns
+    notes.add(Warehouse(str(place)), VESSEL, "vessel", VESSEL, "docked, said later", event_utc_ns=at_ns)
+    of_then_page = client.get(PAGE, params={"as_of": then}).text
+    assert "as known now" in of_then_page and "docked, said later" not in of_then_page
+    assert "docked, said later" in client.get(PAGE).text
+
+
+def test_a_model_of_two_versions_is_drawn_by_the_tests_of_one() -> None:
+    """A step that the sets of either version show is one step."""
+    rows = [
+        {
+            **{"parameter": "b2", "value": 1.0 + k, "low": 0.5 + k, "high": 1.5 + k, "unit": "1", "superseded": False},
+            **{"converged": True, "model": "linear", "estimator": "ml", "start_utc_ns": k * 10**18},
+            **{"start": f"20{10 + k}-01-01T00:00:00Z", "parameter_set_id": f"ps-{k}"},
+        }
+        for k in range(2)
+    ]
+    moved = {"b2": {"moved": True, "percent": 9.0, "percent_std": 1.0}}
+    step_found = {"kind": "step", "between": ["1980-01-01T00:00:00Z", "1990-01-01T00:00:00Z"], "parameters": moved}
+    both = [{"model": "linear", "estimator": "ml", "sets": n, "changes": [step_found]} for n in (8, 9)]
+    drawn = str(draw_history(rows, both))
+    assert drawn.count("changed moved") == 1 and drawn.count("step +9.0") == 1
 
 
 def test_a_time_that_is_none_is_a_page_in_words(opened: Open) -> None:

@@ -43,7 +43,9 @@ def draw_history(
     times = [row["start_utc_ns"] for row in shown]
     first, last = min(times), max(times)
     parts: list[Markup] = []
-    changes = [one for of in examined if (of["model"], of["estimator"]) == kind for one in of["changes"]]
+    # another version of a model, or other settings, are tested by themselves
+    alike = [of for of in examined if (of["model"], of["estimator"]) == kind]
+    changes = max(alike, key=lambda of: int(of["sets"]))["changes"] if alike else []
     bottom = len(names) * (_PANEL + _GAP) + 14.0
     for k, name in enumerate(names):
         own, top = [row for row in shown if row["parameter"] == name], k * (_PANEL + _GAP) + 16.0

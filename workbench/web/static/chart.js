@@ -49,7 +49,7 @@
 
   // words first: series are asked for once the page is painted, or will not say that it was
   const painted = new Promise(done => {
-    setTimeout(done, document.hidden || !PerformanceObserver.supportedEntryTypes.includes("paint") ? 0 : 1000);
+    setTimeout(done, document.hidden || !PerformanceObserver.supportedEntryTypes.includes("paint") ? 0 : 4000);
     new PerformanceObserver(seen => { if (seen.getEntriesByName("first-contentful-paint").length) done(); }).observe({ type: "paint", buffered: true });
   });
 
