@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -12,7 +13,9 @@ from tempfile import TemporaryDirectory
 from playwright.sync_api import Page
 
 from benchmarks.diagnose import late_rudder
+from benchmarks.documents import new_rudder
 from benchmarks.pages.browser import KEMPF, Opened, opened
+from kempf.warehouse.instant import iso_utc
 
 FIGURES = Path(__file__).parents[2] / "docs" / "figures"
 
@@ -84,7 +87,8 @@ def asked(page: Opened, address: str, name: str, height: int) -> None:
     made = tab.locator("main form.job button")
     if made.count():
         made.first.click()
-        tab.wait_for_url(f"**{address.partition('?')[0].rpartition('/')[2]}?**")
+        tab.wait_for_url("**/jobs/**")
+        tab.wait_for_url(re.compile(f"/{address.partition('?')[0].rpartition('/')[2]}([?]|$)"))
     shot(tab, name, height)
 
 
@@ -97,6 +101,15 @@ def main() -> None:
         subprocess.run([*KEMPF, "ingest", *files, "--warehouse", folder / "w"], check=True)
         with opened(folder / "w", folder / "state", width=1000) as page:
             story(page)
+        docked_ns = new_rudder.write(folder / "refitted")
+        at = ("--warehouse", folder / "r")
+        vessel = ("--vessel", new_rudder.VESSEL)
+        files = (*sorted((folder / "refitted").glob("*.mcap")), "--profile", folder / "refitted" / "refitted.yaml")
+        subprocess.run([*KEMPF, "ingest", *files, *at], check=True)
+        subprocess.run([*KEMPF, "identify", *vessel, *at], check=True)
+        subprocess.run([*KEMPF, "note", "docked, larger rudder", *vessel, "--at", iso_utc(docked_ns), *at], check=True)
+        with opened(folder / "r", folder / "state-r", width=1000) as page:
+            asked(page, f"{page.base}/v/{new_rudder.VESSEL}/changes", "changes", 1240)
 
 
 if __name__ == "__main__":
