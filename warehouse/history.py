@@ -290,13 +290,8 @@ def _logs_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> _Logs
     present = {log: row["ingest_id"] for log, row in last.items() if row["removed"] is None}
     past = [row["ingest_id"] for row in rows.rows(named=True) if present.get(row["log_id"]) != row["ingest_id"]]
     found = _segments_in(warehouse, vessel, sorted(present.values()), as_of)
-    return _Logs(past, found, _notes_of(warehouse, vessel, as_of), code_of(warehouse, "estimate"), as_of is not None)
-
-
-def _notes_of(warehouse: Warehouse, vessel: str, as_of: datetime | None) -> list[Note]:
-    """Return what is noted on a vessel, or was by a time."""
-    among = notes.of_vessel(warehouse, vessel)
-    return [one for one in among if as_of is None or (one.written is not None and one.written <= as_of)]
+    noted = notes.of_vessel(warehouse, vessel, as_of)
+    return _Logs(past, found, noted, code_of(warehouse, "estimate"), as_of is not None)
 
 
 def _segments_in(warehouse: Warehouse, vessel: str, ingests: list[str], as_of: datetime | None) -> list[str] | None:

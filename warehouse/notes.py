@@ -110,8 +110,13 @@ def add(
     return Note(number, vessel, subject, subject_id, text.strip(), event_utc_ns, draught_m, _written(warehouse, number))
 
 
-def of_vessel(warehouse: Warehouse, vessel: str | None = None) -> list[Note]:
+def of_vessel(warehouse: Warehouse, vessel: str | None = None, as_of: datetime | None = None) -> list[Note]:
     """Return the notes on one vessel and what is hers, or all, in the order in which they were written.
+
+    Parameters
+    ----------
+    as_of : datetime, optional
+        With a time zone: only those that are known to have been written by then.
 
     Raises
     ------
@@ -120,7 +125,7 @@ def of_vessel(warehouse: Warehouse, vessel: str | None = None) -> list[Note]:
     """
     where = {} if vessel is None else {"vessel_key": vessel_key(vessel)}
     when = said.times(warehouse, "notes")
-    return [
+    every = [
         Note(
             row["number"],
             row["vessel"],
@@ -133,6 +138,7 @@ def of_vessel(warehouse: Warehouse, vessel: str | None = None) -> list[Note]:
         )
         for row in delta.read(warehouse, "notes", where).sort("number").rows(named=True)
     ]
+    return [one for one in every if as_of is None or (one.written is not None and one.written <= as_of)]
 
 
 def carry(

@@ -69,33 +69,28 @@ def punctual(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> Pu
     said = []
     # of a velocity that was turned out of the ship's frame it is not known what was smoothed
     late = _velocity_lateness(own) if "velocity_forward" not in own else None
-    late_std_s, slope = 0.0, None
+    late_std_s, slope, mean_s = 0.0, None, 0.0
     if late is not None:
-        slope = velocity_slope(own["speed_over_ground"], own["course_over_ground"])
-    if late is not None and late.late_s > _SURE * late.std_s:
-        late_std_s = late.std_s
-        changed |= unsmoothed(own["speed_over_ground"], own["course_over_ground"], late.late_s)
-        said.append(
-            f"the GNSS velocity is {late.late_s:.2g} ± {late.std_s:.1g} s (1 s.e.) late beside the fixes, as where it "
-            "is smoothed: undone"
-        )
-    elif late is not None:
-        # it may not be late at all, and is off by so much where it is
-        late_std_s = late.late_s
-        said.append(
-            f"the GNSS velocity may be {late.late_s:.2g} ± {late.std_s:.1g} s (1 s.e.) late beside the fixes: too "
-            "little to be undone, and among what is not known of its instants"
-        )
+        speed, course = own["speed_over_ground"], own["course_over_ground"]
+        slope = velocity_slope(speed, course)
+        size = f"{late.late_s:.2g} ± {late.std_s:.1g} s (1 s.e.) late beside the fixes"
+        if late.late_s > _SURE * late.std_s:
+            late_std_s = late.std_s
+            changed |= unsmoothed(speed, course, late.late_s)
+            said.append(f"the GNSS velocity is {size}, as where it is smoothed: undone")
+        else:
+            # it may not be late at all, and is off by so much where it is
+            late_std_s = late.late_s
+            said.append(
+                f"the GNSS velocity may be {size}: too little to be undone, and among what is not known of its instants"
+            )
     log = own.get("speed_through_water")
     many = readings_averaged(log) if log is not None else 1.0
     if log is not None and many > 1.0:
-        changed["speed_through_water"] = apart(log, many)
-        said.append(
-            f"the speed log shows means over {many * log.period_s:.2g} s: taken at their middle, one after the other"
-        )
+        changed["speed_through_water"], mean_s = apart(log, many), many * log.period_s
+        said.append(f"the speed log shows means over {mean_s:.2g} s: taken at their middle, one after the other")
     whole = replace(instruments, series={**instruments.series, **changed}) if changed else instruments
     errors = instant_errors(instruments.instant_std_s, late_std_s)
-    mean_s = many * log.period_s if log is not None and many > 1.0 else 0.0
     return Punctual(whole, (*said, *said_of(instruments.instant_std_s)), errors, slope, mean_s)
 
 

@@ -34,15 +34,13 @@ def content(desk: Desk, vessel: str, asked: Mapping[str, str]) -> dict[str, Any]
     """Return a vessel's parameters over time, as known now or then, with the changes that were found."""
     found = answer(desk, "changes", vessel, asked)
     then = end_of(found.arguments["as_of"], "as_of") if found.arguments["as_of"] else None
-    written = notes.of_vessel(desk.warehouse, vessel)
-    noted = [one for one in written if then is None or (one.written is not None and one.written <= then)]
     of = history.of_vessel(desk.warehouse, vessel, as_of=then)
     kinds = [] if found.document is None else found.document["changes"]
     return {
         "vessel": vessel,
         "as_of": found.arguments["as_of"],
         "nothing": of.note,
-        "drawn": draw_history(of.rows(), kinds, noted),
+        "drawn": draw_history(of.rows(), kinds, notes.of_vessel(desk.warehouse, vessel, then)),
         "made": found.document,
         "tested": [one for one in kinds if one["sets"]],
         "job": found.waiting,
