@@ -16,6 +16,7 @@ import numba
 import numpy as np
 from numba.core import caching, config
 from numba.core.dispatcher import Dispatcher
+from numba.core.extending import _Intrinsic
 
 __all__ = ["FILLING", "STEP", "njit"]
 
@@ -59,6 +60,11 @@ def _parts(function: Any, seen: set[Any]) -> Iterator[bytes]:
             seen.add(called)
             yield inspect.getsource(called).encode()
             yield from _parts(called, seen)
+        elif isinstance(value, _Intrinsic):
+            if value not in seen:
+                seen.add(value)
+                # what it emits is made by other functions there, too
+                yield inspect.getsource(sys.modules[value._defn.__module__]).encode()
         elif isinstance(value, np.ndarray):
             yield name.encode() + value.tobytes()
         elif isinstance(value, bool | int | float | str | tuple):

@@ -122,6 +122,8 @@ def confirm(
     workers: Executor,
     most_bic: float = np.inf,
     listener: Listener = SILENT,
+    *,
+    race: bool = True,
 ) -> Confirmation:
     """Refit a model with one effect more.
 
@@ -137,10 +139,12 @@ def confirm(
         The change of the information criterion without which it is of no use: another one did better.
     listener : Listener, optional
         Notified of every iteration.
+    race : bool, optional
+        See `kempf.pipeline.diagnose.forward_selection.added`.
     """
     price = price_of(candidate.effect, base)
     wanted = base.log_likelihood + 0.5 * (price - most_bic)
-    fit = added(base, candidate, workers, wanted, listener)
+    fit = added(base, candidate, workers, wanted, listener, race=race)
     ratio = 2.0 * (fit.log_likelihood - base.log_likelihood)
     last = slice(base.values.size, None)
     lowest, highest = (ended[last] for ended in fit.model.at_bounds(fit.values))

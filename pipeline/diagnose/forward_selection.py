@@ -30,7 +30,13 @@ _CALM = (1e-4, 1e-6, 1e-3)
 
 
 def added(
-    base: PooledFit, candidate: Candidate, workers: Executor, wanted: float = -np.inf, listener: Listener = SILENT
+    base: PooledFit,
+    candidate: Candidate,
+    workers: Executor,
+    wanted: float = -np.inf,
+    listener: Listener = SILENT,
+    *,
+    race: bool = True,
 ) -> PooledFit:
     """Fit a model with one effect more.
 
@@ -46,19 +52,21 @@ def added(
         Log-likelihood without which the fit is of no use: climbs that cannot reach it are given up, not converged.
     listener : Listener, optional
         Notified of every iteration, of the race too.
+    race : bool, optional
+        False where the effect has raced beside a hull that was bent more, and nothing came of it.
     """
     model = base.model.with_effect(candidate.effect)
     begin = _begin(candidate)
     first = candidate.effect.parameters[0]
     entries = [(base.hull, begin)]
     ordinary = mariner_like(base.runs[0].run.ship.length_m).array()
-    if len(first.steps) > 1:
+    if race and len(first.steps) > 1:
         sizes = [np.concatenate([[size], begin[1:]]) for size in first.steps]
         entries += [(hull, size) for hull in (base.hull, ordinary) for size in sizes]
     if len(entries) > 1:
         few = slice(0, _RUNS_OF_RACE)
-        race = [_climbed(base, model, hull, size, workers, _RACE, few, listener=listener) for hull, size in entries]
-        best = max(race, key=lambda fit: fit.log_likelihood)
+        raced = [_climbed(base, model, hull, size, workers, _RACE, few, listener=listener) for hull, size in entries]
+        best = max(raced, key=lambda fit: fit.log_likelihood)
         hull, begin = best.hull, best.values[base.values.size :]
     else:
         hull = base.hull

@@ -35,6 +35,8 @@ class Ladder:
     probe: PooledFit
     #: Refits that were climbed to the end: who predicts and who asks the likelihood ask for the same ones.
     refits: dict[tuple[PooledFit, str], Confirmation] = field(default_factory=dict)
+    #: Effects of which nothing came, whatever size and hull they began from: they race no more.
+    in_vain: set[str] = field(default_factory=set)
 
     def confirmed(
         self, base: PooledFit, alone: Unseen, candidate: Candidate, most_bic: float = float("inf")
@@ -44,9 +46,13 @@ class Ladder:
         if known is not None:
             return known
         self.listener.begins(f"refitting with {candidate.effect.title}")
-        made = confirm(base, alone, candidate, self.held, self.workers, most_bic, self.listener)
+        name = candidate.effect.name
+        race = name not in self.in_vain
+        made = confirm(base, alone, candidate, self.held, self.workers, most_bic, self.listener, race=race)
+        if made.likelihood_ratio <= 0.0:
+            self.in_vain.add(name)
         if not made.outdone:
-            self.refits[base, candidate.effect.name] = made
+            self.refits[base, name] = made
         return made
 
     def unseen(self, step: Step) -> Unseen:

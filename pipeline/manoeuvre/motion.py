@@ -59,13 +59,13 @@ def _steady(numbers, v, r, rudder):  # type: ignore[no-untyped-def]
 @njit(**FILLING)
 def rates(x, s, rudder, sea, numbers, fx, fs):  # type: ignore[no-untyped-def]
     """Fill dx/dt of the lateral states, and d(V, north, east, path)/dt."""
-    row, ship, width, table, values, slopes, stack, by, total, J = sea
+    row, ship, table, values, slopes, stack, by, total, J = sea
     row[0], row[_TRUE_HEADING] = s[0], x[PSI, 0]
     # where the air over the deck comes from, clockwise from the bow: in calm air that of her own way
     away = numbers[WIND_FROM] - x[PSI, 0]
     ahead, abeam = numbers[WIND] * np.cos(away) + s[0], numbers[WIND] * np.sin(away) + x[V, 0]
     row[_WIND_SPEED], row[_WIND_ANGLE] = np.hypot(ahead, abeam), np.arctan2(abeam, ahead)
-    dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, fx, J, ONE)
+    dynamics(x, row, rudder, ship, table, values, slopes, stack, by, total, fx, J, ONE)
     length, settled = numbers[LENGTH], numbers[SETTLED]
     fs[0] = (
         (_kept(numbers, s[0], x[V, 0], x[R, 0], rudder[0], x[PSI, 0]) - s[0])
@@ -121,8 +121,8 @@ def _at_sea(numbers, hull, values_of_effects, day, table, extra):  # type: ignor
     # the shaft turning on, deep water, upright; n and n0 are 1 and V0 is the speed that the shaft keeps
     row[_SHAFT], row[_DEPTH], row[_RUN_TIME + 1] = 1.0, 1e12, day
     ship = (hull, (numbers[ARM], 0.0, 0.0, 0.0, numbers[EXPONENT], numbers[APPROACH]))
-    stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))
-    return row, ship, width, table, values, slopes, stack, by, total, np.zeros((width, width, 1))
+    stack, by, total = np.zeros((DEPTH, width + 1, 1)), np.zeros(1), np.zeros((width + 1, 1))
+    return row, ship, table, values, slopes, stack, by, total, np.zeros((0, width, 1))
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -358,5 +358,5 @@ def _blow(air, row, t, numbers):  # type: ignore[no-untyped-def]
 def _record(row, t, x, s, reading, sea):  # type: ignore[no-untyped-def]
     """Write a row of the track; the speed is the one that effects make of the logged one, as of the last call."""
     row[TIME], row[NORTH], row[EAST], row[HEADING] = t, s[1], s[2], x[PSI, 0]
-    row[FORWARD], row[LATERAL], row[RATE] = sea[4][SPEED, 0], x[V, 0], x[R, 0]
+    row[FORWARD], row[LATERAL], row[RATE] = sea[3][SPEED, 0], x[V, 0], x[R, 0]
     row[RUDDER], row[PATH] = reading, s[3]

@@ -1,8 +1,7 @@
 """Lanes: several sets of parameters that go through one compiled filter side by side, innermost in memory.
 
-The compiler knows the length of a tuple, but not its elements: a filter compiled for `ONE` has no loops over lanes at
-all, and one for `LANES` has loops of a length that it cannot know, which it hands to the processor's vector unit. (A
-loop of a short length that it does know it would write out number by number.)
+The compiler knows the length of a tuple, but not its elements: kernels are compiled once for `ONE`, where a place of an
+array is a plain number, and once for `LANES`, where it is a vector (`kempf.pipeline.model.lanes`).
 """
 
 from __future__ import annotations
@@ -13,8 +12,6 @@ from kempf.pipeline.compiled import STEP, njit
 ONE, LANES = (1,), (16, 16)
 #: how many go through together
 MOST = LANES[0]
-#: numbers that the processor takes at once: where lanes are cheap and many, their number is a multiple of it
-VECTOR = 4
 
 
 @njit(**STEP)

@@ -6,9 +6,9 @@ added to what their kind says: to the speed and the rudder that the hull feels, 
 
 from __future__ import annotations
 
-from kempf.pipeline.compiled import FILLING, njit
-from kempf.pipeline.model.batch import each
+from kempf.pipeline.compiled import FILLING, STEP, njit
 from kempf.pipeline.model.chain import N_CHAIN, PSI, F, M, R, V
+from kempf.pipeline.model.lanes import at, choose, everywhere, power, put
 from kempf.pipeline.model.terms.evaluation import evaluate
 from kempf.pipeline.model.terms.program import VARIABLE
 from kempf.schemas.symbols import SYMBOLS
@@ -23,99 +23,120 @@ N_INPUT = 2 + PARAMETER - CHANNEL + 1
 SPEED_ERROR_GAIN = N_INPUT - 1
 #: states before those of effects, and after
 E, N_BEFORE, N_AFTER, MOST_EXTRA = N_CHAIN, N_CHAIN + 1, 3, 4
-#: what a program is added to
-ON_SPEED, ON_RUDDER, ON_SWAY, ON_YAW, ON_EXTRA, ON_LATERAL, ON_YAW_RATE, ON_HEADING = 0, 1, 2, 3, 4, 5, 6, 7
-ON_NOISE, ON_INITIAL = 8, 9
+#: what a program is added to; for states of effects the first one's
+ON_SPEED, ON_RUDDER, ON_SWAY, ON_YAW, ON_LATERAL, ON_YAW_RATE, ON_HEADING = 0, 1, 2, 3, 4, 5, 6
+ON_EXTRA, ON_NOISE, ON_INITIAL = 100, 200, 300
 
 
 @njit(**FILLING)
-def add_programs(  # type: ignore[no-untyped-def]
-    kind, place, table, values, slopes, stack, by, width, total, lanes
-):
-    """Fill ``total``, shape (1 + width, lanes), with the sum of all programs of a kind (and place, for extra states).
+def add_programs(target, table, values, slopes, stack, by, total, lanes):  # type: ignore[no-untyped-def]
+    """Fill ``total``, shape (1 + width, lanes), with the sum of all programs that are added to something.
 
-    Return whether there is any.
+    With one row it takes no derivatives. Return whether there is any; where there is none nothing is filled.
     """
-    programs, code, constants = table
-    for j in range(width + 1):
-        for b in range(each(lanes)):
-            total[j, b] = 0.0
+    programs, code, constants, moving = table
     found = False
     for p in range(programs.shape[0]):
-        if programs[p, 0] == kind and programs[p, 1] == place:
+        if programs[p, 0] == target:
+            if not found:
+                for j in range(total.shape[0]):
+                    put(total, j, 0.0, lanes)
             found = True
-            evaluate(code[programs[p, 2] : programs[p, 3]], constants, values, slopes, stack, by, width, lanes)
-            for j in range(width + 1):
-                for b in range(each(lanes)):
-                    total[j, b] += stack[0, j, b]
+            columns = moving[programs[p, 3] : programs[p, 4] if total.shape[0] > 1 else programs[p, 3]]
+            evaluate(code[programs[p, 1] : programs[p, 2]], constants, columns, values, slopes, stack, by, lanes)
+            put(total, 0, at(total, 0, lanes) + at(stack, (0, 0), lanes), lanes)
+            for j in columns:
+                put(total, j + 1, at(total, j + 1, lanes) + at(stack, (0, j + 1), lanes), lanes)
     return found
 
 
+@njit(**STEP)
+def _square(U, V0, exponent):  # type: ignore[no-untyped-def]
+    """Return the speed by which the rudder's force goes, squared."""
+    return U * U if exponent == 2.0 else U * power(abs(U / V0), exponent - 1.0) * V0
+
+
+@njit(**STEP)
+def _felt(x, row, rudder, table, values, slopes, stack, by, total, lanes):  # type: ignore[no-untyped-def]
+    """Fill the variables, the speed and the rudder among them as effects let the hull feel them."""
+    put(values, SPEED, row[0], lanes)
+    put(values, DELTA, at(rudder, (), lanes), lanes)
+    if table[0].shape[0] == 0:
+        return
+    for i in range(slopes.shape[1]):
+        put(values, i, at(x, i, lanes), lanes)
+    for i in range(N_INPUT - 3):
+        put(values, CHANNEL + i, row[2 + i], lanes)
+    carried = total.shape[0] - 1
+    for j in range(carried):
+        put(slopes, (SPEED, j), 0.0, lanes)
+        put(slopes, (DELTA, j), 0.0, lanes)
+    for target, where in ((ON_SPEED, SPEED), (ON_RUDDER, DELTA)):
+        if add_programs(target, table, values, slopes, stack, by, total, lanes):
+            put(values, where, at(values, where, lanes) + at(total, 0, lanes), lanes)
+            for j in range(carried):
+                put(slopes, (where, j), at(total, j + 1, lanes), lanes)
+
+
+@njit(**STEP)
+def _add_slopes_of_felt(J, hull, v, r, U, delta, square, exponent, slopes, lanes):  # type: ignore[no-untyped-def]
+    """Add what the hull does where effects let the speed or the rudder go with the states."""
+    a11, a12, b1 = at(hull, 0, lanes), at(hull, 1, lanes), at(hull, 4, lanes)
+    a21, a22, b2 = at(hull, 2, lanes), at(hull, 3, lanes), at(hull, 5, lanes)
+    steeper = choose(abs(U), 0.0, 0.0, exponent * square / U)
+    sway_by_speed = a11 * v + a12 * r + b1 * steeper * delta
+    yaw_by_speed = a21 * v + a22 * r + b2 * steeper * delta
+    for j in range(J.shape[0]):
+        by_rudder, by_speed = at(slopes, (DELTA, j), lanes), at(slopes, (SPEED, j), lanes)
+        sway = at(J, (V, j), lanes) + b1 * square * by_rudder
+        yaw = at(J, (R, j), lanes) + b2 * square * by_rudder
+        put(J, (V, j), sway + sway_by_speed * by_speed, lanes)
+        put(J, (R, j), yaw + yaw_by_speed * by_speed, lanes)
+
+
 @njit(**FILLING)
-def dynamics(  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
-    x, row, rudder, ship, width, carried, table, values, slopes, stack, by, total, f, J, lanes
-):
+def dynamics(x, row, rudder, ship, table, values, slopes, stack, by, total, f, J, lanes):  # type: ignore[no-untyped-def]
     """Fill f = dx/dt of chain and effects' states, shape (width, lanes), and its derivatives J, (width, width, lanes).
 
-    ``carried`` is ``width``, or 0 where J is not wanted.
+    A J of no rows is not wanted.
     """
     hull, (arm, mu_F, mu_M, mu_E, exponent, V0) = ship
-    gain = row[SPEED_ERROR_GAIN]
-    busy = table[0].shape[0] > 0
-    for b in range(each(lanes)):
-        values[SPEED, b], values[DELTA, b] = row[0], rudder[b]
-    if busy:
-        for i in range(width):
-            for b in range(each(lanes)):
-                values[i, b] = x[i, b]
-        for i in range(N_INPUT - 3):
-            for b in range(each(lanes)):
-                values[CHANNEL + i, b] = row[2 + i]
-        for j in range(carried):
-            for b in range(each(lanes)):
-                slopes[SPEED, j, b] = slopes[DELTA, j, b] = 0.0
-        for kind in range(2):
-            where = SPEED if kind == 0 else DELTA
-            if add_programs(kind, 0, table, values, slopes, stack, by, carried, total, lanes):
-                for b in range(each(lanes)):
-                    values[where, b] += total[0, b]
-                    for j in range(carried):
-                        slopes[where, j, b] = total[j + 1, b]
-    for b in range(each(lanes)):
-        U, delta = values[SPEED, b], values[DELTA, b] + gain * x[E, b]
-        square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
-        v, r, force = x[V, b], x[R, b], x[F, b]
-        f[V, b] = hull[0, b] * U * v + hull[1, b] * U * r + hull[4, b] * square * delta + force
-        f[R, b] = hull[2, b] * U * v + hull[3, b] * U * r + hull[5, b] * square * delta + arm * force + x[M, b]
-        f[PSI, b], f[F, b], f[M, b], f[E, b] = r, -mu_F * force, -mu_M * x[M, b], -mu_E * x[E, b]
+    gain, width, carried = row[SPEED_ERROR_GAIN], f.shape[0], J.shape[0]
+    busy, total = table[0].shape[0] > 0, total[: 1 + carried]
+    _felt(x, row, rudder, table, values, slopes, stack, by, total, lanes)
+    a11, a12, b1 = at(hull, 0, lanes), at(hull, 1, lanes), at(hull, 4, lanes)
+    a21, a22, b2 = at(hull, 2, lanes), at(hull, 3, lanes), at(hull, 5, lanes)
+    U, delta = at(values, SPEED, lanes), at(values, DELTA, lanes) + gain * at(x, E, lanes)
+    square = _square(U, V0, exponent)
+    v, r, force, moment = at(x, V, lanes), at(x, R, lanes), at(x, F, lanes), at(x, M, lanes)
+    put(f, V, a11 * U * v + a12 * U * r + b1 * square * delta + force, lanes)
+    put(f, R, a21 * U * v + a22 * U * r + b2 * square * delta + arm * force + moment, lanes)
+    put(f, PSI, r, lanes)
+    put(f, F, -mu_F * force, lanes)
+    put(f, M, -mu_M * moment, lanes)
+    put(f, E, -mu_E * at(x, E, lanes), lanes)
     if carried > 0:
         J[:, :, :] = 0.0
-        for b in range(each(lanes)):
-            U = values[SPEED, b]
-            square = U * U if exponent == 2.0 else U * abs(U / V0) ** (exponent - 1.0) * V0
-            J[V, V, b], J[V, R, b], J[V, F, b] = hull[0, b] * U, hull[1, b] * U, 1.0
-            J[R, V, b], J[R, R, b], J[R, F, b], J[R, M, b] = hull[2, b] * U, hull[3, b] * U, arm, 1.0
-            J[PSI, R, b], J[F, F, b], J[M, M, b], J[E, E, b] = 1.0, -mu_F, -mu_M, -mu_E
-            J[V, E, b], J[R, E, b] = hull[4, b] * square * gain, hull[5, b] * square * gain
-            delta, steeper = values[DELTA, b] + gain * x[E, b], exponent * square / U if U != 0.0 else 0.0
-            v, r = x[V, b], x[R, b]
-            for j in range(width):
-                # effects may let the speed go with the states, as they may the rudder
-                by_rudder, by_speed = slopes[DELTA, j, b], slopes[SPEED, j, b]
-                J[V, j, b] += hull[4, b] * square * by_rudder
-                J[R, j, b] += hull[5, b] * square * by_rudder
-                J[V, j, b] += (hull[0, b] * v + hull[1, b] * r + hull[4, b] * steeper * delta) * by_speed
-                J[R, j, b] += (hull[2, b] * v + hull[3, b] * r + hull[5, b] * steeper * delta) * by_speed
+        put(J, (V, V), a11 * U, lanes)
+        put(J, (V, R), a12 * U, lanes)
+        put(J, (R, V), a21 * U, lanes)
+        put(J, (R, R), a22 * U, lanes)
+        put(J, (V, E), b1 * square * gain, lanes)
+        put(J, (R, E), b2 * square * gain, lanes)
+        for i, j, slope in ((V, F, 1.0), (R, F, arm), (R, M, 1.0), (PSI, R, 1.0), (F, F, -mu_F), (M, M, -mu_M)):
+            put(J, (i, j), slope, lanes)
+        put(J, (E, E), -mu_E, lanes)
+        if busy:
+            _add_slopes_of_felt(J, hull, v, r, U, delta, square, exponent, slopes, lanes)
     if busy:
         for kind in range(2 + width - N_BEFORE):
             target = kind if kind < 2 else N_BEFORE + kind - 2
-            on, place = (ON_SWAY + kind, 0) if kind < 2 else (ON_EXTRA, kind - 2)
-            add_programs(on, place, table, values, slopes, stack, by, carried, total, lanes)
-            for b in range(each(lanes)):
-                f[target, b] = total[0, b] + (f[target, b] if kind < 2 else 0.0)
-            for j in range(carried):
-                for b in range(each(lanes)):
-                    J[target, j, b] += total[j + 1, b]
+            on = ON_SWAY + kind if kind < 2 else ON_EXTRA + kind - 2
+            if add_programs(on, table, values, slopes, stack, by, total, lanes):
+                there = at(f, target, lanes) if kind < 2 else everywhere(0.0, lanes)
+                put(f, target, at(total, 0, lanes) + there, lanes)
+                for j in range(carried):
+                    put(J, (target, j), at(J, (target, j), lanes) + at(total, j + 1, lanes), lanes)
 
 
 @njit(**FILLING)
@@ -137,8 +158,6 @@ def measured_by(  # type: ignore[no-untyped-def]
     rudder_before,
     jerky,
     ship,
-    width,
-    carried,
     table,
     values,
     slopes,
@@ -165,29 +184,27 @@ def measured_by(  # type: ignore[no-untyped-def]
         Two, scratch.
     """
     earlier, f_earlier = room
+    width, carried = f.shape[0], J.shape[0]
     if jerky:
-        dynamics(x, row, rudder, ship, width, 0, table, values, slopes, stack, by, total, f, J, lanes)
+        dynamics(x, row, rudder, ship, table, values, slopes, stack, by, total, f, J[:0], lanes)
         for i in range(width):
-            for b in range(each(lanes)):
-                earlier[i, b] = x[i, b] - step_s * f[i, b]
+            put(earlier, i, at(x, i, lanes) - step_s * at(f, i, lanes), lanes)
         dynamics(
-            *(earlier, before, rudder_before, ship, width, 0),
-            *(table, values, slopes, stack, by, total, f_earlier, J, lanes),
+            *(earlier, before, rudder_before, ship),
+            *(table, values, slopes, stack, by, total, f_earlier, J[:0], lanes),
         )
-    dynamics(x, row, rudder, ship, width, carried, table, values, slopes, stack, by, total, f, J, lanes)
+    dynamics(x, row, rudder, ship, table, values, slopes, stack, by, total, f, J, lanes)
     for i in range(width):
-        for b in range(each(lanes)):
-            values[i, b] = x[i, b]
-    for b in range(each(lanes)):
-        values[VDOT, b], values[RDOT, b] = f[V, b], f[R, b]
+        put(values, i, at(x, i, lanes), lanes)
+    for rate, state in ((VDOT, V), (RDOT, R)):
+        put(values, rate, at(f, state, lanes), lanes)
         for j in range(carried):
-            slopes[VDOT, j, b], slopes[RDOT, j, b] = J[V, j, b], J[R, j, b]
+            put(slopes, (rate, j), at(J, (state, j), lanes), lanes)
     if jerky:
-        for b in range(each(lanes)):
-            values[VDDOT, b] = (f[V, b] - f_earlier[V, b]) / step_s
-            values[RDDOT, b] = (f[R, b] - f_earlier[R, b]) / step_s
+        for rate, state in ((VDDOT, V), (RDDOT, R)):
+            put(values, rate, (at(f, state, lanes) - at(f_earlier, state, lanes)) / step_s, lanes)
             for j in range(carried):
-                slopes[VDDOT, j, b] = slopes[RDDOT, j, b] = 0.0
+                slope = everywhere(0.0, lanes)
                 for i in range(carried):
-                    slopes[VDDOT, j, b] += J[V, i, b] * J[i, j, b]
-                    slopes[RDDOT, j, b] += J[R, i, b] * J[i, j, b]
+                    slope += at(J, (state, i), lanes) * at(J, (i, j), lanes)
+                put(slopes, (rate, j), slope, lanes)

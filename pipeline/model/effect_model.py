@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,10 +14,11 @@ from kempf.pipeline.channels.series import Float
 from kempf.pipeline.model import dynamics
 from kempf.pipeline.model.effects import RUDDER_COURSES
 from kempf.pipeline.model.terms.expression import compiled
+from kempf.pipeline.model.terms.program import CONSTANT, VARIABLE
 from kempf.schemas.effect import Effect, Parameter
 from kempf.schemas.errors import UsageError
 from kempf.schemas.instrument_noise import lasting
-from kempf.schemas.symbols import INSTRUMENT_STATES, OWN_STATES, SYMBOLS
+from kempf.schemas.symbols import ACCELERATION_SYMBOLS, INSTRUMENT_STATES, OWN_STATES, SYMBOLS
 
 _PLACE = {
     "speed": dynamics.ON_SPEED,
@@ -30,7 +33,7 @@ _PLACE = {
 _SHORTEST = 0.25
 _INDEX = {name: i for i, name in enumerate(SYMBOLS)}
 
-Table = tuple[NDArray[np.int64], NDArray[np.int64], Float]
+Table = tuple[NDArray[np.int64], NDArray[np.int64], Float, NDArray[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,7 +136,17 @@ class EffectModel:
 
     @cached_property
     def table(self) -> Table:
-        """Programs, their code and their constants, as `kempf.pipeline.estimate.filters.ekf` takes them."""
+        """Programs, their code, their constants and the states that they move with, for the compiled kernels.
+
+        Returns
+        -------
+        programs : ndarray of int64, shape (q, 5)
+            What it is added to, first and last instruction, first and last of the states.
+        code : ndarray of int64, shape (n, 2)
+        constants : ndarray, shape (m,)
+        moving : ndarray of int64
+            States.
+        """
         programs, codes, constants = [], [], []
         start, held, slot, first = 0, 0, 0, dynamics.PARAMETER
         for effect in self.effects:
@@ -143,24 +156,28 @@ class EffectModel:
             for i, state in enumerate(effect.states):
                 variables[state.name] = dynamics.N_BEFORE + slot + i
             variables |= {p.name: first + i for i, p in enumerate(effect.parameters)}
-            texts = [(_PLACE[target], 0, text) for target, text in effect.terms.items()]
+            texts = [(_PLACE[target], text) for target, text in effect.terms.items()]
             for i, state in enumerate(effect.states):
-                texts.append((dynamics.ON_EXTRA, slot + i, state.derivative))
-                texts.append((dynamics.ON_NOISE, slot + i, state.noise))
-                texts.append((dynamics.ON_INITIAL, slot + i, state.initial_std))
-            for kind, place, text in texts:
+                texts.append((dynamics.ON_EXTRA + slot + i, state.derivative))
+                texts.append((dynamics.ON_NOISE + slot + i, state.noise))
+                texts.append((dynamics.ON_INITIAL + slot + i, state.initial_std))
+            for target, text in texts:
                 program = compiled(text, variables)
                 code = program.code.copy()
-                code[code[:, 0] == 0, 1] += held
-                programs.append((kind, place, start, start + len(code)))
+                code[code[:, 0] == CONSTANT, 1] += held
+                programs.append((target, start, start + len(code)))
                 codes.append(code)
                 constants.append(program.constants)
                 start, held = start + len(code), held + len(program.constants)
             slot, first = slot + len(effect.states), first + len(effect.parameters)
+        moving = _moving([target for target, *_ in programs], codes, dynamics.N_BEFORE + self.extra)
+        ends = np.cumsum([0, *(len(states) for states in moving)]).tolist()
+        rows = [(*one, *places) for one, places in zip(programs, pairwise(ends), strict=True)]
         return (
-            np.array(programs, dtype=np.int64).reshape(-1, 4),
+            np.array(rows, dtype=np.int64).reshape(-1, 5),
             np.concatenate([*codes, np.zeros((0, 2), dtype=np.int64)]),
             np.concatenate([*constants, np.zeros(0)]),
+            np.array([state for states in moving for state in states], dtype=np.int64),
         )
 
     def split(self, values: Float) -> list[Float]:
@@ -204,3 +221,20 @@ class EffectModel:
         time = time_s[0] + step * (np.arange(known.size) - before.size)
         courses = [self.rudder(time, known, one)[before.size :] for one in own.T]
         return np.ascontiguousarray((np.stack(courses, axis=-1) + between[:, None])[:, of])
+
+
+def _moving(targets: Sequence[int], codes: Sequence[NDArray[np.int64]], width: int) -> list[list[int]]:
+    """Return the states that each program moves with: by itself, or as the speed and the rudder that it asks for do."""
+    asked = [{int(index) for what, index in code if what == VARIABLE} for code in codes]
+    of_speed, of_rudder = set[int](), set[int]()
+    for target, variables in zip(targets, asked, strict=True):
+        of_speed |= {i for i in variables if i < width and target == dynamics.ON_SPEED}
+    for target, variables in zip(targets, asked, strict=True):
+        if target == dynamics.ON_RUDDER:
+            of_rudder |= {i for i in variables if i < width} | (of_speed if dynamics.SPEED in variables else set())
+    through = {dynamics.SPEED: of_speed, dynamics.DELTA: of_rudder}
+    through |= {_INDEX[name]: set(range(width)) for name in ACCELERATION_SYMBOLS}
+    return [
+        sorted({i for i in variables if i < width}.union(*(through.get(i, set()) for i in variables)))
+        for variables in asked
+    ]

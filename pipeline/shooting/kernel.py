@@ -25,6 +25,7 @@ from kempf.pipeline.model.dynamics import (
     dynamics,
     measured_by,
 )
+from kempf.pipeline.model.lanes import at, put
 from kempf.pipeline.model.terms.program import DEPTH
 
 #: rows of the inputs over half a step
@@ -37,20 +38,17 @@ def _step(x, rows, rudders, h, ship, table, values, slopes, stack, by, total, ro
     k1, k2, k3, k4, xs, J = room
     width = k1.shape[0]
     for i in range(width):
-        for b in range(each(lanes)):
-            xs[i, b] = x[i, b] + 0.5 * h * k1[i, b]
-    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k2, J, lanes)
+        put(xs, i, at(x, i, lanes) + 0.5 * h * at(k1, i, lanes), lanes)
+    dynamics(xs, rows[1], rudders[1], ship, table, values, slopes, stack, by, total, k2, J, lanes)
     for i in range(width):
-        for b in range(each(lanes)):
-            xs[i, b] = x[i, b] + 0.5 * h * k2[i, b]
-    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k3, J, lanes)
+        put(xs, i, at(x, i, lanes) + 0.5 * h * at(k2, i, lanes), lanes)
+    dynamics(xs, rows[1], rudders[1], ship, table, values, slopes, stack, by, total, k3, J, lanes)
     for i in range(width):
-        for b in range(each(lanes)):
-            xs[i, b] = x[i, b] + h * k3[i, b]
-    dynamics(xs, rows[2], rudders[2], ship, width, 0, table, values, slopes, stack, by, total, k4, J, lanes)
+        put(xs, i, at(x, i, lanes) + h * at(k3, i, lanes), lanes)
+    dynamics(xs, rows[2], rudders[2], ship, table, values, slopes, stack, by, total, k4, J, lanes)
     for i in range(width):
-        for b in range(each(lanes)):
-            x[i, b] += h / 6.0 * (k1[i, b] + 2.0 * k2[i, b] + 2.0 * k3[i, b] + k4[i, b])
+        middle = at(k1, i, lanes) + 2.0 * at(k2, i, lanes) + 2.0 * at(k3, i, lanes) + at(k4, i, lanes)
+        put(x, i, at(x, i, lanes) + h / 6.0 * middle, lanes)
 
 
 @njit(**FILLING)
@@ -75,22 +73,21 @@ def _measured(  # type: ignore[no-untyped-def]
 ):
     """Fill ``out``, shape (3, lanes), with what would be measured at one instant."""
     k1, k2, k3, _, _, J = room
-    width, n = k1.shape[0], x.shape[0]
+    n = x.shape[0]
     measured_by(
-        *(x, rows[-1], rudders[-1], step_s, rows[0], rudders[0], jerky, ship, width, 0),
+        *(x, rows[-1], rudders[-1], step_s, rows[0], rudders[0], jerky, ship),
         *(table, values, slopes, stack, by, total, (k2, k3), k1, J, lanes),
     )
     for channel in range(3):
         state, late = (V, R, PSI)[channel], offset_s[channel]
-        for b in range(each(lanes)):
-            out[channel, b] = x[state, b] + late * k1[state, b]
-            if channel == 0:
-                out[channel, b] += current_row[0] * x[n - 3, b] + current_row[1] * x[n - 2, b]
-            elif channel == 1:
-                out[channel, b] += x[n - 1, b]
-        if add_programs(ON_LATERAL + channel, 0, table, values, slopes, stack, by, 0, total, lanes):
-            for b in range(each(lanes)):
-                out[channel, b] += total[0, b]
+        shown = at(x, state, lanes) + late * at(k1, state, lanes)
+        if channel == 0:
+            shown += current_row[0] * at(x, n - 3, lanes) + current_row[1] * at(x, n - 2, lanes)
+        elif channel == 1:
+            shown += at(x, n - 1, lanes)
+        if add_programs(ON_LATERAL + channel, table, values, slopes, stack, by, total[:1], lanes):
+            shown += at(total, 0, lanes)
+        put(out, channel, shown, lanes)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -135,8 +132,9 @@ def shoot(  # type: ignore[no-untyped-def]
     values[SHIP : SHIP + 6] = hull
     values[SHIP + 6], values[SHIP + 7], values[SHIP + 8], values[SHIP + 9] = length, draught, V0, n0
     values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
-    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros((2, B)), np.zeros((width + 1, B))
-    J, x = np.zeros((width, width, B)), np.zeros((size, B))
+    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros(B), np.zeros((width + 1, B))
+    # no derivatives
+    J, x = np.zeros((0, width, B)), np.zeros((size, B))
     k1, k2, k3, k4, xs = (
         np.zeros((width, B)),
         np.zeros((width, B)),

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
-from kempf.pipeline.model.batch import VECTOR
+from kempf.pipeline.model.batch import LANES, MOST
 from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
@@ -84,27 +84,29 @@ class ShotRun:
         ndarray, shape (m, 3, k)
             What would be measured, window after window.
         """
-        run = self.windows.run
-        k, extra = shared.shape[1], self.model.extra
-        many = -(-k // VECTOR) * VECTOR
-        at = np.minimum(np.arange(many), k - 1)
-        shared, own, starts = shared[:, at], own[:, at], starts[..., at]
-        w = starts.shape[0]
-        x0 = np.zeros((w, N_BEFORE + extra + N_AFTER, many))
+        k = shared.shape[1]
+        groups = [np.minimum(np.arange(first, first + MOST), k - 1) for first in range(0, k, MOST)]
+        found = [self._shot(shared[:, at], own[:, at], starts[..., at]) for at in groups]
+        return np.concatenate(found, axis=-1)[..., :k]
+
+    def _shot(self, shared: Float, own: Float, starts: Float) -> Float:
+        """Do as `predicted`, for as many as go through together."""
+        run, extra = self.windows.run, self.model.extra
+        x0 = np.zeros((starts.shape[0], N_BEFORE + extra + N_AFTER, MOST))
         x0[:, :3], x0[:, 3], x0[:, 4] = starts, own[0], own[1]
         x0[:, -3:] = own[None, 2:]
         rudder = self.model.rudders(
             run.fine_time_s, run.inputs[:, 1], run.rudder_before, run.rudder_between, shared[N_HULL:]
         )
         constants = run.constants(self.spec.rudder_speed_exponent)
-        found = np.empty((self.windows.rows.size, 3, many))
+        found = np.empty((self.windows.rows.size, 3, MOST))
         shoot(
             *(np.ascontiguousarray(shared[:N_HULL]), np.ascontiguousarray(shared[N_HULL:])),
             *(run.step_s, run.inputs, np.ascontiguousarray(rudder), run.offset_s, run.current_row),
             *(constants, self.windows.begins, self.windows.ends, x0),
-            *(self.model.table, found, (many, many)),
+            *(self.model.table, found, LANES),
         )
-        return found[..., :k]
+        return found
 
     def steps(self, at: Unknowns, scale: Float) -> Float:
         """Return the steps of the differences: shared, constants that there are, states; shape (6 + p + d + 3,)."""

@@ -48,7 +48,7 @@ class _Course:
         self.values[PARAMETER:, 0] = effects.values
         for i in range(width):
             self.slopes[i, i] = 1.0
-        self.room = (np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1)))
+        self.room = (np.zeros((DEPTH, width + 1, 1)), np.zeros(1), np.zeros((width + 1, 1)))
         # V, delta, wind speed and angle, shaft speed, depth, roll, true heading, time, day; no error of the speed
         self.row = np.array([speed_m_s, 0.0, 0.0, 0.0, 1.0, _DEEP_M, 0.0, course_rad, 0.0, effects.day, 0.0])
         assert self.row.size == N_INPUT
@@ -63,12 +63,12 @@ class _Course:
         unused = (np.zeros((0, 1)), np.zeros((0, 1)))
         dynamics.measured_by(
             *(state, self.row, rudder, 1.0, self.row, rudder, False),
-            *(self.ship, width, width, *shared, unused, f, J, ONE),
+            *(self.ship, *shared, unused, f, J, ONE),
         )
         y, C = np.zeros(3), np.zeros((3, width))
         for channel, own in enumerate((V, R, PSI)):
             y[channel], C[channel, own] = x[own], 1.0
-            if dynamics.add_programs(dynamics.ON_LATERAL + channel, 0, *shared[:3], *room[:2], width, room[2], ONE):
+            if dynamics.add_programs(dynamics.ON_LATERAL + channel, *shared, ONE):
                 y[channel] += room[2][0, 0]
                 C[channel] += room[2][1:, 0]
         return f[:, 0], J[:, :, 0], y, C
@@ -82,8 +82,8 @@ class _Course:
     def noise(self) -> Float:
         found = []
         for place in range(self.width - N_BEFORE):
-            shared = (self.table, self.values, self.slopes, *self.room[:2])
-            dynamics.add_programs(dynamics.ON_NOISE, place, *shared, self.width, self.room[2], ONE)
+            shared = (self.table, self.values, self.slopes, *self.room)
+            dynamics.add_programs(dynamics.ON_NOISE + place, *shared, ONE)
             found.append(float(self.room[2][0, 0]) ** 2)
         return np.array(found)
 

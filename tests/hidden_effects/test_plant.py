@@ -102,7 +102,8 @@ def said(text: str, c: dict[str, float]) -> float:
     here |= {"n": n, "n0": n, "V0": 0.9 * FERRY.trial_speed_m_s} | p | c
     program = compiled(text, {name: k for k, name in enumerate(here)})
     stack, values = np.zeros((DEPTH, 1, 1)), np.array(list(here.values()))[:, None]
-    evaluate(program.code, program.constants, values, np.zeros((len(here), 0, 1)), stack, np.zeros((2, 1)), 0, ONE)
+    none, slopes = np.zeros(0, dtype=np.int64), np.zeros((len(here), 0, 1))
+    evaluate(program.code, program.constants, none, values, slopes, stack, np.zeros(1), ONE)
     return float(stack[0, 0, 0])
 
 

@@ -12,7 +12,7 @@ from kempf.pipeline.model.dynamics import N_BEFORE, N_INPUT, PARAMETER, SHIP, dy
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.pipeline.model.terms.program import DEPTH
-from kempf.schemas.effects import get
+from kempf.schemas.effects import catalogue, get
 from kempf.schemas.instrument_noise import lasting_noise
 
 SPEED, LENGTH, RUDDER = 7.0, 100.0, 0.3
@@ -30,8 +30,8 @@ def moved(model: EffectModel, values: Float, x: Float, exponent: float = 2.0) ->
     row[0] = SPEED
     f, J = np.zeros((width, 1)), np.zeros((width, width, 1))
     dynamics(
-        *(x[:, None].copy(), row, np.array([RUDDER]), (hull, (0.0, 0.0, 0.0, 0.0, exponent, SPEED)), width, width),
-        *(model.table, symbols, slopes, np.zeros((DEPTH, width + 1, 1)), np.zeros((2, 1)), np.zeros((width + 1, 1))),
+        *(x[:, None].copy(), row, np.array([RUDDER]), (hull, (0.0, 0.0, 0.0, 0.0, exponent, SPEED))),
+        *(model.table, symbols, slopes, np.zeros((DEPTH, width + 1, 1)), np.zeros(1), np.zeros((width + 1, 1))),
         *(f, J, ONE),
     )
     return f[:, 0], J[:, :, 0]
@@ -61,3 +61,17 @@ def test_states_of_instruments_stand_beside_those_of_effects_and_move_no_ship() 
     np.testing.assert_array_equal(more[: x.size], f)
     np.testing.assert_array_equal(K[: x.size, : x.size], J)
     assert not np.any(K[: x.size, x.size :])
+
+
+@pytest.mark.parametrize("name", sorted(set(catalogue()) - {"speed_loss"}))
+def test_derivatives_by_every_state_are_there_where_an_effect_lets_the_speed_go_with_them(name: str) -> None:
+    model = EffectModel((get(name), get("speed_loss")))
+    values = np.array([0.3 * p.steps[0] for _, p in model.parameters])
+    x = np.zeros(N_BEFORE + model.extra)
+    x[V], x[R], x[PSI], x[N_BEFORE:] = -0.4, 0.015, 0.2, 0.1
+    _, J = moved(model, values, x)
+    for j in range(x.size):
+        step = 1e-6 * np.eye(x.size)[j]
+        difference = (moved(model, values, x + step)[0] - moved(model, values, x - step)[0]) / 2e-6
+        np.testing.assert_allclose(J[:, j], difference, rtol=1e-5, atol=1e-8)
+    assert np.any(J[N_BEFORE + model.extra - 1] != 0.0)

@@ -69,7 +69,7 @@ def test_the_catalogue_holds_what_was_asked_for() -> None:
 @each
 def test_it_can_be_computed_at_ordinary_states_and_is_absent_without_parameters(effect: Effect) -> None:
     require_ordinary(effect)
-    programs, code, _ = EffectModel((effect,)).table
+    programs, code, _, _ = EffectModel((effect,)).table
     assert len(programs) == len(effect.terms) + 3 * len(effect.states)
     assert code.shape[1] == 2
 

@@ -11,6 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from kempf.pipeline.model.terms import program
 from kempf.pipeline.model.terms.expression import FUNCTIONS, compiled, names_in
 from kempf.pipeline.model.terms.ordinary import run
 from kempf.pipeline.model.terms.program import DEPTH
@@ -168,3 +169,30 @@ def test_the_place_of_a_mistake_is_named() -> None:
     with pytest.raises(UsageError, match="at character 8") as caught:
         compiled("  v +  rr", {"v": 0, "r": 1})
     assert caught.value.details["place"] == 8
+
+
+@pytest.mark.parametrize(
+    ("text", "once"),
+    [
+        ("min(v*r, r)**2 + min(v*r, r)**3", program.MIN),
+        ("sin(v + r)*(sin(v + r) - cos(r*sin(v + r)))", program.SIN),
+        ("r*(abs(v) + 1) + v*(abs(v) + 1)", program.ABS),
+    ],
+)
+def test_what_a_formula_repeats_is_computed_once(text: str, once: int) -> None:
+    values = np.linspace(0.3, 0.9, len(INDEX))
+    made = compiled(text, INDEX)
+    assert np.count_nonzero(made.code[:, 0] == once) == 1
+    named = {name: float(values[k]) for name, k in INDEX.items()}
+    by_python = eval(text, {"sin": np.sin, "cos": np.cos, "abs": abs, "min": min}, named)  # noqa: S307 - our own text
+    assert run(made, values)[0] == pytest.approx(by_python, rel=1e-15)
+    step = 1e-6
+    for k in range(2):
+        away = [run(made, values + sign * step * np.eye(values.size)[k])[0] for sign in (1, -1)]
+        assert run(made, values)[1 + k] == pytest.approx((away[0] - away[1]) / (2 * step), rel=1e-7)
+
+
+def test_parts_are_kept_only_where_the_stack_has_places_left() -> None:
+    part = "sin(v + r)"
+    text = part + " + (1" * (DEPTH - 4) + f" + {part}" + ")" * (DEPTH - 4)
+    assert run(compiled(text, INDEX), np.zeros(len(INDEX)))[0] == DEPTH - 4

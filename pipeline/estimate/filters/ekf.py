@@ -45,6 +45,7 @@ from kempf.pipeline.model.dynamics import (
     dynamics,
     measured_by,
 )
+from kempf.pipeline.model.lanes import at, everywhere, put
 from kempf.pipeline.model.terms.program import DEPTH
 
 #: rows of the input table from one instant to the next, and substeps; a substep reads three rows
@@ -57,10 +58,10 @@ def _begin(P, table, values, slopes, stack, by, total, drive, lanes):  # type: i
     """Add the initial variance of the effects' own states to P, and fill the intensities of what drives them."""
     width = P.shape[0] - N_AFTER
     for i in range(width - N_BEFORE):
-        add_programs(ON_INITIAL, i, table, values, slopes, stack, by, width, total, lanes)
+        add_programs(ON_INITIAL + i, table, values, slopes, stack, by, total[:1], lanes)
         for b in range(each(lanes)):
             P[N_BEFORE + i, N_BEFORE + i, b] += total[0, b] ** 2
-        add_programs(ON_NOISE, i, table, values, slopes, stack, by, width, total, lanes)
+        add_programs(ON_NOISE + i, table, values, slopes, stack, by, total[:1], lanes)
         for b in range(each(lanes)):
             drive[5 + i, b] = total[0, b] ** 2
 
@@ -86,29 +87,25 @@ def _substep(  # type: ignore[no-untyped-def]
 ):
     """Move means over one substep; with ``linearised`` the equations and the rudder's work are kept where it begins."""
     k1, k2, k3, k4, xs, A, w = room
-    width = k1.shape[0]
-    dynamics(
-        x, rows[0], rudders[0], ship, width, linearised * width, table, values, slopes, stack, by, total, k1, A, lanes
-    )
+    width = k1.shape[0] if linearised else 0
+    dynamics(x, rows[0], rudders[0], ship, table, values, slopes, stack, by, total, k1, A[:width], lanes)
     if linearised:
-        for b in range(each(lanes)):
-            # what a unit of rudder does
-            w[0, V, b], w[0, R, b] = ship[0][4, b] * values[SPEED, b] ** 2, ship[0][5, b] * values[SPEED, b] ** 2
+        # what a unit of rudder does
+        speed = at(values, SPEED, lanes)
+        put(w, V, at(ship[0], 4, lanes) * (speed * speed), lanes)
+        put(w, R, at(ship[0], 5, lanes) * (speed * speed), lanes)
     for i in live:
-        for b in range(each(lanes)):
-            xs[i, b] = x[i, b] + 0.5 * h * k1[i, b]
-    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k2, A, lanes)
+        put(xs, i, at(x, i, lanes) + 0.5 * h * at(k1, i, lanes), lanes)
+    dynamics(xs, rows[1], rudders[1], ship, table, values, slopes, stack, by, total, k2, A[:0], lanes)
     for i in live:
-        for b in range(each(lanes)):
-            xs[i, b] = x[i, b] + 0.5 * h * k2[i, b]
-    dynamics(xs, rows[1], rudders[1], ship, width, 0, table, values, slopes, stack, by, total, k3, A, lanes)
+        put(xs, i, at(x, i, lanes) + 0.5 * h * at(k2, i, lanes), lanes)
+    dynamics(xs, rows[1], rudders[1], ship, table, values, slopes, stack, by, total, k3, A[:0], lanes)
     for i in live:
-        for b in range(each(lanes)):
-            xs[i, b] = x[i, b] + h * k3[i, b]
-    dynamics(xs, rows[2], rudders[2], ship, width, 0, table, values, slopes, stack, by, total, k4, A, lanes)
+        put(xs, i, at(x, i, lanes) + h * at(k3, i, lanes), lanes)
+    dynamics(xs, rows[2], rudders[2], ship, table, values, slopes, stack, by, total, k4, A[:0], lanes)
     for i in live:
-        for b in range(each(lanes)):
-            x[i, b] += h / 6.0 * (k1[i, b] + 2.0 * k2[i, b] + 2.0 * k3[i, b] + k4[i, b])
+        middle = at(k1, i, lanes) + 2.0 * at(k2, i, lanes) + 2.0 * at(k3, i, lanes) + at(k4, i, lanes)
+        put(x, i, at(x, i, lanes) + h / 6.0 * middle, lanes)
 
 
 @njit(**FILLING)
@@ -145,14 +142,13 @@ def _spread(P, A, w, h, drive, driven, decay, live, after, room, lanes):  # type
     _noise_at_once(P, w, h / 6.0, drive, driven, lanes)
     carry_covariance(P, Phi, decay, live, after, W, reached, lanes)
     for i in after[: after.size - (after.size > 0 and after[after.size - 1] == P.shape[0] - 1)]:
-        for b in range(each(lanes)):
-            P[i, i, b] += drive[3, b] * h
+        put(P, (i, i), at(P, (i, i), lanes) + at(drive, 3, lanes) * h, lanes)
     if driven[2]:
-        add_from_middle(P, Half, reached, drive[2], 4.0 * h / 6.0, w, (V, R), live, along, work, lanes)
+        add_from_middle(P, Half, reached, drive[2], 4.0 * h / 6.0, w, (V, R), live, along, lanes)
     for turn in range(driven.shape[0] - 2):
         source, state = _source(turn)
         if driven[source]:
-            add_from_middle(P, Half, reached, drive[source], 4.0 * h / 6.0, w, (state,), live, along, work, lanes)
+            add_from_middle(P, Half, reached, drive[source], 4.0 * h / 6.0, w, (state,), live, along, lanes)
     mirror(P, live, lanes)
     _noise_at_once(P, w, h / 6.0, drive, driven, lanes)
 
@@ -186,49 +182,47 @@ def _measurements(  # type: ignore[no-untyped-def]
     lanes,
 ):
     """Predict the measurements of instant ``k``, take them in, and add theirs to the log-likelihoods."""
-    k1, J, gain, weight, h, stood, value, S, jerk = room
+    k1, J, gain, h, stood, value, S, jerk = room
     n, width = x.shape[0], k1.shape[0]
     # linearised once, where the prediction stands; one measurement after the other moves on from there
     measured_by(
-        *(x, rows[-1], rudders[-1], step_s, rows[0], rudders[0], jerky, ship, width, width),
+        *(x, rows[-1], rudders[-1], step_s, rows[0], rudders[0], jerky, ship),
         *(table, values, slopes, stack, by, total, jerk, k1, J, lanes),
     )
     for i in range(n):
-        for b in range(each(lanes)):
-            stood[i, b] = x[i, b]
+        put(stood, i, at(x, i, lanes), lanes)
     for channel in range(3):
         late, state = offset_s[channel], (V, R, PSI)[channel]
-        for b in range(each(lanes)):
-            value[b] = stood[state, b] + late * k1[state, b]
-            S[b] = levels[3 + channel, b] ** 2
+        mean = at(stood, state, lanes) + late * at(k1, state, lanes)
         for j in range(n):
-            for b in range(each(lanes)):
-                h[j, b] = late * J[state, j, b] if j < width else 0.0
-        for b in range(each(lanes)):
-            h[state, b] += 1.0
-            if channel == 0:
-                h[n - 3, b], h[n - 2, b] = current_row[0], current_row[1]
-                value[b] += h[n - 3, b] * stood[n - 3, b] + h[n - 2, b] * stood[n - 2, b]
-            elif channel == 1:
-                h[n - 1, b] = 1.0
-                value[b] += stood[n - 1, b]
-        if add_programs(ON_LATERAL + channel, 0, table, values, slopes, stack, by, width, total, lanes):
-            for b in range(each(lanes)):
-                value[b] += total[0, b]
-                for j in range(width):
-                    h[j, b] += total[j + 1, b]
+            put(h, j, late * at(J, (state, j), lanes) if j < width else everywhere(0.0, lanes), lanes)
+        put(h, state, at(h, state, lanes) + 1.0, lanes)
+        if channel == 0:
+            put(h, n - 3, current_row[0], lanes)
+            put(h, n - 2, current_row[1], lanes)
+            mean += current_row[0] * at(stood, n - 3, lanes) + current_row[1] * at(stood, n - 2, lanes)
+        elif channel == 1:
+            put(h, n - 1, 1.0, lanes)
+            mean += at(stood, n - 1, lanes)
+        if add_programs(ON_LATERAL + channel, table, values, slopes, stack, by, total, lanes):
+            mean += at(total, 0, lanes)
+            for j in range(width):
+                put(h, j, at(h, j, lanes) + at(total, j + 1, lanes), lanes)
+        std = at(levels, 3 + channel, lanes)
+        spread = std * std
         for i in states:
-            for b in range(each(lanes)):
-                gain[0, i, b] = 0.0
+            covariance = everywhere(0.0, lanes)
             for j in states:
-                for b in range(each(lanes)):
-                    gain[0, i, b] += P[i, j, b] * h[j, b]
-            for b in range(each(lanes)):
-                value[b] += h[i, b] * (x[i, b] - stood[i, b])
-                S[b] += h[i, b] * gain[0, i, b]
+                covariance += at(P, (i, j), lanes) * at(h, j, lanes)
+            put(gain, i, covariance, lanes)
+            mean += at(h, i, lanes) * (at(x, i, lanes) - at(stood, i, lanes))
+            spread += at(h, i, lanes) * covariance
+        put(value, (), mean, lanes)
+        put(S, (), spread, lanes)
+        put(predicted, (k, channel), mean, lanes)
+        put(variance, (k, channel), spread, lanes)
         made = not np.isnan(measured[channel])
         for b in range(each(lanes)):
-            predicted[k, channel, b], variance[k, channel, b] = value[b], S[b]
             if not np.isfinite(value[b]) or (made and not (S[b] > 0.0)):
                 log_likelihood[b] = -np.inf
         if made and not withheld:
@@ -237,7 +231,7 @@ def _measurements(  # type: ignore[no-untyped-def]
                 # a lane that ran away stays there: what is added is no number, or changes nothing
                 log_likelihood[b] -= 0.5 * (_LOG_2PI + np.log(S[b]) + e * e * precision)
                 value[b], S[b] = e, precision
-            take_in(x, P, value, S, gain, weight, states, lanes)
+            take_in(x, P, value, S, gain, states, lanes)
 
 
 @njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"})
@@ -295,7 +289,7 @@ def extended(  # type: ignore[no-untyped-def]
     x0 : ndarray, shape (9 + k, lanes); P0 : ndarray, shape (9 + k, 9 + k)
         Mean and covariance of the state at the first instant; effects add to those of their own states.
     table : tuple
-        ``programs`` int64 (q, 4): kind, place, first and last instruction; ``code`` and ``constants`` of all of them.
+        See `kempf.pipeline.model.effect_model.EffectModel.table`.
     kept : tuple of ndarray
         ``predicted`` and ``variance``, shape (n, 3, lanes), to be filled; ``states`` and ``spread``,
         shape (n, 9 + k, lanes), the filtered states and their variances, or 0 rows.
@@ -321,22 +315,21 @@ def extended(  # type: ignore[no-untyped-def]
     values[PARAMETER:], values[SPEED] = parameters, inputs[0, 0]
     for i in range(width):
         slopes[i, i] = 1.0
-    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros((2, B)), np.zeros((width + 1, B))
+    stack, by, total = np.zeros((DEPTH, width + 1, B)), np.zeros(B), np.zeros((width + 1, B))
     live, after = _live_states(P0, width)
     there = np.concatenate((live, after))
     drive = np.zeros((5 + width - N_BEFORE, B))
     _begin(P, table, values, slopes, stack, by, total, drive, lanes)
     k1, J = np.zeros((width, B)), np.zeros((width, width, B))
     vector, matrix, pattern = (width, B), (width, width, B), (width, width)
-    A, w, state = np.zeros(matrix), np.ones((1, width, B)), np.zeros(vector)
+    A, w, state = np.zeros(matrix), np.ones(vector), np.zeros(vector)
     moving = (k1, np.zeros(vector), np.zeros(vector), np.zeros(vector), state, A, w)
     spreading = (
         *(np.zeros(matrix), np.zeros(matrix), np.zeros(matrix), np.zeros(matrix), np.zeros((n, n, B))),
-        *(np.zeros((1, width, B)), np.zeros(pattern, dtype=np.bool_), np.zeros(pattern, dtype=np.bool_)),
+        *(np.zeros(vector), np.zeros(pattern, dtype=np.bool_), np.zeros(pattern, dtype=np.bool_)),
     )
-    gain, weight = np.zeros((1, n, B)), np.zeros((1, n, B))
-    h, stood, decay = np.zeros((n, B)), np.zeros((n, B)), np.ones(n)
-    at_measurements = (k1, J, gain, weight, h, stood, np.zeros(B), np.zeros(B), (np.zeros(vector), np.zeros(vector)))
+    gain, h, stood, decay = np.zeros((n, B)), np.zeros((n, B)), np.zeros((n, B)), np.ones(n)
+    at_measurements = (k1, J, gain, h, stood, np.zeros(B), np.zeros(B), (np.zeros(vector), np.zeros(vector)))
     decay[n - 3 : n - 1] = np.exp(-rates[2] * step_s)
     drive[0], drive[3], drive[4] = levels[0] ** 2, levels[2] ** 2, 2.0 * rates[3] * P0[E, E]
     if P0[M, M] > 0.0:
@@ -357,8 +350,7 @@ def extended(  # type: ignore[no-untyped-def]
                     *(table, values, slopes, stack, by, total, moving, lanes),
                 )
             for i in after:
-                for b in range(B):
-                    x[i, b] *= decay[i]
+                put(x, i, at(x, i, lanes) * decay[i], lanes)
             _spread(P, A, w, step_s, drive, driven, decay, live, after, spreading, lanes)
         here, earlier = ROWS * k + 1, max(ROWS * (k - 1), 0)
         _measurements(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from kempf.pipeline.compiled import FILLING, STEP, njit
 from kempf.pipeline.model.batch import each
+from kempf.pipeline.model.lanes import at, everywhere, put
 
 
 @njit(**FILLING)
@@ -30,10 +31,9 @@ def couplings(A, live, direct, reached, lanes):  # type: ignore[no-untyped-def]
 
 
 @njit(**STEP)
-def _add_product(out, i, j, A, k, m, B, p, q, lanes):  # type: ignore[no-untyped-def]
-    """Add A[k, m] B[p, q] to out[i, j] in every lane."""
-    for b in range(each(lanes)):
-        out[i, j, b] += A[k, m, b] * B[p, q, b]
+def _add_product(out, i, j, a, B, p, q, lanes):  # type: ignore[no-untyped-def]
+    """Add a B[p, q] to out[i, j] in every lane."""
+    put(out, (i, j), at(out, (i, j), lanes) + a * at(B, (p, q), lanes), lanes)
 
 
 @njit(**FILLING)
@@ -41,13 +41,13 @@ def _multiply(A, of_A, B, of_B, live, out, lanes):  # type: ignore[no-untyped-de
     """Fill ``out`` with A B over the live states, both being nothing outside their patterns."""
     for i in live:
         for j in live:
-            for b in range(each(lanes)):
-                out[i, j, b] = 0.0
+            put(out, (i, j), 0.0, lanes)
         for m in live:
             if of_A[i, m]:
+                a = at(A, (i, m), lanes)
                 for j in live:
                     if of_B[m, j]:
-                        _add_product(out, i, j, A, i, m, B, m, j, lanes)
+                        _add_product(out, i, j, a, B, m, j, lanes)
 
 
 @njit(**FILLING)
@@ -58,93 +58,85 @@ def exponential(A, h, live, direct, reached, Half, Phi, term, work, lanes):  # t
     """
     for i in live:
         for j in live:
-            one = 1.0 if i == j else 0.0
-            for b in range(each(lanes)):
-                term[i, j, b] = 0.5 * h * A[i, j, b]
-            for b in range(each(lanes)):
-                Half[i, j, b] = one + term[i, j, b]
+            first = 0.5 * h * at(A, (i, j), lanes)
+            put(term, (i, j), first, lanes)
+            put(Half, (i, j), (1.0 if i == j else 0.0) + first, lanes)
     for order in range(2, 5):
         s = 0.5 * h / order
         _multiply(A, direct, term, reached, live, work, lanes)
         for i in live:
             for j in live:
                 if reached[i, j]:
-                    for b in range(each(lanes)):
-                        term[i, j, b] = s * work[i, j, b]
-                    for b in range(each(lanes)):
-                        Half[i, j, b] += term[i, j, b]
+                    further = s * at(work, (i, j), lanes)
+                    put(term, (i, j), further, lanes)
+                    put(Half, (i, j), at(Half, (i, j), lanes) + further, lanes)
     _multiply(Half, reached, Half, reached, live, Phi, lanes)
 
 
 @njit(**FILLING)
-def carry_covariance(P, Phi, decay, live, after, W, coupled, lanes):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over lanes
+def carry_covariance(P, Phi, decay, live, after, W, coupled, lanes):  # type: ignore[no-untyped-def]  # noqa: PLR0912 - loops over states
     """Let P <- F P F' where F is Phi on the live states and ``decay`` on those after them.
 
     Of the live states only the lower triangle is filled; see `mirror`.
     """
     for i in live:
         for j in live:
-            for b in range(each(lanes)):
-                W[i, j, b] = 0.0
+            put(W, (i, j), 0.0, lanes)
         for j in after:
-            for b in range(each(lanes)):
-                W[i, j, b] = 0.0
+            put(W, (i, j), 0.0, lanes)
         for m in live:
             if coupled[i, m]:
+                a = at(Phi, (i, m), lanes)
                 for j in live:
-                    _add_product(W, i, j, Phi, i, m, P, m, j, lanes)
+                    _add_product(W, i, j, a, P, m, j, lanes)
                 for j in after:
-                    _add_product(W, i, j, Phi, i, m, P, m, j, lanes)
+                    _add_product(W, i, j, a, P, m, j, lanes)
     for i in live:
         for j in live:
             if j > i:
                 break
-            for b in range(each(lanes)):
-                P[i, j, b] = 0.0
+            total = everywhere(0.0, lanes)
             for m in live:
                 if coupled[j, m]:
-                    _add_product(P, i, j, W, i, m, Phi, j, m, lanes)
+                    total += at(W, (i, m), lanes) * at(Phi, (j, m), lanes)
+            put(P, (i, j), total, lanes)
         for j in after:
-            for b in range(each(lanes)):
-                P[i, j, b] = W[i, j, b] * decay[j]
-                P[j, i, b] = P[i, j, b]
+            carried = at(W, (i, j), lanes) * decay[j]
+            put(P, (i, j), carried, lanes)
+            put(P, (j, i), carried, lanes)
     for i in after:
         for j in after:
-            for b in range(each(lanes)):
-                P[i, j, b] *= decay[i] * decay[j]
+            put(P, (i, j), at(P, (i, j), lanes) * (decay[i] * decay[j]), lanes)
 
 
 @njit(**FILLING)
 def add_at_once(P, i, j, q, h, w, lanes):  # type: ignore[no-untyped-def]
-    """Add to P[i, j] what white noise of intensity q along w[0] brings in h seconds, as if at this instant."""
-    for b in range(each(lanes)):
-        P[i, j, b] += h * q[b] * w[0, i, b] * w[0, j, b]
+    """Add to P[i, j] what white noise of intensity q along w brings in h seconds, as if at this instant."""
+    brought = h * at(q, (), lanes) * at(w, i, lanes) * at(w, j, lanes)
+    put(P, (i, j), at(P, (i, j), lanes) + brought, lanes)
 
 
 @njit(**FILLING)
-def add_from_middle(P, Half, reached, q, h, w, sources, live, along, work, lanes):  # type: ignore[no-untyped-def]
-    """Add to the lower triangle of P what white noise along w[0] brings in h seconds, as if half a step ago.
+def add_from_middle(P, Half, reached, q, h, w, sources, live, along, lanes):  # type: ignore[no-untyped-def]
+    """Add to the lower triangle of P what white noise along w brings in h seconds, as if half a step ago.
 
     Parameters
     ----------
-    w, along : ndarray, shape (1, n, lanes)
+    w, along : ndarray, shape (n, lanes)
         w is anything for ``sources`` alone; the other is room.
-    work : ndarray, shape (n, n, lanes)
-        Room; its first column is used.
     """
     for i in live:
-        for b in range(each(lanes)):
-            along[0, i, b] = 0.0
+        total = everywhere(0.0, lanes)
         for m in sources:
             if reached[i, m]:
-                _add_product(along, 0, i, Half, i, m, w, 0, m, lanes)
-        for b in range(each(lanes)):
-            work[i, 0, b] = h * q[b] * along[0, i, b]
+                total += at(Half, (i, m), lanes) * at(w, m, lanes)
+        put(along, i, total, lanes)
     for i in live:
+        brought = h * at(q, (), lanes) * at(along, i, lanes)
         for j in live:
             if j > i:
                 break
-            _add_product(P, i, j, work, i, 0, along, 0, j, lanes)
+            put(P, (i, j), at(P, (i, j), lanes) + brought * at(along, j, lanes), lanes)
 
 
 @njit(**FILLING)
@@ -154,24 +146,21 @@ def mirror(P, live, lanes):  # type: ignore[no-untyped-def]
         for j in live:
             if j >= i:
                 break
-            for b in range(each(lanes)):
-                P[j, i, b] = P[i, j, b]
+            put(P, (j, i), at(P, (i, j), lanes), lanes)
 
 
 @njit(**FILLING)
-def take_in(x, P, e, precision, gain, weight, states, lanes):  # type: ignore[no-untyped-def]
+def take_in(x, P, e, precision, gain, states, lanes):  # type: ignore[no-untyped-def]
     """Take in one scalar measurement of innovations e and variances 1 / ``precision``; ``gain`` holds P h.
 
-    ``states`` are those that there are; ``weight``, shape (1, n, lanes), is room to work in.
+    ``states`` are those that there are.
     """
     for i in states:
-        for b in range(each(lanes)):
-            weight[0, i, b] = -gain[0, i, b] * precision[b]
-        for b in range(each(lanes)):
-            x[i, b] -= weight[0, i, b] * e[b]
+        weight = -at(gain, i, lanes) * at(precision, (), lanes)
+        put(x, i, at(x, i, lanes) - weight * at(e, (), lanes), lanes)
         for j in states:
             if j > i:
                 break
-            _add_product(P, i, j, weight, 0, i, gain, 0, j, lanes)
-            for b in range(each(lanes)):
-                P[j, i, b] = P[i, j, b]
+            left = at(P, (i, j), lanes) + weight * at(gain, j, lanes)
+            put(P, (i, j), left, lanes)
+            put(P, (j, i), left, lanes)

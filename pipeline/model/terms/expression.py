@@ -88,12 +88,57 @@ def compiled(text: str, variables: Mapping[str, int]) -> Program:
     UsageError
         ``expression_invalid``: it holds something else; the message says what and where.
     """
-    code: list[tuple[int, int]] = []
-    constants: list[float] = []
-    deepest = _emit(_parsed(text).body, text, variables, code, constants, 0)
-    if deepest > DEPTH:
-        raise _wrong(text, None, f"it is nested {deepest} deep, {DEPTH} is the most")
-    return Program(np.array(code, dtype=np.int64).reshape(-1, 2), np.array(constants, dtype=np.float64))
+    tree = _parsed(text).body
+    writing = _Writing(text, variables)
+    writing.write(tree, 0)
+    if writing.deepest > DEPTH:
+        raise _wrong(text, None, f"it is nested {writing.deepest} deep, {DEPTH} is the most")
+    kept = _worth_keeping(tree, DEPTH - writing.deepest)
+    if kept:
+        writing = _Writing(text, variables, kept)
+        writing.write(tree, 0)
+    code = np.array(writing.code, dtype=np.int64).reshape(-1, 2)
+    return Program(code, np.array(writing.constants, dtype=np.float64))
+
+
+def _worth_keeping(tree: ast.expr, places: int) -> dict[ast.expr, int]:
+    """Return the nodes whose like a formula repeats, and the places above its stack where what they give is kept.
+
+    A cross-flow drag asks eight times for the speed of the bow: it is computed once.
+    """
+    number, size = _numbered(tree)
+    alike: dict[int, list[ast.expr]] = {}
+    row = [tree]
+    while row:
+        node = row.pop()
+        nodes = alike.setdefault(number[node], [])
+        nodes.append(node)
+        if len(nodes) == 1:
+            # what stands in a repetition is not computed again
+            row += [below for below in ast.iter_child_nodes(node) if isinstance(below, ast.expr)][::-1]
+    # to keep it costs an instruction, and every time it is asked for again another
+    gain = {k: (len(nodes) - 1) * (size[nodes[0]] - 1) - 1 for k, nodes in alike.items()}
+    best = sorted((k for k, saved in gain.items() if saved > 0), key=lambda k: (-gain[k], k))
+    place = {k: DEPTH - 1 - at for at, k in enumerate(best[:places])}
+    return {node: place[k] for node, k in number.items() if k in place and isinstance(node, ast.expr)}
+
+
+def _numbered(tree: ast.expr) -> tuple[dict[ast.AST, int], dict[ast.AST, int]]:
+    """Return a number for every node of a tree, equal for those written alike, and how many nodes each is made of."""
+    number: dict[ast.AST, int] = {}
+    size: dict[ast.AST, int] = {}
+    known: dict[object, int] = {}
+
+    def visit(node: ast.AST) -> None:
+        below = list(ast.iter_child_nodes(node))
+        for child in below:
+            visit(child)
+        own = tuple(repr(value) for _, value in ast.iter_fields(node) if not isinstance(value, ast.AST | list))
+        number[node] = known.setdefault((type(node), own, tuple(number[child] for child in below)), len(known))
+        size[node] = isinstance(node, ast.expr) + sum(size[child] for child in below)
+
+    visit(tree)
+    return number, size
 
 
 def _parsed(text: str) -> ast.Expression:
@@ -143,62 +188,64 @@ def _levels(tree: ast.AST) -> int:
     return levels
 
 
-def _emit(
-    node: ast.expr,
-    text: str,
-    variables: Mapping[str, int],
-    code: list[tuple[int, int]],
-    constants: list[float],
-    height: int,
-) -> int:
-    """Append the instructions of a node; return the highest the stack stands on the way."""
-    if height > DEPTH:
-        return height
-    if isinstance(node, ast.Constant) and type(node.value) in (int, float):
-        code.append((program.CONSTANT, len(constants)))
-        constants.append(_number(node, text))
-        return height + 1
-    if isinstance(node, ast.Name):
-        if node.id not in variables:
-            raise _unknown(node.id, node.col_offset, text, [*variables, *FUNCTIONS])
-        code.append((program.VARIABLE, variables[node.id]))
-        return height + 1
-    if isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
-        high = _emit(node.operand, text, variables, code, constants, height)
-        if isinstance(node.op, ast.USub):
-            code.append((program.NEGATE, 0))
-        return high
-    if isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
-        if isinstance(node.op, ast.Pow):
-            _check_power(node, text)
-        high = _emit(node.left, text, variables, code, constants, height)
-        high = max(high, _emit(node.right, text, variables, code, constants, height + 1))
-        code.append((_BINARY[type(node.op)], 0))
-        return high
-    if isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
-        return _emit_call(node, node.func.id, text, variables, code, constants, height)
-    raise _wrong(text, node.col_offset + 1, f"{_WORDS.get(type(node), 'this')} may not stand in a formula")
+class _Writing:
+    """The instructions of a formula as they are written."""
 
+    def __init__(self, text: str, variables: Mapping[str, int], kept: Mapping[ast.expr, int] | None = None) -> None:
+        self.text, self.variables, self.kept = text, variables, kept or {}
+        self.code: list[tuple[int, int]] = []
+        self.constants: list[float] = []
+        #: the highest the stack stands on the way
+        self.deepest = 0
+        self._there: set[int] = set()
 
-def _emit_call(
-    node: ast.Call,
-    name: str,
-    text: str,
-    variables: Mapping[str, int],
-    code: list[tuple[int, int]],
-    constants: list[float],
-    height: int,
-) -> int:
-    if name not in FUNCTIONS:
-        raise _unknown(name, node.col_offset, text, list(FUNCTIONS))
-    instruction, count = FUNCTIONS[name]
-    if len(node.args) != count or node.keywords:
-        raise _wrong(text, node.col_offset + 1, f"{name} takes {count} argument{'s' * (count > 1)}")
-    high = height
-    for k, argument in enumerate(node.args):
-        high = max(high, _emit(argument, text, variables, code, constants, height + k))
-    code.append((instruction, 0))
-    return high
+    def write(self, node: ast.expr, height: int) -> None:
+        """Append the instructions of a node whose result stands at a height of the stack."""
+        self.deepest = max(self.deepest, height + 1)
+        if height >= DEPTH:
+            return
+        place = self.kept.get(node)
+        if place is not None and place in self._there:
+            self.code.append((program.RECALL, place))
+            return
+        self._write(node, height)
+        if place is not None:
+            self._there.add(place)
+            self.code.append((program.KEEP, place))
+
+    def _write(self, node: ast.expr, height: int) -> None:
+        if isinstance(node, ast.Constant) and type(node.value) in (int, float):
+            self.code.append((program.CONSTANT, len(self.constants)))
+            self.constants.append(_number(node, self.text))
+        elif isinstance(node, ast.Name):
+            if node.id not in self.variables:
+                raise _unknown(node.id, node.col_offset, self.text, [*self.variables, *FUNCTIONS])
+            self.code.append((program.VARIABLE, self.variables[node.id]))
+        elif isinstance(node, ast.UnaryOp) and isinstance(node.op, ast.USub | ast.UAdd):
+            self.write(node.operand, height)
+            if isinstance(node.op, ast.USub):
+                self.code.append((program.NEGATE, 0))
+        elif isinstance(node, ast.BinOp) and type(node.op) in _BINARY:
+            if isinstance(node.op, ast.Pow):
+                _check_power(node, self.text)
+            self.write(node.left, height)
+            self.write(node.right, height + 1)
+            self.code.append((_BINARY[type(node.op)], 0))
+        elif isinstance(node, ast.Call) and isinstance(node.func, ast.Name):
+            self._write_call(node, node.func.id, height)
+        else:
+            what = _WORDS.get(type(node), "this")
+            raise _wrong(self.text, node.col_offset + 1, f"{what} may not stand in a formula")
+
+    def _write_call(self, node: ast.Call, name: str, height: int) -> None:
+        if name not in FUNCTIONS:
+            raise _unknown(name, node.col_offset, self.text, list(FUNCTIONS))
+        instruction, count = FUNCTIONS[name]
+        if len(node.args) != count or node.keywords:
+            raise _wrong(self.text, node.col_offset + 1, f"{name} takes {count} argument{'s' * (count > 1)}")
+        for k, argument in enumerate(node.args):
+            self.write(argument, height + k)
+        self.code.append((instruction, 0))
 
 
 def _number(node: ast.Constant, text: str) -> float:

@@ -91,7 +91,8 @@ def run(program: Program, values: Float) -> Float:
     slopes = np.zeros((values.size, width, 1))
     slopes[:width, :, 0] = np.eye(width)
     stack = np.zeros((DEPTH, width + 1, 1))
-    evaluate(program.code, program.constants, values[:, None], slopes, stack, np.zeros((2, 1)), width, ONE)
+    every = np.arange(width)
+    evaluate(program.code, program.constants, every, values[:, None], slopes, stack, np.zeros(1), ONE)
     result: Float = stack[0, :, 0]
     return result
 

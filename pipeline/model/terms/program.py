@@ -14,9 +14,11 @@ from kempf.schemas.symbols import COMPUTED_SYMBOLS, STATE_SYMBOLS
 MOVING = len(STATE_SYMBOLS) + len(COMPUTED_SYMBOLS)
 #: deepest stack of a program; a bit for each place must fit into an integer
 DEPTH = 24
-#: instructions; the second number of an instruction is an index for the first two
+#: instructions; the second number of an instruction is an index for the first two, and a place for the last
 CONSTANT, VARIABLE, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, NEGATE = 0, 1, 2, 3, 4, 5, 6, 7
 ABS, SIGN, SIN, COS, SQRT, EXP, LOG, TANH, MIN, MAX = 8, 9, 10, 11, 12, 13, 14, 15, 16, 17
+#: copy the top of the stack to a place above all that is worked with, and a place to the top
+KEEP, RECALL = 18, 19
 
 
 @dataclass(frozen=True, eq=False)
