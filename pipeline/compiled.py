@@ -63,8 +63,11 @@ def _parts(function: Any, seen: set[Any]) -> Iterator[bytes]:
         elif isinstance(value, _Intrinsic):
             if value not in seen:
                 seen.add(value)
-                # what it emits is made by other functions there, too
-                yield inspect.getsource(sys.modules[value._defn.__module__]).encode()
+                # what it emits is made by other functions and constants there, too
+                there = sys.modules[value._defn.__module__]
+                yield inspect.getsource(there).encode()
+                numbers = {name: one for name, one in vars(there).items() if isinstance(one, int | float | tuple)}
+                yield repr(sorted(numbers.items())).encode()
         elif isinstance(value, np.ndarray):
             yield name.encode() + value.tobytes()
         elif isinstance(value, bool | int | float | str | tuple):

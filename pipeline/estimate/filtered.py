@@ -17,8 +17,8 @@ from kempf.pipeline.model.dynamics import N_AFTER, N_BEFORE
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.schemas.model_spec import ModelSpec
 
-#: so few sets of parameters go through one by one: a group of lanes costs as much as these
-_ALONE = 4
+#: so few sets of parameters go through one by one: a group of lanes costs less than twice as much
+_ALONE = 1
 #: states of a run that every fit of it begins from: v, r, psi, F and M, before the error of the speed and effects
 _CHAIN = 5
 

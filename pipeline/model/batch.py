@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from kempf.pipeline.compiled import STEP, njit
 
-#: for one set of parameters, and for so many
+#: for one set of parameters, and for so many; a power of two, or the processor takes them one by one
 ONE, LANES = (1,), (16, 16)
 #: how many go through together
 MOST = LANES[0]
