@@ -22,6 +22,16 @@ HELD = {held}
 def inner(x):
     return {factor} * x
 """
+INSTRUCTIONS = """
+from factor import FACTOR
+from numba.extending import intrinsic
+
+@intrinsic
+def inner(context, x):
+    def build(context, builder, sig, args):
+        return builder.fmul(args[0], args[0].type(FACTOR))
+    return x(x), build
+"""
 OUTER = """
 from kempf.pipeline.compiled import njit
 from inner import HELD, inner
@@ -39,6 +49,10 @@ def said(folder: Path, held: float, factor: float, before: str = "pass") -> tupl
     text = INNER.format(held=held, factor=factor)
     if not (folder / "inner.py").exists() or (folder / "inner.py").read_text() != text:
         (folder / "inner.py").write_text(text)
+    return ran(folder, before)
+
+
+def ran(folder: Path, before: str = "pass") -> tuple[float, int]:
     root = Path(__file__).parents[1]
     command = (
         f"import sys; sys.path[:0] = [{str(root)!r}, {str(folder)!r}]; sys.argv = ['outer']; {before}; import outer"
@@ -58,6 +72,20 @@ def test_a_change_in_another_file_is_compiled_in(tmp_path: Path, changed: str) -
         assert said(tmp_path, 20.0, 2.0) == (22.0, 0)
     else:
         assert said(tmp_path, 10.0, 3.0) == (13.0, 0)
+
+
+def test_a_constant_of_instructions_of_our_own_is_compiled_in(tmp_path: Path) -> None:
+    """The width of a vector is such a one: kept from before, a kernel would write past its arrays."""
+    (tmp_path / "inner.py").write_text(INSTRUCTIONS)
+    (tmp_path / "outer.py").write_text(OUTER.replace("HELD, ", "").replace(" + HELD", ""))
+
+    def doubled(factor: float) -> tuple[float, int]:
+        (tmp_path / "factor.py").write_text(f"FACTOR = {factor}")
+        return ran(tmp_path)
+
+    assert doubled(2.0) == (2.0, 0)
+    assert doubled(2.0) == (2.0, 1)
+    assert doubled(3.0) == (3.0, 0)
 
 
 def test_a_change_of_the_options_is_compiled_in(tmp_path: Path) -> None:

@@ -176,7 +176,8 @@ class RunFilter:
     ) -> list[Passed]:
         run, spec = self.run, self.spec
         (n, _), (size, k) = run.measured.shape, x0.shape
-        assert size == N_BEFORE + self.model.extra + N_AFTER
+        # the kernel writes as many lanes as it was compiled for
+        assert size == N_BEFORE + self.model.extra + N_AFTER and k == lanes[0]
         rates = (
             *(spec.wind_correlation_rate_per_s, spec.moment_correlation_rate_per_s),
             *(spec.current_correlation_rate_per_s, run.speed_error_rate_per_s),

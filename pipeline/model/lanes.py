@@ -15,7 +15,7 @@ from llvmlite import ir
 from numba.core import cgutils, types
 from numba.core.datamodel import models
 from numba.core.typing.templates import AbstractTemplate, infer_global, signature
-from numba.extending import intrinsic, lower_builtin, lower_cast, register_model
+from numba.extending import intrinsic, lower_builtin, register_model
 
 from kempf.pipeline.model.batch import MOST
 
@@ -60,12 +60,6 @@ def _wide(context: Any, builder: Any, value: Any, of: Any) -> Any:
     return _spread(builder, context.cast(builder, value, of, types.float64))
 
 
-@lower_cast(types.Float, _Lanes)
-@lower_cast(types.Integer, _Lanes)
-def _number_to_lanes(context: Any, builder: Any, of: Any, _to: Any, value: Any) -> Any:
-    return _wide(context, builder, value, of)
-
-
 def _is_number(of: Any) -> bool:
     return isinstance(of, types.Float | types.Integer)
 
@@ -83,7 +77,8 @@ def _lower(operation: Any, build: Callable[..., Any]) -> None:
     def lowered(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         return build(builder, *(_wide(context, builder, a, of) for a, of in zip(args, sig.args, strict=True)))
 
-    pairs = [(_Lanes, _Lanes), (_Lanes, types.Float), (types.Float, _Lanes)]
+    numbers = (types.Float, types.Integer)
+    pairs = [(_Lanes, _Lanes), *((_Lanes, number) for number in numbers), *((number, _Lanes) for number in numbers)]
     for kinds in pairs if operation not in (operator.neg, abs) else [(_Lanes,)]:
         lower_builtin(operation, *kinds)(lowered)
 
