@@ -28,6 +28,7 @@ from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.pipeline.diagnose.verdict import verdict
 from kempf.pipeline.estimate.agreement import agreement_of
+from kempf.pipeline.estimate.iteration import SILENT, Iteration
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.terms.own import from_expression
@@ -36,6 +37,26 @@ from kempf.schemas.errors import DataRejected
 from tests.diagnose.sailing import SOME, WORKERS, Sailed, sailed
 
 LAG = ("rudder_lag", "cross_flow_drag")
+
+
+class Heard:
+    """How many runs each climb went over."""
+
+    def __init__(self) -> None:
+        self.runs: list[int] = []
+
+    def begins(self, what: str) -> None:
+        del what
+
+    def counted(self, done: int, total: int) -> None:
+        del done, total
+
+    def iterated(self, iteration: Iteration) -> None:
+        if iteration.number == 0:
+            self.runs.append(iteration.runs)
+
+    def fitted(self, last: Iteration) -> None:
+        del last
 
 
 @pytest.fixture(scope="module")
@@ -358,6 +379,37 @@ def test_a_hull_of_which_a_sign_is_wrong_is_no_ship(wrong: int) -> None:
     hull[wrong] *= -1.0
     # a12 may have either sign
     assert is_ship(hull) == (wrong == 1)
+
+
+def test_what_raced_in_vain_races_no_more(monkeypatch: pytest.MonkeyPatch) -> None:
+    ratios, raced = {"dead_time": -3.0, "backlash": 8.0}, []
+
+    def confirmed(_base: object, _alone: object, candidate: Candidate, *_: object, race: bool) -> SimpleNamespace:
+        raced.append((candidate.effect.name, race))
+        return SimpleNamespace(likelihood_ratio=ratios[candidate.effect.name], outdone=False)
+
+    monkeypatch.setattr("kempf.pipeline.diagnose.ladder.confirm", confirmed)
+    ladder = Ladder(None, {}, (), WORKERS, DiagnosisSettings(), SILENT, cast(PooledFit, None))
+    alone = cast(Unseen, None)
+    for base in (cast(PooledFit, object()), cast(PooledFit, object())):
+        for name in ratios:
+            candidate = cast(Candidate, SimpleNamespace(effect=effects.get(name)))
+            ladder.confirmed(base, alone, candidate)
+    assert raced == [("dead_time", True), ("backlash", True), ("dead_time", False), ("backlash", True)]
+
+
+def test_an_effect_that_races_no_more_climbs_from_the_hull_at_hand(late: tuple[Sailed, Diagnosis]) -> None:
+    base = late[1].steps[-1].fit
+    candidate = score(base, effects.get("dead_time"), WORKERS)
+
+    def climbs(*, race: bool) -> list[int]:
+        heard = Heard()
+        added(base, candidate, WORKERS, listener=heard, race=race)
+        return heard.runs
+
+    few = min(len(base.runs), 3)
+    assert climbs(race=True)[:7] == [few] * 7
+    assert climbs(race=False) == [len(base.runs)]
 
 
 def test_what_was_taken_for_the_true_effect_goes_when_that_is_added(monkeypatch: pytest.MonkeyPatch) -> None:
