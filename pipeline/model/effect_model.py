@@ -226,15 +226,17 @@ class EffectModel:
 def _moving(targets: Sequence[int], codes: Sequence[NDArray[np.int64]], width: int) -> list[list[int]]:
     """Return the states that each program moves with: by itself, or as the speed and the rudder that it asks for do."""
     asked = [{int(index) for what, index in code if what == VARIABLE} for code in codes]
+    own = [{i for i in variables if i < width} for variables in asked]
     of_speed, of_rudder = set[int](), set[int]()
-    for target, variables in zip(targets, asked, strict=True):
-        of_speed |= {i for i in variables if i < width and target == dynamics.ON_SPEED}
-    for target, variables in zip(targets, asked, strict=True):
+    for target, states in zip(targets, own, strict=True):
+        if target == dynamics.ON_SPEED:
+            of_speed |= states
+    for target, states, variables in zip(targets, own, asked, strict=True):
         if target == dynamics.ON_RUDDER:
-            of_rudder |= {i for i in variables if i < width} | (of_speed if dynamics.SPEED in variables else set())
+            of_rudder |= states | (of_speed if dynamics.SPEED in variables else set())
     through = {dynamics.SPEED: of_speed, dynamics.DELTA: of_rudder}
     through |= {_INDEX[name]: set(range(width)) for name in ACCELERATION_SYMBOLS}
     return [
-        sorted({i for i in variables if i < width}.union(*(through.get(i, set()) for i in variables)))
-        for variables in asked
+        sorted(states.union(*(through[i] for i in variables & through.keys())))
+        for states, variables in zip(own, asked, strict=True)
     ]

@@ -124,7 +124,7 @@ def _worth_keeping(tree: ast.expr, places: int) -> dict[ast.expr, int]:
 
 
 def _numbered(tree: ast.expr) -> tuple[dict[ast.AST, int], dict[ast.AST, int]]:
-    """Return a number for every node of a tree, equal for those written alike, and how many nodes each is made of."""
+    """Return a number for every node of a tree, equal for those written alike, and the instructions that each takes."""
     number: dict[ast.AST, int] = {}
     size: dict[ast.AST, int] = {}
     known: dict[object, int] = {}
@@ -135,7 +135,8 @@ def _numbered(tree: ast.expr) -> tuple[dict[ast.AST, int], dict[ast.AST, int]]:
             visit(child)
         own = tuple(repr(value) for _, value in ast.iter_fields(node) if not isinstance(value, ast.AST | list))
         number[node] = known.setdefault((type(node), own, tuple(number[child] for child in below)), len(known))
-        size[node] = isinstance(node, ast.expr) + sum(size[child] for child in below)
+        # the name of a function is no instruction of its own
+        size[node] = isinstance(node, ast.expr) - isinstance(node, ast.Call) + sum(size[child] for child in below)
 
     visit(tree)
     return number, size
