@@ -185,19 +185,14 @@ def choose(_context: Any, left: Any, right: Any, yes: Any, no: Any) -> Any:
     return (LANES_TYPE if many else types.float64)(left, right, yes, no), build
 
 
-def _function(name: str) -> Callable[..., Any]:
-    @_emitted
-    def called(_context: Any, x: Any) -> Any:
-        def build(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
-            return _called(builder, name, args[0])
+@_emitted
+def root(_context: Any, x: Any) -> Any:
+    """Return the square root, lane by lane."""
 
-        return x(x), build
+    def build(_context: Any, builder: Any, _sig: Any, args: Any) -> Any:
+        return _called(builder, "llvm.sqrt", args[0])
 
-    return called
-
-
-#: square root, lane by lane
-root = _function("llvm.sqrt")
+    return x(x), build
 
 
 @_emitted
@@ -206,8 +201,7 @@ def power(_context: Any, x: Any, exponent: Any) -> Any:
 
     def build(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         number = context.cast(builder, args[1], sig.args[1], types.float64)
-        return _called(
-            builder, "llvm.pow", args[0], _spread(builder, number) if isinstance(sig.args[0], _Lanes) else number
-        )
+        by = _spread(builder, number) if isinstance(sig.args[0], _Lanes) else number
+        return _called(builder, "llvm.pow", args[0], by)
 
     return x(x, exponent), build

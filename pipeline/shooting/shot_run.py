@@ -84,20 +84,20 @@ class ShotRun:
         ndarray, shape (m, 3, k)
             What would be measured, window after window.
         """
-        k = shared.shape[1]
+        run, k = self.windows.run, shared.shape[1]
+        rudder = self.model.rudders(
+            run.fine_time_s, run.inputs[:, 1], run.rudder_before, run.rudder_between, shared[N_HULL:]
+        )
         groups = [np.minimum(np.arange(first, first + MOST), k - 1) for first in range(0, k, MOST)]
-        found = [self._shot(shared[:, at], own[:, at], starts[..., at]) for at in groups]
+        found = [self._shot(shared[:, at], own[:, at], starts[..., at], rudder[:, at]) for at in groups]
         return np.concatenate(found, axis=-1)[..., :k]
 
-    def _shot(self, shared: Float, own: Float, starts: Float) -> Float:
+    def _shot(self, shared: Float, own: Float, starts: Float, rudder: Float) -> Float:
         """Do as `predicted`, for as many as go through together."""
         run, extra = self.windows.run, self.model.extra
         x0 = np.zeros((starts.shape[0], N_BEFORE + extra + N_AFTER, MOST))
         x0[:, :3], x0[:, 3], x0[:, 4] = starts, own[0], own[1]
         x0[:, -3:] = own[None, 2:]
-        rudder = self.model.rudders(
-            run.fine_time_s, run.inputs[:, 1], run.rudder_before, run.rudder_between, shared[N_HULL:]
-        )
         constants = run.constants(self.spec.rudder_speed_exponent)
         found = np.empty((self.windows.rows.size, 3, MOST))
         shoot(

@@ -28,35 +28,16 @@ from kempf.pipeline.diagnose.staged import staged
 from kempf.pipeline.diagnose.unsure_instants import WithInstants
 from kempf.pipeline.diagnose.verdict import verdict
 from kempf.pipeline.estimate.agreement import agreement_of
-from kempf.pipeline.estimate.iteration import SILENT, Iteration
+from kempf.pipeline.estimate.iteration import SILENT
 from kempf.pipeline.estimate.plain_fit import fit_plain
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.model.terms.own import from_expression
 from kempf.schemas import effects
 from kempf.schemas.errors import DataRejected
+from tests.diagnose.heard import Heard
 from tests.diagnose.sailing import SOME, WORKERS, Sailed, sailed
 
 LAG = ("rudder_lag", "cross_flow_drag")
-
-
-class Heard:
-    """How many runs each climb went over."""
-
-    def __init__(self) -> None:
-        self.runs: list[int] = []
-
-    def begins(self, what: str) -> None:
-        del what
-
-    def counted(self, done: int, total: int) -> None:
-        del done, total
-
-    def iterated(self, iteration: Iteration) -> None:
-        if iteration.number == 0:
-            self.runs.append(iteration.runs)
-
-    def fitted(self, last: Iteration) -> None:
-        del last
 
 
 @pytest.fixture(scope="module")
@@ -405,7 +386,7 @@ def test_an_effect_that_races_no_more_climbs_from_the_hull_at_hand(late: tuple[S
     def climbs(*, race: bool) -> list[int]:
         heard = Heard()
         added(base, candidate, WORKERS, listener=heard, race=race)
-        return heard.runs
+        return [climb[0].runs for climb in heard.climbs]
 
     few = min(len(base.runs), 3)
     assert climbs(race=True)[:7] == [few] * 7

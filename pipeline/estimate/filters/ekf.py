@@ -59,11 +59,11 @@ def _begin(P, table, values, slopes, stack, by, total, drive, lanes):  # type: i
     width = P.shape[0] - N_AFTER
     for i in range(width - N_BEFORE):
         add_programs(ON_INITIAL + i, table, values, slopes, stack, by, total[:1], lanes)
-        for b in range(each(lanes)):
-            P[N_BEFORE + i, N_BEFORE + i, b] += total[0, b] ** 2
+        own, std = (N_BEFORE + i, N_BEFORE + i), at(total, 0, lanes)
+        put(P, own, at(P, own, lanes) + std * std, lanes)
         add_programs(ON_NOISE + i, table, values, slopes, stack, by, total[:1], lanes)
-        for b in range(each(lanes)):
-            drive[5 + i, b] = total[0, b] ** 2
+        intensity = at(total, 0, lanes)
+        put(drive, 5 + i, intensity * intensity, lanes)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
