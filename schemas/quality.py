@@ -12,8 +12,8 @@ from kempf.schemas.faults import faults_of
 #: What a finding is of, one and several.
 FINDINGS = {
     "not_converged": ("parameter set that did not converge", "parameter sets that did not converge"),
-    "no_shared_hull": ("model that her zigzags do not share", "models that her zigzags do not share"),
-    "left_out": ("zigzag that the pooled set leaves out", "zigzags that the pooled set leaves out"),
+    "no_shared_hull": ("model that her manoeuvres do not share", "models that her manoeuvres do not share"),
+    "left_out": ("manoeuvre that the pooled set leaves out", "manoeuvres that the pooled set leaves out"),
     "no_zigzag": ("log without a zigzag", "logs without a zigzag"),
     "missing_channels": ("log in which zigzags cannot be looked for", "logs in which zigzags cannot be looked for"),
     "channels": ("log whose channels contradict each other", "logs whose channels contradict each other"),

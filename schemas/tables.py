@@ -155,7 +155,7 @@ _ALL = (
             _INGEST,
             Column("segment_id", "text", "hash of the log and the bounds"),
             _LOG,
-            Column("kind", "text", "zigzag, zigzag_broken_off, turning_circle, pull_out, spiral"),
+            Column("kind", "text", "zigzag, zigzag_broken_off, random_manoeuvre, turning_circle, pull_out, spiral"),
             Column(
                 "psi0_deg", "real", "nominal heading deviation at which the rudder is reversed; NaN: no zigzag", "deg"
             ),

@@ -44,6 +44,7 @@ STAGES: dict[Stage, Entry] = {
         (
             *("channels.instruments", "channels.doctor.examine", "channels.doctor.corrections"),
             *("channels.doctor.refused", "channels.doctor.verdict", "segment.find", "segment.find_turning"),
+            "segment.random_manoeuvre",
             *("segment.by_hand", "segment.corrections", "segment.imo", "segment.imo_turning", "segment.lateral"),
             "estimate.no_log.companions",
         ),

@@ -20,8 +20,10 @@ from kempf.warehouse.store import Warehouse
 
 _JSON = ("imo", "quality", "detail")
 
-#: Kinds a model is fitted to; every other one is kept to be looked at and to validate on.
 _ZIGZAGS = ("zigzag", "zigzag_broken_off")
+
+#: Kinds a model is fitted to; every other one is kept to be looked at and to validate on.
+_FITTED = (*_ZIGZAGS, "random_manoeuvre")
 
 
 def segment_id(log_id: str, kind: str, start_utc_ns: int, end_utc_ns: int) -> str:
@@ -71,8 +73,19 @@ class Segment:
 
     @property
     def is_zigzag(self) -> bool:
-        """Whether it is a zigzag, complete or not: what models are fitted to."""
+        """Whether it is a zigzag, complete or not."""
         return self.kind in _ZIGZAGS
+
+    @property
+    def is_fitted(self) -> bool:
+        """Whether models are fitted to it."""
+        return self.kind in _FITTED
+
+    @property
+    def words(self) -> str:
+        """What it is, in words: ``20/20 zigzag``, ``turning circle``."""
+        angles = f"{self.psi0_deg:g}/{self.delta0_deg:g} " if self.is_zigzag else ""
+        return angles + self.kind.replace("_", " ")
 
     def show(self, file_name: str) -> dict[str, Any]:
         """Return the segment as the command line's JSON object.
@@ -155,7 +168,7 @@ def replace(warehouse: Warehouse, found: Mapping[tuple[str, str], Sequence[Segme
 
 
 def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
-    """Return the zigzags found in the current ingest of each log that nobody excluded, sorted by start then id.
+    """Return what models are fitted to: of the current ingest of each log, what nobody excluded, by start, then id.
 
     Whatever is fitted, pooled, diagnosed or compared asks here, so that no turning circle is ever fitted by accident.
 
@@ -171,7 +184,7 @@ def current(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:
     NotFound
         ``no_warehouse``, ``no_vessel``.
     """
-    return [segment for segment in every(warehouse, vessel) if segment.is_zigzag]
+    return [segment for segment in every(warehouse, vessel) if segment.is_fitted]
 
 
 def every(warehouse: Warehouse, vessel: str | None = None) -> list[Segment]:

@@ -22,8 +22,8 @@ def main() -> None:
         measured_ships.take_in(warehouse, ship)
         found = diagnose_vessel(warehouse, ship.name, default_model_of(warehouse, ship.name))[0].show()
     lines = [
-        f"{len(found['fitted'])} zigzags fitted, {len(found['held_out'])} held out before anything was looked at; the "
-        "model is the one that her profile's surroundings choose.",
+        f"{len(found['fitted'])} manoeuvres fitted, {len(found['held_out'])} held out before anything was looked at: "
+        "zigzags and random manoeuvres. The model is the one that her profile's surroundings choose.",
         "",
     ]
     result_page.write("diagnose.pond_ladder", "Pond runs: the ladder", [*lines, *section(found)])

@@ -24,6 +24,9 @@ from kempf.warehouse.parameter_set import ParameterSet
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
+#: what a comparison says of a manoeuvre, beside how it was predicted
+_SAILED = ("kind", "psi0_deg", "delta0_deg", "start", "end")
+
 
 @dataclass(frozen=True, eq=False)
 class Comparison:
@@ -53,14 +56,8 @@ class Comparison:
             "horizon": self.horizon.name,
             "horizon_words": self.horizon.words,
             "runs": [
-                {
-                    **run.show(),
-                    "psi0_deg": segment.psi0_deg,
-                    "delta0_deg": segment.delta0_deg,
-                    "start": segment.show("")["start"],
-                    "end": segment.show("")["end"],
-                }
-                for run, segment in zip(self.runs, self.found, strict=True)
+                {**run.show(), **{name: sailed[name] for name in _SAILED}}
+                for run, sailed in zip(self.runs, (segment.show("") for segment in self.found), strict=True)
             ],
             "summary": summary(self.runs),
             "judged": {"sample": sample, "free_run_error_percent": error},

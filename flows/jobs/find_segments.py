@@ -1,4 +1,4 @@
-"""The job that finds the manoeuvres of one ingest, as they are stored: zigzags, and what is kept to validate on."""
+"""The job that finds the manoeuvres of one ingest, as they are stored: those fitted, and those kept to validate on."""
 
 from __future__ import annotations
 
@@ -18,7 +18,9 @@ from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo import judge
 from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.lateral import lateral_summary
+from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.pull_out import PullOut
+from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
 from kempf.pipeline.segment.spiral import Spiral
 from kempf.pipeline.segment.turning_circle import TurningCircle
 from kempf.pipeline.segment.zigzag import Zigzag
@@ -73,8 +75,11 @@ def find_segments(
     )
     manoeuvres = [_marked(one, ingest, profile, instruments) for one in marked]
     turning = find_turning(instruments, [one.zigzag for one in marked])
-    others = [_with(_kept_aside(one, ingest, profile), standing) for one in turning]
-    return manoeuvres + others, (*instruments.notes, *notes)
+    others = [_kept_aside(one, ingest, profile) for one in turning]
+    taken = [(one.start_utc_ns, one.end_utc_ns) for one in (*manoeuvres, *others)]
+    irregular = find_random(Signals.of(heading, rudder), instruments, taken)
+    others += [_random(one, ingest, profile, instruments) for one in irregular]
+    return [*manoeuvres, *(_with(one, standing) for one in others)], (*instruments.notes, *notes)
 
 
 def _marked(one: Marked, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
@@ -119,20 +124,52 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
             "overshoots": [asdict(overshoot) for overshoot in zigzag.overshoots],
             "phases": [asdict(phase) for phase in zigzag.phases],
             "speed": asdict(zigzag.speed) if zigzag.speed else None,
-            "lateral_speed": lateral_summary(instruments, zigzag),
-            # which other zigzags may help one without a log is decided before any is read again
-            "has_log": has_log(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
-            "shaft_speed_per_s": shaft_speed(instruments, zigzag.start_utc_ns, zigzag.end_utc_ns),
-            **({} if _own_time(zigzag, ingest, profile) else {"own_time": False}),
+            **_of_fitted(zigzag, ingest, profile, instruments),
         },
     )
 
 
-def _own_time(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile) -> bool:
+def _random(one: RandomManoeuvre, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
+    kind = "random_manoeuvre"
+    return Segment(
+        segment_id=segment_id(ingest.log_id, kind, one.start_utc_ns, one.end_utc_ns),
+        vessel=ingest.vessel,
+        log_id=ingest.log_id,
+        ingest_id=ingest.ingest_id,
+        kind=kind,
+        psi0_deg=nan,
+        delta0_deg=one.delta0_deg,
+        first_side=one.side,
+        base_heading_deg=one.base_heading_deg,
+        start_utc_ns=one.start_utc_ns,
+        end_utc_ns=one.end_utc_ns,
+        executes_utc_ns=one.orders_utc_ns,
+        overshoots_deg=(),
+        code_version=ingest.code_version,
+        quality={"gap_s": one.gap_s, "reasons": ()},
+        detail={"heading_range_deg": one.heading_range_deg, **_of_fitted(one, ingest, profile, instruments)},
+    )
+
+
+def _of_fitted(
+    one: Zigzag | RandomManoeuvre, ingest: Ingest, profile: VesselProfile, instruments: Instruments
+) -> dict[str, Any]:
+    """Return the detail of a manoeuvre that a model is fitted to."""
+    bounds = one.start_utc_ns, one.end_utc_ns
+    return {
+        "lateral_speed": lateral_summary(instruments, *bounds, one.base_heading_deg),
+        # which others may help one without a log is decided before any is read again
+        "has_log": has_log(instruments, *bounds),
+        "shaft_speed_per_s": shaft_speed(instruments, *bounds),
+        **({} if _own_time(one.start_utc_ns, ingest, profile) else {"own_time": False}),
+    }
+
+
+def _own_time(start_utc_ns: int, ingest: Ingest, profile: VesselProfile) -> bool:
     """Return whether the log has the time itself; one of before `CLOCK_FIRST_NS` has a clock that was never set."""
     source = profile.source_for(ingest.file_name)
     stated = source is not None and source.time is not None and source.time.stated
-    return not stated and zigzag.start_utc_ns >= CLOCK_FIRST_NS
+    return not stated and start_utc_ns >= CLOCK_FIRST_NS
 
 
 def _kept_aside(one: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: VesselProfile) -> Segment:

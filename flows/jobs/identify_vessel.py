@@ -244,8 +244,15 @@ def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
 
 
 def _point_to_current(new: Waiting, outcomes: Sequence[IdentifyOutcome], request: Request, *, adopt: bool) -> None:
-    """Let ``current`` point to the latest whole zigzag whose maximum-likelihood identification converged."""
-    whole = [o.set_id for o in outcomes if o.set_id is not None and o.segment.kind == "zigzag" and o.converged]
+    """Let ``current`` point to the latest whole zigzag whose maximum-likelihood identification converged.
+
+    Of a vessel without one, to the latest random manoeuvre.
+    """
+
+    def converged(kind: str) -> list[str]:
+        return [o.set_id for o in outcomes if o.set_id is not None and o.segment.kind == kind and o.converged]
+
+    whole = converged("zigzag") or converged("random_manoeuvre")
     if whole and request.estimator == SINGLE and new.may_move(request.spec, adopt=adopt):
         new.point(whole[-1])
 

@@ -52,7 +52,7 @@ class IngestOutcome:
     tally: Tally | None = None
     #: How it was read, and why zigzags could not be looked for, where that is so.
     notes: tuple[str, ...] = ()
-    #: Zigzags found in this log.
+    #: Manoeuvres found in this log that models are fitted to: zigzags, then random ones.
     segments: tuple[Segment, ...] = ()
     #: Manoeuvres of other kinds found in it.
     others: tuple[Segment, ...] = ()
@@ -235,8 +235,8 @@ def _outcome(
         row.ingest_id,
         row.tally,
         (*row.notes, *examination.notes),
-        tuple(segment for segment in found_segments if segment.is_zigzag),
-        tuple(segment for segment in found_segments if not segment.is_zigzag),
+        tuple(segment for segment in found_segments if segment.is_fitted),
+        tuple(segment for segment in found_segments if not segment.is_fitted),
         lost=lost.of_ingests(warehouse, [row.ingest_id]).get(row.ingest_id, ()),
         examination=examination,
     )

@@ -53,14 +53,14 @@ def quality_of(warehouse: Warehouse, vessel: str) -> list[Finding]:
 
 
 def _of_logs(warehouse: Warehouse, vessel: str, found: Iterable[segments.Segment]) -> Iterable[Finding]:
-    with_zigzag = {one.ingest_id for one in found if one.is_zigzag}
+    fitted = {one.ingest_id for one in found if one.is_fitted}
     rows = logs.current(warehouse, vessel)
     said = examinations.of_ingests(warehouse, [row.ingest_id for row in rows], [vessel])
     for row in rows:
         seen = said.get(row.ingest_id)
         if seen is not None:
             yield from (Finding("channels", row.log_id, f"{row.file_name}: {words}") for words in seen.findings[:1])
-        if row.ingest_id in with_zigzag:
+        if row.ingest_id in fitted:
             continue
         missing = [note for note in (seen.notes if seen else ()) if "zigzags cannot be looked for" in note]
         if missing:
@@ -76,7 +76,7 @@ def _of_sets(sets: Iterable[parameter_sets.Convergence]) -> Iterable[Finding]:
             yield Finding("not_converged", one.parameter_set_id, f"{what} did not converge.", one.segment_ids)
         if one.pooling.get("may_be_pooled") is False:
             said = one.pooling
-            words = f"{what}: its {said['segments']} zigzags do not share one hull (p = {said['p_value']:.1g})."
+            words = f"{what}: its {said['segments']} manoeuvres do not share one hull (p = {said['p_value']:.1g})."
             yield Finding("no_shared_hull", one.parameter_set_id, words, one.segment_ids)
         for name, why in sorted(one.left_out.items()):
             yield Finding("left_out", name, f"{what} leaves {name} out: {why}.", (name,))

@@ -101,7 +101,7 @@ def assemble(
     if not records:
         raise NotFound(
             "no_runs",
-            f"None of the {len(bounds)} zigzags can be used: "
+            f"None of the {len(bounds)} manoeuvres can be used: "
             + "; ".join(f"{name}: {why}" for name, why in sorted(skipped.items())[:5]),
             "See docs/bad_input.md for every reason and what to do about it.",
             {"skipped": skipped},

@@ -1,4 +1,4 @@
-"""The lateral speed of one zigzag in a few numbers: eq. (18), its standard error, and the check on eq. (19)."""
+"""The lateral speed of one manoeuvre in a few numbers: eq. (18), its standard error, and the check on eq. (19)."""
 
 from __future__ import annotations
 
@@ -9,19 +9,24 @@ import numpy as np
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import check_current, lateral_speed, noise_std
-from kempf.pipeline.segment.zigzag import Zigzag
 
 _NEEDED = ("speed_over_ground", "course_over_ground", "heading")
 _FEWEST = 8
 
 
-def lateral_summary(instruments: Instruments, zigzag: Zigzag) -> dict[str, Any]:
-    """Compute the lateral speed over a zigzag and summarise it.
+def lateral_summary(
+    instruments: Instruments, start_utc_ns: int, end_utc_ns: int, base_heading_deg: float
+) -> dict[str, Any]:
+    """Compute the lateral speed over a manoeuvre and summarise it.
 
     Parameters
     ----------
     instruments : Instruments
         Series of the log.
+    start_utc_ns, end_utc_ns : int
+        Bounds of the manoeuvre.
+    base_heading_deg : float
+        Heading before it, deg.
 
     Returns
     -------
@@ -31,7 +36,7 @@ def lateral_summary(instruments: Instruments, zigzag: Zigzag) -> dict[str, Any]:
         each channel and the check on eq. (19), units in the keys; where it is False, ``why``.
     """
     cut = {
-        name: series.between(zigzag.start_utc_ns, zigzag.end_utc_ns)
+        name: series.between(start_utc_ns, end_utc_ns)
         for name in (*_NEEDED, "speed_through_water")
         if (series := instruments.get(name)) is not None
     }
@@ -53,7 +58,7 @@ def lateral_summary(instruments: Instruments, zigzag: Zigzag) -> dict[str, Any]:
         lateral,
         cut["heading"],
         log if log is not None and len(log) >= _FEWEST else None,
-        _on_the_turn(np.deg2rad(zigzag.base_heading_deg), float(cut["heading"].value[0])),
+        _on_the_turn(np.deg2rad(base_heading_deg), float(cut["heading"].value[0])),
     )
     return {
         "computed": True,

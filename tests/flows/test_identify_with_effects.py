@@ -72,7 +72,7 @@ def test_a_set_names_its_model_and_plain_identification_leaves_current_where_it_
     again = run(place, "identify", "--vessel", VESSEL, "--model", pooled[:12])
     assert [one["parameter_set_id"] for one in again] == [one["parameter_set_id"] for one in identified]
     output = kempf("identify", "--vessel", VESSEL, "--model", pooled[:12], "--warehouse", place / "w")
-    assert f"2 zigzags pooled, 1 held out: {pooled}" in output.out
+    assert f"2 manoeuvres pooled, 1 held out: {pooled}" in output.out
     run(place, "identify", "--vessel", VESSEL)
     warehouse = Warehouse(str(place / "w"))
     assert aliases.of_vessel(warehouse, VESSEL) == {"current": pooled}

@@ -84,7 +84,7 @@ def test_reprocessing_keeps_the_pool_and_the_command_lists_it_last(days: Warehou
     listed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri), "--json").json
     assert [one["estimator"] for one in listed] == ["ml", "ml", "ml", POOLED]
     output = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri))
-    assert "2 zigzags pooled" in output.out and "not in it: 1 zigzag" in output.out
+    assert "2 manoeuvres pooled" in output.out and "not in it: 1 manoeuvre" in output.out
     assert len(parameter_sets.summaries(days, "mariner")) == 4
 
 
@@ -104,4 +104,4 @@ def test_the_current_set_is_named(days: Warehouse) -> None:
     (pooled,) = (s["parameter_set_id"] for s in stored if s["estimator"] == POOLED)
     printed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri)).out
     assert f"current of mariner: {pooled}, plain, pooled" in printed
-    assert printed.index("zigzags pooled") < printed.index("20/20 zigzag")
+    assert printed.index("manoeuvres pooled") < printed.index("20/20 zigzag")

@@ -87,7 +87,7 @@ def test_zigzags_that_share_no_hull_and_such_as_are_left_out(warehouse: Warehous
         ),
     )
     found = {one.kind: one.words for one in quality_of(warehouse, "mariner")}
-    assert "its 4 zigzags do not share one hull (p = 1e-09)" in found["no_shared_hull"]
+    assert "its 4 manoeuvres do not share one hull (p = 1e-09)" in found["no_shared_hull"]
     assert f"leaves {zigzag.segment_id} out: too short" in found["left_out"]
     assert marks(warehouse) == {zigzag.segment_id: ["left out of the pooled set"]}
 

@@ -86,7 +86,7 @@ def test_runs_of_one_stated_start_are_runs_of_their_own(tank: Warehouse) -> None
 
 def test_they_are_pooled_and_compared_and_what_is_left_out_is_said(tank: Warehouse) -> None:
     done = kempf("identify", "--vessel", "mariner", "--warehouse", Path(tank.uri))
-    assert "pooled" in done.out and "not in it: 1 zigzag, seg-" in done.out
+    assert "pooled" in done.out and "not in it: 1 manoeuvre, seg-" in done.out
     assert "another log holds the same manoeuvre, seg-" in done.out
     listed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(tank.uri), "--json").json
     pooled = [one for one in listed if one["estimator"] == "ml-pooled"]

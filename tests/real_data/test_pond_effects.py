@@ -42,8 +42,8 @@ def test_her_diagnosis_names_the_three_with_sizes_that_predict(pond: Voyage) -> 
     chosen = choose(pond.warehouse, vessel)
     some = ("wind_force", "propeller_wash", "cross_flow_drag", "yaw_vr2")
     diagnosis = examine(pond.warehouse, chosen, spec, NONE_OF_ONES_OWN, only=some).diagnosis
-    names = ("wind_force", "propeller_wash", "cross_flow_drag")
-    assert [step.added.name for step in diagnosis.steps[1:] if step.added is not None] == list(names)
+    names = tuple(step.added.name for step in diagnosis.steps[1:] if step.added is not None)
+    assert names == ("propeller_wash", "wind_force", "cross_flow_drag")
     assert all(step.together == names for step in diagnosis.steps[1:])
     # whether or not one step ahead anything still shows: fits one step and one leg ahead disagree
     said = sentences(diagnosis)
@@ -51,7 +51,7 @@ def test_her_diagnosis_names_the_three_with_sizes_that_predict(pond: Voyage) -> 
     assert any("still disagree" in line for line in said)
     assert any("None of the known effects explains what remains" in line for line in said) is diagnosis.something_left
     (together,) = (line for line in said if "belong together" in line)
-    assert together.startswith("Force and moment of the wind, propeller race over the rudder and cross-flow drag")
+    assert together.startswith("Propeller race over the rudder, force and moment of the wind and cross-flow drag")
     # one step ahead disturbances carry all three: the sizes are those that predict legs
     assert sum(", fitted to legs" in line for line in said) == 3
     first, last = diagnosis.steps[0].ahead, diagnosis.steps[-1].ahead

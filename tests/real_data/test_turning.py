@@ -9,6 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
+from kempf.flows.jobs.log_channels import channels_of
 from kempf.warehouse import segments
 from tests.real_data.voyage import SHARED, Voyage
 
@@ -73,8 +74,23 @@ def test_every_circle_is_found_with_the_figures_of_its_positions(pond: Voyage, n
 def test_nothing_else_is_found_on_the_pond(pond: Voyage) -> None:
     others = {name: [s.kind for s in o.others] for name, o in pond.outcomes.items() if name not in CIRCLES}
     assert set(map(tuple, others.values())) == {()}
-    assert all(s.is_zigzag for s in segments.current(pond.warehouse, pond.ship.name))
-    assert len(segments.every(pond.warehouse, pond.ship.name)) == len(segments.current(pond.warehouse)) + len(CIRCLES)
+    fitted = segments.current(pond.warehouse, pond.ship.name)
+    names = {o.log_id: name for name, o in pond.outcomes.items()}
+    for one in fitted:
+        named = names[one.log_id].partition("_")[0]
+        assert one.kind == {"zigzag": "zigzag", "random": "random_manoeuvre"}[named]
+    assert len(segments.every(pond.warehouse, pond.ship.name)) == len(fitted) + len(CIRCLES)
+
+
+def test_random_runs_are_found_where_she_goes_ahead(pond: Voyage) -> None:
+    irregular = [s for s in segments.current(pond.warehouse, pond.ship.name) if s.kind == "random_manoeuvre"]
+    assert len(irregular) == 4 and len({s.log_id for s in irregular}) == 2
+    for one in irregular:
+        channels = channels_of(pond.warehouse, one.ingest_id)
+        along = channels.series["speed_over_ground"].between(one.start_utc_ns, one.end_utc_ns).value
+        shaft = channels.series["shaft_speed"].between(one.start_utc_ns, one.end_utc_ns).value
+        assert along.min() > 0.05 and shaft.min() > -0.5
+        assert len(one.executes_utc_ns) >= 6 and one.delta0_deg == pytest.approx(35.0, abs=0.5)
 
 
 def test_zigzags_in_the_tank_are_zigzags_only(tank: Voyage) -> None:

@@ -162,7 +162,8 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
     head += ["largest overshoot error deg"]
     rows, short = [], short_ids(run["segment_id"] for run in runs)
     for run in runs:
-        row = [short[run["segment_id"]], f"{run['psi0_deg']:g}/{run['delta0_deg']:g}", run["start"][:16]]
+        angles = f"{run['psi0_deg']:g}/{run['delta0_deg']:g}" if "zigzag" in run["kind"] else "random"
+        row = [short[run["segment_id"]], angles, run["start"][:16]]
         for name in there:
             row += [_percent(run["fit_percent"].get(name)), number(run["rms_display"].get(name, {}).get("value"), 3)]
         errors = [error for error in run["overshoot_error_deg"] if error is not None]

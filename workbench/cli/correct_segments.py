@@ -174,7 +174,5 @@ def _words(planned: Planned) -> str:
 def _described(segment: Segment) -> str:
     from kempf.warehouse.instant import iso_utc
 
-    angles = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} " if segment.is_zigzag else ""
-    kind = segment.kind.replace("_", " ")
     span = f"{iso_utc(segment.start_utc_ns)[:19]} to {iso_utc(segment.end_utc_ns)[:19]}"
-    return f"{segment.segment_id} ({angles}{kind}, {span})"
+    return f"{segment.segment_id} ({segment.words}, {span})"

@@ -66,7 +66,7 @@ def command(
     else:
         if pooled is not None:
             held = len(pooled.convergence.get("held_out", ()))
-            title = f"{counted(len(pooled.segment_ids) - held, 'zigzag')} pooled"
+            title = f"{counted(len(pooled.segment_ids) - held, 'manoeuvre')} pooled"
             title += f", {held} held out: {pooled.parameter_set_id}" if held else f": {pooled.parameter_set_id}"
             tell_set(pooled, title, verbose=verbose)
             _print_alone(alone, verbose=verbose)
@@ -100,12 +100,12 @@ def _pooled(
 
 
 def _print_alone(alone: dict[str, str], *, verbose: bool) -> None:
-    """Say which zigzags are not in the pooled set, those of one reason together."""
+    """Say which manoeuvres are not in the pooled set, those of one reason together."""
     for why in dict.fromkeys(alone.values()):
         names = [name for name, reason in alone.items() if reason == why]
         more = f" and {len(names) - MOST} more" if len(names) > MOST and not verbose else ""
         shown = names if verbose else names[:MOST]
-        click.echo(f"  not in it: {counted(len(names), 'zigzag')}, {', '.join(shown)}{more}: {why}")
+        click.echo(f"  not in it: {counted(len(names), 'manoeuvre')}, {', '.join(shown)}{more}: {why}")
 
 
 def _print_current(warehouse: Warehouse, vessel: str, pooled: ParameterSet | None) -> None:
@@ -118,7 +118,7 @@ def _print_current(warehouse: Warehouse, vessel: str, pooled: ParameterSet | Non
         click.echo(f"current of {vessel}: no set; none of them converged")
         return
     name, model = current.parameter_set_id, current.model_name
-    what = "pooled" if len(current.segment_ids) > 1 else "one zigzag"
+    what = "pooled" if len(current.segment_ids) > 1 else "one manoeuvre"
     click.echo(f"current of {vessel}: {name}, {model}, {what}")
     if pooled is not None and pooled.parameter_set_id != name:
         click.echo(f"  it stays; to have the pooled one: kempf params alias current {pooled.parameter_set_id}")
@@ -135,7 +135,7 @@ def _show(outcome: IdentifyOutcome, alone: dict[str, str]) -> object:
 
 def _print_outcome(outcome: IdentifyOutcome, *, verbose: bool) -> None:
     segment = outcome.segment
-    named = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} zigzag {segment.segment_id}"
+    named = f"{segment.words} {segment.segment_id}"
     if outcome.parameter_set is None:
         assert outcome.error is not None
         click.echo(f"{named}: not identified [{outcome.error.code}] {outcome.error}", err=True)

@@ -131,7 +131,10 @@ def _found(outcome: IngestOutcome) -> str:
     found = [
         f"{s.psi0_deg:g}/{s.delta0_deg:g} to {s.first_side}{' (broken off)' if s.kind != 'zigzag' else ''}"
         for s in outcome.segments
+        if s.is_zigzag
     ]
-    zigzags = f"{counted(len(found), 'zigzag')}: {', '.join(found)}" if found else "no zigzag"
-    others = [f"{s.kind.replace('_', ' ')} with {s.delta0_deg:.3g} deg to {s.first_side}" for s in outcome.others]
-    return "; ".join([zigzags, *([f"kept for validation: {', '.join(others)}"] if others else [])])
+    irregular = len(outcome.segments) - len(found)
+    said = [f"{counted(len(found), 'zigzag')}: {', '.join(found)}" if found else "no zigzag"]
+    said += [counted(irregular, "random manoeuvre")] if irregular else []
+    others = [f"{s.words} with {s.delta0_deg:.3g} deg to {s.first_side}" for s in outcome.others]
+    return "; ".join([*said, *([f"kept for validation: {', '.join(others)}"] if others else [])])

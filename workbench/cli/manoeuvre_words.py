@@ -37,6 +37,9 @@ def headline(segment: Segment) -> str:
     if segment.kind == "turning_circle":
         turned = abs(float(segment.detail["heading_change_deg"]))
         return f"turning circle, rudder {rudder}, turned {turned:.0f} deg, track from {segment.detail['track']}"
+    if segment.kind == "random_manoeuvre":
+        orders, range_deg = len(segment.executes_utc_ns), segment.detail["heading_range_deg"]
+        return f"random manoeuvre, {orders} orders of up to {rudder}, headings over {range_deg:.0f} deg"
     if segment.kind == "pull_out":
         verdict = segment.detail["verdict"]
         pair = {
@@ -52,11 +55,8 @@ def headline(segment: Segment) -> str:
 def figures(segment: Segment) -> list[str]:
     """Return its figures, one sentence each, and what is to be known before trusting them."""
     length = segment.detail.get("length_m")
-    lines = [
-        _figure(_WORDS[name], name, segment.detail["figures"][name], length)
-        for name in _WORDS
-        if name in segment.detail["figures"]
-    ]
+    known = segment.detail.get("figures", {})
+    lines = [_figure(_WORDS[name], name, known[name], length) for name in _WORDS if name in known]
     for point in segment.detail.get("points", ()):
         rate = point["yaw_rate_deg_s"]
         steady = "" if point["steady"] else ", not steady yet"

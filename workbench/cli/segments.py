@@ -81,7 +81,7 @@ def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str]) -> None
         [
             short[s.segment_id],
             s.vessel,
-            f"{s.psi0_deg:g}/{s.delta0_deg:g}" + ("" if s.kind == "zigzag" else f" {s.kind.replace('_', ' ')}"),
+            f"{s.psi0_deg:g}/{s.delta0_deg:g}" if s.kind == "zigzag" else s.words,
             s.first_side,
             number(s.base_heading_deg),
             iso_utc(s.start_utc_ns)[:16],
@@ -96,12 +96,13 @@ def _print_zigzags(zigzags: Sequence[Segment], short: Mapping[str, str]) -> None
 
 
 def _print_other(segment: Segment, short: str) -> None:
-    """Print a manoeuvre that no model is fitted to: what it was, then a figure a line, 95 % intervals in brackets."""
+    """Print a manoeuvre that is no zigzag: what it was, then a figure a line, 95 % intervals in brackets."""
     from kempf.warehouse.instant import iso_utc
     from kempf.workbench.cli.manoeuvre_words import figures, headline
 
     start = iso_utc(segment.start_utc_ns)[:16]
-    click.echo(f"{short} {segment.vessel} {start}, kept for validation: {headline(segment)}")
+    use = "fitted" if segment.is_fitted else "kept for validation"
+    click.echo(f"{short} {segment.vessel} {start}, {use}: {headline(segment)}")
     for line in figures(segment):
         click.echo(f"  {line}")
 

@@ -35,7 +35,7 @@ def draw_zigzag(shown: ManoeuvreEvidence, psi0_deg: float, allowed: Mapping[int,
     Parameters
     ----------
     psi0_deg : float
-        Nominal heading deviation.
+        Nominal heading deviation; NaN where no zigzag was sailed.
     allowed : mapping of int to float
         Of `limits`.
     first, last : str
@@ -45,7 +45,7 @@ def draw_zigzag(shown: ManoeuvreEvidence, psi0_deg: float, allowed: Mapping[int,
         figure = framed_figure(3.8, legend_in=0.25)
         panel = figure.subplots()
         panel.axhline(0.0, color=INK, lw=0.5)
-        for side in (-1, 1):
+        for side in (-1, 1) if np.isfinite(psi0_deg) else ():
             panel.axhline(side * psi0_deg, color=FAINT, lw=0.8, ls=":")
         panel.plot(shown.time_s, np.degrees(shown.rudder), color=FAINT, lw=1.1, label="rudder")
         panel.plot(shown.time_s, np.degrees(shown.heading_deviation), color=INK, lw=1.6, label="heading, measured")

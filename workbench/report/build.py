@@ -109,12 +109,11 @@ def content_of(
     shown = []
     for number, one in enumerate(evidence.manoeuvres, start=1):
         segment = segments[one.segment_id]
-        angles = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} zigzag, {segment.first_side} first"
         start = iso_utc(one.start_utc_ns)[:16].replace("T", " ")
         shown.append(
             ShownManoeuvre(
                 number=number,
-                label=f"Manoeuvre {number}: {angles}, {start} UTC",
+                label=f"Manoeuvre {number}: {segment.words}, {segment.first_side} first, {start} UTC",
                 log=chosen.file_names[segment.log_id],
                 psi0_deg=segment.psi0_deg,
                 imo=segment.imo,

@@ -16,10 +16,9 @@ _MOST = 40
 
 def span_of(one: Segment) -> dict[str, Any]:
     """Return what a chart draws of a manoeuvre: its span and its executes."""
-    name = (f"{one.psi0_deg:g}/{one.delta0_deg:g} " if one.is_zigzag else "") + one.kind.replace("_", " ")
     return {
         "kind": "manoeuvre",
-        "words": name + (" (excluded)" if one.excluded is not None else ""),
+        "words": one.words + (" (excluded)" if one.excluded is not None else ""),
         "from": iso_utc(one.start_utc_ns),
         "to": iso_utc(one.end_utc_ns),
         "executes": [iso_utc(t) for t in one.executes_utc_ns],
