@@ -10,6 +10,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+from numba.core.caching import _CacheLocator
+
 from tests.scale.servers import ROOT, environment
 
 DOCKERFILE = ROOT / "deploy" / "Dockerfile"
@@ -80,15 +82,18 @@ def build(root: Path, given: Mapping[str, str]) -> Image:  # noqa: PLR0912 - a b
         elif word == "ENV":
             name, _, value = rest.partition("=")
             settings[name] = value
+            if name == "NUMBA_CACHE_DIR" and stages == 1:
+                _lay_kernels(root, Path(within(root, value)))
         elif word == "COPY" and rest.startswith("--from="):
-            _, source, target = rest.split()
+            source, target = (one for one in rest.split() if not one.startswith("--"))
             assert source == target and (root / source.lstrip("/")).exists(), "it is there already: one folder for both"
         elif word == "COPY":
             *sources, target = rest.split()
             for source in sources:
                 _copy(ROOT / source, here / target / Path(source).name if target.endswith("/") else here / target)
         elif word == "RUN" and stages == 1:
-            env = {k: v for k, v in environment(**arguments).items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
+            kept = {name: within(root, value) for name, value in settings.items()}
+            env = {k: v for k, v in environment(**arguments, **kept).items() if k not in ("PYTHONPATH", "VIRTUAL_ENV")}
             done = subprocess.run(
                 ["sh", "-c", within(root, rest)], cwd=here, env=env, capture_output=True, text=True, check=False
             )
@@ -101,6 +106,19 @@ def build(root: Path, given: Mapping[str, str]) -> Image:  # noqa: PLR0912 - a b
     for name in ("home/kempf", "tmp"):
         (root / name).mkdir(parents=True, exist_ok=True)
     return Image(root, settings)
+
+
+def _lay_kernels(root: Path, folder: Path) -> None:
+    """Put the kernels that the tests run on where the image's own are looked for, as a builder with a cache has them.
+
+    They are found again by what went into them, so that only those whose code differs are compiled.
+    """
+    (package,) = root.glob("opt/kempf/lib/*/site-packages/kempf/pipeline")
+    for kernel in (ROOT / "pipeline").rglob("*.nb[ic]"):
+        there = package / kernel.parent.relative_to(ROOT / "pipeline").parent
+        place = folder / _CacheLocator.get_suitable_cache_subpath(str(there / "any.py"))
+        place.mkdir(parents=True, exist_ok=True)
+        shutil.copy(kernel, place)
 
 
 def _copy(source: Path, target: Path) -> None:

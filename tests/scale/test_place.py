@@ -127,7 +127,15 @@ def version() -> str:
     return str(tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]["version"])
 
 
+def kernels(place: Place) -> set[Path]:
+    """What is compiled for the services."""
+    found = set(Path(place.here("/opt/kernels")).rglob("*.nbc"))
+    assert len(found) > 50
+    return found
+
+
 def test_a_night_from_the_inbox_to_the_dashboard(place: Place) -> None:
+    compiled = kernels(place)
     page = place.here("http://prefect:4200")
     assert json.loads(answer(f"{page}/ui-settings"))["api_url"] == f"{page}/api"
     assert b"<html" in answer(page).lower()
@@ -140,6 +148,7 @@ def test_a_night_from_the_inbox_to_the_dashboard(place: Place) -> None:
     assert all(any(f"{name}: changed" in text for name in VESSELS) for text in did), "each of the two had a share"
     listed = place.run("worker", "kempf", "params", "list", "--json")
     assert {one["vessel"] for one in json.loads(listed.stdout)} == set(VESSELS), listed
+    assert kernels(place) == compiled, "the image has them"
     place.start("tables")
     folder = Path(place.here("/data/kempf-tables"))
     wait_for((folder / "run_history.parquet").exists, 120.0)
