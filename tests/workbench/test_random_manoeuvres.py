@@ -89,6 +89,7 @@ def test_it_is_compared_and_shown_as_they_are(identified: tuple[Path, Ran], tmp_
             for page in ("/v/ferry", f"/segments/{name}", f"/v/ferry/model?run={name}"):
                 shown = client.get(page)
                 assert shown.status_code == 200 and "random manoeuvre" in shown.text, (page, shown.text[:400])
+            assert "Explain this stretch" in client.get(f"/segments/{name}").text
     finally:
         keeper.stop()
 

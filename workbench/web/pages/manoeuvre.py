@@ -47,7 +47,8 @@ def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
     begin, end = window(asked.get("from"), asked.get("to"), first, last)
     hers = notes.of_vessel(desk.warehouse, row.vessel)
     gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
-    current = aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel)
+    compared = one.is_fitted and one.excluded is None
+    current = compared and aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel)
     content: dict[str, Any] = {
         "one": shown,
         "log_id": row.log_id,
