@@ -307,7 +307,7 @@ class CommonLikelihood:
         """Return u and J of every run, those of the highest point so far without computing them anew."""
         if np.array_equal(theta, self.top):
             return self.lines
-        return self._linearised(theta, self._passed(theta))
+        return linearise(self.filtered, self._points(theta), self.workers)
 
     def error_at(self, theta: Float) -> float:
         """Return the error one step ahead, see `one_step_error`.
@@ -354,13 +354,14 @@ class CommonLikelihood:
         """Ask the extended filter of every run.
 
         A search takes no step that does not rise above all before, so that nobody asks for the derivatives of a point
-        no higher than the highest: they are left at 0, a dozen passes each spared.
+        no higher than the highest: they are left at 0.
         """
-        bases = self._passed(theta)
-        value = sum(base.log_likelihood for base in bases) - self._loss(theta)
+        points = self._points(theta)
+        begun = _begun(self.filtered, points, self.workers)
+        value = sum(base.log_likelihood for base, _ in begun) - self._loss(theta)
         if not np.isfinite(value) or value <= self.highest:
             return value if np.isfinite(value) else -np.inf, []
-        lines = self._linearised(theta, bases)
+        lines = _finished(self.filtered, points, begun, self.workers)
         parts = []
         for line in lines:
             J = np.zeros((line.u.size, self.shared + N_LEVELS))
@@ -375,12 +376,11 @@ class CommonLikelihood:
     def _loss(self, theta: Float) -> float:
         return 0.0 if self.before is None else self.before.loss(theta[: self.shared])
 
-    def _passed(self, theta: Float) -> list[Passed]:
-        numbers = range(len(self.filtered))
-        return list(self.workers.map(lambda i: sensitivity.passed(self.filtered[i], self.point(theta, i)), numbers))
+    def _points(self, theta: Float) -> list[Point]:
+        return [self.point(theta, i) for i in range(len(self.filtered))]
 
-    def _linearised(self, theta: Float, bases: Sequence[Passed]) -> tuple[Linearised, ...]:
-        return linearise(self.filtered, [self.point(theta, i) for i in range(len(bases))], bases, self.workers)
+    def _passed(self, theta: Float) -> list[Passed]:
+        return list(self.workers.map(sensitivity.passed, self.filtered, self._points(theta)))
 
 
 def _nothing(shared: int, runs: int) -> Arrow:
@@ -390,27 +390,47 @@ def _nothing(shared: int, runs: int) -> Arrow:
     )
 
 
-def linearise(
-    filtered: Sequence[RunFilter], points: Sequence[Point], bases: Sequence[Passed], workers: Executor
+def linearise(filtered: Sequence[RunFilter], points: Sequence[Point], workers: Executor) -> tuple[Linearised, ...]:
+    """Return u and J of every run at its point."""
+    return _finished(filtered, points, _begun(filtered, points, workers), workers)
+
+
+#: the pass of a run, and those columns of J that one group of lanes gives beside it
+_Begun = tuple[Passed, list[Float]]
+
+
+def _begun(filtered: Sequence[RunFilter], points: Sequence[Point], workers: Executor) -> list[_Begun]:
+    def one(run: RunFilter, point: Point) -> _Begun:
+        base, columns = sensitivity.with_columns(run, point, sensitivity.active(run)[: MOST - 1])
+        return base, columns if np.isfinite(base.log_likelihood) else []
+
+    return list(workers.map(one, filtered, points))
+
+
+def _finished(
+    filtered: Sequence[RunFilter], points: Sequence[Point], begun: Sequence[_Begun], workers: Executor
 ) -> tuple[Linearised, ...]:
-    """Return u and J of every run at its point, ``bases`` being the passes there."""
     # a group of lanes of one run is the smallest piece of work: so three runs keep two cores busy
     jobs: list[tuple[int, list[int]]] = []
-    for i, (one, base) in enumerate(zip(filtered, bases, strict=True)):
+    for i, (base, columns) in enumerate(begun):
         if np.isfinite(base.log_likelihood):
-            wanted = sensitivity.active(one)
-            jobs += [(i, wanted[k : k + MOST]) for k in range(0, len(wanted), MOST)]
-    made = workers.map(lambda job: sensitivity.columns(filtered[job[0]], points[job[0]], bases[job[0]], job[1]), jobs)
-    found: list[list[tuple[int, Float]]] = [[] for _ in bases]
-    for (i, wanted), columns in zip(jobs, made, strict=True):
-        found[i] += zip(wanted, columns, strict=True)
-    return tuple(_line(base, own) for base, own in zip(bases, found, strict=True))
+            rest = sensitivity.active(filtered[i])[len(columns) :]
+            jobs += [(i, rest[k : k + MOST]) for k in range(0, len(rest), MOST)]
+
+    def more(job: tuple[int, list[int]]) -> list[Float]:
+        i, wanted = job
+        return sensitivity.columns(filtered[i], points[i], begun[i][0], wanted)
+
+    found = [list(columns) for _, columns in begun]
+    for (i, _), columns in zip(jobs, workers.map(more, jobs), strict=True):
+        found[i] += columns
+    return tuple(_line(run, base, own) for run, (base, _), own in zip(filtered, begun, found, strict=True))
 
 
-def _line(base: Passed, columns: Sequence[tuple[int, Float]]) -> Linearised:
+def _line(run: RunFilter, base: Passed, columns: Sequence[Float]) -> Linearised:
     if not columns:
         return Linearised(base, np.zeros(0), np.zeros((0, 0)), [])
-    J = np.column_stack([column for _, column in columns])
+    J = np.column_stack(columns)
     # a filter that runs away beside its point shows no slope there, and its square is no number
     J = np.where(np.abs(J) < _STEEPEST, J, 0.0)
-    return Linearised(base, sensitivity.whitened(base), J, [index for index, _ in columns])
+    return Linearised(base, sensitivity.whitened(base), J, sensitivity.active(run))

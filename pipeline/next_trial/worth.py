@@ -17,7 +17,7 @@ from scipy.stats import norm
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.search.block_arrow import inverse
-from kempf.pipeline.estimate.sensitivity import N_HULL, Point, active, columns, passed, whitened
+from kempf.pipeline.estimate.sensitivity import N_HULL, Point, active, whitened, with_columns
 
 #: so often a manoeuvre may be repeated
 _MOST = 64
@@ -35,9 +35,8 @@ class Known:
 
 def information(filtered: RunFilter, point: Point) -> Float:
     """Return the expected information of a run on hull and effects, its noise levels unknown, shape (6 + p, 6 + p)."""
-    wanted = active(filtered)
-    base = passed(filtered, point)
-    J = np.column_stack(columns(filtered, point, base, wanted))
+    _, columns = with_columns(filtered, point, active(filtered))
+    J = np.column_stack(columns)
     whole, shared = J.T @ J, N_HULL + point.values.size
     across, levels = whole[:shared, shared:], whole[shared:, shared:]
     found: Float = whole[:shared, :shared] - across @ inverse(levels) @ across.T
@@ -76,12 +75,12 @@ def apart(filtered: RunFilter, point: Point, known: Known) -> float:
     point : Point
         Where this model stands.
     """
-    base = passed(filtered, point)
+    base, columns = with_columns(filtered, point, known.index)
     u = whitened(base)
     m = u.size // 2
     # the mean of what is measured differs, its spread hardly
     z = u[:m]
-    J = np.column_stack(columns(filtered, point, base, known.index))[:m]
+    J = np.column_stack(columns)[:m]
     pull = J.T @ z
     left = float(z @ z - pull @ inverse(J.T @ J + inverse(known.covariance)) @ pull)
     return max(left, 0.0)

@@ -11,7 +11,7 @@ from kempf.pipeline.diagnose.effect_score import grid
 from kempf.pipeline.diagnose.ridge_reference import TERMS
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise
-from kempf.pipeline.estimate.sensitivity import Point, passed
+from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.batch import MOST
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
@@ -30,7 +30,7 @@ def base() -> PooledFit:
     runs = tuple(RunFilter(run, model, spec) for run in sailed("none").runs[:2])
     hull, values = mariner_like(runs[0].run.ship.length_m).array(), np.array([-0.01])
     points = [Point(hull, values, LEVELS) for _ in runs]
-    lines = linearise(runs, points, [passed(run, point) for run, point in zip(runs, points, strict=True)], WORKERS)
+    lines = linearise(runs, points, WORKERS)
     levels = np.stack([LEVELS, LEVELS])
     stated = (0.0, np.full((7, 7), np.nan), tuple(lines), True, "", 0)
     return PooledFit(model, runs, hull, values, levels, *stated)

@@ -13,7 +13,7 @@ from kempf.pipeline.estimate import pooled_fit
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise
 from kempf.pipeline.estimate.record.grid_run import GridRun
-from kempf.pipeline.estimate.sensitivity import Point, passed
+from kempf.pipeline.estimate.sensitivity import Point
 from kempf.pipeline.model.effect_model import EffectModel
 from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effects import catalogue
@@ -40,7 +40,7 @@ def scored(run: GridRun, truth: np.ndarray, seed: int, name: str) -> Candidate:
     filtered = RunFilter(replace(run, measured=truth + noise), EffectModel(), STILL)
     hull = mariner_like(run.ship.length_m).array()
     point = Point(hull, np.zeros(0), LEVELS)
-    (line,) = linearise((filtered,), (point,), (passed(filtered, point),), WORKERS)
+    (line,) = linearise((filtered,), (point,), WORKERS)
     base = PooledFit(
         *(EffectModel(), (filtered,), hull, np.zeros(0), LEVELS[None, :], line.passed.log_likelihood),
         *(np.full((6, 6), np.nan), (line,), True, "", 0),

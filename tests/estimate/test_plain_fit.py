@@ -13,7 +13,7 @@ import pytest
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate import sensitivity
 from kempf.pipeline.estimate.agreement import LEVEL
-from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.filtered import Passed, RunFilter
 from kempf.pipeline.estimate.maximum_likelihood import STANDARD, identify
 from kempf.pipeline.estimate.plain_fit import PlainFit, fit_plain, off_in_std
 from kempf.pipeline.estimate.pooled_fit import CommonLikelihood, linearise
@@ -63,18 +63,17 @@ def test_a_filter_that_runs_away_beside_its_point_shows_no_slope_there(
     three: PlainFit, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Its square is no number, and one eigenvalue that is none ended a diagnosis."""
-    fit, columns = three.fit, sensitivity.columns
+    fit, with_columns = three.fit, sensitivity.with_columns
 
-    def astray(*given: Any) -> list[Float]:
-        found = columns(*given)
+    def astray(*given: Any) -> tuple[Passed, list[Float]]:
+        base, found = with_columns(*given)
         found[0] = found[0].copy()
         found[0][:3] = np.inf, 1e200, np.nan
-        return found
+        return base, found
 
-    monkeypatch.setattr(sensitivity, "columns", astray)
+    monkeypatch.setattr(sensitivity, "with_columns", astray)
     with ThreadPoolExecutor(2) as workers:
-        points, bases = [fit.point(k) for k in range(3)], [one.passed for one in fit.linearised]
-        lines = linearise(fit.runs, points, bases, workers)
+        lines = linearise(fit.runs, [fit.point(k) for k in range(3)], workers)
     for line, before in zip(lines, fit.linearised, strict=True):
         assert not np.any(line.J[:3, 0])
         np.testing.assert_array_equal(line.J[3:], before.J[3:])
