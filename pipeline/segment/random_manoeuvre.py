@@ -91,14 +91,23 @@ def find_random(
     ----------
     Wakita et al. 2022, doi 10.1007/s00773-021-00867-1; Miyauchi et al. 2022, doi 10.1007/s00773-022-00889-3.
     """
-    held = held_stretches(signals.rudder_s, signals.rudder, 0, signals.rudder.size, signals.rudder_noise)
     occupied = [tuple((ns - signals.origin_ns) * 1e-9 for ns in bounds) for bounds in taken]
     found = []
     for span in _without(_ahead(signals, instruments), occupied):
-        inside = [one for one in held if span[0] <= one.start_s <= span[1]]
+        inside = _held_in(signals, span)
         orders = [after for before, after in pairwise(inside) if _is_order(before.rudder, after.rudder)]
         found += [one for part in _unpaused(orders) if (one := _described(signals, span, inside, part)) is not None]
     return found
+
+
+def _held_in(signals: Signals, span: Span) -> list[HeldRudder]:
+    """Return the angles at which the rudder is held, each begun within a stretch of time; none where all are small."""
+    first, behind = np.searchsorted(signals.rudder_s, span)
+    # most of a voyage is not worth a closer look
+    if not bool(np.any(np.abs(signals.rudder[first:behind]) >= _ORDER_RAD)):
+        return []
+    held = held_stretches(signals.rudder_s, signals.rudder, int(first), int(behind), signals.rudder_noise)
+    return held[1:] if held and first and held[0].first == first else held
 
 
 def _is_order(before: float, after: float) -> bool:
