@@ -160,7 +160,7 @@ def _ahead(signals: Signals, instruments: Instruments) -> list[Span]:
     enough = _SLOWEST_SHARE * float(np.percentile(speed.value, _HARDLY_EXCEEDED))
     spans = _spans(speed.time_utc_ns, speed.value >= enough, signals) if enough > 0.0 else []
     shaft = instruments.get("shaft_speed")
-    if shaft is None:
+    if shaft is None or not len(shaft):
         return spans
     astern = _NOT_ASTERN * float(np.percentile(np.abs(shaft.value), _HARDLY_EXCEEDED))
     turning = _spans(shaft.time_utc_ns, shaft.value >= -astern, signals)

@@ -42,7 +42,7 @@ class VesselView:
     name: str
 
     def segments(self) -> pl.DataFrame:
-        """Return the zigzags in her logs, one row each, in order of time."""
+        """Return the manoeuvres in her logs that models are fitted to, one row each, in order of time."""
         from kempf.warehouse import logs, segments
 
         files = {row.ingest_id: row.file_name for row in logs.current(self.warehouse, self.name)}
