@@ -18,7 +18,6 @@ from kempf.pipeline.segment.find_turning import find_turning
 from kempf.pipeline.segment.imo import judge
 from kempf.pipeline.segment.imo_turning import judge_circle
 from kempf.pipeline.segment.lateral import lateral_summary
-from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.pull_out import PullOut
 from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
 from kempf.pipeline.segment.spiral import Spiral
@@ -77,8 +76,7 @@ def find_segments(
     turning = find_turning(instruments, [one.zigzag for one in marked])
     others = [_kept_aside(one, ingest, profile) for one in turning]
     taken = [(one.start_utc_ns, one.end_utc_ns) for one in (*manoeuvres, *others)]
-    irregular = find_random(Signals.of(heading, rudder), instruments, taken)
-    others += [_random(one, ingest, profile, instruments) for one in irregular]
+    others += [_random(one, ingest, profile, instruments) for one in find_random(instruments, taken)]
     return [*manoeuvres, *(_with(one, standing) for one in others)], (*instruments.notes, *notes)
 
 

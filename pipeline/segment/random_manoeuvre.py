@@ -23,6 +23,9 @@ from kempf.pipeline.segment.zigzag import Side
 #: rad: keeping and regaining a course takes less.
 _ORDER_RAD = float(np.deg2rad(15.0))
 
+#: Fewest values of heading and of rudder.
+_FEWEST_VALUES = 5
+
 #: Fewest orders.
 _FEWEST_ORDERS = 6
 
@@ -32,8 +35,8 @@ _LONGEST_PAUSE = 4.0
 #: Smallest range of the heading, rad: orders that do not turn her say nothing.
 _TURNED_RAD = float(np.deg2rad(30.0))
 
-#: Slowest way, as a share of the speed that the log hardly exceeds. A steady circle takes two thirds of the approach
-#: speed of a full ship; below it she is stopping, or gathering way.
+#: Slowest way, as a share of the speed that the log hardly exceeds. Hard over a full ship keeps a third of her approach
+#: speed; below that she is stopping, or gathering way.
 _SLOWEST_SHARE, _HARDLY_EXCEEDED = 0.3, 90.0
 
 #: Shaft speed astern up to which a shaft counts as stopped, as a share of the one that the log hardly exceeds.
@@ -67,30 +70,30 @@ class RandomManoeuvre:
     gap_s: float
 
 
-def find_random(
-    signals: Signals, instruments: Instruments, taken: Sequence[tuple[int, int]] = ()
-) -> list[RandomManoeuvre]:
+def find_random(instruments: Instruments, taken: Sequence[tuple[int, int]] = ()) -> list[RandomManoeuvre]:
     """Find every random manoeuvre in a log.
 
     Parameters
     ----------
-    signals : Signals
-        Heading and rudder.
     instruments : Instruments
-        For the way through the water, else over ground, and the shaft speed where it is recorded. A log without any
-        speed has none.
+        Series of the log: heading and rudder angle, the way through the water, else over ground, and the shaft speed
+        where it is recorded.
     taken : sequence of (int, int)
         Bounds of the manoeuvres that were found before, UTC nanoseconds: nothing of theirs is used again.
 
     Returns
     -------
     list of RandomManoeuvre
-        In order of time.
+        In order of time; empty where there is none, or heading, rudder or any speed are missing.
 
     References
     ----------
     Wakita et al. 2022, doi 10.1007/s00773-021-00867-1; Miyauchi et al. 2022, doi 10.1007/s00773-022-00889-3.
     """
+    heading, rudder = instruments.get("heading"), instruments.get("rudder_angle")
+    if heading is None or rudder is None or len(heading) < _FEWEST_VALUES or len(rudder) < _FEWEST_VALUES:
+        return []
+    signals = Signals.of(heading, rudder)
     occupied = [tuple((ns - signals.origin_ns) * 1e-9 for ns in bounds) for bounds in taken]
     found = []
     for span in _without(_ahead(signals, instruments), occupied):
@@ -164,8 +167,21 @@ def _ahead(signals: Signals, instruments: Instruments) -> list[Span]:
         return spans
     astern = _NOT_ASTERN * float(np.percentile(np.abs(shaft.value), _HARDLY_EXCEEDED))
     turning = _spans(shaft.time_utc_ns, shaft.value >= -astern, signals)
-    both = [(max(a, c), min(b, d)) for a, b in spans for c, d in turning]
-    return [(begin, end) for begin, end in both if begin < end]
+    return _common(spans, turning)
+
+
+def _common(spans: Sequence[Span], others: Sequence[Span]) -> list[Span]:
+    """Return the stretches of time that two series of them share; each is in order of time, without overlaps."""
+    found, k, j = [], 0, 0
+    while k < len(spans) and j < len(others):
+        begin, end = max(spans[k][0], others[j][0]), min(spans[k][1], others[j][1])
+        if begin < end:
+            found.append((begin, end))
+        if spans[k][1] <= others[j][1]:
+            k += 1
+        else:
+            j += 1
+    return found
 
 
 def _way(instruments: Instruments) -> Series | None:

@@ -9,7 +9,6 @@ from kempf.pipeline.channels.instruments import Instruments as Channels
 from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.find import find_manoeuvres
 from kempf.pipeline.segment.find_turning import find_turning
-from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
@@ -33,7 +32,7 @@ def found_in(ship: Ship, speed: Series | None = None, shaft: Series | None = Non
     channels = Channels(series, {}, ())
     before = [*(found := find_manoeuvres(heading, rudder)), *find_turning(channels, found)]
     taken = [(one.start_utc_ns, one.end_utc_ns) for one in before]
-    return find_random(Signals.of(heading, rudder), channels, taken)
+    return find_random(channels, taken)
 
 
 def constant(ship: Ship, value: float) -> Series:
@@ -127,10 +126,23 @@ def test_over_ground_it_is_the_way_along_the_ship_that_counts() -> None:
     heading, rudder = measure(ship, Instruments())
     ground = constant(ship, 5.0)
     over = np.interp(ground.time_utc_ns, heading.time_utc_ns, heading.value)
-    signals = Signals.of(heading, rudder)
     base = {"heading": heading, "rudder_angle": rudder, "speed_over_ground": ground}
     ahead = Channels({**base, "course_over_ground": Series(ground.time_utc_ns, over)}, {}, ())
     astern = Channels({**base, "course_over_ground": Series(ground.time_utc_ns, over + np.pi)}, {}, ())
-    assert len(find_random(signals, ahead)) == 1 == len(find_random(signals, Channels(base, {}, ())))
-    assert find_random(signals, astern) == []
-    assert find_random(signals, Channels({"heading": heading, "rudder_angle": rudder}, {}, ())) == []
+    assert len(find_random(ahead)) == 1 == len(find_random(Channels(base, {}, ())))
+    assert find_random(astern) == []
+
+
+def test_without_what_it_takes_there_is_none() -> None:
+    ship = Ship()
+    ship.wait(0.0, 200.0)
+    at_random(ship, 12, 4)
+    heading, rudder = measure(ship, Instruments())
+    whole = {"heading": heading, "rudder_angle": rudder, "speed_through_water": constant(ship, 5.0)}
+    assert len(find_random(Channels(whole, {}, ()))) == 1
+    nothing = Series(heading.time_utc_ns[:0], heading.value[:0])
+    for name in whole:
+        assert find_random(Channels({k: v for k, v in whole.items() if k != name}, {}, ())) == []
+        assert find_random(Channels({**whole, name: nothing}, {}, ())) == []
+    # a shaft that never wrote says nothing against it
+    assert len(find_random(Channels({**whole, "shaft_speed": nothing}, {}, ()))) == 1
