@@ -92,13 +92,13 @@ def pond(data: Path, workers: Executor) -> list[str]:
         model = climbed(shooting, names)[-1]
         ours = [_cells([misfits(model, windows, made.spec)]) for windows in (shooting.held, turned)]
         rows.append([" + ".join(("plain", *names)), held, *ours[0], circle, *ours[1]])
-    head = ["model", "zigzags held out: prototype", "ours, states as measured", "ours, states fitted"]
+    head = ["model", "held out: prototype (zigzags)", "ours, states as measured", "ours, states fitted"]
     head += ["circles: prototype", "ours, states as measured", "ours, states fitted"]
     return [
         "## The prototype's models of the ship on a pond",
         "",
-        f"{len(chosen)} zigzags fitted, {len(apart)} held out, {len(turned)} circles never fitted ({refused} more hold "
-        "one order of the rudder alone, which makes no record), windows of "
+        f"{len(chosen)} manoeuvres fitted, zigzags and random ones, {len(apart)} held out, {len(turned)} circles not "
+        f"({refused} more hold one order of the rudder alone, which makes no record), windows of "
         f"{shooting.horizon_s:.3g} s, units of 0.01 m/s, 0.3 deg/s and 2 deg. The prototype's: 6 zigzags and 2 random "
         "runs fitted, 3 zigzags held out, 15 circles.",
         "",
