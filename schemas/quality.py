@@ -14,7 +14,7 @@ FINDINGS = {
     "not_converged": ("parameter set that did not converge", "parameter sets that did not converge"),
     "no_shared_hull": ("model that her manoeuvres do not share", "models that her manoeuvres do not share"),
     "left_out": ("manoeuvre that the pooled set leaves out", "manoeuvres that the pooled set leaves out"),
-    "no_zigzag": ("log without a zigzag", "logs without a zigzag"),
+    "no_zigzag": ("log without a manoeuvre to fit", "logs without a manoeuvre to fit"),
     "missing_channels": ("log in which zigzags cannot be looked for", "logs in which zigzags cannot be looked for"),
     "channels": ("log whose channels contradict each other", "logs whose channels contradict each other"),
 }
@@ -48,7 +48,7 @@ class Quality(Limits):
 
 
 def in_words(kind: str, count: int) -> str:
-    """Return how many findings there are of a kind, such as ``2 logs without a zigzag``."""
+    """Return how many findings there are of a kind, such as ``2 logs without a manoeuvre to fit``."""
     one, several = FINDINGS[kind]
     return f"{count} {one if count == 1 else several}"
 

@@ -40,13 +40,14 @@ def _overlap(one: Segment, other: Segment) -> bool:
 
 
 def same(one: Segment, other: Segment) -> bool:
-    """Return whether two segments are one manoeuvre: at the same time, to the same side, executes at the same instants.
+    """Return whether two segments are one manoeuvre: of one kind at the same time, executes at the same instants.
 
     Where neither log has a time of its own, since both count from a start that the profile states or from the moment
     at which the logger was switched on, the time says nothing: runs of a tank share their start. They are one only
     where what was measured is the same, as in two exports of one run.
     """
-    if not _overlap(one, other) or one.first_side != other.first_side:
+    # a zigzag that one log holds to its end may be broken off in the other
+    if not _overlap(one, other) or one.first_side != other.first_side or one.is_zigzag != other.is_zigzag:
         return False
     late = _apart_s(one, other)
     if one.own_time or other.own_time:
@@ -61,6 +62,12 @@ def _apart_s(one: Segment, other: Segment) -> float:
 
 
 def _measured_alike(one: Segment, other: Segment) -> bool:
-    """Return whether two segments have the same overshoots, to what another rounding of one signal leaves."""
-    pairs = zip(one.overshoots_deg, other.overshoots_deg, strict=False)
-    return len(one.overshoots_deg) == len(other.overshoots_deg) and all(abs(a - b) < _SAME_ANGLE_DEG for a, b in pairs)
+    """Return whether two segments measured the same, to what another rounding of one signal leaves."""
+    mine, others = _measured_deg(one), _measured_deg(other)
+    return len(mine) == len(others) and all(abs(a - b) < _SAME_ANGLE_DEG for a, b in zip(mine, others, strict=True))
+
+
+def _measured_deg(one: Segment) -> tuple[float, ...]:
+    """Return how the ship answered, deg: the overshoots, or of a random manoeuvre how far the heading went."""
+    turned = one.detail.get("heading_range_deg")
+    return one.overshoots_deg if turned is None else (float(turned), one.delta0_deg)

@@ -1,4 +1,4 @@
-"""How many logs, zigzags and parameter sets each vessel has."""
+"""How many logs, manoeuvres to fit and parameter sets each vessel has."""
 
 from __future__ import annotations
 
@@ -11,6 +11,8 @@ from kempf.warehouse.store import Warehouse
 
 def vessel_counts(warehouse: Warehouse) -> list[dict[str, Any]]:
     """Return ``vessel``, ``logs``, ``segments`` and ``parameter_sets`` of each vessel, by name.
+
+    The segments are those that a model is fitted to.
 
     Raises
     ------

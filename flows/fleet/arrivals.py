@@ -56,7 +56,7 @@ def table(outcomes: Sequence[dict[str, Any]]) -> list[dict[str, Any]]:
         {
             "log": Path(o["path"]).name,
             "outcome": o["outcome"],
-            "zigzags": len(o["segments"]),
+            "manoeuvres to fit": len(o["segments"]),
             "rejected": (o["records"] or {}).get("rejected"),
             "error": o.get("error", {}).get("message", ""),
         }

@@ -42,7 +42,7 @@ def alarming(report: Mapping[str, Any]) -> bool:
 
 
 def beyond(report: Mapping[str, Any], quality: Quality) -> list[str]:
-    """Return what a vessel has more of than the limits allow, in words, such as ``2 logs without a zigzag``."""
+    """Return what a vessel has more of than the limits allow, such as ``2 logs without a manoeuvre to fit``."""
     return [in_words(kind, count) for kind, count in _over(report, quality).items()]
 
 
@@ -119,7 +119,7 @@ def markdown(reports: Reports, quality: Quality = NO_LIMITS, pages: str | None =
         f"# {sentence(reports, quality)}",
         "",
         f"{totals['logs']} logs, {totals['reread']} read anew, {totals['searched']} only searched anew; "
-        f"{totals['segments']} zigzags; {totals['new_sets']} new parameter sets, {totals['kept_sets']} kept.",
+        f"{totals['segments']} manoeuvres to fit; {totals['new_sets']} new parameter sets, {totals['kept_sets']} kept.",
     ]
     if verified:
         lines += ["", "Verified: " + ", ".join(f"{count} {verdict}" for verdict, count in sorted(verified.items()))]

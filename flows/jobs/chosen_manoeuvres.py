@@ -1,4 +1,4 @@
-"""Which zigzags of a vessel a model is fitted to: each manoeuvre once, all read with the newest profile."""
+"""Which manoeuvres of a vessel a model is fitted to: each manoeuvre once, all read with the newest profile."""
 
 from __future__ import annotations
 
@@ -48,12 +48,12 @@ def without_log(segment: Segment) -> bool:
 
 
 def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = MappingProxyType({})) -> Chosen:
-    """Choose the zigzags of a vessel, as they are stored: each manoeuvre once, all read with one profile.
+    """Choose the manoeuvres of a vessel to fit, as they are stored: each manoeuvre once, all read with one profile.
 
     Parameters
     ----------
     failed : mapping of str to str, optional
-        Ingests whose zigzags do not count, and why.
+        Ingests whose manoeuvres do not count, and why.
 
     Raises
     ------
@@ -67,9 +67,9 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
     if not manoeuvres:
         raise NotFound(
             "no_segments",
-            f"No zigzag was found in the {len(rows)} logs of {vessel!r}."
+            f"Neither a zigzag nor a random manoeuvre was found in the {len(rows)} logs of {vessel!r}."
             if not left
-            else f"None of the {len(left)} zigzags of {vessel!r} counts: {'; '.join(sorted(set(left.values())))}.",
+            else f"None of the {len(left)} manoeuvres of {vessel!r} counts: {'; '.join(sorted(set(left.values())))}.",
             "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
             {"vessel": vessel, **({"skipped": left} if left else {})},
         )
@@ -82,7 +82,7 @@ def choose(warehouse: Warehouse, vessel: str, failed: Mapping[str, str] = Mappin
             skipped[segment.segment_id] = "its log is read with an older profile"
     logged = [s for s in kept if not without_log(s)]
     if len(logged) >= _ENOUGH:
-        # over ground a stream along the course is taken for speed: beside zigzags with a log it only misleads
+        # over ground a stream along the course is taken for speed: beside manoeuvres with a log it only misleads
         skipped |= {s.segment_id: "no speed through the water, unlike others" for s in kept if s not in logged}
         kept = logged
     kept.sort(key=lambda s: (s.log_id, s.start_utc_ns, s.end_utc_ns))
@@ -119,5 +119,5 @@ def choose_refreshed(warehouse: Warehouse, vessel: str, progress: Progress = sil
 
 
 def out_of_date(refreshed: Refreshed) -> dict[str, str]:
-    """Return for each ingest that could not be brought up to date why its zigzags do not count."""
+    """Return for each ingest that could not be brought up to date why its manoeuvres do not count."""
     return {ingest: f"its log cannot be read anew: {error.message}" for ingest, error in refreshed.failed.items()}

@@ -27,6 +27,9 @@ from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.segments import Segment, segment_id
 
+#: what differs between kinds without overshoots: name, executes, criteria, quality and detail
+_OfKind = tuple[str, tuple[int, ...], dict[str, Any], dict[str, Any], dict[str, Any]]
+
 
 @dataclass(frozen=True)
 class Ingest:
@@ -128,25 +131,9 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
 
 
 def _random(one: RandomManoeuvre, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
-    kind = "random_manoeuvre"
-    return Segment(
-        segment_id=segment_id(ingest.log_id, kind, one.start_utc_ns, one.end_utc_ns),
-        vessel=ingest.vessel,
-        log_id=ingest.log_id,
-        ingest_id=ingest.ingest_id,
-        kind=kind,
-        psi0_deg=nan,
-        delta0_deg=one.delta0_deg,
-        first_side=one.side,
-        base_heading_deg=one.base_heading_deg,
-        start_utc_ns=one.start_utc_ns,
-        end_utc_ns=one.end_utc_ns,
-        executes_utc_ns=one.orders_utc_ns,
-        overshoots_deg=(),
-        code_version=ingest.code_version,
-        quality={"gap_s": one.gap_s, "reasons": ()},
-        detail={"heading_range_deg": one.heading_range_deg, **_of_fitted(one, ingest, profile, instruments)},
-    )
+    detail = {"heading_range_deg": one.heading_range_deg, **_of_fitted(one, ingest, profile, instruments)}
+    quality = {"gap_s": one.gap_s, "reasons": one.reasons}
+    return _no_zigzag(one, ingest, ("random_manoeuvre", one.orders_utc_ns, {}, quality, detail))
 
 
 def _of_fitted(
@@ -173,6 +160,12 @@ def _own_time(start_utc_ns: int, ingest: Ingest, profile: VesselProfile) -> bool
 def _kept_aside(one: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: VesselProfile) -> Segment:
     """Return a manoeuvre that no model is fitted to, with its figures."""
     kind, executes, imo, quality, detail = _of_kind(one, profile)
+    return _no_zigzag(one, ingest, (kind, executes, imo, quality, {"length_m": profile.length_m, **detail}))
+
+
+def _no_zigzag(one: TurningCircle | PullOut | Spiral | RandomManoeuvre, ingest: Ingest, of_kind: _OfKind) -> Segment:
+    """Return a manoeuvre with neither a nominal heading deviation nor overshoots."""
+    kind, executes, imo, quality, detail = of_kind
     return Segment(
         segment_id=segment_id(ingest.log_id, kind, one.start_utc_ns, one.end_utc_ns),
         vessel=ingest.vessel,
@@ -190,14 +183,11 @@ def _kept_aside(one: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: 
         code_version=ingest.code_version,
         imo=imo,
         quality=quality,
-        detail={"length_m": profile.length_m, **detail},
+        detail=detail,
     )
 
 
-def _of_kind(
-    one: TurningCircle | PullOut | Spiral, profile: VesselProfile
-) -> tuple[str, tuple[int, ...], dict[str, Any], dict[str, Any], dict[str, Any]]:
-    """Return what differs between the kinds: its name, executes, criteria, quality and detail."""
+def _of_kind(one: TurningCircle | PullOut | Spiral, profile: VesselProfile) -> _OfKind:
     if isinstance(one, TurningCircle):
         made = one.measured
         criteria = judge_circle(one, profile.length_m, profile.trial_speed_m_s)

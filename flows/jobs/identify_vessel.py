@@ -237,7 +237,8 @@ def _no_segments(warehouse: Warehouse, vessel: str) -> NotFound:
     held = logs.current(warehouse, vessel)
     return NotFound(
         "no_segments",
-        f"No zigzag was found in the {len(held)} logs of {vessel!r}, so there is nothing to identify from.",
+        f"Neither a zigzag nor a random manoeuvre was found in the {len(held)} logs of {vessel!r}, so there is nothing "
+        "to identify from.",
         "Ingest a log that holds one; `kempf ingest` says for each log why none was found.",
         {"vessel": vessel, "logs": [row.file_name for row in held]},
     )

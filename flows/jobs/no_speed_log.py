@@ -87,15 +87,22 @@ def estimate_of(
     profile : VesselProfile
         Its trial speed counts where the settings have none.
     instruments : mapping of str to Instruments
-        Series by log; those of the companions.
+        Series by log, those of the companions too.
+
+    Raises
+    ------
+    DataRejected
+        ``engine_changed``: see `pipeline.estimate.no_log.companions.check_engine`.
     """
-    settings = dict(inputs.settings)
+    settings, (own,) = dict(inputs.settings), inputs.bounds
+    companions.check_engine(instruments[own.log_id], own.start_utc_ns, own.end_utc_ns)
     no_log = dict(settings.pop(KEY))
     if no_log["trial_speed_m_s"] is None and profile.trial_speed_m_s is not None:
         no_log |= {"trial_speed_m_s": profile.trial_speed_m_s, "trial_speed_std_m_s": profile.trial_speed_std_m_s}
     beside, refused = [], []
     for bounds in inputs.companions:
         try:
+            companions.check_engine(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
             beside.append(make_record(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns))
         except KempfError as error:
             refused.append(error.code)

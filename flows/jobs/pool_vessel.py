@@ -34,23 +34,23 @@ def pool_vessel(
 
 
 def poolable(warehouse: Warehouse, vessel: str, request: Request, outcomes: Sequence[IdentifyOutcome]) -> Chosen | str:
-    """Return the zigzags that are pooled, each manoeuvre once, or why there is nothing to pool."""
+    """Return the manoeuvres that are pooled, each manoeuvre once, or why there is nothing to pool."""
     if request.estimator != SINGLE:
-        return f"the estimator {request.estimator} takes one zigzag at a time; {SINGLE} pools"
+        return f"the estimator {request.estimator} takes one manoeuvre at a time; {SINGLE} pools"
     # a log none of whose manoeuvres could be identified stays out
     usable = {o.segment.ingest_id for o in outcomes if o.set_id is not None}
     if not usable:
-        return "no zigzag could be identified"
+        return "no manoeuvre could be identified"
     unusable = {row.ingest_id for row in logs.current(warehouse, vessel)} - usable
-    chosen = choose(warehouse, vessel, dict.fromkeys(unusable, "no zigzag of its log could be identified"))
+    chosen = choose(warehouse, vessel, dict.fromkeys(unusable, "no manoeuvre of its log could be identified"))
     if len(chosen.segments) < 2:
         others = "; ".join(sorted(set(chosen.skipped.values())))
-        return "there is one zigzag that counts" + (f", of the others: {others}" if others else "")
+        return "there is one manoeuvre that counts" + (f", of the others: {others}" if others else "")
     # pooled with the speed over ground they would be wrong together, and sure of it
     if request.spec.current != "none" and any(without_log(segment) for segment in chosen.segments):
         return (
-            "the zigzags have no speed through the water, and in a current that over ground is another; in still water "
-            "`surroundings: pond` of the profile, or a model with `current: none` (--model FILE), pools them"
+            "the manoeuvres have no speed through the water, and in a current that over ground is another; in still "
+            "water `surroundings: pond` of the profile, or a model with `current: none` (--model FILE), pools them"
         )
     return chosen
 

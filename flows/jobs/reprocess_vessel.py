@@ -114,7 +114,7 @@ def reprocess_vessels(
     _together(all_of_them, lambda: remember_history(warehouse, [w.report for w in all_of_them], flow_run))
     for report in (work.report for work in all_of_them):
         _log.info(
-            "%s: %s; %d logs, %d read anew; %d zigzags; %d sets made, %d kept; %d failures, %d findings",
+            "%s: %s; %d logs, %d read anew; %d manoeuvres to fit; %d sets made, %d kept; %d failures, %d findings",
             *(report.vessel, report.status, report.logs, report.reread, report.segments, report.new_sets),
             *(report.kept_sets, len(report.failures), len(report.findings)),
         )

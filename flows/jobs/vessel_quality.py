@@ -1,4 +1,4 @@
-"""The job that judges what is stored of a vessel: sets that did not converge, logs without a zigzag, and the like.
+"""The job that judges what is stored of a vessel: sets that did not converge, logs without one to fit, and the like.
 
 Nothing of it is a failure: the work was done, and this is what a person should know of what came of it.
 """
@@ -66,7 +66,9 @@ def _of_logs(warehouse: Warehouse, vessel: str, found: Iterable[segments.Segment
         if missing:
             yield Finding("missing_channels", row.log_id, f"{row.file_name}: {missing[0]}.")
         else:
-            yield Finding("no_zigzag", row.log_id, f"{row.file_name}: no zigzag was found.")
+            yield Finding(
+                "no_zigzag", row.log_id, f"{row.file_name}: neither a zigzag nor a random manoeuvre was found."
+            )
 
 
 def _of_sets(sets: Iterable[parameter_sets.Convergence]) -> Iterable[Finding]:

@@ -13,8 +13,9 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from kempf.pipeline.channels.grid import gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
-from kempf.pipeline.channels.series import Nanoseconds, Series
+from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.segment.held_rudder import HeldRudder, held_stretches
 from kempf.pipeline.segment.measured import Signals
 from kempf.pipeline.segment.zigzag import Side
@@ -32,6 +33,10 @@ _FEWEST_ORDERS = 6
 #: Longest time between two orders, in medians of it: beyond it she sails a circle or a straight course.
 _LONGEST_PAUSE = 4.0
 
+#: Smallest share of the time between first and last order with half of `_ORDER_RAD` and more: she is turned about for
+#: most of it, while course alterations on a passage are brief against the courses between them.
+_BUSY_SHARE = 0.4
+
 #: Smallest range of the heading, rad: orders that do not turn her say nothing.
 _TURNED_RAD = float(np.deg2rad(30.0))
 
@@ -42,8 +47,8 @@ _SLOWEST_SHARE, _HARDLY_EXCEEDED = 0.3, 90.0
 #: Shaft speed astern up to which a shaft counts as stopped, as a share of the one that the log hardly exceeds.
 _NOT_ASTERN = 0.05
 
-#: Longest time between two readings that say whether she goes ahead, in medians of it.
-_LONGEST_GAP = 5.0
+#: Readings in a row that show that she is slow or her shaft turns astern: one alone may be wrong.
+_FEWEST_IN_A_ROW = 3
 
 #: beginning and end of a stretch of time, s
 Span = tuple[float, float]
@@ -59,15 +64,21 @@ class RandomManoeuvre:
     delta0_deg: float
     #: Heading at the beginning, 0 to 360 deg.
     base_heading_deg: float
-    #: start_utc_ns, end_utc_ns: From a usual pause before the first order to one behind the last.
+    #: start_utc_ns, end_utc_ns: From a usual rest before the first order to one behind the last; of the rest between
+    #: two manoeuvres each has half at most.
     start_utc_ns: int
     end_utc_ns: int
     #: Instants at which the rudder came to a new angle, UTC nanoseconds.
     orders_utc_ns: tuple[int, ...]
     #: Range of the heading, deg.
     heading_range_deg: float
-    #: Time within it for which heading or rudder were not recorded, s.
+    #: Time within it for which heading or rudder were not recorded, s; no gap is too long to interpolate over.
     gap_s: float
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """What to know of its quality, in sentences."""
+        return (f"Heading or rudder were not recorded for {self.gap_s:.1f} s.",) if self.gap_s > 0.0 else ()
 
 
 def find_random(instruments: Instruments, taken: Sequence[tuple[int, int]] = ()) -> list[RandomManoeuvre]:
@@ -93,24 +104,35 @@ def find_random(instruments: Instruments, taken: Sequence[tuple[int, int]] = ())
     heading, rudder = instruments.get("heading"), instruments.get("rudder_angle")
     if heading is None or rudder is None or len(heading) < _FEWEST_VALUES or len(rudder) < _FEWEST_VALUES:
         return []
+    way = _way(instruments)
+    if way is None or not len(way):
+        return []
     signals = Signals.of(heading, rudder)
-    occupied = [tuple((ns - signals.origin_ns) * 1e-9 for ns in bounds) for bounds in taken]
+    occupied = [_span(signals, *bounds) for bounds in taken]
+    hindered = [*_gaps(signals, heading), *_gaps(signals, rudder), *_slow(signals, way), *_astern(signals, instruments)]
+    whole = _span(signals, int(way.time_utc_ns[0]), int(way.time_utc_ns[-1]))
     found = []
-    for span in _without(_ahead(signals, instruments), occupied):
+    for span in _without(whole, [*occupied, *hindered]):
         inside = _held_in(signals, span)
         orders = [after for before, after in pairwise(inside) if _is_order(before.rudder, after.rudder)]
-        found += [one for part in _unpaused(orders) if (one := _described(signals, span, inside, part)) is not None]
+        for part, room in _unpaused(orders, span):
+            one = _described(signals, room, inside, part)
+            found += [] if one is None else [one]
     return found
 
 
+def _span(signals: Signals, first_utc_ns: int, last_utc_ns: int) -> Span:
+    """Return two instants in seconds after the origin."""
+    return (first_utc_ns - signals.origin_ns) / SECOND_NS, (last_utc_ns - signals.origin_ns) / SECOND_NS
+
+
 def _held_in(signals: Signals, span: Span) -> list[HeldRudder]:
-    """Return the angles at which the rudder is held, each begun within a stretch of time; none where all are small."""
+    """Return the angles at which the rudder is held within a stretch of time; none where all are small."""
     first, behind = np.searchsorted(signals.rudder_s, span)
     # most of a voyage is not worth a closer look
     if not bool(np.any(np.abs(signals.rudder[first:behind]) >= _ORDER_RAD)):
         return []
-    held = held_stretches(signals.rudder_s, signals.rudder, int(first), int(behind), signals.rudder_noise)
-    return held[1:] if held and first and held[0].first == first else held
+    return held_stretches(signals.rudder_s, signals.rudder, int(first), int(behind), signals.rudder_noise)
 
 
 def _is_order(before: float, after: float) -> bool:
@@ -118,28 +140,33 @@ def _is_order(before: float, after: float) -> bool:
     return abs(after - before) >= _ORDER_RAD and max(abs(before), abs(after)) >= _ORDER_RAD
 
 
-def _unpaused(orders: list[HeldRudder]) -> list[list[HeldRudder]]:
-    """Divide orders where the rudder rests much longer than between the others, as long as there are enough."""
+def _unpaused(orders: list[HeldRudder], room: Span) -> list[tuple[list[HeldRudder], Span]]:
+    """Divide orders where the rudder rests much longer than between the others, as long as there are enough.
+
+    The stretch of time that they are in is divided in the middle of such a rest.
+    """
     if len(orders) < _FEWEST_ORDERS:
         return []
     pauses = np.diff([one.start_s for one in orders])
-    at = np.flatnonzero(pauses > _LONGEST_PAUSE * np.median(pauses))
-    if not at.size:
-        return [orders]
-    edges = [0, *(int(k) + 1 for k in at), len(orders)]
-    return [part for first, end in pairwise(edges) for part in _unpaused(orders[first:end])]
+    at = [int(k) for k in np.flatnonzero(pauses > _LONGEST_PAUSE * np.median(pauses))]
+    if not at:
+        return [(orders, room)]
+    middles = [0.5 * (orders[k].start_s + orders[k + 1].start_s) for k in at]
+    counts, bounds = [0, *(k + 1 for k in at), len(orders)], [room[0], *middles, room[1]]
+    parts = zip(pairwise(counts), pairwise(bounds), strict=True)
+    return [one for (first, end), hers in parts for one in _unpaused(orders[first:end], hers)]
 
 
 def _described(
-    signals: Signals, span: Span, inside: Sequence[HeldRudder], orders: Sequence[HeldRudder]
+    signals: Signals, room: Span, inside: Sequence[HeldRudder], orders: Sequence[HeldRudder]
 ) -> RandomManoeuvre | None:
-    """Return what is recorded of a manoeuvre; None where she hardly turned."""
+    """Return what is recorded of a manoeuvre; None where she hardly turned, or her rudder mostly lay amidships."""
     pause = float(np.median(np.diff([one.start_s for one in orders])))
-    begin = max(span[0], orders[0].start_s - pause)
-    end = min(span[1], orders[-1].start_s + pause)
+    begin = max(room[0], orders[0].start_s - pause)
+    end = min(room[1], orders[-1].start_s + pause)
     first, behind = np.searchsorted(signals.heading_s, [begin, end + 1e-9])
     heading = signals.heading[first:behind]
-    if heading.size < 2 or float(np.ptp(heading)) < _TURNED_RAD:
+    if heading.size < 2 or float(np.ptp(heading)) < _TURNED_RAD or _busy_share(signals, orders) < _BUSY_SHARE:
         return None
     hers = [one.rudder for one in inside if begin <= one.end_s and one.start_s <= end]
     side = next(rudder for rudder in hers if abs(rudder) >= _ORDER_RAD / 2.0)
@@ -155,33 +182,32 @@ def _described(
     )
 
 
-def _ahead(signals: Signals, instruments: Instruments) -> list[Span]:
-    """Return when she makes way ahead, and her shaft does not turn astern, where it is recorded."""
-    speed = _way(instruments)
-    if speed is None:
-        return []
-    enough = _SLOWEST_SHARE * float(np.percentile(speed.value, _HARDLY_EXCEEDED))
-    spans = _spans(speed.time_utc_ns, speed.value >= enough, signals) if enough > 0.0 else []
+def _busy_share(signals: Signals, orders: Sequence[HeldRudder]) -> float:
+    """Return the share of the time between first and last order in which the rudder is not about amidships."""
+    first, behind = np.searchsorted(signals.rudder_s, [orders[0].start_s, orders[-1].start_s])
+    return float(np.mean(np.abs(signals.rudder[first:behind]) >= _ORDER_RAD / 2.0))
+
+
+def _slow(signals: Signals, way: Series) -> list[Span]:
+    """Return when she is seen to make hardly any way ahead."""
+    enough = _SLOWEST_SHARE * float(np.percentile(way.value, _HARDLY_EXCEEDED))
+    return _seen(signals, way, (way.value < enough) | (enough <= 0.0))
+
+
+def _astern(signals: Signals, instruments: Instruments) -> list[Span]:
+    """Return when the shaft is seen to turn astern."""
     shaft = instruments.get("shaft_speed")
     if shaft is None or not len(shaft):
-        return spans
-    astern = _NOT_ASTERN * float(np.percentile(np.abs(shaft.value), _HARDLY_EXCEEDED))
-    turning = _spans(shaft.time_utc_ns, shaft.value >= -astern, signals)
-    return _common(spans, turning)
+        return []
+    stopped = _NOT_ASTERN * float(np.percentile(np.abs(shaft.value), _HARDLY_EXCEEDED))
+    return _seen(signals, shaft, shaft.value < -stopped)
 
 
-def _common(spans: Sequence[Span], others: Sequence[Span]) -> list[Span]:
-    """Return the stretches of time that two series of them share; each is in order of time, without overlaps."""
-    found, k, j = [], 0, 0
-    while k < len(spans) and j < len(others):
-        begin, end = max(spans[k][0], others[j][0]), min(spans[k][1], others[j][1])
-        if begin < end:
-            found.append((begin, end))
-        if spans[k][1] <= others[j][1]:
-            k += 1
-        else:
-            j += 1
-    return found
+def _gaps(signals: Signals, series: Series) -> list[Span]:
+    """Return the gaps of a channel that a model does not interpolate over."""
+    time_s = series.seconds_since(signals.origin_ns)
+    at = np.flatnonzero(np.diff(time_s) > gap_limit_s(series))
+    return [(float(time_s[k]), float(time_s[k + 1])) for k in at]
 
 
 def _way(instruments: Instruments) -> Series | None:
@@ -194,27 +220,26 @@ def _way(instruments: Instruments) -> Series | None:
         return None
     if course is None or heading is None or not len(course) or len(heading) < 2:
         return ground
-    # the two are of one receiver and share their rows, see `channels.instruments`
+    # each at its own instants
     angle = course.value - np.interp(course.time_utc_ns, heading.time_utc_ns, heading.value)
     along = np.interp(ground.time_utc_ns, course.time_utc_ns, np.cos(angle)) * ground.value
     return Series(ground.time_utc_ns, along)
 
 
-def _spans(time_utc_ns: Nanoseconds, holds: NDArray[np.bool_], signals: Signals) -> list[Span]:
-    """Return from when to when something holds, of three readings at least, and not across a gap."""
-    time_s = (time_utc_ns - signals.origin_ns) * 1e-9
-    if time_s.size < 3:
-        return []
-    steps = np.diff(time_s)
-    breaks = np.flatnonzero((np.diff(holds.astype(np.int8)) != 0) | (steps > _LONGEST_GAP * np.median(steps))) + 1
-    groups = np.split(np.arange(time_s.size), breaks)
-    return [(float(time_s[g[0]]), float(time_s[g[-1]])) for g in groups if g.size >= 3 and holds[g[0]]]
+def _seen(signals: Signals, series: Series, holds: NDArray[np.bool_]) -> list[Span]:
+    """Return from when to when several readings in a row show something."""
+    time_s = series.seconds_since(signals.origin_ns)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
+    rows = zip(edges[::2], edges[1::2] - 1, strict=True)
+    return [(float(time_s[a]), float(time_s[b])) for a, b in rows if b - a + 1 >= _FEWEST_IN_A_ROW]
 
 
-def _without(spans: Sequence[Span], occupied: Sequence[tuple[float, ...]]) -> list[Span]:
-    """Take stretches of time out of others."""
-    left = list(spans)
-    for begin, end in occupied:
-        pieces = [piece for a, b in left for piece in ((a, min(b, begin)), (max(a, end), b))]
-        left = [piece for piece in pieces if piece[1] > piece[0]]
-    return sorted(left)
+def _without(whole: Span, taken: Sequence[Span]) -> list[Span]:
+    """Return what is left of a stretch of time without others."""
+    left, begin = [], whole[0]
+    for first, last in sorted(taken):
+        if first > begin:
+            left.append((begin, min(first, whole[1])))
+        begin = max(begin, last)
+    left.append((begin, whole[1]))
+    return [span for span in left if span[1] > span[0]]

@@ -59,4 +59,6 @@ def test_runs_without_a_shaft_speed_stay_as_they_are() -> None:
 def test_the_approach_of_a_run_from_rest_is_the_speed_that_it_comes_to() -> None:
     time = np.arange(200.0)
     assert approach_speed(time, 8.0 - 0.01 * time) == pytest.approx(8.0, abs=0.05)
+    # out of a turn, or amid a random manoeuvre
+    assert approach_speed(time, 8.0 - 3.0 * np.exp(-time / 40.0)) == pytest.approx(8.0, rel=0.03)
     assert approach_speed(time, 0.4 * (1.0 - np.exp(-time / 40.0))) == pytest.approx(0.4, rel=0.03)

@@ -16,7 +16,7 @@ from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.estimate import maximum_likelihood
 from kempf.pipeline.estimate.filters.smoother import LinearSystem, last_state, smooth
 from kempf.pipeline.estimate.maximum_likelihood import MaximumLikelihoodSettings
-from kempf.pipeline.estimate.no_log.companions import Passage, companions_of, has_log
+from kempf.pipeline.estimate.no_log.companions import Passage, check_engine, companions_of, has_log
 from kempf.pipeline.estimate.no_log.identify import SPEED_POWER, NoLogSettings, identify_without_log
 from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.estimate.record.record import Record
@@ -360,6 +360,27 @@ def test_companions_are_soon_and_on_other_headings() -> None:
     assert companions_of(run, others[:4]) == (3,)
     assert companions_of(run, others[:2]) == ()
     assert companions_of(run, [passage(-0.5, 170.0), passage(0.5, 170.0)]) == (0, 1)
+
+
+@pytest.mark.parametrize(("ordered", "refused"), [(1.0, False), (0.9, False), (0.7, True), (-1.0, True)])
+def test_an_engine_set_anew_is_refused(ordered: float, refused: bool) -> None:
+    trial, _ = sailed(0.6)
+    instruments = instruments_of(trial)
+    shaft = instruments.series["shaft_speed"]
+    start, end = int(shaft.time_utc_ns[0]), int(shaft.time_utc_ns[-1])
+    late = shaft.time_utc_ns > start + 0.8 * (end - start)
+    anew = replace(shaft, value=np.where(late, ordered, 1.0) * shaft.value)
+    instruments = replace(instruments, series={**instruments.series, "shaft_speed": anew})
+    if not refused:
+        check_engine(instruments, start, end)
+        return
+    with pytest.raises(DataRejected, match="rpm") as said:
+        check_engine(instruments, start, end)
+    assert said.value.code == "engine_changed"
+    # before it was set anew, and where nobody knows, nothing speaks against it
+    check_engine(instruments, start, start + round(0.7 * (end - start)))
+    nowhere = {k: v for k, v in instruments.series.items() if k != "shaft_speed"}
+    check_engine(replace(instruments, series=nowhere), start, end)
 
 
 @pytest.mark.parametrize("readings", [0, 19, 20, 200])

@@ -95,7 +95,11 @@ def test_why_zigzags_are_not_pooled_is_said(days: Warehouse) -> None:
         poolable(days, "mariner", Request(), []),
         poolable(days, "mariner", Request(), outcomes[:1]),
     ]
-    expected = ("takes one zigzag at a time", "no zigzag could be identified", "there is one zigzag that counts")
+    expected = (
+        "takes one manoeuvre at a time",
+        "no manoeuvre could be identified",
+        "there is one manoeuvre that counts",
+    )
     assert all(words in str(reason) for words, reason in zip(expected, reasons, strict=True)), reasons
 
 

@@ -59,7 +59,7 @@ def spoilt(warehouse: Warehouse, change: Callable[[ParameterSet], ParameterSet])
 def test_logs_and_sets_are_judged(warehouse: Warehouse) -> None:
     kinds = {one.kind: one for one in quality_of(warehouse, "mariner")}
     assert set(kinds) == {"no_zigzag", "missing_channels"}
-    assert kinds["no_zigzag"].words == "voyage.nmea: no zigzag was found."
+    assert kinds["no_zigzag"].words == "voyage.nmea: neither a zigzag nor a random manoeuvre was found."
     assert kinds["missing_channels"].words.startswith("no_rudder.nmea: no rudder_angle in this log")
     (zigzag,) = segments.current(warehouse, "mariner")
     assert marks(warehouse) == {}
@@ -105,9 +105,11 @@ def report(vessel: str = "a", **counts: int) -> dict[str, Any]:
 def test_limits_decide_and_say_why() -> None:
     limits = Quality(no_zigzag=1, not_converged=0, vessels={"b": Limits(not_converged=None)})
     assert fleet_report.beyond(report(no_zigzag=1), limits) == []
-    assert fleet_report.beyond(report(no_zigzag=2, channels=9), limits) == ["2 logs without a zigzag"]
+    assert fleet_report.beyond(report(no_zigzag=2, channels=9), limits) == ["2 logs without a manoeuvre to fit"]
     # what a vessel does not name is as for the fleet
-    assert fleet_report.beyond(report("b", not_converged=5, no_zigzag=2), limits) == ["2 logs without a zigzag"]
+    assert fleet_report.beyond(report("b", not_converged=5, no_zigzag=2), limits) == [
+        "2 logs without a manoeuvre to fit"
+    ]
     assert fleet_report.needs_a_person(report(not_converged=1), limits)
     assert not fleet_report.needs_a_person(report(not_converged=1), NO_LIMITS)
     reports = [report(not_converged=1), report("b", channels=1)]
@@ -127,7 +129,7 @@ def test_a_night_over_bad_models_is_not_green_until_they_are_seen_to(warehouse: 
     limits.write_text("no_zigzag: 0\n", encoding="utf-8")
     asked = ("reprocess", "--quality", limits, "--warehouse", warehouse.uri)
     first = kempf(*asked)
-    assert first.code == 5 and "mariner is beyond the limits of quality: 1 log without a zigzag" in first.err
+    assert first.code == 5 and "mariner is beyond the limits of quality: 1 log without a manoeuvre to fit" in first.err
     # nothing changed since: it is said again, without looking at her
     (again,) = do_fleet(warehouse)
     assert again["status"] == "unchanged" and {one["kind"] for one in again["findings"]} == {

@@ -158,3 +158,23 @@ def test_where_a_log_has_its_own_time_the_executes_decide(other: Segment, twins:
 def test_where_none_has_what_was_measured_decides(other: Segment, twins: bool) -> None:
     kept, left = once([put_over("a", own_time=False), other], same)
     assert (len(kept) == 1) == twins == bool(left)
+
+
+def ordered(log: str, turned_deg: float, largest_deg: float = 35.0) -> Segment:
+    """A random manoeuvre by one programme of orders, run again."""
+    made = put_over(log, 0.0, (), own_time=False, heading_range_deg=turned_deg)
+    return replace(made, kind="random_manoeuvre", delta0_deg=largest_deg)
+
+
+@pytest.mark.parametrize(
+    ("other", "twins"),
+    [
+        (ordered("b", 141.203), True),
+        (ordered("b", 141.3), False),
+        (ordered("b", 141.2, 34.9), False),
+        (put_over("b", 0.0, (), own_time=False), False),
+    ],
+)
+def test_runs_of_one_programme_of_orders_are_told_apart_by_the_heading(other: Segment, twins: bool) -> None:
+    kept, left = once([ordered("a", 141.2), other], same)
+    assert (len(kept) == 1) == twins == bool(left)

@@ -143,7 +143,7 @@ def test_nothing_is_pooled_with_the_speed_over_ground(filled: tuple[Warehouse, A
     # the command says so of each, as text and as JSON
     assert all("no speed through the water" in one["not_pooled"] for one in filled[1])
     said = kempf("identify", "--vessel", "mariner", "--warehouse", Path(warehouse.uri))
-    assert "not pooled: the zigzags have no speed through the water" in said.err
+    assert "not pooled: the manoeuvres have no speed through the water" in said.err
     still = Request(ModelSpec(current="none"))
     assert isinstance(poolable(warehouse, "mariner", still, outcomes), Chosen)
     assert all(without_log(segment) for segment in segments.current(warehouse, "mariner"))

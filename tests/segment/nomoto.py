@@ -61,6 +61,14 @@ class Ship:
             order = gain * (course - self.heading) - damping * self.yaw_rate
             self.steer(min(max(order, -20.0), 20.0), at_most_s=0.2)
 
+    def by_hand(self, seed: int) -> None:
+        """Let a helmsman hold any angle for any time, about the course 0, until 1500 s."""
+        random = np.random.default_rng(seed)
+        self.wait(0.0, 60.0)
+        while self.now < 1500.0:
+            towards = -1.0 if self.heading > 0 else 1.0
+            self.wait(towards * float(random.uniform(-3.0, 12.0)), float(random.uniform(6.0, 35.0)))
+
     def zigzag(self, psi0: float, delta0: float, side: int, legs: int, neutral: float = 0.0) -> list[float]:
         """Run a zigzag about the present heading and return the instants of its executes, s."""
         base, executes = self.heading, []

@@ -48,13 +48,8 @@ def test_autopilot_in_a_seaway(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(40))
 def test_hand_steering(seed: int) -> None:
-    """A helmsman who holds any angle for any time, about a course."""
-    random = np.random.default_rng(seed)
     ship = Ship()
-    ship.wait(0.0, 60.0)
-    while ship.now < 1500.0:
-        towards = -1.0 if ship.heading > 0 else 1.0
-        ship.wait(towards * float(random.uniform(-3.0, 12.0)), float(random.uniform(6.0, 35.0)))
+    ship.by_hand(seed)
     assert all_found_in(ship) == []
 
 

@@ -13,19 +13,25 @@ from kempf.pipeline.segment.random_manoeuvre import RandomManoeuvre, find_random
 from tests.segment.nomoto import START_NS, Instruments, Ship, measure
 
 
-def at_random(ship: Ship, orders: int, seed: int) -> tuple[float, float]:
+def at_random(ship: Ship, orders: int, seed: int, rest: tuple[float, float] = (20.0, 50.0)) -> tuple[float, float]:
     """Sail so many orders, each far from the one before; return the instants of the first and the last, s."""
     random = np.random.default_rng(seed)
     begun, last, rudder = ship.now, ship.now, ship.rudder
     for _ in range(orders):
         others = [angle for angle in (-35.0, -20.0, 0.0, 20.0, 35.0) if abs(angle - rudder) >= 20.0]
         rudder, last = float(random.choice(others)), ship.now
-        ship.wait(rudder, float(random.uniform(20.0, 50.0)))
+        ship.wait(rudder, float(random.uniform(*rest)))
     return begun, last
 
 
-def found_in(ship: Ship, speed: Series | None = None, shaft: Series | None = None) -> list[RandomManoeuvre]:
+def found_in(
+    ship: Ship, speed: Series | None = None, shaft: Series | None = None, unrecorded: tuple[float, float] | None = None
+) -> list[RandomManoeuvre]:
     heading, rudder = measure(ship, Instruments())
+    if unrecorded is not None:
+        time_s = (rudder.time_utc_ns - START_NS) / 1e9
+        there = (time_s < unrecorded[0]) | (time_s > unrecorded[1])
+        rudder = Series(rudder.time_utc_ns[there], rudder.value[there])
     series = {"heading": heading, "rudder_angle": rudder}
     series |= {"speed_through_water": constant(ship, 5.0) if speed is None else speed}
     series |= {} if shaft is None else {"shaft_speed": shaft}
@@ -76,13 +82,8 @@ def test_too_few_orders_are_none() -> None:
 
 @pytest.mark.parametrize("seed", range(10))
 def test_hand_steering_is_none(seed: int) -> None:
-    """A helmsman who holds any angle for any time, about a course."""
-    random = np.random.default_rng(seed)
     ship = Ship()
-    ship.wait(0.0, 60.0)
-    while ship.now < 1500.0:
-        towards = -1.0 if ship.heading > 0 else 1.0
-        ship.wait(towards * float(random.uniform(-3.0, 12.0)), float(random.uniform(6.0, 35.0)))
+    ship.by_hand(seed)
     assert found_in(ship) == []
 
 
@@ -117,6 +118,68 @@ def test_a_long_rest_of_the_rudder_parts_two() -> None:
     begun, _ = at_random(ship, 10, 3)
     one, other = found_in(ship)
     assert seconds(one.end_utc_ns) < begun - 600.0 < seconds(other.start_utc_ns)
+
+
+def test_parts_of_unequal_rhythm_share_nothing() -> None:
+    ship = Ship(rudder_rate_deg_s=20.0, time_constant_s=4.0, gain_per_s=0.1)
+    ship.wait(0.0, 200.0)
+    at_random(ship, 9, 2, rest=(44.0, 45.0))
+    ship.wait(ship.rudder, 10.0)
+    at_random(ship, 24, 4, rest=(12.0, 12.5))
+    heading, rudder = measure(ship, Instruments())
+    series = {"heading": heading, "rudder_angle": rudder, "speed_through_water": constant(ship, 5.0)}
+    one, other = find_random(Channels(series, {}, ()))
+    assert one.end_utc_ns <= other.start_utc_ns
+    assert one.orders_utc_ns[-1] < one.end_utc_ns and other.start_utc_ns < other.orders_utc_ns[0]
+
+
+@pytest.mark.parametrize("apart_s", [300.0, 1200.0])
+def test_a_passage_with_course_alterations_is_none(apart_s: float) -> None:
+    ship = Ship()
+    for k in range(9):
+        course = ship.heading + (40.0 if k % 2 else -25.0)
+        side = 1.0 if k % 2 else -1.0
+        ship.steer(20.0 * side, lambda course=course, side=side: side * (ship.heading - course) > -15.0)  # type: ignore[misc]
+        ship.wait(10.0 * side, 6.0)
+        ship.wait(-8.0 * side, 8.0)
+        ship.autopilot(course, apart_s)
+    assert found_in(ship) == []
+
+
+def test_readings_that_are_wrong_for_a_moment_end_nothing() -> None:
+    ship = Ship()
+    ship.wait(0.0, 200.0)
+    first, last = at_random(ship, 12, 1)
+    half = round(0.5 * (first + last))
+    for channel, value in (("speed", 5.0), ("shaft", 1.5)):
+        series = constant(ship, value)
+        series.value[half : half + 2] = -value
+        (one,) = found_in(ship, **{channel: series})
+        assert seconds(one.start_utc_ns) <= first + 1.0 and last - 1.0 <= seconds(one.end_utc_ns), channel
+    few = constant(ship, 1.5)
+    (one,) = found_in(ship, shaft=Series(few.time_utc_ns[:2], few.value[:2]))
+    assert one.reasons == ()
+
+
+def test_a_gap_ends_it_and_a_short_one_is_said() -> None:
+    ship = Ship()
+    ship.wait(0.0, 200.0)
+    first, last = at_random(ship, 20, 1)
+    half = 0.5 * (first + last)
+    one, other = found_in(ship, unrecorded=(half, half + 40.0))
+    assert seconds(one.end_utc_ns) <= half and half + 39.0 <= seconds(other.start_utc_ns)
+    # that interpolation bridges one of three sampling intervals is asked of every channel
+    (whole,) = found_in(ship, unrecorded=(half, half + 0.6))
+    assert whole.start_utc_ns < START_NS + half * 1e9 < whole.end_utc_ns
+
+
+def test_the_first_order_after_she_gathered_way_counts() -> None:
+    ship = Ship()
+    ship.wait(0.0, 200.0)
+    first, _ = at_random(ship, 12, 1)
+    gathering = stepped(ship, 0.5, 5.0, first - 15.0)
+    (one,), (whole,) = found_in(ship, speed=gathering), found_in(ship)
+    assert one.orders_utc_ns == whole.orders_utc_ns and whole.start_utc_ns < one.start_utc_ns
 
 
 def test_over_ground_it_is_the_way_along_the_ship_that_counts() -> None:

@@ -13,11 +13,9 @@ from kempf.pipeline.simulate.hulls import HULLS
 from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.manoeuvre import HeldRudder, SteadyCourse, ZigzagTest
 from kempf.pipeline.simulate.trial import TrialSettings, simulate_trial
-from kempf.warehouse.store import Warehouse
-from kempf.workbench.web.jobs.keeper import Keeper
-from kempf.workbench.web.jobs.queue import DONE, Queue
+from kempf.workbench.web.jobs.queue import DONE
 from tests.workbench.driving import HULL, Ran, kempf
-from tests.workbench.web.conftest import OURS, TOKEN, client_of, until
+from tests.workbench.web.conftest import OURS, at_work, until
 
 ORDERS = (35.0, 0.0, -20.0, 20.0, -35.0, 35.0, 0.0, 35.0, -20.0, 0.0, -35.0, 20.0)
 
@@ -77,21 +75,14 @@ def test_it_is_compared_and_shown_as_they_are(identified: tuple[Path, Ran], tmp_
     assert kinds["random_manoeuvre"]["psi0_deg"] is None and kinds["zigzag"]["psi0_deg"] == 20.0
     assert " random " in kempf("compare", "--vessel", "ferry", "--warehouse", warehouse).out
     name = kinds["random_manoeuvre"]["segment_id"]
-    state = tmp_path / "state"
-    keeper = Keeper(state, Warehouse(str(warehouse)))
-    keeper.start()
-    try:
-        with client_of(warehouse, state) as client:
-            client.get(f"/?token={TOKEN}")
-            asked = {"kind": "predict", "vessel": "ferry", "set": document["parameter_set_id"], "horizon": "free"}
-            place = client.post("/jobs", data=asked, headers=OURS).headers["location"]
-            until(lambda: Queue(state / "jobs.sqlite").get(place.rsplit("/", 1)[-1]).state == DONE)
-            for page in ("/v/ferry", f"/segments/{name}", f"/v/ferry/model?run={name}"):
-                shown = client.get(page)
-                assert shown.status_code == 200 and "random manoeuvre" in shown.text, (page, shown.text[:400])
-            assert "Explain this stretch" in client.get(f"/segments/{name}").text
-    finally:
-        keeper.stop()
+    with at_work(warehouse, tmp_path / "state") as (client, _, queue):
+        asked = {"kind": "predict", "vessel": "ferry", "set": document["parameter_set_id"], "horizon": "free"}
+        place = client.post("/jobs", data=asked, headers=OURS).headers["location"]
+        until(lambda: queue.get(place.rsplit("/", 1)[-1]).state == DONE)
+        for page in ("/v/ferry", f"/segments/{name}", f"/v/ferry/model?run={name}"):
+            shown = client.get(page)
+            assert shown.status_code == 200 and "random manoeuvre" in shown.text, (page, shown.text[:400])
+        assert "Explain this stretch" in client.get(f"/segments/{name}").text
 
 
 def test_it_is_excluded_as_they_are(taken: tuple[Path, Ran], tmp_path: Path) -> None:

@@ -156,7 +156,7 @@ def _print_sample(title: str, runs: list[dict[str, Any]], mean: dict[str, Any] |
         click.echo(click.style(f"{title}: no manoeuvre", bold=True))
         return
     there = [name for name in _CHANNELS if name in mean["fit_percent"]]
-    head = ["manoeuvre", "zigzag", "start UTC"]
+    head = ["manoeuvre", "what", "start UTC"]
     for name in there:
         head += [f"{_CHANNELS[name]} fit %", f"rms {mean['rms_display'][name]['unit']}"]
     head += ["largest overshoot error deg"]

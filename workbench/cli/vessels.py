@@ -29,7 +29,9 @@ def list_vessels(uri: str, as_json: bool) -> None:
     if as_json:
         print_json(listed)
         return
-    print_table(["vessel", "logs", "zigzags", "parameter sets"], [[str(v) for v in row.values()] for row in listed])
+    print_table(
+        ["vessel", "logs", "manoeuvres to fit", "parameter sets"], [[str(v) for v in row.values()] for row in listed]
+    )
 
 
 @command.command("show")

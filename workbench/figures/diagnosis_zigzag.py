@@ -88,8 +88,6 @@ def describe_zigzag(shown: ManoeuvreEvidence, label: str) -> str:
     label : str
         Of the manoeuvre.
     """
-    overshoots = ", ".join(f"{peak.beyond_deg:.1f}" for peak in shown.peaks) or "none"
-    return (
-        f"{label}: heading, measured and predicted in free run, and rudder in time. "
-        f"Measured overshoots beyond the nominal heading, degrees: {overshoots}."
-    )
+    overshoots = ", ".join(f"{peak.beyond_deg:.1f}" for peak in shown.peaks)
+    said = f" Measured overshoots beyond the nominal heading, degrees: {overshoots}." if overshoots else ""
+    return f"{label}: heading, measured and predicted in free run, and rudder in time.{said}"

@@ -17,8 +17,8 @@ from kempf.workbench.notebook.vessel_view import VesselView
 
 _INGESTED = {
     **{"log": pl.String, "outcome": pl.String, "records_read": pl.Int64, "records_kept": pl.Int64},
-    **{"records_rejected": pl.Int64, "zigzags": pl.Int64, "channels": pl.List(pl.String), "notes": pl.List(pl.String)},
-    "error": pl.String,
+    **{"records_rejected": pl.Int64, "manoeuvres": pl.Int64, "channels": pl.List(pl.String)},
+    **{"notes": pl.List(pl.String), "error": pl.String},
 }
 _VESSELS = {"vessel": pl.String, "logs": pl.Int64, "segments": pl.Int64, "parameter_sets": pl.Int64}
 
@@ -58,7 +58,7 @@ class WarehouseView:
         vessel: str | None = None,
         profile: str | os.PathLike[str] | None = None,
     ) -> pl.DataFrame:
-        """Take raw logs in: each is read, checked, kept byte for byte and searched for zigzags.
+        """Take raw logs in: each is read, checked, kept byte for byte and searched for manoeuvres.
 
         Parameters
         ----------
@@ -93,7 +93,7 @@ class WarehouseView:
                 "log": Path(outcome.path).name,
                 "outcome": outcome.outcome,
                 **({} if outcome.tally is None else vars(outcome.tally)),
-                "zigzags": len(outcome.segments),
+                "manoeuvres": len(outcome.segments),
                 "channels": [] if outcome.examination is None else list(outcome.examination.findings),
                 "notes": list(outcome.notes),
                 "error": None if outcome.error is None else str(outcome.error),
@@ -103,7 +103,7 @@ class WarehouseView:
         return frame_of(rows, _INGESTED)
 
     def vessels(self) -> pl.DataFrame:
-        """Return the vessels with how many logs, zigzags and parameter sets they have.
+        """Return the vessels with how many logs, manoeuvres to fit and parameter sets they have.
 
         Raises
         ------

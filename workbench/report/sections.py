@@ -342,7 +342,7 @@ def coverage(content: ReportContent) -> list[Block]:
 
 
 def zigzags(content: ReportContent) -> list[Block]:
-    """Zigzag plots, overshoots measured and predicted, criteria."""
+    """Draw the manoeuvres; list overshoots measured and predicted, and the criteria of zigzags."""
     first, last = content.wording.first_model, content.wording.last_model
     made: list[Block] = []
     for one in content.manoeuvres:
@@ -363,6 +363,8 @@ def zigzags(content: ReportContent) -> list[Block]:
             value, limit = _degrees(criterion.get("value_deg")), _degrees(criterion.get("limit_deg"))
             rows.append((one.short, name, value, limit, said, criterion.get("why") or ""))
     head = ("manoeuvre", "criterion", "measured, deg", "limit, deg", "result", "why not")
+    if not rows:
+        return made
     return [*made, TableBlock("Criteria of IMO resolution MSC.137(76), 5.3.3", head, rows, numeric=(2, 3))]
 
 

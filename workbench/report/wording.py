@@ -220,7 +220,7 @@ def _sections(verdict: str, evidence: DiagnosisEvidence, first: str, last: str) 
         ),
         "coverage": SectionWords("What the manoeuvres cover", "Beyond it, the model extrapolates."),
         "zigzags": SectionWords(
-            "Zigzags and the IMO criteria",
+            "Manoeuvres and the IMO criteria",
             "Heading as measured and as the free run predicts it on the logged rudder. Overshoots are those measured.",
         ),
         "provenance": SectionWords("Inputs, versions and settings", "What this report was made from."),

@@ -14,6 +14,7 @@ import numpy as np
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS
+from kempf.schemas.errors import DataRejected
 
 #: a run farther away in time is of another day: the stream, the load and the engine are others
 _SAME_DAY_S = 12 * 3600.0
@@ -21,6 +22,9 @@ _SAME_DAY_S = 12 * 3600.0
 _LEAST_TURN_DEG = 60.0
 #: relative difference of the shaft speeds up to which the engine setting counts as the same
 _SAME_SHAFT_SPEED = 0.03
+#: range of the shaft speed within a run, relative to its median, up to which it is one engine setting: a diesel slows
+#: in a turn. Taken from the fifth to the ninety-fifth percentile
+_ONE_SETTING, _RANGE = 0.2, (5.0, 95.0)
 #: each run more costs as much time as the first, and adds less than the one before
 _MOST = 2
 #: the log counts for a segment from so many readings on, within so much more at either end, as `make_record` has it
@@ -66,6 +70,30 @@ def shaft_speed(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) ->
         return None
     median = float(np.median(part.value))
     return median if np.isfinite(median) else None
+
+
+def check_engine(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -> None:
+    """Refuse a segment in which the engine was set anew: its speed on a straight course is no longer one.
+
+    Where the shaft speed was not logged, nothing is known of it.
+
+    Raises
+    ------
+    DataRejected
+        ``engine_changed``.
+    """
+    shaft, median = instruments.get("shaft_speed"), shaft_speed(instruments, start_utc_ns, end_utc_ns)
+    if shaft is None or not median:
+        return
+    low, high = np.percentile(shaft.between(start_utc_ns, end_utc_ns).value, _RANGE)
+    if high - low > _ONE_SETTING * abs(median):
+        raise DataRejected(
+            "engine_changed",
+            f"There is no speed through the water, and the shaft goes from {60.0 * low:.0f} to {60.0 * high:.0f} rpm: "
+            "what is estimated in place of a log holds for one engine setting.",
+            "Log the speed through the water, or sail the manoeuvre at one engine setting.",
+            {"shaft_speed_per_s": [float(low), float(high)]},
+        )
 
 
 def companions_of(run: Passage, others: Sequence[Passage]) -> tuple[int, ...]:

@@ -18,12 +18,13 @@ from kempf.schemas.model_spec import ModelSpec
 
 _APPROACH_S = 5.0
 _SLOWEST = 0.1
-#: share of the speed that a run comes to below which it begins at rest; quantile that is the speed it comes to
-_AT_REST, _REACHED = 0.5, 0.95
+#: share of the speed that a run comes to below which it does not begin with the speed of the approach: it begins at
+#: rest, out of a turn, or amid a random manoeuvre; quantile that is the speed it comes to
+_BEGINS_SLOWER, _REACHED = 0.9, 0.95
 
 
 def approach_speed(time_s: Float, speed_m_s: Float) -> float:
-    """Return the speed of the approach, m/s; of a run that begins almost at rest the one that it comes to.
+    """Return the speed of the approach, m/s; of a run that begins slower, the one that it comes to.
 
     Parameters
     ----------
@@ -31,7 +32,7 @@ def approach_speed(time_s: Float, speed_m_s: Float) -> float:
     """
     approach = float(np.median(speed_m_s[time_s <= time_s[0] + _APPROACH_S]))
     reached = float(np.quantile(speed_m_s, _REACHED))
-    return approach if approach > _AT_REST * reached else reached
+    return approach if approach > _BEGINS_SLOWER * reached else reached
 
 
 T = TypeVar("T", bound=Instants)

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -50,15 +51,21 @@ def writing(client: TestClient) -> TestClient:
     return client
 
 
-@pytest.fixture
-def working(own: Path, tmp_path: Path) -> Iterator[tuple[TestClient, Keeper, Queue]]:  # noqa: F811
-    """A browser that may write, and an engine at work."""
-    state = tmp_path / "state"
-    keeper = Keeper(state, Warehouse(str(own)))
+@contextmanager
+def at_work(place: Path, state: Path) -> Iterator[tuple[TestClient, Keeper, Queue]]:
+    """A browser that may write at a warehouse's pages, and an engine at work."""
+    keeper = Keeper(state, Warehouse(str(place)))
     keeper.start()
     try:
-        with client_of(own, state) as client:
+        with client_of(place, state) as client:
             client.get(f"/?token={TOKEN}")
             yield client, keeper, Queue(state / "jobs.sqlite")
     finally:
         keeper.stop()
+
+
+@pytest.fixture
+def working(own: Path, tmp_path: Path) -> Iterator[tuple[TestClient, Keeper, Queue]]:  # noqa: F811
+    """A browser that may write, and an engine at work."""
+    with at_work(own, tmp_path / "state") as one:
+        yield one
