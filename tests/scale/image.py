@@ -84,6 +84,8 @@ def build(root: Path, given: Mapping[str, str]) -> Image:  # noqa: PLR0912 - a b
             settings[name] = value
             if name == "NUMBA_CACHE_DIR" and stages == 1:
                 _lay_kernels(root, Path(within(root, value)))
+                # what a builder without them would compile is what the steps behind load
+                arguments["NUMBA_DEBUG_CACHE"] = "1"
         elif word == "COPY" and rest.startswith("--from="):
             source, target = (one for one in rest.split() if not one.startswith("--"))
             assert source == target and (root / source.lstrip("/")).exists(), "it is there already: one folder for both"
@@ -98,6 +100,8 @@ def build(root: Path, given: Mapping[str, str]) -> Image:  # noqa: PLR0912 - a b
                 ["sh", "-c", within(root, rest)], cwd=here, env=env, capture_output=True, text=True, check=False
             )
             assert done.returncode == 0, (rest, done.stdout, done.stderr)
+            if "NUMBA_CACHE_DIR" in kept:
+                _keep_used(Path(kept["NUMBA_CACHE_DIR"]), done.stdout)
         elif word == "RUN":
             for name in re.findall(r"(?<=\s)/data\S*", rest):
                 Path(within(root, name)).mkdir(parents=True, exist_ok=True)
@@ -119,6 +123,15 @@ def _lay_kernels(root: Path, folder: Path) -> None:
         place = folder / _CacheLocator.get_suitable_cache_subpath(str(there / "any.py"))
         place.mkdir(parents=True, exist_ok=True)
         shutil.copy(kernel, place)
+
+
+def _keep_used(folder: Path, said: str) -> None:
+    """Take away the kernels that no step has used: an image built without a cache would not hold them."""
+    used = set(re.findall(r"\[cache\] data (?:loaded from|saved to) '([^']+)'", said))
+    assert used, said
+    for kernel in folder.rglob("*.nbc"):
+        if str(kernel) not in used:
+            kernel.unlink()
 
 
 def _copy(source: Path, target: Path) -> None:
