@@ -127,27 +127,28 @@ class _Search:
         By how likely the readings are from the third on, after the first two, so that both orders compare; a shape
         costs one, as by Akaike.
         """
-        penalty = _penalty(order, log_width)
-        bent, solved, log_det = self._smoothers[order].weighed(penalty)
-        count = bent.shape[0]
-        own, best = bent.T @ solved, None
-        for shape in range(bent.shape[1]):
-            if not own[shape, shape] > 0.0:
-                continue
-            # beside no shape there is no multiple
-            multiple = float(own[0, shape] / own[shape, shape]) if shape else 0.0
-            variance = max(float(own[0, 0]) - multiple * float(own[0, shape]), 0.0) / count
-            if variance <= self._floor:
-                continue
-            likely = -0.5 * (count * (np.log(2.0 * np.pi * variance) + 1.0) + log_det) - bool(shape)
-            if order == 1:
-                step = float(bent[0, 0] - multiple * bent[0, shape])
-                spread = variance * (2.0 + self._first_step / penalty)
-                likely += 0.5 * (np.log(2.0 * np.pi * spread) + step**2 / spread)
-            if best is None or likely > best.log_likelihood:
-                around = variance / float(own[shape, shape])
-                best = _Candidate(float(likely), order, log_width, shape, multiple, variance, around)
-        return best or _Candidate(_IMPOSSIBLE, order, log_width, 0, 0.0, self._floor, 0.0)
+        penalty, smoother = _penalty(order, log_width), self._smoothers[order]
+        white, log_det = smoother.whitened(penalty)
+        count = white.shape[0]
+        with_series, own = white[:, 0] @ white, np.einsum("ij,ij->j", white, white)
+        # beside no shape there is no multiple
+        multiples = np.where(own > 0.0, with_series / np.where(own > 0.0, own, 1.0), 0.0)
+        multiples[0] = 0.0
+        variances = np.maximum(own[0] - multiples * with_series, 0.0) / count
+        possible = (own > 0.0) & (variances > self._floor)
+        if not possible.any():
+            return _Candidate(_IMPOSSIBLE, order, log_width, 0, 0.0, self._floor, 0.0)
+        variance = np.where(possible, variances, 1.0)
+        likely = -0.5 * (count * (np.log(2.0 * np.pi * variance) + 1.0) + log_det)
+        likely[1:] -= 1.0
+        if order == 1:
+            first = smoother.differences[0]
+            spread = variance * (2.0 + self._first_step / penalty)
+            likely += 0.5 * (np.log(2.0 * np.pi * spread) + (first[0] - multiples * first) ** 2 / spread)
+        best = int(np.argmax(np.where(possible, likely, -np.inf)))
+        around = float(variances[best] / own[best])
+        of_best = best, float(multiples[best]), float(variances[best]), around
+        return _Candidate(float(likely[best]), order, log_width, *of_best)
 
     def laid(self, one: _Candidate) -> tuple[Float, float]:
         """Return the signal, shape (n,), and the standard error that the multiple brings in."""

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 from scipy.linalg import cho_solve_banded, cholesky_banded
+from scipy.linalg.lapack import dtbtrs
 
 from kempf.pipeline.channels.series import Float
 
@@ -39,7 +40,10 @@ class Smoother:
             self._q = np.stack([1.0 / h[:-1], -1.0 / h[:-1] - 1.0 / h[1:], 1.0 / h[1:]])
             ribs = [(h[:-1] + h[1:]) / 3.0, h[1:-1] / 6.0]
         self._columns = columns
-        self._bent = sum(row[:, None] * self._shifted(k) for k, row in enumerate(self._q))
+        #: Divided differences of the columns, shape (n - order, k).
+        self.differences: Float = np.asfortranarray(
+            sum(row[:, None] * self._shifted(k) for k, row in enumerate(self._q))
+        )
         # the upper diagonals, the main one last
         self._squares, self._ribs = np.zeros((order + 1, h.size + 1 - order)), np.zeros((order + 1, h.size + 1 - order))
         for k in range(order + 1):
@@ -63,15 +67,15 @@ class Smoother:
         -------
         ndarray, shape (n, k)
         """
-        bent = cho_solve_banded((self._factor(penalty), False), self._bent)
+        bent = cho_solve_banded((self._factor(penalty), False), self.differences)
         taken = np.zeros_like(self._columns)
         for k, row in enumerate(self._q):
             taken[k : k + row.size] += row[:, None] * bent
         result: Float = self._columns - penalty * taken
         return result
 
-    def weighed(self, penalty: float) -> tuple[Float, Float, float]:
-        """Return the differences of the columns, what their inverse covariance makes of them, and its logarithm.
+    def whitened(self, penalty: float) -> tuple[Float, float]:
+        """Return the differences of the columns with their covariance taken out, and the logarithm of that.
 
         Of the readings' noise, white and of variance 1, and of a derivative (the one that is kept small) that is white
         noise of a density of 1 / ``penalty`` (Wahba 1978, "Improper priors, spline smoothing and the problem of
@@ -79,14 +83,16 @@ class Smoother:
 
         Returns
         -------
-        differences, weighed : ndarray, shape (n - order, k)
+        whitened : ndarray, shape (n - order, k)
+            The product of two of its columns is that of their differences, weighed by the inverse covariance.
         log_determinant : float
             Of the covariance of the readings after the first ones, as many as the order, given these.
         """
         factor = self._factor(penalty)
         log_determinant = 2.0 * float(np.sum(np.log(factor[-1]))) - factor.shape[1] * np.log(penalty)
-        weighed = penalty * cho_solve_banded((factor, False), self._bent)
-        return self._bent, weighed, log_determinant - 2.0 * self._log_scale
+        # half of a solution by the factor: for products the other half is not needed
+        half, _ = dtbtrs(factor, self.differences, uplo="U", trans="T")
+        return np.sqrt(penalty) * half, log_determinant - 2.0 * self._log_scale
 
     def _factor(self, penalty: float) -> Float:
         factor: Float = cholesky_banded(self._ribs + penalty * self._squares)

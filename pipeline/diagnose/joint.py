@@ -38,7 +38,9 @@ class Joint:
     effects: tuple[Effect, ...]
     #: The last one, and what could be in its place; terms of series after the others.
     alternatives: tuple[Effect, ...]
-    #: Share of the repetitions, each without one manoeuvre, whose best is one of these sets.
+    #: Share of the repetitions, each without one manoeuvre, whose best set has effects of the same groups: a race over
+    #: the rudder and a rudder force with another power of the speed are near one another, and which of both comes out
+    #: first turns on single seconds of the record.
     stability: float
 
 
@@ -66,7 +68,8 @@ def better_together(shooting: ShootingRange, base: Ahead, effects: Sequence[Effe
         return None
     best = min(good, key=lambda one: one.left_out.mean)
     close = [one for one in good if paired(best.left_out, one.left_out).in_std > -ALIKE]
-    stability = stability_of(good, close)
+    alike = [one for one in good if _groups(one) == _groups(best)]
+    stability = stability_of(good, alike)
     added = best.model.effects[len(base.model.effects) :]
     if not (stability >= STABLE and _holds(base, best) and all(_is_needed(shooting, best, e) for e in added)):
         return None
@@ -115,6 +118,11 @@ def _holds(base: Ahead, made: Ahead) -> bool:
     return not worsens(base, made) and all(
         fall.in_std > _FALLS and fall.falls_by > owed and fall.better >= MOST * fall.of for fall in falls
     )
+
+
+def _groups(one: Ahead) -> list[str]:
+    """Return the parts of the physics that a model's effects belong to, sorted."""
+    return sorted(effect.group for effect in one.model.effects)
 
 
 def _is_needed(shooting: ShootingRange, best: Ahead, effect: Effect) -> bool:

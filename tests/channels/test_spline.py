@@ -47,8 +47,8 @@ def test_it_is_the_expected_path_of_a_random_walk_and_as_likely_as_its_density_s
     whole = path + np.eye(30)
     smoother = Smoother(time, y[:, None], order)
     np.testing.assert_allclose(smoother.smooth(penalty)[:, 0], path @ np.linalg.solve(whole, y), atol=1e-4)
-    bent, weighed, log_determinant = smoother.weighed(penalty)
-    square = float(bent[:, 0] @ weighed[:, 0])
+    white, log_determinant = smoother.whitened(penalty)
+    square = float(white[:, 0] @ white[:, 0])
     count = 30 - order
     found = -0.5 * (square + log_determinant + count * np.log(2.0 * np.pi))
     rest, first = slice(order, None), slice(0, order)

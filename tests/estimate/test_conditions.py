@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import cont2discrete
 
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
@@ -99,6 +100,17 @@ def test_the_heel_of_a_turn_is_what_the_turn_lets_expect(
     assert np.std(columns["phi"] - true) < 0.5 * np.std(wandering - true)
     about = columns["phi"] - columns["phi"].mean()
     assert about @ (true - true.mean()) / (about @ about) == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.parametrize("step_s", [0.05, 0.01])
+@pytest.mark.parametrize("period_s", [0.5, 6.0, 40.0])
+@pytest.mark.parametrize("damping", [0.05, 0.4])
+def test_an_oscillator_is_that_of_scipy(period_s: float, damping: float, step_s: float) -> None:
+    w = 2.0 * np.pi / period_s
+    above, below, _ = cont2discrete(([w * w], [1.0, 2.0 * damping * w, w * w]), step_s, method="foh")
+    found = heel.oscillator(period_s, damping, step_s)
+    np.testing.assert_allclose(found[0], above.ravel(), rtol=2e-6)
+    np.testing.assert_allclose(found[1], below, rtol=1e-12)
 
 
 def test_a_channel_that_ends_within_the_manoeuvre_is_none() -> None:

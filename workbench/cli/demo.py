@@ -64,7 +64,7 @@ def _print_demonstration(shown: Demonstration) -> None:
     click.echo()
     for outcome in shown.identified:
         segment = outcome.segment
-        title = f"{segment.psi0_deg:g}/{segment.delta0_deg:g} zigzag of {segment.segment_id}"
+        title = f"{segment.words} of {segment.segment_id}"
         if outcome.parameter_set is None:
             click.echo(f"{title}: not identified, {outcome.error}")
             continue

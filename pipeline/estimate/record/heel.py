@@ -7,7 +7,7 @@ speed are read more often and better than the roll: what they say of it need not
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import lfilter
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.channels.signal import signal
@@ -65,13 +65,47 @@ def _responses(roll: Series, record: Record) -> list[Float]:
     push = push - np.mean(push)
     if not np.ptp(push) > 0.0:
         return []
-    shapes = [np.interp(at, time, push)]
-    for period in _PERIODS_S[2.0 * roll.period_s <= _PERIODS_S]:
-        for damping in _DAMPINGS:
-            w = 2.0 * np.pi / period
-            above, below, _ = cont2discrete(([w * w], [1.0, 2.0 * damping * w, w * w]), step_s, method="foh")
-            shapes.append(np.interp(at, time, lfilter(above.ravel(), below, push)))
-    return shapes
+    before = np.clip(np.searchsorted(time, at, side="right") - 1, 0, time.size - 2)
+    share = (at - time[before]) / step_s
+    moved = [
+        push,
+        *(
+            lfilter(*oscillator(float(period), damping, step_s), push)
+            for period in _PERIODS_S[2.0 * roll.period_s <= _PERIODS_S]
+            for damping in _DAMPINGS
+        ),
+    ]
+    return [course[before] + share * (course[before + 1] - course[before]) for course in moved]
+
+
+def oscillator(period_s: float, damping: float, step_s: float) -> tuple[Float, Float]:
+    """Return a damped oscillator as a filter of what pushes it, in straight lines between the instants.
+
+    Parameters
+    ----------
+    period_s : float
+        Natural period.
+    damping : float
+        Part of critical damping, below 1.
+
+    Returns
+    -------
+    numerator, denominator : ndarray, shape (3,)
+        As `scipy.signal.lfilter` takes them. A steady push comes out as it is.
+
+    References
+    ----------
+    Franklin, Powell & Workman (1998), Digital Control of Dynamic Systems, 3rd ed., sect. 6.3.2: the triangle-hold
+    equivalent, the second difference of the response to a ramp.
+    """
+    w = 2.0 * np.pi / period_s
+    damped, t = w * np.sqrt(1.0 - damping**2), step_s * np.arange(4.0)
+    swing = 2.0 * damping / w * np.cos(damped * t) + (2.0 * damping**2 - 1.0) / damped * np.sin(damped * t)
+    ramp = t - 2.0 * damping / w + np.exp(-damping * w * t) * swing
+    impulse = np.diff(np.concatenate([[0.0], ramp]), n=2) / step_s
+    decay = np.exp(-damping * w * step_s)
+    below = np.array([1.0, -2.0 * decay * np.cos(damped * step_s), decay**2])
+    return np.convolve(impulse, below)[:3], below
 
 
 def _yaw_rate(record: Record, time_s: Float) -> Float:
