@@ -19,6 +19,7 @@ SOURCES = [
         "estimate/record/checks",
         "estimate/record/channel_faults",
         "estimate/maximum_likelihood",
+        "estimate/no_log/companions",
         "channels/doctor/verdict",
     )
 ]
