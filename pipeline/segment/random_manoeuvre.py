@@ -227,11 +227,13 @@ def _way(instruments: Instruments) -> Series | None:
 
 
 def _seen(signals: Signals, series: Series, holds: NDArray[np.bool_]) -> list[Span]:
-    """Return from when to when several readings in a row show something."""
+    """Return when several readings in a row show something, up to the readings beside them that do not."""
     time_s = series.seconds_since(signals.origin_ns)
     edges = np.flatnonzero(np.diff(np.concatenate([[False], holds, [False]]).astype(np.int8)))
-    rows = zip(edges[::2], edges[1::2] - 1, strict=True)
-    return [(float(time_s[a]), float(time_s[b])) for a, b in rows if b - a + 1 >= _FEWEST_IN_A_ROW]
+    first, behind = edges[::2], edges[1::2]
+    long = behind - first >= _FEWEST_IN_A_ROW
+    begins, ends = time_s[np.maximum(first - 1, 0)][long], time_s[np.minimum(behind, time_s.size - 1)][long]
+    return [(float(begin), float(end)) for begin, end in zip(begins, ends, strict=True)]
 
 
 def _without(whole: Span, taken: Sequence[Span]) -> list[Span]:
