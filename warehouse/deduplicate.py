@@ -40,7 +40,7 @@ def _overlap(one: Segment, other: Segment) -> bool:
 
 
 def same(one: Segment, other: Segment) -> bool:
-    """Return whether two segments are one manoeuvre: of one kind at the same time, executes at the same instants.
+    """Return whether two segments are one manoeuvre: at the same time, executes at the same instants.
 
     Where neither log has a time of its own, since both count from a start that the profile states or from the moment
     at which the logger was switched on, the time says nothing: runs of a tank share their start. They are one only

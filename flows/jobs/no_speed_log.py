@@ -95,14 +95,18 @@ def estimate_of(
         ``engine_changed``: see `pipeline.estimate.no_log.companions.check_engine`.
     """
     settings, (own,) = dict(inputs.settings), inputs.bounds
-    companions.check_engine(instruments[own.log_id], own.start_utc_ns, own.end_utc_ns)
+    # in still water the speed over ground is that through the water, whatever the engine does
+    asked = spec.current != "none"
+    if asked:
+        companions.check_engine(instruments[own.log_id], own.start_utc_ns, own.end_utc_ns)
     no_log = dict(settings.pop(KEY))
     if no_log["trial_speed_m_s"] is None and profile.trial_speed_m_s is not None:
         no_log |= {"trial_speed_m_s": profile.trial_speed_m_s, "trial_speed_std_m_s": profile.trial_speed_std_m_s}
     beside, refused = [], []
     for bounds in inputs.companions:
         try:
-            companions.check_engine(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
+            if asked:
+                companions.check_engine(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns)
             beside.append(make_record(instruments[bounds.log_id], bounds.start_utc_ns, bounds.end_utc_ns))
         except KempfError as error:
             refused.append(error.code)

@@ -26,6 +26,8 @@ _MOST_EFFECTS, _REFITS = 3, 10
 _FALLS = 3.0
 #: held-out manoeuvres that can confirm a set
 _FEWEST_HELD = 2
+#: groups of the catalogue whose effects are formulas of one thing
+_FORMS = ("hull", "propulsion")
 #: beside what is linear in the effects
 _DAMPING = 1e-6
 
@@ -38,9 +40,7 @@ class Joint:
     effects: tuple[Effect, ...]
     #: The last one, and what could be in its place; terms of series after the others.
     alternatives: tuple[Effect, ...]
-    #: Share of the repetitions, each without one manoeuvre, whose best set has effects of the same groups: a race over
-    #: the rudder and a rudder force with another power of the speed are near one another, and which of both comes out
-    #: first turns on single seconds of the record.
+    #: Share of the repetitions, each without one manoeuvre, whose best set has effects of the same kinds.
     stability: float
 
 
@@ -68,7 +68,7 @@ def better_together(shooting: ShootingRange, base: Ahead, effects: Sequence[Effe
         return None
     best = min(good, key=lambda one: one.left_out.mean)
     close = [one for one in good if paired(best.left_out, one.left_out).in_std > -ALIKE]
-    alike = [one for one in good if _groups(one) == _groups(best)]
+    alike = [one for one in good if kinds(one.model.effects) == kinds(best.model.effects)]
     stability = stability_of(good, alike)
     added = best.model.effects[len(base.model.effects) :]
     if not (stability >= STABLE and _holds(base, best) and all(_is_needed(shooting, best, e) for e in added)):
@@ -120,9 +120,13 @@ def _holds(base: Ahead, made: Ahead) -> bool:
     )
 
 
-def _groups(one: Ahead) -> list[str]:
-    """Return the parts of the physics that a model's effects belong to, sorted."""
-    return sorted(effect.group for effect in one.model.effects)
+def kinds(effects: Sequence[Effect]) -> list[str]:
+    """Return what effects are of, sorted: formulas of the hull's drag or of the propulsion are of one kind each.
+
+    A race over the rudder and a rudder force with another power of the speed are near one another, and which of both
+    comes out first turns on single seconds of the record. Of the other groups every effect is a kind of its own.
+    """
+    return sorted(effect.group if effect.group in _FORMS else effect.name for effect in effects)
 
 
 def _is_needed(shooting: ShootingRange, best: Ahead, effect: Effect) -> bool:

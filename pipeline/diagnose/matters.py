@@ -23,7 +23,7 @@ FALLS = 3.5
 LEAST_FALL = 0.05
 #: share of the manoeuvres that must be predicted better
 MOST = 2.0 / 3.0
-#: share of the repetitions, each without one manoeuvre, that must choose the same set
+#: share of the repetitions, each without one manoeuvre, that must choose what predicts alike
 STABLE = 0.9
 #: standard errors within which two models predict alike, and beyond which one is worse
 ALIKE, WORSE = 2.0, 2.0

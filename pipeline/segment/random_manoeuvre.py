@@ -47,6 +47,9 @@ _SLOWEST_SHARE, _HARDLY_EXCEEDED = 0.3, 90.0
 #: Shaft speed astern up to which a shaft counts as stopped, as a share of the one that the log hardly exceeds.
 _NOT_ASTERN = 0.05
 
+#: Longest gap of the speed that a record of a manoeuvre may have, s: the limit of `pipeline.estimate.record.cut`.
+_LONGEST_SPEED_GAP_S = 60.0
+
 #: Readings in a row that show that she is slow or her shaft turns astern: one alone may be wrong.
 _FEWEST_IN_A_ROW = 3
 
@@ -109,7 +112,9 @@ def find_random(instruments: Instruments, taken: Sequence[tuple[int, int]] = ())
         return []
     signals = Signals.of(heading, rudder)
     occupied = [_span(signals, *bounds) for bounds in taken]
-    hindered = [*_gaps(signals, heading), *_gaps(signals, rudder), *_slow(signals, way), *_astern(signals, instruments)]
+    gaps = [gap for one in (heading, rudder) for gap in _gaps(signals, one, gap_limit_s(one))]
+    gaps += _gaps(signals, way, _LONGEST_SPEED_GAP_S)
+    hindered = [*gaps, *_slow(signals, way), *_astern(signals, instruments)]
     whole = _span(signals, int(way.time_utc_ns[0]), int(way.time_utc_ns[-1]))
     found = []
     for span in _without(whole, [*occupied, *hindered]):
@@ -117,7 +122,8 @@ def find_random(instruments: Instruments, taken: Sequence[tuple[int, int]] = ())
         orders = [after for before, after in pairwise(inside) if _is_order(before.rudder, after.rudder)]
         for part, room in _unpaused(orders, span):
             one = _described(signals, room, inside, part)
-            found += [] if one is None else [one]
+            if one is not None:
+                found.append(one)
     return found
 
 
@@ -203,10 +209,10 @@ def _astern(signals: Signals, instruments: Instruments) -> list[Span]:
     return _seen(signals, shaft, shaft.value < -stopped)
 
 
-def _gaps(signals: Signals, series: Series) -> list[Span]:
+def _gaps(signals: Signals, series: Series, longest_s: float) -> list[Span]:
     """Return the gaps of a channel that a model does not interpolate over."""
     time_s = series.seconds_since(signals.origin_ns)
-    at = np.flatnonzero(np.diff(time_s) > gap_limit_s(series))
+    at = np.flatnonzero(np.diff(time_s) > longest_s)
     return [(float(time_s[k]), float(time_s[k + 1])) for k in at]
 
 

@@ -8,7 +8,7 @@ from typing import cast
 import numpy as np
 from scipy.optimize import lsq_linear
 
-from kempf.pipeline.diagnose.joint import _sets, _worth, better_together
+from kempf.pipeline.diagnose.joint import _sets, _worth, better_together, kinds
 from kempf.pipeline.shooting.ahead import Ahead, shooting_range
 from kempf.pipeline.shooting.normal_equations import NormalEquations
 from kempf.schemas.effects import catalogue, get
@@ -65,6 +65,16 @@ def test_no_set_bends_the_hull_twice() -> None:
         frozenset((hulls[0].name, rudder.name)),
         frozenset((hulls[1].name, rudder.name)),
     }
+
+
+def test_formulas_of_one_thing_are_of_one_kind_and_others_are_not() -> None:
+    def of(*names: str) -> list[str]:
+        return kinds([get(name) for name in names])
+
+    assert of("wind_force", "propeller_wash", "cross_flow_drag") == of("sway_vr2", "speed_exponent", "wind_force")
+    assert of("wind_force", "propeller_wash") != of("earth_current", "propeller_wash")
+    assert of("wind_force", "propeller_wash") != of("wind_force", "rudder_stall")
+    assert of("propeller_wash") != of("propeller_wash", "cross_flow_drag")
 
 
 def test_a_ship_without_effects_gets_none_and_one_held_out_run_confirms_nothing() -> None:

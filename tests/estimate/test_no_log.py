@@ -379,6 +379,11 @@ def test_an_engine_set_anew_is_refused(ordered: float, refused: bool) -> None:
     assert said.value.code == "engine_changed"
     # before it was set anew, and where nobody knows, nothing speaks against it
     check_engine(instruments, start, start + round(0.7 * (end - start)))
+    # stopped for the most of it, so that the median is none of her speeds
+    early = shaft.time_utc_ns < start + 0.6 * (end - start)
+    stopped = replace(shaft, value=np.where(early, 0.0, shaft.value))
+    with pytest.raises(DataRejected, match="from 0 to"):
+        check_engine(replace(instruments, series={**instruments.series, "shaft_speed": stopped}), start, end)
     nowhere = {k: v for k, v in instruments.series.items() if k != "shaft_speed"}
     check_engine(replace(instruments, series=nowhere), start, end)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 import pytest
@@ -12,10 +12,12 @@ import yaml
 
 from kempf.flows.jobs.chosen_manoeuvres import Chosen, without_log
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel, inputs_of
-from kempf.flows.jobs.no_speed_log import KEY
+from kempf.flows.jobs.log_channels import channels_of
+from kempf.flows.jobs.no_speed_log import KEY, estimate_of
 from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
 from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.estimate.no_log.identify import NoLogSettings
+from kempf.pipeline.estimate.record.cut import make_record
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.disturbances import Disturbance, Environment
 from kempf.pipeline.simulate.instruments import DEFAULT_INSTRUMENTS
@@ -23,6 +25,7 @@ from kempf.pipeline.simulate.logger_profile import logger_profile
 from kempf.pipeline.simulate.manoeuvre import SteadyCourse, ZigzagTest
 from kempf.pipeline.simulate.plant import STATE
 from kempf.pipeline.simulate.trial import Trial, TrialSettings, simulate_trial, zigzag_settings
+from kempf.schemas.errors import DataRejected
 from kempf.schemas.model_spec import ModelSpec
 from kempf.warehouse import parameter_sets, segments
 from kempf.warehouse.parameter_set import ParameterSet, parameter_set_id
@@ -159,3 +162,25 @@ def test_other_settings_of_the_speed_make_another_set(filled: tuple[Warehouse, A
     assert KEY not in inputs_of(one, "p", rival).settings
     logged = replace(one, detail={**one.detail, "has_log": True})
     assert KEY not in inputs_of(logged, "p", wished).settings
+
+
+@pytest.mark.parametrize(("current", "refused"), [("earth", True), ("none", False)])
+def test_an_engine_set_anew_is_refused_but_in_still_water(
+    current: Literal["earth", "none"], refused: bool, filled: tuple[Warehouse, Any], trials: tuple[Trial, ...]
+) -> None:
+    warehouse, _ = filled
+    segment = segments.current(warehouse, "mariner")[0]
+    bounds = segment.start_utc_ns, segment.end_utc_ns
+    read = channels_of(warehouse, segment.ingest_id)
+    shaft = read.series["shaft_speed"]
+    late = shaft.time_utc_ns > bounds[0] + 0.6 * (bounds[1] - bounds[0])
+    anew = replace(shaft, value=np.where(late, 0.5, 1.0) * shaft.value)
+    instruments = replace(read, series={**read.series, "shaft_speed": anew})
+    spec = ModelSpec(current=current)
+    asked = (make_record(instruments, *bounds), spec, 0.0, logger_profile(trials[0].settings))
+    inputs = inputs_of(segment, "0" * 64, Request(spec=spec))
+    if refused:
+        with pytest.raises(DataRejected, match="rpm"):
+            estimate_of(*asked, inputs, {segment.log_id: instruments})
+    else:
+        assert estimate_of(*asked, inputs, {segment.log_id: instruments}).parameters

@@ -83,7 +83,7 @@ def check_engine(instruments: Instruments, start_utc_ns: int, end_utc_ns: int) -
         ``engine_changed``.
     """
     shaft, median = instruments.get("shaft_speed"), shaft_speed(instruments, start_utc_ns, end_utc_ns)
-    if shaft is None or not median:
+    if shaft is None or median is None:
         return
     low, high = np.percentile(shaft.between(start_utc_ns, end_utc_ns).value, _RANGE)
     if high - low > _ONE_SETTING * abs(median):
