@@ -20,6 +20,8 @@ _PERIODS_S = np.geomspace(0.5, 40.0, 25)
 _DAMPINGS = (0.05, 0.15, 0.4)
 #: instants at which the turn is laid down, in periods of the roll's readings and in the shortest natural periods
 _OF_READING, _OF_PERIOD = 0.25, 0.1
+#: and no finer than this, s: the differences of a ramp's response lose their digits
+_FINEST_S = 0.0025
 #: readings by which the oscillator is chosen
 _MOST = 4000
 
@@ -57,7 +59,7 @@ def rolling(roll: Series, record: Record) -> Series:
 
 def _responses(roll: Series, record: Record) -> list[Float]:
     """Return the heel that the turn brings, at once and by every oscillator, at the instants of the roll."""
-    step_s = min(_OF_READING * roll.period_s, _OF_PERIOD * float(_PERIODS_S[0]))
+    step_s = max(min(_OF_READING * roll.period_s, _OF_PERIOD * float(_PERIODS_S[0])), _FINEST_S)
     at = roll.seconds_since(record.start_utc_ns)
     time = np.arange(min(at[0], 0.0), at[-1] + step_s, step_s)
     push = np.interp(time, record.time_s, record.speed_m_s) * _yaw_rate(record, time)
