@@ -40,7 +40,7 @@ def main() -> None:
         f"{len(chosen.segments)} manoeuvres; the first row has the bounds that the search gives them, in each of the "
         f"others every bound is up to {MOVED_S:g} s further in, at random. The effects that predict clearly better "
         "together, and what could be in the place of the last one; the share of the repetitions without one manoeuvre "
-        "each whose best set has effects of the same groups.",
+        "each whose best set has effects of the same kinds.",
         "",
         *result_page.table(["bounds", "held out", "effects that belong together", "or, for the last", "share"], rows),
     ]

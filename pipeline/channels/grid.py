@@ -8,6 +8,9 @@ import numpy as np
 
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds, Series
 
+#: Longest distance of two values of the speed, s: a log slower than this changes little in between.
+LONGEST_SPEED_GAP_S = 60.0
+
 
 @dataclass(frozen=True, eq=False)
 class Grid:

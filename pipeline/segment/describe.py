@@ -9,7 +9,7 @@ import numpy as np
 from kempf.pipeline.channels.series import Series
 from kempf.pipeline.segment.constancy import speed_constancy
 from kempf.pipeline.segment.local_fit import value_and_rate
-from kempf.pipeline.segment.measured import Signals
+from kempf.pipeline.segment.measured import Signals, said_of_gap
 from kempf.pipeline.segment.nominal import HEADING_TOLERANCE, RUDDER_TOLERANCE, measured_angles, nominal_angle
 from kempf.pipeline.segment.phases import leg_phases, turning_point
 from kempf.pipeline.segment.settings import SegmentSettings
@@ -245,8 +245,6 @@ def _quality(
     shown = [reasons[switching.start]] if switching.start in reasons else []
     if speed is not None and not abs(speed.trend_percent) <= _SPEED_TREND_PERCENT:
         shown.append(f"The speed changed by {speed.trend_percent:.0f} % after the second execute.")
-    if gap_s > 0:
-        shown.append(f"Heading or rudder were not recorded for {gap_s:.1f} s.")
     return Quality(
         n_legs=switching.last - switching.first + 1,
         rudder_scatter_deg=float(np.max(np.abs(angles_deg - np.where(angles_deg > 0, starboard, port)))),
@@ -255,5 +253,5 @@ def _quality(
         switching_centre_deg=float(np.rad2deg(switching.centre - switching.base_heading)),
         start=switching.start,
         gap_s=gap_s,
-        reasons=tuple(shown),
+        reasons=(*shown, *said_of_gap(gap_s)),
     )

@@ -59,6 +59,11 @@ class Signals:
         return max(_gaps(self.heading_s, start_s, end_s), _gaps(self.rudder_s, start_s, end_s))
 
 
+def said_of_gap(gap_s: float) -> tuple[str, ...]:
+    """Return what to say of a manoeuvre for some of which heading or rudder were not recorded; nothing of no gap."""
+    return (f"Heading or rudder were not recorded for {gap_s:.1f} s.",) if gap_s > 0.0 else ()
+
+
 def _gaps(time_s: Float, start_s: float, end_s: float) -> float:
     """Sum the intervals that are more than five times as long as usual."""
     steps = np.diff(time_s[np.searchsorted(time_s, start_s) : np.searchsorted(time_s, end_s, side="right")])

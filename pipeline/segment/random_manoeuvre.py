@@ -13,11 +13,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.grid import LONGEST_SPEED_GAP_S, gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS, Series
 from kempf.pipeline.segment.held_rudder import HeldRudder, held_stretches
-from kempf.pipeline.segment.measured import Signals
+from kempf.pipeline.segment.measured import Signals, said_of_gap
 from kempf.pipeline.segment.zigzag import Side
 
 #: Smallest change of the rudder that is an order of such a manoeuvre, and smallest angle that it goes to or comes from,
@@ -46,9 +46,6 @@ _SLOWEST_SHARE, _HARDLY_EXCEEDED = 0.3, 90.0
 
 #: Shaft speed astern up to which a shaft counts as stopped, as a share of the one that the log hardly exceeds.
 _NOT_ASTERN = 0.05
-
-#: Longest gap of the speed that a record of a manoeuvre may have, s: the limit of `pipeline.estimate.record.cut`.
-_LONGEST_SPEED_GAP_S = 60.0
 
 #: Readings in a row that show that she is slow or her shaft turns astern: one alone may be wrong.
 _FEWEST_IN_A_ROW = 3
@@ -81,7 +78,7 @@ class RandomManoeuvre:
     @property
     def reasons(self) -> tuple[str, ...]:
         """What to know of its quality, in sentences."""
-        return (f"Heading or rudder were not recorded for {self.gap_s:.1f} s.",) if self.gap_s > 0.0 else ()
+        return said_of_gap(self.gap_s)
 
 
 def find_random(instruments: Instruments, taken: Sequence[tuple[int, int]] = ()) -> list[RandomManoeuvre]:
@@ -113,7 +110,7 @@ def find_random(instruments: Instruments, taken: Sequence[tuple[int, int]] = ())
     signals = Signals.of(heading, rudder)
     occupied = [_span(signals, *bounds) for bounds in taken]
     gaps = [gap for one in (heading, rudder) for gap in _gaps(signals, one, gap_limit_s(one))]
-    gaps += _gaps(signals, way, _LONGEST_SPEED_GAP_S)
+    gaps += _gaps(signals, way, LONGEST_SPEED_GAP_S)
     hindered = [*gaps, *_slow(signals, way), *_astern(signals, instruments)]
     whole = _span(signals, int(way.time_utc_ns[0]), int(way.time_utc_ns[-1]))
     found = []

@@ -14,7 +14,7 @@ from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.segment.circle_figures import CircleFigures, circle_figures
 from kempf.pipeline.segment.held_rudder import HeldRudder
 from kempf.pipeline.segment.local_fit import value_and_rate
-from kempf.pipeline.segment.measured import Signals
+from kempf.pipeline.segment.measured import Signals, said_of_gap
 from kempf.pipeline.segment.nominal import RUDDER_TOLERANCE, nominal_angle
 from kempf.pipeline.segment.ramps import Ramp, approach_before, measure_ramp
 from kempf.pipeline.segment.settings import SegmentSettings
@@ -245,6 +245,4 @@ def _reasons(start: Start, ramp: Ramp | None, measured: CircleFigures, gap_s: fl
     trend = measured.approach_speed_trend_percent
     if abs(trend) > _SPEED_TREND_PERCENT:
         shown.append(f"The speed changed by {trend:.0f} % over the approach.")
-    if gap_s > 0:
-        shown.append(f"Heading or rudder were not recorded for {gap_s:.1f} s.")
-    return (*shown, *measured.reasons)
+    return (*shown, *said_of_gap(gap_s), *measured.reasons)

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from kempf.pipeline.channels import grid
 from kempf.pipeline.channels.doctor import outcome
 from kempf.pipeline.channels.doctor.faults import UNITS
 from kempf.pipeline.estimate.record import channel_faults, checks, cut, jumps
@@ -53,7 +54,7 @@ def test_thresholds_are_the_codes() -> None:
     assert f"fewer than {cut._MIN_INSTANTS // 2} readings" in TEXT
     assert f"fewer than {cut._MIN_INSTANTS} instants" in TEXT
     assert f"less than {np.rad2deg(cut._MIN_RUDDER_STD_RAD):.1f} deg rms" in TEXT
-    assert f"more than {cut._MAX_SPEED_GAP_S:.0f} s" in TEXT
+    assert f"more than {grid.LONGEST_SPEED_GAP_S:.0f} s" in TEXT
     assert f"beyond {np.rad2deg(checks._FARTHEST_RUDDER_RAD):.0f} deg" in TEXT
     assert f"within {np.rad2deg(checks._FAINT_RUDDER_RAD):.0f} deg" in TEXT
     assert (checks._SWING_PER_RUDDER, checks._EXECUTES) == (10.0, 2)

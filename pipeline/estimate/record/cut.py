@@ -8,7 +8,7 @@ import numpy as np
 
 from kempf.pipeline.channels.corners import with_corners
 from kempf.pipeline.channels.doctor.log import Log
-from kempf.pipeline.channels.grid import gap_limit_s
+from kempf.pipeline.channels.grid import LONGEST_SPEED_GAP_S, gap_limit_s
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.lateral_speed import LateralSpeed, lateral_speed, noise_std
 from kempf.pipeline.channels.punctual import Punctual, VelocitySlope, punctual
@@ -23,8 +23,6 @@ from kempf.pipeline.estimate.record.speed_error import SpeedError, rudder_of_spe
 from kempf.pipeline.estimate.record.water_speed import water_speed
 from kempf.schemas.errors import DataRejected
 
-#: a log slower than this changes little in between; longer gaps are refused
-_MAX_SPEED_GAP_S = 60.0
 _MIN_INSTANTS = 40
 #: time beyond the segment over which the log is taken at least, s, and how many means that share no reading are enough
 _BEYOND_S, _FEWEST_OF_LOG = 5.0, 12
@@ -194,7 +192,7 @@ def _speed(
     if spikes:
         warnings.append(f"{spikes} spikes of the speed left out")
     slow = water_speed(log, heading, rudder, mean_s)
-    speed = slow.series.at(instants, _MAX_SPEED_GAP_S)
+    speed = slow.series.at(instants, LONGEST_SPEED_GAP_S)
     if np.nanmax(np.abs(speed), initial=0.0) < 0.05:
         raise DataRejected(
             "no_speed",
@@ -243,7 +241,7 @@ def _trimmed(instants: Nanoseconds, speed: Float, warnings: list[str]) -> tuple[
         apart = np.diff(instants[known]).max() / SECOND_NS
         raise DataRejected(
             "speed_gap",
-            f"The speed has a gap of {apart:.0f} s inside the segment; up to {_MAX_SPEED_GAP_S:.0f} s are bridged.",
+            f"The speed has a gap of {apart:.0f} s inside the segment; up to {LONGEST_SPEED_GAP_S:.0f} s are bridged.",
             "Repeat the manoeuvre, or identify the part of it before or after the gap.",
             {"gap_s": float(apart)},
         )
