@@ -17,7 +17,7 @@ QUICK := test_layers.py test_docstrings.py package/test_import.py docs/test_docu
 	$(addprefix simulate/test_, disturbances.py manoeuvre.py) $(addprefix warehouse/test_, store.py vessels.py segments.py) \
 	flows/test_fleet_plan.py $(addprefix workbench/test_, names.py effects.py)
 
-.PHONY: demo test check quick bench bench-long lock clean setup
+.PHONY: demo test check compiled quick bench bench-long lock clean setup
 
 demo: $(RUNTIME)
 	$(BIN)/kempf demo
@@ -26,9 +26,12 @@ demo: $(RUNTIME)
 # First, whether the demonstration still gives the reference's segments and parameter sets, bit for bit: it compiles what
 # the tests call, which each of their processes would do for itself. Then the tests, in the order of their names: by default
 # the files with the fewest tests come last, and these are the slowest.
-test: check
-	$(BIN)/python -m benchmarks.identify.identical demo
+test: $(DEVELOP)
+	$(MAKE) --jobs 2 check compiled
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
+
+compiled: $(DEVELOP)
+	$(BIN)/python -m benchmarks.identify.identical demo
 
 check: $(DEVELOP)
 	$(BIN)/ruff check .
@@ -45,7 +48,7 @@ bench: $(RIVALS)
 	for name in documents.house identify.engines identify.hsva identify.hsva_held_out identify.usv identify.trials fleet.rerun_demo ingest.speed \
 		identify.monte_carlo identify.current_frame documents.draw_paper identify.course_keeping identify.estimator_speed \
 		identify.estimators baselines.vessel_models diagnose.trials_diagnosis diagnose.trials_as_sold diagnose.hsva_ladder \
-		diagnose.hsva_folds diagnose.pond_ladder diagnose.diagnosis_speed identify.prediction identify.predicted_measured ingest.doctor_measured \
+		diagnose.hsva_folds diagnose.pond_ladder diagnose.pond_bounds diagnose.noise_hills diagnose.diagnosis_speed identify.prediction identify.predicted_measured ingest.doctor_measured \
 		ingest.mcap_speed ingest.nmea_speed fleet.adopt fleet.command_speed aims; \
 		do $(BIN)/python -m benchmarks.$$name || exit 1; done
 

@@ -10,6 +10,7 @@ import hashlib
 import inspect
 import sys
 from collections.abc import Callable, Iterator
+from functools import cache
 from typing import Any
 
 import numba
@@ -58,20 +59,26 @@ def _parts(function: Any, seen: set[Any]) -> Iterator[bytes]:
         called = value.py_func if isinstance(value, Dispatcher) else None
         if called is not None and called not in seen:
             seen.add(called)
-            yield inspect.getsource(called).encode()
+            yield _source(called)
             yield from _parts(called, seen)
         elif isinstance(value, _Intrinsic):
             if value not in seen:
                 seen.add(value)
                 # what it emits is made by other functions and constants there, too
                 there = sys.modules[value._defn.__module__]
-                yield inspect.getsource(there).encode()
+                yield _source(there)
                 numbers = {name: one for name, one in vars(there).items() if isinstance(one, int | float | tuple)}
                 yield repr(sorted(numbers.items())).encode()
         elif isinstance(value, np.ndarray):
             yield name.encode() + value.tobytes()
         elif isinstance(value, bool | int | float | str | tuple):
             yield f"{name}={value!r}".encode()
+
+
+@cache
+def _source(one: Any) -> bytes:
+    """Return the source of a function or module, found once: it goes into each of its callers."""
+    return inspect.getsource(one).encode()
 
 
 class _Whole:

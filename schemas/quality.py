@@ -15,7 +15,10 @@ FINDINGS = {
     "no_shared_hull": ("model that her manoeuvres do not share", "models that her manoeuvres do not share"),
     "left_out": ("manoeuvre that the pooled set leaves out", "manoeuvres that the pooled set leaves out"),
     "no_zigzag": ("log without a manoeuvre to fit", "logs without a manoeuvre to fit"),
-    "missing_channels": ("log in which zigzags cannot be looked for", "logs in which zigzags cannot be looked for"),
+    "missing_channels": (
+        "log in which manoeuvres cannot be looked for",
+        "logs in which manoeuvres cannot be looked for",
+    ),
     "channels": ("log whose channels contradict each other", "logs whose channels contradict each other"),
 }
 Kind = Literal["not_converged", "no_shared_hull", "left_out", "no_zigzag", "missing_channels", "channels"]

@@ -22,19 +22,20 @@ BELOW = {
 #: both share would hide itself.
 ROOMS = {
     "compiled": set(),
+    "distributions": set(),
     "ingest": {"compiled"},
     "channels": set(),
     "segment": {"channels"},
     "model": {"compiled", "channels"},
-    "estimate": {"compiled", "channels", "segment", "model"},
+    "estimate": {"compiled", "distributions", "channels", "segment", "model"},
     "predict": {"compiled", "channels", "model", "estimate"},
-    "compare": {"channels", "model", "estimate", "predict"},
+    "compare": {"distributions", "channels", "model", "estimate", "predict"},
     "shooting": {"compiled", "channels", "model", "estimate"},
-    "diagnose": {"channels", "model", "estimate", "predict", "compare", "shooting"},
-    "manoeuvre": {"compiled", "channels", "segment", "model", "estimate"},
-    "next_trial": {"channels", "model", "estimate", "manoeuvre"},
+    "diagnose": {"distributions", "channels", "model", "estimate", "predict", "compare", "shooting"},
+    "manoeuvre": {"compiled", "distributions", "channels", "segment", "model", "estimate"},
+    "next_trial": {"distributions", "channels", "model", "estimate", "manoeuvre"},
     "steering": {"channels", "model", "estimate", "predict"},
-    "history": {"channels"},
+    "history": {"distributions", "channels"},
     "simulate": set(),
 }
 #: What the warehouse may know of the pipeline: the types that it stores.

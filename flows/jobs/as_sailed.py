@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import radians
 from typing import Any
@@ -26,7 +27,9 @@ from kempf.pipeline.manoeuvre.ship import Start
 from kempf.pipeline.manoeuvre.spiral import Spiral
 from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.model.chain import F, R, V
+from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
 
@@ -135,12 +138,22 @@ def _runs(
     kept = tuple(segment for segment in chosen.segments if segment.segment_id in names)
     if not kept:
         return {}
-    logs = {segment.log_id for segment in kept}
-    fewer = replace(chosen, segments=kept, ingests={k: v for k, v in chosen.ingests.items() if k in logs})
-    spec = ModelSpec.model_validate(dict(predicted.parameter_set.model_spec))
-    made, model = assembled(warehouse, fewer, spec, progress), predicted.prediction.models[0].model.waters.model
+    basis, model = predicted.basis, predicted.prediction.models[0].model.waters.model
     model, _ = with_lasting_noise(predicted.parameter_set, model, np.zeros(len(model.names)))
-    return {run.name: RunFilter(run, model, made.spec) for run in made.runs}
+    # those of the set are laid out already; a segment may have been corrected since
+    own = {
+        s.segment_id for s in kept if basis.bounds.get(s.segment_id) == Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)
+    }
+    runs = [run for run in basis.runs.runs if run.name in own]
+    others = tuple(segment for segment in kept if segment.segment_id not in own)
+    if others:
+        logs = {segment.log_id for segment in others}
+        fewer = replace(chosen, segments=others, ingests={k: v for k, v in chosen.ingests.items() if k in logs})
+        spec = ModelSpec.model_validate(dict(predicted.parameter_set.model_spec))
+        # a manoeuvre that is no run is sailed without the wind and the first motion that a run would say
+        with suppress(NotFound):
+            runs += assembled(warehouse, fewer, spec, progress, basis.alike).runs
+    return {run.name: RunFilter(run, model, basis.runs.spec) for run in runs}
 
 
 def _as_ordered(asked: Manoeuvre, segment: Segment) -> Manoeuvre:

@@ -66,7 +66,7 @@ def find_segments(
     absent = [name for name, series in (("heading", heading), ("rudder_angle", rudder)) if series is None]
     if heading is None or rudder is None:
         missing = " and ".join(absent)
-        note = f"no {missing} in this log: zigzags cannot be looked for; map it in the profile if the log has it"
+        note = f"no {missing} in this log: manoeuvres cannot be looked for; map it in the profile if the log has it"
         return [], (*instruments.notes, note)
     speed = instruments.get("speed_through_water") or instruments.get("speed_over_ground")
     standing = corrections.standing(said)

@@ -1,4 +1,4 @@
-"""The job that identifies a model from every zigzag of a vessel and stores the parameter sets."""
+"""The job that identifies a model from every zigzag and random manoeuvre of a vessel and stores the parameter sets."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def identify_vessel(
     flow_run: str | None = None,
     progress: Progress = silent,
 ) -> list[IdentifyOutcome]:
-    """Identify a model from every zigzag of a vessel.
+    """Identify a model from every zigzag and random manoeuvre of a vessel.
 
     Logs that were read with another profile or other code are read anew first. A set whose inputs, code, model and
     settings are the same as before is not computed again. Segments share the cores: the compiled likelihood runs

@@ -1,4 +1,4 @@
-"""The job that takes raw logs in: read, deposit, find the zigzags."""
+"""The job that takes raw logs in: read, deposit, find the manoeuvres."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ class IngestOutcome:
     ingest_id: str | None = None
     #: Records and values read, kept and rejected.
     tally: Tally | None = None
-    #: How it was read, and why zigzags could not be looked for, where that is so.
+    #: How it was read, and why manoeuvres could not be looked for, where that is so.
     notes: tuple[str, ...] = ()
     #: Manoeuvres found in this log that models are fitted to: zigzags, then random ones.
     segments: tuple[Segment, ...] = ()
@@ -282,7 +282,7 @@ def store(warehouse: Warehouse, read: Sequence[ReadLog]) -> list[Deposit]:
     KempfError
         One is another vessel's, or the warehouse cannot be written; then none of them counts.
     """
-    # zigzags and verdicts before the rows that make the logs count: what a crash leaves in between is not seen, and not
-    # missed
+    # manoeuvres and verdicts before the rows that make the logs count: what a crash leaves in between is not seen, and
+    # not missed
     search_log.store(warehouse, [one.found for one in read])
     return deposit(warehouse, [one.delivery for one in read])

@@ -1,4 +1,4 @@
-"""The job that identifies one hull from all zigzags of a vessel and stores it as a parameter set of its own."""
+"""The job that identifies one hull from all manoeuvres of a vessel and stores it as a parameter set of its own."""
 
 from __future__ import annotations
 
@@ -109,7 +109,7 @@ def not_pooled(
     outcomes: Sequence[IdentifyOutcome],
     pooled: ParameterSet | KempfError | None,
 ) -> dict[str, str]:
-    """Say of every zigzag that the pooled set is not fitted to, by segment, why.
+    """Say of every manoeuvre that the pooled set is not fitted to, by segment, why.
 
     Parameters
     ----------
@@ -119,7 +119,7 @@ def not_pooled(
     Returns
     -------
     dict of str to str
-        Empty for a vessel with a single zigzag: there is nothing to pool.
+        Empty for a vessel with a single manoeuvre: there is nothing to pool.
     """
     names = [outcome.segment.segment_id for outcome in outcomes]
     if len(names) < 2:

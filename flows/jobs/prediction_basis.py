@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,10 +12,11 @@ from kempf.flows.jobs.leg_fit import fitted_to_legs
 from kempf.flows.jobs.loads_of_logs import loads_of_logs
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.ship_model import ShipOfSet
-from kempf.flows.jobs.vessel_runs import LENGTH_M, VesselRuns, assemble
+from kempf.flows.jobs.vessel_runs import LENGTH_M, Like, VesselRuns, assemble
 from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.record.grid_run import common_slip
 from kempf.pipeline.estimate.record.left_out import left_out
 from kempf.pipeline.manoeuvre.covered import covered
 from kempf.pipeline.manoeuvre.draws import Identified
@@ -39,6 +41,8 @@ class Basis:
 
     profile: VesselProfile
     runs: VesselRuns
+    #: Which part of which log every run is of, by its name.
+    bounds: Mapping[str, Bounds]
     surge: SurgeFit
     rudder_rate: RudderRate
     #: How far out the manoeuvres go.
@@ -51,6 +55,11 @@ class Basis:
         """Way that a turn of the shaft keeps on a straight course, m, as models take it; None without a shaft speed."""
         logged = [run for run in self.runs.runs if "shaft_speed" in run.channels and run.approach_per_s > 0.0]
         return float(np.median([run.approach_m_s / run.approach_per_s for run in logged])) if logged else None
+
+    @property
+    def alike(self) -> Like:
+        """What other runs of hers are to share with these."""
+        return Like(self.runs.runs[0].step_s, common_slip(self.runs.runs))
 
     @property
     def approach_m_s(self) -> float:
@@ -92,7 +101,7 @@ def basis_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silen
     runs = assemble(instruments, profile, bounds, ModelSpec.model_validate(dict(one.model_spec)), laden=laden)
     scale = profile.length_m or _scale_m(one)
     surge = surge_of(runs.runs, scale, runs.spec.rudder_speed_exponent)
-    return Basis(profile, runs, surge, rudder_rate(runs.records), covered(runs.runs, scale), scale)
+    return Basis(profile, runs, dict(bounds), surge, rudder_rate(runs.records), covered(runs.runs, scale), scale)
 
 
 def identified(ship: ShipOfSet, basis: Basis) -> Identified:

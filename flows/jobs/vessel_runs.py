@@ -1,4 +1,4 @@
-"""All zigzags of a vessel as diagnosis and comparison take them, with ships to start from."""
+"""All manoeuvres of a vessel as identification, diagnosis and comparison take them, with ships to start from."""
 
 from __future__ import annotations
 

@@ -9,10 +9,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
 from kempf.pipeline.channels.doctor.log import Complex, Velocity
 from kempf.pipeline.channels.doctor.robust_regression import fit
+from kempf.pipeline.channels.recursion import filtered
 from kempf.pipeline.channels.series import SECOND_NS, Float, Nanoseconds
 
 #: instants that are needed
@@ -89,8 +89,7 @@ def _regressed(left: list[Float], columns: list[Float]) -> Lateness | None:
 def _innovations(columns: Float, gain: float) -> Float:
     """Return what a mean that follows columns with a gain does not foresee, shape (n - 1, c)."""
     step = np.diff(columns, axis=0)
-    made: Float = lfilter([1.0], [1.0, gain - 1.0], step, axis=0)
-    return made
+    return filtered([1.0], [1.0, gain - 1.0], step)
 
 
 def _both(time: Nanoseconds, other: Nanoseconds) -> tuple[Nanoseconds, slice]:

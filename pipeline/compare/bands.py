@@ -13,10 +13,10 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.stats import beta
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.group import BAND, UNITS
+from kempf.pipeline.distributions import beta_quantile, beta_tail
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import Looked
 
@@ -85,7 +85,7 @@ def _bands(parts: Sequence[_Spectra], name: str) -> list[dict[str, Any]]:
         if k == 0 or rest == 0:
             continue
         share, expected = float(np.sum(power[inside])) / whole, k / frequency.size
-        bounds = beta.ppf([0.5 - BAND / 2.0, 0.5 + BAND / 2.0], k, rest) / expected
+        bounds = beta_quantile(np.array([0.5 - BAND / 2.0, 0.5 + BAND / 2.0]), k, rest) / expected
         ratio = share / expected
         found.append(
             {
@@ -96,7 +96,7 @@ def _bands(parts: Sequence[_Spectra], name: str) -> list[dict[str, Any]]:
                 "ratio": ratio,
                 "band": [float(bounds[0]), float(bounds[1])],
                 "outside": not bounds[0] <= ratio <= bounds[1],
-                "p_value": float(beta.sf(share, k, rest)),
+                "p_value": beta_tail(share, k, rest),
                 "peak_hz": float(frequency[inside][int(np.argmax(power[inside]))]),
                 "free_run_rms": factor * float(np.sqrt(np.sum(error[inside]) / len(parts))),
                 "unit": unit,

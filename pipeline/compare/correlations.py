@@ -10,10 +10,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2, norm
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.compare.group import BAND
+from kempf.pipeline.distributions import chi2_tail, normal_quantile, normal_up_to
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import Looked
@@ -21,7 +21,7 @@ from kempf.schemas.symbols import CHANNEL_SYMBOLS
 
 #: lags go up to this time, and to so many steps at most
 _LONGEST_S, _MOST = 60.0, 120
-_WIDTH = float(norm.ppf(0.5 + BAND / 2.0))
+_WIDTH = float(normal_quantile(0.5 + BAND / 2.0))
 #: pairs below which a lag is left out
 _FEWEST_PAIRS = 20
 
@@ -110,7 +110,7 @@ def _summary(rho: Float, pairs: Float, lag_s: Float) -> dict[str, Any]:
         "expected_outside": (1.0 - BAND) * rho.size,
         "largest": float(rho[at]),
         "largest_lag_s": float(lag_s[at]),
-        "p_adjusted": min(1.0, 2.0 * rho.size * float(norm.sf(np.max(np.abs(rho) * np.sqrt(pairs))))),
+        "p_adjusted": min(1.0, 2.0 * rho.size * float(normal_up_to(-np.max(np.abs(rho) * np.sqrt(pairs))))),
     }
 
 
@@ -118,5 +118,5 @@ def _ljung_box(rho: Float, pairs: Float) -> dict[str, Any]:
     good = np.isfinite(rho)
     freedom = int(np.count_nonzero(good))
     statistic = float(np.sum(rho[good] ** 2 * (pairs[good] + 2.0)))
-    p_value = float(chi2.sf(statistic, freedom)) if freedom else None
+    p_value = chi2_tail(statistic, freedom) if freedom else None
     return {"ljung_box": statistic, "degrees_of_freedom": freedom, "p_value": p_value}

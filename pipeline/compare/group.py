@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import chi2, norm
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.distributions import chi2_quantile, normal_quantile
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import Samples
 
@@ -24,7 +24,7 @@ UNITS: dict[str, tuple[str, float]] = {
     "yaw_rate": ("deg/s", float(np.rad2deg(1.0))),
     "heading": ("deg", float(np.rad2deg(1.0))),
 }
-_TWO_SIDED = float(norm.ppf(0.5 + BAND / 2.0))
+_TWO_SIDED = float(normal_quantile(0.5 + BAND / 2.0))
 
 
 def rms_band(n: int) -> tuple[float, float]:
@@ -36,7 +36,7 @@ def rms_band(n: int) -> tuple[float, float]:
     >>> round(low, 2), round(high, 2)
     (0.92, 1.08)
     """
-    low, high = chi2.ppf([0.5 - BAND / 2.0, 0.5 + BAND / 2.0], n) / n
+    low, high = chi2_quantile(np.array([0.5 - BAND / 2.0, 0.5 + BAND / 2.0]), n) / n
     return float(np.sqrt(low)), float(np.sqrt(high))
 
 

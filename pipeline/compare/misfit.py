@@ -8,13 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from scipy.stats import chi2
-
 from kempf.pipeline.compare.bands import by_band
 from kempf.pipeline.compare.bins import Bin, binned, bins, grouped, phases, runs, sides
 from kempf.pipeline.compare.correlations import correlations
 from kempf.pipeline.compare.group import BAND
 from kempf.pipeline.compare.worst_windows import worst
+from kempf.pipeline.distributions import chi2_log_tail, chi2_tail
 from kempf.pipeline.predict.run_residuals import Looked, samples_of
 
 #: how many groups are named as those that stand out
@@ -63,9 +62,9 @@ def _stands_out(
     found = []
     for of, which, channel, reading in tested:
         square = reading["n"] * reading["whitened_rms"] ** 2
-        adjusted = min(1.0, len(tested) * float(chi2.sf(square, reading["n"])))
+        adjusted = min(1.0, len(tested) * chi2_tail(square, reading["n"]))
         if adjusted < 1.0 - BAND:
             kept = {key: reading[key] for key in ("n", "whitened_rms", "band")}
-            rank = float(chi2.logsf(square, reading["n"]))
+            rank = chi2_log_tail(square, reading["n"])
             found.append((rank, {"of": of, "which": which, "channel": channel, **kept, "p_adjusted": adjusted}))
     return [entry for _, entry in sorted(found, key=lambda pair: pair[0])[:_NAMED]]

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import SECOND_NS, Float
 from kempf.pipeline.compare.group import UNITS
+from kempf.pipeline.distributions import chi2_log_tail, chi2_tail
 from kempf.pipeline.predict.free_run import CHANNELS
 from kempf.pipeline.predict.run_residuals import Looked
 
@@ -45,9 +45,9 @@ def _one_step(looked: Sequence[Looked], channel: int, name: str) -> list[dict[st
     found = []
     for run in looked:
         for at, mean, count in _windows(run.whitened[:, channel] ** 2):
-            probability = float(chi2.sf(mean * count, count))
+            probability = chi2_tail(mean * count, count)
             measured = {"whitened_rms": float(np.sqrt(mean)), "p_value": probability}
-            rank = -float(chi2.logsf(mean * count, count))
+            rank = -chi2_log_tail(mean * count, count)
             found.append({**_window(run, at), "channel": name, "measure": "one step", **measured, "_rank": rank})
     return found
 

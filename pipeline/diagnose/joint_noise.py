@@ -19,14 +19,16 @@ from kempf.pipeline.model.ship import mariner_like
 from kempf.schemas.effect import Effect
 from kempf.schemas.instrument_noise import lasting_noise
 
-#: log-likelihood that a search which goes on may still find at its top
+#: log-likelihood that a search which goes on may still find at its top, and by which another hill must be higher
 _LEFT = 1.0
 
 
 def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, listener: Listener = SILENT) -> PooledFit:
     """Return a fit with lasting noise, or the higher one that all lasting noise together has beside another hull.
 
-    The search begins beside a hull of the ship's length (`kempf.pipeline.model.ship.mariner_like`) and quiet weather.
+    The search begins beside a hull of the ship's length (`kempf.pipeline.model.ship.mariner_like`) and quiet weather,
+    and once more from the fit itself: several noises have several maxima, and from one beginning it may hang on the
+    last bit of its numbers which of them the search comes to.
 
     Parameters
     ----------
@@ -48,22 +50,42 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     present = {effect.name for effect in fit.model.effects}
     missing = [noise for name, noise in lasting_noise().items() if name not in present]
     model = EffectModel((*fit.model.effects, *missing))
-    values = np.concatenate([fit.values, *([p.steps[0] for p in noise.parameters] for noise in missing)])
+    values = np.concatenate([fit.values, *(_typical(noise) for noise in missing)])
     wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
     hull = mariner_like(fit.runs[0].run.ship.length_m).array()
-    made = refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener)
-    settled = made.converged
-    if made.log_likelihood > wanted and not made.converged:
-        # it came from far, and its iterations may have run out next to the top
-        before = made.log_likelihood
-        made = refitted(
-            *(made.runs, model, made.hull, made.levels, made.values, workers), wanted=wanted, listener=listener
-        )
-        settled = made.converged or made.log_likelihood < before + _LEFT
+    made, settled = _climbed(
+        refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener),
+        *(wanted, workers, listener),
+    )
+    every = lasting_noise()
+    begin = [_typical(e) if e.name in every else fit.values[fit.model.own(e.name)] for e in model.effects]
+    higher = max(made.log_likelihood, wanted) + _LEFT
+    other, other_settled = _climbed(
+        refitted(
+            *(fit.runs, model, fit.hull, fit.levels, np.concatenate(begin), workers), wanted=higher, listener=listener
+        ),
+        *(higher, workers, listener),
+    )
+    if other.log_likelihood > higher and (other_settled or not settled):
+        made, settled = other, other_settled
     # a fit that did not converge itself may ask no more of another
     if not (made.log_likelihood > wanted and (settled or not fit.converged)):
         return fit
     return _without_idle(made, missing, least_gain, workers, listener)
+
+
+def _climbed(made: PooledFit, wanted: float, workers: Executor, listener: Listener) -> tuple[PooledFit, bool]:
+    """Return a fit that came from far at its top, and whether it is there: its iterations may run out next to it."""
+    if made.converged or not made.log_likelihood > wanted:
+        return made, made.converged
+    more = refitted(
+        *(made.runs, made.model, made.hull, made.levels, made.values, workers), wanted=wanted, listener=listener
+    )
+    return more, more.converged or more.log_likelihood < made.log_likelihood + _LEFT
+
+
+def _typical(noise: Effect) -> list[float]:
+    return [parameter.steps[0] for parameter in noise.parameters]
 
 
 def _without_idle(

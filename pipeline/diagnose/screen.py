@@ -15,7 +15,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.diagnose.effect_responses import EffectTrial, responses
@@ -29,6 +28,7 @@ from kempf.pipeline.diagnose.effect_score import (
     solved,
 )
 from kempf.pipeline.diagnose.nuisance import Nuisance, nuisance
+from kempf.pipeline.distributions import chi2_tail
 from kempf.pipeline.estimate.iteration import SILENT, Listener
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.pipeline.estimate.sensitivity import N_HULL
@@ -137,7 +137,7 @@ def _tested(known: Nuisance, columns: Float, effect: Effect, steps: tuple[float,
     return Candidate(
         effect=effect,
         score=found.score,
-        p_value=float(chi2.sf(found.score, found.estimate.size)) if plausible(effect, found.change) else 1.0,
+        p_value=chi2_tail(found.score, found.estimate.size) if plausible(effect, found.change) else 1.0,
         p_adjusted=1.0,
         change=found.change,
         std=found.std,

@@ -16,7 +16,6 @@ from concurrent.futures import Executor
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float, Mask
 from kempf.pipeline.diagnose.confusion_sets import ALIKE
@@ -33,6 +32,7 @@ from kempf.pipeline.diagnose.effect_score import (
     solved,
 )
 from kempf.pipeline.diagnose.stretch_rows import Rows, rows_of
+from kempf.pipeline.distributions import chi2_tail
 from kempf.pipeline.estimate.pooled_fit import PooledFit
 from kempf.schemas.effect import Effect
 
@@ -122,7 +122,7 @@ def explain(
         instants=rows.instants,
         measurements=count,
         square=square,
-        p_misfit=float(chi2.sf(square, count)) if count else 1.0,
+        p_misfit=chi2_tail(square, count) if count else 1.0,
         of_its_length=max(1, whole // max(1, rows.instants)),
         effects=(),
     )
@@ -193,7 +193,7 @@ def _tested(rows: Rows, errors: Float, free: Float, trial: EffectTrial, columns:
         effect=effect,
         here=here,
         everywhere=everywhere,
-        p_value=float(chi2.sf(here.score, here.estimate.size)) if plausible(effect, here.change) else 1.0,
+        p_value=chi2_tail(here.score, here.estimate.size) if plausible(effect, here.change) else 1.0,
         p_adjusted=1.0,
         explained=1.0 - float(rest @ rest) / square if square > 0.0 else 0.0,
         absorption=absorption,

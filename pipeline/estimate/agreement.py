@@ -11,9 +11,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import chi2
 
 from kempf.pipeline.channels.series import Float, Mask
+from kempf.pipeline.distributions import chi2_tail
 from kempf.pipeline.estimate.pooled_fit import Linearised, PooledFit
 from kempf.pipeline.estimate.search.block_arrow import inverse
 from kempf.pipeline.estimate.sensitivity import N_HULL
@@ -35,7 +35,7 @@ class Agreement:
     @property
     def p_value(self) -> float:
         """Probability of a statistic as large where the runs share their parameters."""
-        return float(chi2.sf(self.statistic, self.degrees_of_freedom)) if self.degrees_of_freedom > 0 else 1.0
+        return chi2_tail(self.statistic, self.degrees_of_freedom) if self.degrees_of_freedom > 0 else 1.0
 
     @property
     def widened(self) -> float:

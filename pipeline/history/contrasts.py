@@ -77,9 +77,10 @@ def variances(covariance: Float, along: Float) -> Float:
 def _kept(count: int) -> float:
     """Return what is expected of ``count`` squared standard normals without the largest of them."""
     from scipy.integrate import quad
-    from scipy.stats import chi2
 
-    return count - float(quad(lambda x: 1.0 - chi2.cdf(x, 1) ** count, 0.0, 80.0)[0])
+    from kempf.pipeline.distributions import chi2_tail
+
+    return count - float(quad(lambda x: 1.0 - (1.0 - chi2_tail(x, 1)) ** count, 0.0, 80.0)[0])
 
 
 def scatter(z: Float, variance: Float) -> Float:

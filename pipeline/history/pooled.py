@@ -60,7 +60,7 @@ def pool(value: Float, covariance: Float) -> Pooled:
     >>> both.value.tolist(), round(both.q, 6), both.dof
     ([2.0], 2.0, 1)
     """
-    from scipy.stats import chi2
+    from kempf.pipeline.distributions import chi2_tail
 
     if not value.size or not bool(np.all(usable(value, covariance))):
         raise DataRejected(
@@ -83,13 +83,13 @@ def pool(value: Float, covariance: Float) -> Pooled:
         # against the mean of the others, whose covariance is that of an independent estimate
         rest = np.linalg.inv(total - J[i])
         gap = y[i] - rest @ (np.sum(h, axis=0) - h[i])
-        one_out[i] = min(1.0, n * float(chi2.sf(gap @ np.linalg.solve(S[i] + rest, gap), p)))
+        one_out[i] = min(1.0, n * chi2_tail(float(gap @ np.linalg.solve(S[i] + rest, gap)), p))
     return Pooled(
         mean * scale,
         np.linalg.inv(total) * np.outer(scale, scale),
         q,
         dof,
-        float(chi2.sf(q, dof)) if dof else float("nan"),
+        chi2_tail(q, dof) if dof else float("nan"),
         float(np.sqrt(q / dof)) if dof else float("nan"),
         one_out,
     )

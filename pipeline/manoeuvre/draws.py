@@ -12,9 +12,9 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 
 import numpy as np
-from scipy.stats import norm, qmc
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.distributions import normal_quantile
 from kempf.pipeline.manoeuvre.own_zigzags import REFERENCE
 from kempf.pipeline.manoeuvre.rudder_rate import RudderRate
 from kempf.pipeline.manoeuvre.ship import Ship, Waters
@@ -91,12 +91,15 @@ class Identified:
 
     def ships(self, count: int = DRAWS) -> Iterator[Ship]:
         """Draw ships; parameters of effects stay within what is physical."""
+        # what only draws does not start with every command
+        from scipy.stats import qmc
+
         p = self.effects.size
         # the same draws for every model: what differs between two is their parameters
         seed = int.from_bytes(sha256(b"manoeuvre").digest()[:8], "big")
         sequence = qmc.Sobol(6 + p + 4, rng=np.random.Generator(np.random.PCG64(seed)))
         # of the closed unit interval the ends have no normal number
-        normal = norm.ppf(np.clip(sequence.random(count), 1e-12, 1.0 - 1e-12))
+        normal = normal_quantile(np.clip(sequence.random(count), 1e-12, 1.0 - 1e-12))
         theta = np.concatenate([self.hull, self.effects]) + normal[:, : 6 + p] @ _root(self.covariance).T
         low, high = self.waters.model.low, self.waters.model.high
         # numbers of their own, so that hull and effects are drawn alike whatever costs her speed

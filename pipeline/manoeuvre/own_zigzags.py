@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import binom
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.distributions import binomial_up_to
 
 #: to which an overshoot is measured, deg
 READ_DEG = 0.1
@@ -91,7 +91,7 @@ def missed(overshoots: Float) -> bool:
         return False
     off, half = overshoots[:, 0] - overshoots[:, 1], 0.5 * (overshoots[:, 3] - overshoots[:, 2])
     inside = int(np.sum(np.abs(off) <= np.hypot(half, _HALF * READ_DEG)))
-    return bool(binom.cdf(inside, len(off), 0.95) < _CHANCE)
+    return binomial_up_to(inside, len(off), 0.95) < _CHANCE
 
 
 def scatter(overshoots: Float, scattered: Float) -> float:

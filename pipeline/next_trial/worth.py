@@ -12,9 +12,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.stats import norm
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.distributions import normal_up_to
 from kempf.pipeline.estimate.filtered import RunFilter
 from kempf.pipeline.estimate.search.block_arrow import inverse
 from kempf.pipeline.estimate.sensitivity import N_HULL, Point, active, whitened, with_columns
@@ -88,4 +88,4 @@ def apart(filtered: RunFilter, point: Point, known: Known) -> float:
 
 def probability(D: float, window: float) -> float:
     """Return the probability that a run puts the true model ahead by so much of twice the log-likelihood."""
-    return float(norm.cdf((0.5 * D - 0.5 * window) / np.sqrt(D))) if D > 0.0 else 0.0
+    return float(normal_up_to((0.5 * D - 0.5 * window) / np.sqrt(D))) if D > 0.0 else 0.0

@@ -78,6 +78,27 @@ def test_joint_noise_on_the_same_hill_leaves_the_fit_as_it_is():
     assert with_joint_noise(fit, 15.0, WORKERS) is fit
 
 
+@pytest.mark.parametrize("higher", ["ship", "fit"])
+def test_of_two_beginnings_the_higher_hill_is_taken(monkeypatch: pytest.MonkeyPatch, higher: str):
+    ship = sailed()
+    plain = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit
+    begun = []
+
+    def climbed(runs, model, hull, levels, values, *_: Any, **__: Any) -> PooledFit:
+        # the noises are asked one by one afterwards, with fewer of them
+        if len(model.effects) < len(NAMES):
+            return replace(plain, model=model, values=values, log_likelihood=plain.log_likelihood)
+        begun.append("fit" if np.array_equal(hull, plain.hull) else "ship")
+        gain = 200.0 if begun[-1] == higher else 100.0
+        return replace(plain, model=model, hull=hull, values=values, log_likelihood=plain.log_likelihood + gain)
+
+    monkeypatch.setattr("kempf.pipeline.diagnose.joint_noise.refitted", climbed)
+    made = with_joint_noise(plain, 15.0, WORKERS)
+    assert begun == ["ship", "fit"]
+    assert made.log_likelihood == plain.log_likelihood + 200.0
+    assert np.array_equal(made.hull, plain.hull) == (higher == "fit")
+
+
 def test_joint_noise_whose_iterations_run_out_next_to_the_top_goes_on(monkeypatch: pytest.MonkeyPatch):
     ship = sailed(name="tanker", seed=6, sold=True)
     plain = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit

@@ -64,3 +64,12 @@ def test_what_is_handed_out_is_there() -> None:
         assert getattr(kempf, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'opne'"):
         kempf.opne  # noqa: B018
+
+
+def test_what_computes_starts_without_the_slow_half_of_scipy() -> None:
+    # what they need of it is in pipeline/distributions.py and pipeline/channels/recursion.py
+    jobs = ("identify_vessel", "pool_vessel", "diagnose_vessel", "checked_prediction", "compare_vessel", "ingest_logs")
+    code = "import sys; " + "; ".join(f"import kempf.flows.jobs.{job}" for job in jobs) + "; print(*sys.modules)"
+    found = set(subprocess.run([sys.executable, "-c", code], check=True, capture_output=True, text=True).stdout.split())
+    assert "scipy.special" in found
+    assert not found & {"scipy.stats", "scipy.signal", "scipy.ndimage", "prefect", "matplotlib"}

@@ -5,6 +5,8 @@ import re
 import shutil
 import subprocess
 import sys
+from hashlib import sha256
+from importlib.metadata import distributions
 from pathlib import Path
 
 import pytest
@@ -117,3 +119,6 @@ def test_the_machine_is_named() -> None:
     assert set(found) == {"system", "machine", "processor", "environment"}
     assert found["system"] and found["machine"]
     assert re.fullmatch(r"[0-9a-f]{64}", found["environment"])
+    # of what is installed, as the standard library names it
+    installed = sorted({f"{one.name.lower()}=={one.version}" for one in distributions() if one.name})
+    assert found["environment"] == sha256("\n".join(installed).encode()).hexdigest()

@@ -83,7 +83,7 @@ def test_a_log_without_rudder_or_heading_is_kept_and_says_so(
     path.write_bytes(b"".join(line for line in clean(mariner) if sentence not in line))
     outcome = one(take_in(place, path))
     assert outcome["segments"] == []
-    note = f"no {channel} in this log: zigzags cannot be looked for; map it in the profile if the log has it"
+    note = f"no {channel} in this log: manoeuvres cannot be looked for; map it in the profile if the log has it"
     assert note in outcome["notes"]
     assert kempf("segments", "--warehouse", place, "--json").json == []
     assert kempf("segments", "--warehouse", place).out == "No zigzag found.\n"

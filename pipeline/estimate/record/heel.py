@@ -7,8 +7,8 @@ speed are read more often and better than the roll: what they say of it need not
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import lfilter
 
+from kempf.pipeline.channels.recursion import filtered
 from kempf.pipeline.channels.series import SECOND_NS, Float, Series
 from kempf.pipeline.channels.signal import signal
 from kempf.pipeline.estimate.record.record import MEASUREMENTS, Record
@@ -72,7 +72,7 @@ def _responses(roll: Series, record: Record) -> list[Float]:
     moved = [
         push,
         *(
-            lfilter(*oscillator(float(period), damping, step_s), push)
+            filtered(*oscillator(float(period), damping, step_s), push)
             for period in _PERIODS_S[2.0 * roll.period_s <= _PERIODS_S]
             for damping in _DAMPINGS
         ),
@@ -93,7 +93,7 @@ def oscillator(period_s: float, damping: float, step_s: float) -> tuple[Float, F
     Returns
     -------
     numerator, denominator : ndarray, shape (3,)
-        As `scipy.signal.lfilter` takes them. A steady push comes out as it is.
+        As `filtered` takes them. A steady push comes out as it is.
 
     References
     ----------

@@ -10,9 +10,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.signal import lfilter
 
 from kempf.pipeline.channels.means import curve_of_means, mean_about
+from kempf.pipeline.channels.recursion import filtered
 from kempf.pipeline.channels.series import SECOND_NS, Float, Mask, Nanoseconds, Series
 from kempf.pipeline.channels.signal import Signal, signal
 from kempf.pipeline.estimate.record.moves import moves
@@ -77,7 +77,7 @@ def _lost(heading: Series, instants: Nanoseconds, leg_s: float) -> list[Float]:
     for legs in _LEGS:
         kept = float(np.exp(-period_s / (legs * leg_s)))
         # at rest in the mean: what came before the segment is the spline's
-        shapes.append(np.asarray(lfilter([1.0 - kept], [1.0, -kept], square - np.mean(square))))
+        shapes.append(filtered([1.0 - kept], [1.0, -kept], square - np.mean(square)))
     return [shape for shape in shapes if np.ptp(shape) > 0.0]
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import lfilter
 
+from kempf.pipeline.channels.recursion import filtered
 from kempf.pipeline.channels.series import Float
 from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.surge.usual import KINDS, SETTLED_STD, UNSETTLED, UNSETTLED_STD
@@ -69,7 +69,7 @@ class LoggedSpeed:
 
         def lagged(course: Float) -> Float:
             mean = 0.5 * (course[1:] + course[:-1])
-            found: Float = np.concatenate([[0.0], lfilter([1.0 - kept], [1.0, -kept], mean)])
+            found: Float = np.concatenate([[0.0], filtered([1.0 - kept], [1.0, -kept], mean)])
             return found
 
         own = np.column_stack([lagged(self.shaft), kept ** np.arange(self.speed.size)])

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from kempf.pipeline.channels.series import Float
+from kempf.pipeline.distributions import normal_up_to
 from kempf.pipeline.manoeuvre.surge.usual import BY_DRIFT, BY_RATE, KINDS
 
 
@@ -68,9 +69,7 @@ class SurgeFit:
 
     def drawn(self, normal: Float) -> Float:
         """Return tau, k_vr, k_r, k_d and k_w of draws, shape (n, 5), from standard normal numbers, shape (n, 5)."""
-        from scipy.stats import norm
-
-        part = np.searchsorted(np.cumsum(self.probability), norm.cdf(normal[:, 0]) * (1.0 - 1e-12))
+        part = np.searchsorted(np.cumsum(self.probability), normal_up_to(normal[:, 0]) * (1.0 - 1e-12))
         found = np.empty((len(normal), 5))
         roots: dict[int, tuple[list[int], Float]] = {}
         for i, (k, z) in enumerate(zip(np.minimum(part, self.tau.size - 1).tolist(), normal[:, 1:], strict=True)):
