@@ -68,11 +68,12 @@ def whitened(one: Passed) -> Float:
 
 
 def difference(base: Passed, other: Passed, step: float) -> Float:
-    """Return one column of J, shape (2 m,), from a pass a step away."""
+    """Return one column of J, shape (2 m,), from a pass a step away; not finite where the filter runs away."""
     made = np.isfinite(base.innovation)
     S = base.variance[made]
-    first = -(other.innovation[made] - base.innovation[made]) / np.sqrt(S)
-    return np.concatenate([first, np.log(other.variance[made] / S) / _ROOT_2]) / step
+    with np.errstate(invalid="ignore", divide="ignore"):
+        first = -(other.innovation[made] - base.innovation[made]) / np.sqrt(S)
+        return np.concatenate([first, np.log(other.variance[made] / S) / _ROOT_2]) / step
 
 
 def active(filtered: RunFilter) -> list[int]:
