@@ -27,9 +27,6 @@ from kempf.schemas.correction import Correction
 from kempf.schemas.profile import VesselProfile
 from kempf.warehouse.segments import Segment, segment_id
 
-#: what differs between kinds without overshoots: name, executes, criteria, quality and detail
-_OfKind = tuple[str, tuple[int, ...], dict[str, Any], dict[str, Any], dict[str, Any]]
-
 
 @dataclass(frozen=True)
 class Ingest:
@@ -133,7 +130,7 @@ def _segment(zigzag: Zigzag, ingest: Ingest, profile: VesselProfile, instruments
 def _random(one: RandomManoeuvre, ingest: Ingest, profile: VesselProfile, instruments: Instruments) -> Segment:
     detail = {"heading_range_deg": one.heading_range_deg, **_of_fitted(one, ingest, profile, instruments)}
     quality = {"gap_s": one.gap_s, "reasons": one.reasons}
-    return _no_zigzag(one, ingest, ("random_manoeuvre", one.orders_utc_ns, {}, quality, detail))
+    return _no_zigzag(one, ingest, "random_manoeuvre", one.orders_utc_ns, quality, detail)
 
 
 def _of_fitted(
@@ -159,13 +156,57 @@ def _own_time(start_utc_ns: int, ingest: Ingest, profile: VesselProfile) -> bool
 
 def _kept_aside(one: TurningCircle | PullOut | Spiral, ingest: Ingest, profile: VesselProfile) -> Segment:
     """Return a manoeuvre that no model is fitted to, with its figures."""
-    kind, executes, imo, quality, detail = _of_kind(one, profile)
-    return _no_zigzag(one, ingest, (kind, executes, imo, quality, {"length_m": profile.length_m, **detail}))
+    if isinstance(one, TurningCircle):
+        return _turning_circle(one, ingest, profile)
+    quality = {"reasons": one.reasons}
+    detail: dict[str, Any] = {
+        "length_m": profile.length_m,
+        "figures": {name: asdict(figure) for name, figure in one.figures.items()},
+    }
+    if isinstance(one, PullOut):
+        detail |= {
+            "delta0_measured_deg": one.delta0_measured_deg,
+            "rudder_after_deg": one.rudder_after_deg,
+            "partner_start_utc_ns": one.partner_start_utc_ns,
+            "verdict": one.verdict,
+        }
+        return _no_zigzag(one, ingest, "pull_out", (one.start_utc_ns,), quality, detail)
+    detail |= {"loop": one.loop, "n_ways": one.n_ways, "points": [asdict(point) for point in one.points]}
+    executes = tuple(point.start_utc_ns for point in one.points)
+    return _no_zigzag(one, ingest, "spiral", executes, quality, detail)
 
 
-def _no_zigzag(one: TurningCircle | PullOut | Spiral | RandomManoeuvre, ingest: Ingest, of_kind: _OfKind) -> Segment:
-    """Return a manoeuvre with neither a nominal heading deviation nor overshoots."""
-    kind, executes, imo, quality, detail = of_kind
+def _turning_circle(one: TurningCircle, ingest: Ingest, profile: VesselProfile) -> Segment:
+    made = one.measured
+    detail = {
+        "length_m": profile.length_m,
+        "figures": {name: asdict(figure) for name, figure in made.figures.items()},
+        "figures_over_ground": made.over_ground,
+        "figures_less_drift": made.less_drift,
+        "track": made.track,
+        "circle_drift": asdict(made.drift) if made.drift else None,
+        "corrected_for_current": made.corrected,
+        "delta0_measured_deg": one.delta0_measured_deg,
+        "execute_uncertainty_s": one.execute_uncertainty_s,
+        "heading_change_deg": one.heading_change_deg,
+        "approach_speed_m_s": made.approach_speed_m_s,
+        "approach_speed_trend_percent": made.approach_speed_trend_percent,
+    }
+    executes = () if one.execute_utc_ns is None else (one.execute_utc_ns,)
+    criteria = judge_circle(one, profile.length_m, profile.trial_speed_m_s)
+    segment = _no_zigzag(one, ingest, "turning_circle", executes, asdict(one.quality), detail)
+    return replace(segment, imo={shown.pop("name"): shown for shown in map(asdict, criteria)})
+
+
+def _no_zigzag(
+    one: TurningCircle | PullOut | Spiral | RandomManoeuvre,
+    ingest: Ingest,
+    kind: str,
+    executes_utc_ns: tuple[int, ...],
+    quality: dict[str, Any],
+    detail: dict[str, Any],
+) -> Segment:
+    """Return a manoeuvre with neither a nominal heading deviation nor overshoots, without criteria."""
     return Segment(
         segment_id=segment_id(ingest.log_id, kind, one.start_utc_ns, one.end_utc_ns),
         vessel=ingest.vessel,
@@ -178,50 +219,10 @@ def _no_zigzag(one: TurningCircle | PullOut | Spiral | RandomManoeuvre, ingest: 
         base_heading_deg=one.base_heading_deg,
         start_utc_ns=one.start_utc_ns,
         end_utc_ns=one.end_utc_ns,
-        executes_utc_ns=executes,
+        executes_utc_ns=executes_utc_ns,
         overshoots_deg=(),
         code_version=ingest.code_version,
-        imo=imo,
+        imo={},
         quality=quality,
         detail=detail,
     )
-
-
-def _of_kind(one: TurningCircle | PullOut | Spiral, profile: VesselProfile) -> _OfKind:
-    if isinstance(one, TurningCircle):
-        made = one.measured
-        criteria = judge_circle(one, profile.length_m, profile.trial_speed_m_s)
-        executes = () if one.execute_utc_ns is None else (one.execute_utc_ns,)
-        return (
-            "turning_circle",
-            executes,
-            {shown.pop("name"): shown for shown in map(asdict, criteria)},
-            asdict(one.quality),
-            {
-                "figures": {name: asdict(figure) for name, figure in made.figures.items()},
-                "figures_over_ground": made.over_ground,
-                "figures_less_drift": made.less_drift,
-                "track": made.track,
-                "circle_drift": asdict(made.drift) if made.drift else None,
-                "corrected_for_current": made.corrected,
-                "delta0_measured_deg": one.delta0_measured_deg,
-                "execute_uncertainty_s": one.execute_uncertainty_s,
-                "heading_change_deg": one.heading_change_deg,
-                "approach_speed_m_s": made.approach_speed_m_s,
-                "approach_speed_trend_percent": made.approach_speed_trend_percent,
-            },
-        )
-    figures = {name: asdict(figure) for name, figure in one.figures.items()}
-    quality = {"reasons": one.reasons}
-    if isinstance(one, PullOut):
-        detail = {
-            "figures": figures,
-            "delta0_measured_deg": one.delta0_measured_deg,
-            "rudder_after_deg": one.rudder_after_deg,
-            "partner_start_utc_ns": one.partner_start_utc_ns,
-            "verdict": one.verdict,
-        }
-        return "pull_out", (one.start_utc_ns,), {}, quality, detail
-    points = [asdict(point) for point in one.points]
-    detail = {"figures": figures, "loop": one.loop, "n_ways": one.n_ways, "points": points}
-    return "spiral", tuple(point.start_utc_ns for point in one.points), {}, quality, detail
