@@ -1,7 +1,7 @@
 """Tail probabilities and quantiles of the distributions that tests go by.
 
-`scipy.stats` has them too, and takes longer to import than half of the commands take to answer; these are the functions
-of `scipy.special` that it calls.
+`scipy.stats` has them too, and takes longer to import than half of the commands take to answer; these are of
+`scipy.special`, and equal to it within rounding.
 """
 
 from __future__ import annotations
@@ -25,7 +25,9 @@ __all__ = [
 
 
 def chi2_tail(square: float, degrees_of_freedom: float) -> float:
-    """Return the probability that chi-square exceeds a value."""
+    """Return the probability that chi-square exceeds a value; NaN without degrees of freedom."""
+    if not degrees_of_freedom > 0:
+        return float("nan")
     return float(chdtrc(degrees_of_freedom, max(square, 0.0)))
 
 

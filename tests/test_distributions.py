@@ -23,6 +23,7 @@ def test_chi_square(square, freedom):
 def test_what_is_too_small_for_a_number_has_no_logarithm_and_no_number_stays_none():
     assert distributions.chi2_log_tail(5000.0, 2) == -np.inf
     assert np.isnan(distributions.chi2_tail(float("nan"), 2))
+    assert np.isnan(distributions.chi2_tail(2.0, 0)) and np.isnan(distributions.chi2_log_tail(2.0, 0))
 
 
 def test_normal():

@@ -10,6 +10,7 @@ import platform
 import shutil
 import subprocess
 from dataclasses import dataclass
+from email import message_from_string
 from functools import cache
 from hashlib import sha256
 from importlib.metadata import Distribution, PackageNotFoundError, distributions, version
@@ -167,9 +168,10 @@ def _name_and_version(one: Distribution) -> str:
 
     Its properties parse the whole description of the package, twice: a third of a second for all of them.
     """
-    text = one.read_text("METADATA") or one.read_text("PKG-INFO") or ""
-    head = dict(line.split(": ", 1) for line in text.partition("\n\n")[0].splitlines() if ": " in line)
-    return f"{head['Name'].strip().lower()}=={head['Version'].strip()}" if "Name" in head else ""
+    # an empty name: the one file that an old egg-info is
+    text = one.read_text("METADATA") or one.read_text("PKG-INFO") or one.read_text("") or ""
+    head = message_from_string(text.partition("\n\n")[0])
+    return f"{head['Name'].lower()}=={head['Version']}" if head["Name"] else ""
 
 
 def _processor() -> str:

@@ -32,7 +32,7 @@ class StoredExamination:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """How the channels were chosen, and why zigzags could not be looked for, where that is so."""
+        """How the channels were chosen, and why manoeuvres could not be looked for, where that is so."""
         return tuple(self.content.get("notes", ()))
 
 

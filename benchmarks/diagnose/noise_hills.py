@@ -1,4 +1,4 @@
-"""Whether the lasting noise of instruments hangs on the last digits: looked for anew from fits that differ there.
+"""Whether the lasting noise of instruments depends on the last digits: looked for anew from fits that differ there.
 
 The likelihood of several noises has several maxima. Rounding, another processor or another version of a library must
 not decide which of them a model comes to, as all that is diagnosed is counted from there.
@@ -22,7 +22,7 @@ from kempf.flows.jobs.vessel_runs import assembled
 from kempf.pipeline.diagnose.instrument_noise import with_instrument_noise
 from kempf.pipeline.diagnose.split import split
 from kempf.pipeline.estimate.plain_fit import fit_plain
-from kempf.pipeline.estimate.pooled_fit import PooledFit
+from kempf.pipeline.estimate.pooled_fit import PooledFit, linearise
 from kempf.warehouse.store import Warehouse
 
 #: how much the fits differ, of each number, and how many there are beside the fit itself
@@ -39,7 +39,7 @@ def main() -> None:
         for ship in (measured_ships.tank(data), measured_ships.pond(data)):
             plain = _plain(ship, workers)
             for seed in range(_TIMES + 1):
-                found = with_instrument_noise(_moved(plain, seed), workers)
+                found = with_instrument_noise(_moved(plain, seed, workers), workers)
                 names = ", ".join(sorted(effect.name for effect in found.model.effects)) or "none"
                 rows.append([ship.name, str(seed or "-"), names, f"{found.log_likelihood:.2f}", f"{found.hull[3]:.5f}"])
     lines = [
@@ -64,12 +64,14 @@ def _plain(ship: measured_ships.Ship, workers: ThreadPoolExecutor) -> PooledFit:
     return fit_plain([runs[i] for i in fitted], spec, workers).fit
 
 
-def _moved(fit: PooledFit, seed: int) -> PooledFit:
+def _moved(fit: PooledFit, seed: int, workers: ThreadPoolExecutor) -> PooledFit:
     if not seed:
         return fit
     random = np.random.default_rng(seed)
     hull, levels = (x * (1.0 + _DIFFER * random.standard_normal(x.shape)) for x in (fit.hull, fit.levels))
-    return replace(fit, hull=hull, levels=levels)
+    moved = replace(fit, hull=hull, levels=levels)
+    lines = linearise(moved.runs, [moved.point(run) for run in range(len(moved.runs))], workers)
+    return replace(moved, linearised=lines, log_likelihood=sum(line.passed.log_likelihood for line in lines))
 
 
 if __name__ == "__main__":

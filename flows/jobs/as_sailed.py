@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import radians
 from typing import Any
 
 import numpy as np
 
-from kempf.flows.jobs.chosen_manoeuvres import choose
+from kempf.flows.jobs.chosen_manoeuvres import Chosen, choose
 from kempf.flows.jobs.lasting_noise import with_lasting_noise
+from kempf.flows.jobs.loads_of_logs import loads_beside
 from kempf.flows.jobs.log_channels import channels_of
 from kempf.flows.jobs.predicted import Predicted
 from kempf.flows.jobs.prediction_basis import Basis
@@ -20,6 +20,7 @@ from kempf.flows.process.progress import Progress, silent
 from kempf.pipeline.channels.instruments import Instruments
 from kempf.pipeline.channels.series import SECOND_NS
 from kempf.pipeline.estimate.filtered import Passed, RunFilter
+from kempf.pipeline.estimate.record.grid_run import GridRun
 from kempf.pipeline.manoeuvre.began import Began, began
 from kempf.pipeline.manoeuvre.draws import Identified
 from kempf.pipeline.manoeuvre.sailed import Manoeuvre
@@ -29,6 +30,7 @@ from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.model.chain import F, R, V
 from kempf.schemas.errors import NotFound
 from kempf.schemas.model_spec import ModelSpec
+from kempf.warehouse import notes
 from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.segments import Segment
 from kempf.warehouse.store import Warehouse
@@ -140,20 +142,37 @@ def _runs(
         return {}
     basis, model = predicted.basis, predicted.prediction.models[0].model.waters.model
     model, _ = with_lasting_noise(predicted.parameter_set, model, np.zeros(len(model.names)))
-    # those of the set are laid out already; a segment may have been corrected since
-    own = {
-        s.segment_id for s in kept if basis.bounds.get(s.segment_id) == Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)
-    }
-    runs = [run for run in basis.runs.runs if run.name in own]
-    others = tuple(segment for segment in kept if segment.segment_id not in own)
-    if others:
-        logs = {segment.log_id for segment in others}
-        fewer = replace(chosen, segments=others, ingests={k: v for k, v in chosen.ingests.items() if k in logs})
-        spec = ModelSpec.model_validate(dict(predicted.parameter_set.model_spec))
-        # a manoeuvre that is no run is sailed without the wind and the first motion that a run would say
-        with suppress(NotFound):
-            runs += assembled(warehouse, fewer, spec, progress, basis.alike).runs
+    # those of the set are laid out already
+    own = {bounds: name for name, bounds in basis.bounds.items()}
+    named = {s.segment_id: own.get(Bounds(s.log_id, s.start_utc_ns, s.end_utc_ns)) for s in kept}
+    laid = {run.name: run for run in basis.runs.runs}
+    runs = [replace(laid[name], name=segment_id) for segment_id, name in named.items() if name in laid]
+    others = tuple(segment for segment in kept if named[segment.segment_id] is None)
+    try:
+        runs += _beside_the_set(warehouse, predicted, replace(chosen, segments=others), progress) if others else ()
+    except NotFound as error:
+        # a manoeuvre that is no run is sailed without the wind and the first motion that a run would give
+        if error.code != "no_runs":
+            raise
     return {run.name: RunFilter(run, model, basis.runs.spec) for run in runs}
+
+
+def _beside_the_set(
+    warehouse: Warehouse, predicted: Predicted, chosen: Chosen, progress: Progress
+) -> tuple[GridRun, ...]:
+    """Return runs of further manoeuvres as those of the set are: profile, step, slip and load on the set's scale."""
+    basis, one = predicted.basis, predicted.parameter_set
+    inputs: dict[str, Any] = dict(one.provenance.get("inputs") or {})
+    logs, others = {s.log_id for s in chosen.segments}, [(s.segment_id, s) for s in chosen.segments]
+    noted = notes.draughts_m(notes.of_vessel(warehouse, predicted.vessel), chosen.segments)
+    alike = replace(
+        chosen,
+        ingests={log_id: ingest_id for log_id, ingest_id in chosen.ingests.items() if log_id in logs},
+        profile_sha256=str(inputs["profile_sha256"]),
+        loads=loads_beside(basis.bounds.items(), inputs.get("draughts_m", {}), others, noted),
+    )
+    spec = ModelSpec.model_validate(dict(one.model_spec))
+    return assembled(warehouse, alike, spec, progress, basis.alike).runs
 
 
 def _as_ordered(asked: Manoeuvre, segment: Segment) -> Manoeuvre:

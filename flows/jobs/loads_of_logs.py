@@ -9,6 +9,7 @@ from kempf.pipeline.estimate.record.loads import loads
 from kempf.warehouse.notes import Sailed
 
 S = TypeVar("S", bound=Sailed)
+T = TypeVar("T", bound=Sailed)
 
 
 def in_order(named: Iterable[tuple[str, S]]) -> list[tuple[str, S]]:
@@ -30,3 +31,39 @@ def loads_of_logs(named: Iterable[tuple[str, S]], draughts_m: Mapping[str, float
         By log, m, of those whose draught is known.
     """
     return loads(logs_in_order(named), draughts_m)
+
+
+def loads_beside(
+    own: Iterable[tuple[str, S]],
+    own_draughts_m: Mapping[str, float],
+    others: Iterable[tuple[str, T]],
+    other_draughts_m: Mapping[str, float],
+) -> dict[str, float]:
+    """Return the load of every log of a set and of logs beside it, all on the scale of the set.
+
+    A log beside the set counts as laden as the last log of the set before it, or the first one, where the set does not
+    go by draughts or that of the log is not known.
+
+    Parameters
+    ----------
+    own, others : iterable of (str, Sailed)
+        Stretches of the logs of the set, and of others.
+    own_draughts_m, other_draughts_m : mapping of str to float
+        By log, m, of those whose draught is known.
+    """
+    began: dict[str, int] = {}
+    for _, one in in_order(own):
+        began.setdefault(one.log_id, one.start_utc_ns)
+    known = loads(list(began), own_draughts_m)
+    found, first = dict(known), next(iter(began))
+    by_draughts = all(log_id in own_draughts_m for log_id in began)
+    for _, other in in_order(others):
+        if other.log_id in found:
+            continue
+        if by_draughts and other.log_id in other_draughts_m:
+            both = {first: own_draughts_m[first], other.log_id: other_draughts_m[other.log_id]}
+            found[other.log_id] = loads([first, other.log_id], both)[other.log_id]
+        else:
+            before = [log_id for log_id, start in began.items() if start <= other.start_utc_ns]
+            found[other.log_id] = known[before[-1] if before else first]
+    return found

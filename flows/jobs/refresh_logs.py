@@ -55,7 +55,7 @@ class Stale:
     logs: int
     #: Read with another profile or by other code.
     unread: tuple[LogRow, ...]
-    #: Those of the others in whose readings other code has looked for zigzags.
+    #: Those of the others in whose readings other code has looked for manoeuvres.
     unsearched: tuple[LogRow, ...]
 
     @property
@@ -162,7 +162,7 @@ def _search_anew(warehouse: Warehouse, rows: Sequence[LogRow], begin: Callable[[
     for chunk in _chunks(rows):
         searched: dict[str, SearchedLog] = {}
         for row in chunk:
-            begin(f"looking for zigzags in {row.file_name}")
+            begin(f"looking for manoeuvres in {row.file_name}")
             try:
                 searched[row.ingest_id] = search_again(warehouse, row, said.get(row.log_id, ()))
             except Exception as error:  # noqa: BLE001 - whatever it is, the next log must not pay for it

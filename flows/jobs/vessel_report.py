@@ -22,7 +22,7 @@ class VesselReport:
 
     vessel: str
     #: logs, reread, searched, segments, new_sets, kept_sets: Logs in all, logs read anew, logs of the others in which
-    #: zigzags were looked for anew, zigzags found, parameter sets made and kept.
+    #: manoeuvres were looked for anew, manoeuvres found, parameter sets made and kept.
     logs: int = 0
     reread: int = 0
     searched: int = 0

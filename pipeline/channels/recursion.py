@@ -13,8 +13,8 @@ from kempf.pipeline.channels.series import Float
 def filtered(numerator: Sequence[float] | Float, denominator: Sequence[float] | Float, columns: Float) -> Float:
     """Return columns through a rational filter that was at rest before them.
 
-    The equations of its difference equation are a banded triangle, solved as one: `scipy.signal.lfilter` gives the
-    same and makes every command start three quarters of a second later, which is what importing it takes.
+    Its difference equation is a banded triangular system, solved in one call: `scipy.signal.lfilter` gives the same and
+    makes every command start three quarters of a second later, which is what importing it takes.
 
     Parameters
     ----------
@@ -31,6 +31,10 @@ def filtered(numerator: Sequence[float] | Float, denominator: Sequence[float] | 
     >>> filtered([0.5], [1.0, -0.5], np.ones(4))
     array([0.5   , 0.75  , 0.875 , 0.9375])
     """
+    columns = np.asarray(columns, dtype=np.float64)
+    if not columns.size:
+        # LAPACK does not look before it writes
+        return columns.copy()
     driven = np.zeros_like(columns)
     for delay, factor in enumerate(numerator[: len(columns)]):
         driven[delay:] += factor * columns[: len(columns) - delay]

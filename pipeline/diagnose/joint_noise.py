@@ -27,7 +27,7 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     """Return a fit with lasting noise, or the higher one that all lasting noise together has beside another hull.
 
     The search begins beside a hull of the ship's length (`kempf.pipeline.model.ship.mariner_like`) and quiet weather,
-    and once more from the fit itself: several noises have several maxima, and from one beginning it may hang on the
+    and once more from the fit itself: several noises have several maxima, and from one beginning it may depend on the
     last bit of its numbers which of them the search comes to.
 
     Parameters
@@ -57,25 +57,31 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
         refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener),
         *(wanted, workers, listener),
     )
+
+    def usable(log_likelihood: float, there: bool) -> bool:
+        # a fit that did not converge itself may ask no more of another
+        return log_likelihood > wanted and (there or not fit.converged)
+
+    first = usable(made.log_likelihood, settled)
     every = lasting_noise()
     begin = [_typical(e) if e.name in every else fit.values[fit.model.own(e.name)] for e in model.effects]
-    higher = max(made.log_likelihood, wanted) + _LEFT
+    higher = made.log_likelihood + _LEFT if first else wanted
     other, other_settled = _climbed(
         refitted(
             *(fit.runs, model, fit.hull, fit.levels, np.concatenate(begin), workers), wanted=higher, listener=listener
         ),
         *(higher, workers, listener),
     )
-    if other.log_likelihood > higher and (other_settled or not settled):
-        made, settled = other, other_settled
-    # a fit that did not converge itself may ask no more of another
-    if not (made.log_likelihood > wanted and (settled or not fit.converged)):
+    second = other.log_likelihood > higher and usable(other.log_likelihood, other_settled)
+    if second and (other_settled or not (first and settled)):
+        made = other
+    elif not first:
         return fit
     return _without_idle(made, missing, least_gain, workers, listener)
 
 
 def _climbed(made: PooledFit, wanted: float, workers: Executor, listener: Listener) -> tuple[PooledFit, bool]:
-    """Return a fit that came from far at its top, and whether it is there: its iterations may run out next to it."""
+    """Climb on where the iterations ran out next to the top; return the fit and whether it has reached the top."""
     if made.converged or not made.log_likelihood > wanted:
         return made, made.converged
     more = refitted(

@@ -99,6 +99,42 @@ def test_of_two_beginnings_the_higher_hill_is_taken(monkeypatch: pytest.MonkeyPa
     assert np.array_equal(made.hull, plain.hull) == (higher == "fit")
 
 
+#: what the two climbs gain, whether they reach their tops, and which one is taken
+CLIMBS = [
+    ((100.0, True), (200.0, True), "fit"),
+    ((200.0, True), (100.0, True), "ship"),
+    ((100.0, False), (80.0, True), "fit"),
+    ((20.0, True), (100.0, False), None),
+    ((20.0, True), (100.0, True), "fit"),
+    ((20.0, True), (40.0, True), None),
+]
+
+
+@pytest.mark.parametrize(("ship_climb", "fit_climb", "taken"), CLIMBS)
+def test_a_climb_that_counts_for_nothing_stands_in_no_ones_way(monkeypatch, ship_climb, fit_climb, taken):
+    ship = sailed()
+    plain = replace(fit_plain(ship.runs[:2], ship.spec, WORKERS).fit, converged=True)
+    begun: list[str] = []
+
+    def climbed(runs, model, hull, levels, values, *_: Any, **__: Any) -> PooledFit:
+        if len(model.effects) < len(NAMES):
+            return replace(plain, model=model, values=values)
+        which = "fit" if np.array_equal(hull, plain.hull) else "ship"
+        begun.append(which)
+        gain, there = fit_climb if which == "fit" else ship_climb
+        # one whose iterations ran out goes on, and rises further
+        more = 50.0 * (begun.count(which) - 1)
+        likely = plain.log_likelihood + gain + more
+        return replace(plain, model=model, hull=hull, values=values, converged=there, log_likelihood=likely)
+
+    monkeypatch.setattr("kempf.pipeline.diagnose.joint_noise.refitted", climbed)
+    made = with_joint_noise(plain, 15.0, WORKERS)
+    if taken is None:
+        assert made is plain
+    else:
+        assert np.array_equal(made.hull, plain.hull) == (taken == "fit") and made is not plain
+
+
 def test_joint_noise_whose_iterations_run_out_next_to_the_top_goes_on(monkeypatch: pytest.MonkeyPatch):
     ship = sailed(name="tanker", seed=6, sold=True)
     plain = fit_plain(ship.runs[:2], ship.spec, WORKERS).fit

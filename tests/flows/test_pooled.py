@@ -8,19 +8,30 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from kempf.flows.jobs import as_sailed as as_sailed_job
+from kempf.flows.jobs.as_sailed import as_sailed
+from kempf.flows.jobs.chosen_manoeuvres import Chosen
 from kempf.flows.jobs.files import read_profiles
 from kempf.flows.jobs.identify_vessel import Request, identify_vessel
 from kempf.flows.jobs.ingest_logs import ingest
+from kempf.flows.jobs.loads_of_logs import loads_beside
 from kempf.flows.jobs.pool_vessel import pool_vessel, poolable
+from kempf.flows.jobs.predict_request import PredictRequest
+from kempf.flows.jobs.predict_vessel import models_of_set, predict_with
 from kempf.flows.jobs.prediction_basis import basis_of, identified
 from kempf.flows.jobs.reprocess_vessel import reprocess_vessel
 from kempf.flows.jobs.rerun_set import rerun
 from kempf.flows.jobs.ship_model import ship_of_set
 from kempf.flows.jobs.standing_model import POOLED
+from kempf.flows.jobs.vessel_runs import assembled
+from kempf.pipeline.estimate.filtered import RunFilter
+from kempf.pipeline.estimate.record.grid_run import GridRun
+from kempf.pipeline.manoeuvre.zigzag import Zigzag
 from kempf.pipeline.simulate.csv_log import to_csv
 from kempf.pipeline.simulate.nmea_log import to_nmea
 from kempf.pipeline.simulate.trial import simulate_trial, zigzag_settings
-from kempf.warehouse import aliases, parameter_sets
+from kempf.warehouse import aliases, parameter_sets, segments
+from kempf.warehouse.parameter_set import Bounds
 from kempf.warehouse.store import Warehouse
 from tests.conftest import Ship
 from tests.flows.content import fresh
@@ -109,3 +120,61 @@ def test_the_current_set_is_named(days: Warehouse) -> None:
     printed = kempf("identify", "--vessel", "mariner", "--warehouse", Path(days.uri)).out
     assert f"current of mariner: {pooled}, plain, pooled" in printed
     assert printed.index("manoeuvres pooled") < printed.index("20/20 zigzag")
+
+
+def test_a_prediction_lays_out_the_manoeuvres_of_its_set_once_and_others_alike(
+    days: Warehouse, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Behind the others: it takes a third day in."""
+    settings = zigzag_settings("mariner", duration_s=400.0, seed=3)
+    third = simulate_trial(replace(settings, start_utc_ns=settings.start_utc_ns + 2 * DAY_NS, heading_deg=200.0))
+    (tmp_path / "third.csv.gz").write_bytes(to_csv(third))
+    (taken,) = ingest(days, [tmp_path / "third.csv.gz"], "mariner")
+    (beside,) = taken.segments
+    every = [s for s in segments.current(days, "mariner") if s.kind == "zigzag"]
+    pooled = parameter_sets.get(days, aliases.of_vessel(days, "mariner")["current"])
+    single = next(
+        row["parameter_set_id"]
+        for row in parameter_sets.summaries(days, "mariner").rows(named=True)
+        if row["estimator"] != POOLED
+    )
+    for set_id in (pooled.parameter_set_id, single):
+        asked = PredictRequest("zigzag", set_id=set_id)
+        made = predict_with(models_of_set(days, "mariner", asked), asked, count=8)
+        own = set(made.parameter_set.segment_ids)
+        laid: list[Chosen] = []
+        runs: dict[str, GridRun] = {}
+
+        def laid_out(warehouse, chosen, *rest, laid=laid):
+            laid.append(chosen)
+            return assembled(warehouse, chosen, *rest)
+
+        def filtered(run, *rest, runs=runs):
+            runs[run.name] = run
+            return RunFilter(run, *rest)
+
+        monkeypatch.setattr(as_sailed_job, "assembled", laid_out)
+        monkeypatch.setattr(as_sailed_job, "RunFilter", filtered)
+        pairs = [(s, Zigzag(np.radians(20.0), np.radians(20.0), overshoots=2)) for s in every]
+        sailed = as_sailed(days, made, pairs)
+        monkeypatch.undo()
+        assert {one.segment.segment_id for one in sailed if one.sample == "fitted"} == own
+        # what is asked of the log that two loggers wrote is asked once
+        assert own | {beside.segment_id} <= set(runs) <= {s.segment_id for s in every}
+        (chosen,) = laid
+        assert {s.segment_id for s in chosen.segments} == set(runs) - own
+        first = made.basis.runs.runs[0]
+        assert {run.step_s for run in runs.values()} == {first.step_s}
+        assert chosen.profile_sha256 == made.parameter_set.provenance["inputs"]["profile_sha256"]
+
+
+def test_logs_beside_a_set_are_laden_on_its_scale() -> None:
+    def log(name: str, day: int) -> tuple[str, Bounds]:
+        return name, Bounds(name, day * DAY_NS, day * DAY_NS + 1)
+
+    own, others = [log("b", 1), log("d", 3)], [log("a", 0), log("c", 2), log("e", 4)]
+    # by their numbers: those beside the set as in the last log before them
+    assert loads_beside(own, {}, others, {"e": 9.0}) == {"b": 0.0, "d": 1.0, "a": 0.0, "c": 0.0, "e": 1.0}
+    # by draughts, where they are known
+    found = loads_beside(own, {"b": 8.0, "d": 10.0}, others, {"a": 7.2, "e": 9.6})
+    assert found == pytest.approx({"b": 0.0, "d": 2.5, "a": -1.0, "c": 0.0, "e": 2.0})

@@ -114,6 +114,22 @@ def test_importing_the_store_loads_no_heavy_library() -> None:
     assert done.stdout.strip() == "[]"
 
 
+def test_what_is_installed_is_named_as_the_standard_library_does(tmp_path: Path) -> None:
+    for name, text in {
+        "plain-1.dist-info": "Metadata-Version: 2.1\nName: Plain\nVersion: 1\n\nName: other\n",
+        "bare-1.dist-info": "Name: bare\n\n",
+        "tight-1.dist-info": "Name:tight\nVersion:1\n\n",
+        "lower-1.dist-info": "name: lower\nversion: 1\r\n\r\n",
+        "nameless-1.dist-info": "Version: 1\n\n",
+    }.items():
+        (tmp_path / name).mkdir()
+        (tmp_path / name / "METADATA").write_bytes(text.encode())
+    (tmp_path / "old-2.egg-info").write_text("Name: old\nVersion: 2\n")
+    found = [code_version._name_and_version(one) for one in distributions(path=[str(tmp_path)])]
+    wanted = [f"{one.name.lower()}=={one.version}" if one.name else "" for one in distributions(path=[str(tmp_path)])]
+    assert found == wanted and len(found) == 6
+
+
 def test_the_machine_is_named() -> None:
     found = code_version.machine()
     assert set(found) == {"system", "machine", "processor", "environment"}
