@@ -66,10 +66,9 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     every = lasting_noise()
     begin = [_typical(e) if e.name in every else fit.values[fit.model.own(e.name)] for e in model.effects]
     higher = made.log_likelihood + _LEFT if first else wanted
+    # to its end: whether a climb can come so high is judged too early where it begins with a long way to go
     other, other_settled = _climbed(
-        refitted(
-            *(fit.runs, model, fit.hull, fit.levels, np.concatenate(begin), workers), wanted=higher, listener=listener
-        ),
+        refitted(fit.runs, model, fit.hull, fit.levels, np.concatenate(begin), workers, listener=listener),
         *(higher, workers, listener),
     )
     second = other.log_likelihood > higher and usable(other.log_likelihood, other_settled)
