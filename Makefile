@@ -17,7 +17,7 @@ QUICK := test_layers.py test_docstrings.py package/test_import.py docs/test_docu
 	$(addprefix simulate/test_, disturbances.py manoeuvre.py) $(addprefix warehouse/test_, store.py vessels.py segments.py) \
 	flows/test_fleet_plan.py $(addprefix workbench/test_, names.py effects.py)
 
-.PHONY: demo test check types compiled quick bench bench-long lock clean setup
+.PHONY: demo test check lint types compiled quick bench bench-long lock clean setup
 
 demo: $(RUNTIME)
 	$(BIN)/kempf demo
@@ -26,26 +26,23 @@ demo: $(RUNTIME)
 # First, beside the check of types, whether the demonstration still gives the reference's segments and parameter sets, bit
 # for bit: it compiles what the tests call, which each of their processes would do for itself. Then the tests, in the order
 # of their names: by default the files with the fewest tests come last, and these are the slowest.
-test: $(DEVELOP)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+test: lint
 	$(MAKE) --jobs 2 types compiled
 	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 compiled: $(DEVELOP)
 	$(BIN)/python -m benchmarks.identify.identical demo
 
+lint: $(DEVELOP)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+
 types: $(DEVELOP)
 	$(BIN)/mypy
 
-check: $(DEVELOP)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
+check: lint types
 
-quick: $(DEVELOP)
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
+quick: lint
 	$(BIN)/python -m pytest --numprocesses 2 --dist loadfile $(addprefix tests/, $(QUICK))
 
 # Every figure anew, each on its own page in benchmarks/results; needs the measured logs in ../shared. Minutes.

@@ -53,10 +53,8 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     values = np.concatenate([fit.values, *(_typical(noise) for noise in missing)])
     wanted = fit.log_likelihood + least_gain * max(len(missing), 1)
     hull = mariner_like(fit.runs[0].run.ship.length_m).array()
-    made, settled = _climbed(
-        refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener),
-        *(wanted, workers, listener),
-    )
+    made = refitted(fit.runs, model, hull, calm_levels(fit), values, workers, wanted=wanted, listener=listener)
+    made, settled = _climbed(made, wanted, workers, listener)
 
     def usable(log_likelihood: float, there: bool) -> bool:
         # a fit that did not converge itself may ask no more of another
@@ -67,10 +65,8 @@ def with_joint_noise(fit: PooledFit, least_gain: float, workers: Executor, liste
     begin = [_typical(e) if e.name in every else fit.values[fit.model.own(e.name)] for e in model.effects]
     higher = made.log_likelihood + _LEFT if first else wanted
     # to its end: whether a climb can come so high is judged too early where it begins with a long way to go
-    other, other_settled = _climbed(
-        refitted(fit.runs, model, fit.hull, fit.levels, np.concatenate(begin), workers, listener=listener),
-        *(higher, workers, listener),
-    )
+    other = refitted(fit.runs, model, fit.hull, fit.levels, np.concatenate(begin), workers, listener=listener)
+    other, other_settled = _climbed(other, higher, workers, listener)
     second = other.log_likelihood > higher and usable(other.log_likelihood, other_settled)
     if second and (other_settled or not (first and settled)):
         made = other

@@ -91,7 +91,7 @@ class Identified:
 
     def ships(self, count: int = DRAWS) -> Iterator[Ship]:
         """Draw ships; parameters of effects stay within what is physical."""
-        # what only draws does not start with every command
+        # imported by what draws only: it takes longer than most commands take to start
         from scipy.stats import qmc
 
         p = self.effects.size
