@@ -14,7 +14,7 @@ from kempf.flows.process.cores import usable
 from kempf.flows.process.progress import Progress, silent
 from kempf.flows.process.wrap_error import wrapped
 from kempf.schemas.errors import KempfError
-from kempf.warehouse import runs, vessels
+from kempf.warehouse import runs
 from kempf.warehouse.runs import FlowRun
 from kempf.warehouse.store import Warehouse
 
@@ -58,19 +58,19 @@ class Plan:
         # a vessel without any log is looked at, too
         weights = [(name, max(logs, 1)) for name, logs in self.due]
         left = sum(weight for _, weight in weights)
-        first = wanted = min(LOGS_A_BATCH, OF_SHARE * left / workers)
-        found: list[list[str]] = []
+        first = size = min(LOGS_A_BATCH, OF_SHARE * left / workers)
+        batches: list[list[str]] = []
         batch: list[str] = []
         held = 0
         for name, weight in weights:
             batch.append(name)
             held += weight
-            if held >= wanted:
-                found.append(batch)
+            if held >= size:
+                batches.append(batch)
                 left -= held
                 batch, held = [], 0
-                wanted = max(min(LOGS_A_BATCH, OF_SHARE * left / workers), OF_FIRST * first)
-        return [*found, batch] if batch else found
+                size = max(min(LOGS_A_BATCH, OF_SHARE * left / workers), OF_FIRST * first)
+        return [*batches, batch] if batch else batches
 
 
 def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_only: bool = True) -> Plan:
@@ -92,8 +92,7 @@ def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_on
         ``no_warehouse``.
     """
     warehouse.require()
-    asked = sorted(set(names)) if names else vessels.names(warehouse)
-    states = fleet_state(warehouse, asked if names else None)
+    states = fleet_state(warehouse, sorted(set(names)) if names else None)
     settled = _settled(warehouse, states) if changed_only else {}
     due = sorted((len(state.log_ids), name) for name, state in states.items() if name not in settled)
     reports = [from_run(run) for run in settled.values()]
@@ -104,11 +103,11 @@ def plan(warehouse: Warehouse, names: Sequence[str] | None = None, *, changed_on
 
 def _settled(warehouse: Warehouse, states: Mapping[str, VesselState]) -> dict[str, FlowRun]:
     """Return the run that left each vessel in the state that she is in."""
-    found = {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
+    by_id = {run.run_id: run for run in runs.all_runs(warehouse, FLOW)}
     settled = {}
     for name, state in states.items():
         for changed_only in (True, False):
-            run = found.get(run_id_of(name, changed_only=changed_only))
+            run = by_id.get(run_id_of(name, changed_only=changed_only))
             if run is not None and run.message.get("state") == state.digest:
                 settled[name] = run
                 break
@@ -194,10 +193,10 @@ def to_try_again(reports: Iterable[Report]) -> list[str]:
 
 def together(first: Report, second: Report) -> Report:
     """Return the report of two attempts on one vessel: what both did, and what the second left."""
-    done = {key: first[key] + second[key] for key in ("new_sets", "reread", "searched")}
+    sums = {key: first[key] + second[key] for key in ("new_sets", "reread", "searched")}
     kept = max(second["kept_sets"] - first["new_sets"], 0)
-    changed = "changed" if second["status"] == "unchanged" and any(done.values()) else second["status"]
-    return {**second, "status": changed, "kept_sets": kept, **done}
+    changed = "changed" if second["status"] == "unchanged" and any(sums.values()) else second["status"]
+    return {**second, "status": changed, "kept_sets": kept, **sums}
 
 
 def do_fleet(

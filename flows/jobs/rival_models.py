@@ -26,7 +26,7 @@ class Rivals:
     remarks: tuple[str, ...]
 
 
-def rivals_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = silent) -> Rivals:
+def rivals_of(warehouse: Warehouse, parameter_set: ParameterSet, progress: Progress = silent) -> Rivals:
     """Return the sets of the models that fit the data of a set as well as its own.
 
     A confusion set of the vessel's newest diagnosis names the effects that fit alike; a model with another member in an
@@ -35,17 +35,19 @@ def rivals_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = sile
 
     Parameters
     ----------
-    one : ParameterSet
+    parameter_set : ParameterSet
         The set that is asked for.
     """
-    effects = tuple(one.model_spec.get("effects", ()))
-    found = [d for d in diagnoses.of_vessel(warehouse, one.vessel) if _same_data(d.inputs, one)]
-    if not found:
+    effects = tuple(parameter_set.model_spec.get("effects", ()))
+    candidates = [
+        d for d in diagnoses.of_vessel(warehouse, parameter_set.vessel) if _same_data(d.inputs, parameter_set)
+    ]
+    if not candidates:
         return Rivals(
             (), ("no diagnosis says which models fit as well: this one is taken alone; see `kempf diagnose`",)
         )
-    alike = [tuple(entry["effects"]) for entry in found[-1].content.get("sets", ()) if len(entry["effects"]) > 1]
-    wanted = [
+    alike = [tuple(entry["effects"]) for entry in candidates[-1].content.get("sets", ()) if len(entry["effects"]) > 1]
+    rivals = [
         tuple(other if name == effect else name for name in effects)
         for effect in effects
         for members in alike
@@ -53,20 +55,22 @@ def rivals_of(warehouse: Warehouse, one: ParameterSet, progress: Progress = sile
         for other in members
         if other not in effects
     ]
-    if not wanted:
+    if not rivals:
         return Rivals((), ())
-    stored = {tuple(other.model_spec.get("effects", ())): other for other in _of_same_data(warehouse, one)}
+    stored = {
+        tuple(other.model_spec.get("effects", ())): other for other in _other_effects_alone(warehouse, parameter_set)
+    }
     sets, remarks = [], []
-    for names in dict.fromkeys(wanted):
+    for names in dict.fromkeys(rivals):
         try:
-            sets.append(stored[names] if names in stored else _made(warehouse, one, names, progress))
+            sets.append(stored[names] if names in stored else _made(warehouse, parameter_set, names, progress))
         except KempfError as error:
             remarks.append(f"{' + '.join(names)} fits as well and is not among the models: {error.message}")
     return Rivals(tuple(sets), tuple(remarks))
 
 
-def _same_data(inputs: Mapping[str, Any], one: ParameterSet) -> bool:
-    own: Mapping[str, Any] = one.provenance.get("inputs") or {}
+def _same_data(inputs: Mapping[str, Any], parameter_set: ParameterSet) -> bool:
+    own: Mapping[str, Any] = parameter_set.provenance.get("inputs") or {}
     return _manoeuvres(inputs) == _manoeuvres(own) and inputs.get("profile_sha256") == own.get("profile_sha256")
 
 
@@ -75,19 +79,32 @@ def _manoeuvres(inputs: Mapping[str, Any]) -> list[str]:
     return sorted(canonical_json(bounds) for bounds in inputs.get("segments") or ())
 
 
-def _of_same_data(warehouse: Warehouse, one: ParameterSet) -> list[ParameterSet]:
-    """Return the stored sets of the same manoeuvres and estimator, in the order of their ids."""
-    names = sorted(parameter_sets.summaries(warehouse, one.vessel)["parameter_set_id"].to_list())
-    every = parameter_sets.get_all(warehouse, one.vessel, names)
+def _other_effects_alone(warehouse: Warehouse, parameter_set: ParameterSet) -> list[ParameterSet]:
+    """Return the stored sets that differ from a set in the effects of their model alone, in the order of their ids.
+
+    One of another current or wind, or of other code, would count as a doubt about the effects what is another model of
+    the surroundings, or another version of the estimator.
+    """
+    names = sorted(parameter_sets.summaries(warehouse, parameter_set.vessel)["parameter_set_id"].to_list())
+    every = parameter_sets.get_all(warehouse, parameter_set.vessel, names)
+    own: Mapping[str, Any] = parameter_set.provenance.get("inputs") or {}
     return [
         other
         for other in every
-        if other.estimator == one.estimator and _same_data(other.provenance.get("inputs") or {}, one)
+        if _same_data(other.provenance.get("inputs") or {}, parameter_set)
+        and _beside_effects(other.provenance.get("inputs") or {}) == _beside_effects(own)
     ]
 
 
-def _made(warehouse: Warehouse, one: ParameterSet, names: tuple[str, ...], progress: Progress) -> ParameterSet:
-    spec, own = model_of(one)
-    chosen = choose(warehouse, one.vessel)
-    made, _ = store_model(warehouse, chosen, spec.model_copy(update={"effects": names}), own, progress)
-    return made
+def _beside_effects(inputs: Mapping[str, Any]) -> dict[str, Any]:
+    model = {name: value for name, value in (inputs.get("model") or {}).items() if name != "effects"}
+    return {"model": model, **{name: inputs.get(name) for name in ("estimator", "code_version")}}
+
+
+def _made(
+    warehouse: Warehouse, parameter_set: ParameterSet, names: tuple[str, ...], progress: Progress
+) -> ParameterSet:
+    spec, own = model_of(parameter_set)
+    chosen = choose(warehouse, parameter_set.vessel)
+    rival, _ = store_model(warehouse, chosen, spec.model_copy(update={"effects": names}), own, progress)
+    return rival

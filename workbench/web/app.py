@@ -24,6 +24,7 @@ from kempf.workbench.web import static_files
 from kempf.workbench.web.addresses import address_of, vessel_at
 from kempf.workbench.web.desk import Desk
 from kempf.workbench.web.guard import Guard
+from kempf.workbench.web.numbers import whole_number
 from kempf.workbench.web.pages import (
     changes,
     compare,
@@ -49,6 +50,8 @@ from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.settings import Settings
 from kempf.workbench.web.templating import rendered
 
+#: Of a chart: no screen is so wide.
+_MOST_BINS = 99_999
 #: What an error's exit code is as the status of an answer.
 _STATUS = {1: 500, 2: 400, 3: 422, 4: 404, 5: 422}
 #: What some errors are: gone in a moment, too late, too large.
@@ -158,8 +161,8 @@ def _serve_jobs(app: FastAPI, desk: Desk) -> None:
         return _shown(request, job.gather(desk, request.path_params["name"]))
 
     def document(request: Request) -> Response:
-        after = request.query_params.get("after", "0")
-        return _json(job.document(desk, request.path_params["name"], int(after) if after.isdigit() else 0))
+        after = whole_number(request.query_params.get("after", "0"))
+        return _json(job.document(desk, request.path_params["name"], after or 0))
 
     async def ask(request: Request) -> Response:
         form = await _form(request)
@@ -212,8 +215,8 @@ def _window(request: Request) -> tuple[str | None, str | None]:
 
 
 def _series(desk: Desk, request: Request) -> Response:
-    wanted = request.query_params.get("ch", "")
-    content = series.frame(desk, request.path_params["log_id"], wanted, *_window(request), _bins(request))
+    channels = request.query_params.get("ch", "")
+    content = series.frame(desk, request.path_params["log_id"], channels, *_window(request), _bins(request))
     return Response(content, media_type="application/octet-stream")
 
 
@@ -224,10 +227,13 @@ def _predicted(desk: Desk, request: Request) -> Response:
 
 
 def _bins(request: Request) -> int:
-    bins = request.query_params.get("bins", "1000")
-    if not (bins.isdigit() and len(bins) < 6):
-        raise UsageError("bins_unreadable", f"{bins[:40]!r} is no number of bins.", "Give a whole number.")
-    return int(bins)
+    text = request.query_params.get("bins", "1000")
+    bins = whole_number(text)
+    if bins is None or not 1 <= bins <= _MOST_BINS:
+        raise UsageError(
+            "bins_unreadable", f"{text[:40]!r} is no number of bins.", f"Give a whole number from 1 to {_MOST_BINS}."
+        )
+    return bins
 
 
 def _shown(request: Request, page: Page) -> Response:
@@ -258,11 +264,11 @@ def _refused(request: Request, error: Exception) -> Response:
             f"There is nothing at the address {request.url.path[:200]!r}.",
             "Go to the fleet's page, or type a name or an id into the field above.",
         )
-    found = wrapped(error)
-    if found.code == "internal":
-        traceback.print_exception(found, file=sys.stderr)
-    status = _STATUS_OF_CODE.get(found.code, _STATUS[found.exit_code])
+    failure = wrapped(error)
+    if failure.code == "internal":
+        traceback.print_exception(failure, file=sys.stderr)
+    status = _STATUS_OF_CODE.get(failure.code, _STATUS[failure.exit_code])
     if request.url.path.endswith((".json", "/series", "/predicted")):
-        return Response(json_text(found.to_json()) + "\n", status, media_type="application/json")
-    page = Page("error.html", "That did not work", {"error": found, "status": status})
+        return Response(json_text(failure.to_json()) + "\n", status, media_type="application/json")
+    page = Page("error.html", "That did not work", {"error": failure, "status": status})
     return HTMLResponse(_html(request, page), status)

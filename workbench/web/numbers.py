@@ -1,4 +1,4 @@
-"""Numbers as they are typed into a form."""
+"""Numbers as they are typed into a form or an address."""
 
 from __future__ import annotations
 
@@ -34,3 +34,15 @@ def number_of(text: str, of: str, unit: str = "") -> float | None:
         raise UsageError(
             "number_unreadable", f"{text[:40]!r} is no {of}.", f"{expected}, or leave the field blank."
         ) from None
+
+
+def whole_number(text: str) -> int | None:
+    """Return the whole number that decimal digits give; None of anything else, and of more than nine digits.
+
+    Examples
+    --------
+    >>> whole_number("12"), whole_number("-1"), whole_number("²"), whole_number("")
+    (12, None, None, None)
+    """
+    # `isdigit` takes a superscript too, which `int` does not read
+    return int(text) if text.isdecimal() and len(text) < 10 else None

@@ -8,6 +8,7 @@ from collections.abc import AsyncGenerator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
+from uuid import uuid4
 
 from starlette.concurrency import run_in_threadpool
 from starlette.datastructures import UploadFile
@@ -94,19 +95,20 @@ class Uploads:
         file.file.seek(0)
         to = self.folder / digest.hexdigest() / base_name(file.filename or "")
         to.parent.mkdir(parents=True, exist_ok=True)
-        part = to.with_name(to.name[:200] + ".part")
+        # the same file may be arriving twice
+        part = to.with_name(f"{to.name[:180]}.{uuid4().hex}.part")
         with part.open("wb") as target:
             shutil.copyfileobj(file.file, target, _BLOCK)
         part.replace(to)
         return f"{to.parent.name}/{to.name}"
 
     def _forget_the_oldest(self) -> None:
-        held = sorted(self.folder.glob("*"), key=lambda one: (one.stat().st_mtime_ns, one.name))
-        for one in held[:-_MOST_KEPT]:
-            shutil.rmtree(one, ignore_errors=True)
+        held = sorted(self.folder.glob("*"), key=lambda folder: (folder.stat().st_mtime_ns, folder.name))
+        for folder in held[:-_MOST_KEPT]:
+            shutil.rmtree(folder, ignore_errors=True)
 
 
-def base_name(given: str) -> str:
+def base_name(file_name: str) -> str:
     r"""Return the name of a file without the folders that a browser may send with it.
 
     Examples
@@ -114,7 +116,7 @@ def base_name(given: str) -> str:
     >>> base_name("../../etc/passwd"), base_name("C:\\trials\\day 1.csv"), base_name("..")
     ('passwd', 'day 1.csv', 'log')
     """
-    last = given.replace("\\", "/").rpartition("/")[2]
+    last = file_name.replace("\\", "/").rpartition("/")[2]
     shown = "".join(letter for letter in last if letter.isprintable())[-120:]
     return shown if shown.strip(". ") else "log"
 
@@ -145,11 +147,11 @@ def paths_of(state: Path, names: Any) -> list[Path]:
     UsageError
         ``upload_gone``.
     """
-    found = [state / "uploads" / name for name in names]
-    if not all(path.is_file() for path in found):
+    paths = [state / "uploads" / name for name in names]
+    if not all(path.is_file() for path in paths):
         raise UsageError(
             "upload_gone",
             "What was sent is not kept any more.",
             "Send it again from the page that takes logs in.",
         )
-    return found
+    return paths

@@ -83,6 +83,9 @@ def test_the_page_of_a_job_shows_how_its_fit_goes(queue: Queue, client: TestClie
     assert stated[1]["figures"] == {
         **{"iteration": 8, "climb": 4, "log_likelihood": 1234.52, "error": 0.0314, "fitted": True}
     }
+    for no_number in ("²", "-1", "9" * 5000):
+        every = client.get(f"/jobs/{name}.json", params={"after": no_number})
+        assert every.status_code == 200 and len(every.json()["ticks"]) > 2
     queue.finish(name, {"to": "/"})
     assert "Iteration 8" in client.get(f"/jobs/{name}").text  # it stays when the job is done
 

@@ -180,6 +180,9 @@ def test_what_is_not_there_is_a_page_in_words_with_the_next_step(client: TestCli
         ("ch=heading&from=" + "9" * 60, "instant_unreadable"),
         ("ch=heading&from=2030-01-01T00:00:00Z&to=2029-01-01T00:00:00Z", "window_empty"),
         ("ch=heading&bins=-1", "bins_unreadable"),
+        ("ch=heading&bins=0", "bins_unreadable"),
+        ("ch=heading&bins=²", "bins_unreadable"),
+        ("ch=heading&bins=" + "9" * 5000, "bins_unreadable"),
         ("ch=" + ",".join(f"c{k}" for k in range(20)), "too_many_channels"),
     ],
 )

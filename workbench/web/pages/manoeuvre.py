@@ -11,6 +11,7 @@ from kempf.workbench.documents.manoeuvres import listed_manoeuvres
 from kempf.workbench.web.addresses import of_vessel
 from kempf.workbench.web.data.predictions import HORIZONS, KeptPrediction, kept_of
 from kempf.workbench.web.desk import Desk
+from kempf.workbench.web.numbers import whole_number
 from kempf.workbench.web.pages.model import stretch_address, worst_stretches
 from kempf.workbench.web.pages.page import Page
 from kempf.workbench.web.pages.series import derived, offered
@@ -23,72 +24,75 @@ _MARGIN = 0.05
 
 def document(desk: Desk, segment_id: str) -> dict[str, Any]:
     """Return the manoeuvre's entry in what `kempf segments --json` prints."""
-    one = segments.by_prefix(desk.warehouse, segment_id)
-    listed = listed_manoeuvres(desk.warehouse, one.vessel)
-    return next(entry for entry in listed.documents if entry["segment_id"] == one.segment_id)
+    segment = segments.by_prefix(desk.warehouse, segment_id)
+    listed = listed_manoeuvres(desk.warehouse, segment.vessel)
+    return next(entry for entry in listed.documents if entry["segment_id"] == segment.segment_id)
 
 
-def gather(desk: Desk, segment_id: str, asked: Mapping[str, str]) -> Page:
+def gather(desk: Desk, segment_id: str, fields: Mapping[str, str]) -> Page:
     """Return the page of a manoeuvre.
 
     Parameters
     ----------
-    asked : mapping
+    fields : mapping
         ``from`` and ``to``; ``set`` and ``h``, the model beside it and its horizon; ``worst``, which of the worst
         stretches of that model this window is, from 1.
     """
     shown = document(desk, segment_id)
     row = logs.of_ingest(desk.warehouse, shown["ingest_id"])
     listed = segments.found_in(desk.warehouse, row.vessel)
-    place = next(k for k, one in enumerate(listed) if one.segment_id == shown["segment_id"])
-    one = listed[place]
-    beyond = int(_MARGIN * (one.end_utc_ns - one.start_utc_ns))
-    first, last = max(one.start_utc_ns - beyond, row.start_utc_ns), min(one.end_utc_ns + beyond, row.end_utc_ns)
-    begin, end = window(asked.get("from"), asked.get("to"), first, last)
+    place = next(k for k, segment in enumerate(listed) if segment.segment_id == shown["segment_id"])
+    segment = listed[place]
+    beyond = int(_MARGIN * (segment.end_utc_ns - segment.start_utc_ns))
+    first, last = max(segment.start_utc_ns - beyond, row.start_utc_ns), min(segment.end_utc_ns + beyond, row.end_utc_ns)
+    begin, end = window(fields.get("from"), fields.get("to"), first, last)
     hers = notes.of_vessel(desk.warehouse, row.vessel)
     gone = lost.of_ingests(desk.warehouse, [row.ingest_id]).get(row.ingest_id, ())
-    compared = one.is_fitted and one.excluded is None
+    compared = segment.is_fitted and segment.excluded is None
     current = compared and aliases.CURRENT in aliases.of_vessel(desk.warehouse, row.vessel)
     content: dict[str, Any] = {
         "one": shown,
         "log_id": row.log_id,
         "channels": offered(desk.channels.of(row.ingest_id)),
-        "spans": [span_of(one), *spans_of_lost(gone, first, last), *spans_of_notes(hers, last)],
+        "spans": [span_of(segment), *spans_of_lost(gone, first, last), *spans_of_notes(hers, last)],
         "window": (iso_utc(begin), iso_utc(end)),
         "whole": (iso_utc(first), iso_utc(last)),
         "current": current,
         "predicted": None,
         "stretch": None,
-        "notes": [note.show() for note in hers if note.subject_id == one.segment_id],
+        "notes": [note.show() for note in hers if note.subject_id == segment.segment_id],
         "before": listed[place - 1].segment_id if place else None,
         "after": listed[place + 1].segment_id if place + 1 < len(listed) else None,
     }
     if current:
-        set_id, horizon, made = kept_of(desk.warehouse, desk.state, row.vessel, asked.get("set"), asked.get("h"))
-        if made is not None and one.segment_id in made.columns:
-            beside = f"/segments/{one.segment_id}/predicted?set={set_id}&h={horizon}"
+        set_id, horizon, prediction = kept_of(
+            desk.warehouse, desk.state, row.vessel, fields.get("set"), fields.get("h")
+        )
+        if prediction is not None and segment.segment_id in prediction.columns:
+            beside = f"/segments/{segment.segment_id}/predicted?set={set_id}&h={horizon}"
             content |= {
                 "predicted": beside,
                 "set_id": set_id,
                 "horizon": dict(HORIZONS).get(horizon, f"{horizon} ahead"),
             }
             content |= {"channels": [*content["channels"], derived()]}
-            content["stretch"] = _stretch(made, set_id, horizon, asked.get("worst", ""))
-    title = f"{span_of(one)['words']}, {iso_utc(one.start_utc_ns)[:16].replace('T', ' ')} UTC"
+            content["stretch"] = _stretch(prediction, set_id, horizon, fields.get("worst", ""))
+    title = f"{span_of(segment)['words']}, {iso_utc(segment.start_utc_ns)[:16].replace('T', ' ')} UTC"
     above = ((row.vessel, of_vessel(row.vessel)), (row.file_name, f"/logs/{row.log_id}"))
     return Page("manoeuvre.html", title, content, above)
 
 
-def _stretch(made: KeptPrediction, set_id: str, horizon: str, asked: str) -> dict[str, Any] | None:
+def _stretch(prediction: KeptPrediction, set_id: str, horizon: str, number: str) -> dict[str, Any] | None:
     """Return which of a model's worst stretches is shown, with the ways to the ones beside it."""
-    listed = worst_stretches(made.document["where"])
-    if not (asked.isdigit() and 1 <= int(asked) <= len(listed)):
+    listed = worst_stretches(prediction.document["where"])
+    ordinal = whole_number(number)
+    if ordinal is None or not 1 <= ordinal <= len(listed):
         return None
-    place = int(asked) - 1
-    ways = [stretch_address(one, set_id, horizon, k + 1) for k, one in enumerate(listed)]
-    one = listed[place]
+    place = ordinal - 1
+    ways = [stretch_address(stretch, set_id, horizon, k + 1) for k, stretch in enumerate(listed)]
+    stretch = listed[place]
     return {
-        "words": f"{one['channel'].replace('_', ' ')}, {one['measure']} ({one['sample']})",
+        "words": f"{stretch['channel'].replace('_', ' ')}, {stretch['measure']} ({stretch['sample']})",
         "number": place + 1,
         "of": len(listed),
         "set": set_id,

@@ -1,0 +1,75 @@
+"""Which stored sets count as rivals of a set: other effects, everything else alike."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from kempf.flows.jobs import rival_models
+from kempf.warehouse import diagnoses, parameter_sets
+from kempf.warehouse.diagnoses import StoredDiagnosis
+from kempf.warehouse.parameter_set import ParameterSet
+from kempf.warehouse.store import Warehouse
+from tests.warehouse.samples import inputs, parameter_set
+
+
+def of_model(effects: tuple[str, ...], code: str = "c0de", **model: Any) -> ParameterSet:
+    spec = {"name": "linear", "current": "free", **model, "effects": effects}
+    return parameter_set(made_of=inputs(model_spec=spec, code_version=code))
+
+
+@pytest.fixture
+def drag(tmp_path: Path) -> tuple[Warehouse, ParameterSet]:
+    """A vessel whose diagnosis does not distinguish drag from drift cubed."""
+    warehouse, drag = Warehouse(str(tmp_path / "w")), of_model(("cross_flow_drag",))
+    parameter_sets.insert(warehouse, [drag])
+    content = {"sets": [{"effects": ["cross_flow_drag", "yaw_v3"]}]}
+    made_of = drag.provenance["inputs"]
+    diagnosis = StoredDiagnosis(
+        *("dx-1", drag.vessel, drag.parameter_set_id, drag.start_utc_ns, "ambiguous", ("cross_flow_drag", "yaw_v3")),
+        *(content, made_of, "c0de"),
+    )
+    assert diagnoses.insert(warehouse, diagnosis)
+    return warehouse, drag
+
+
+@pytest.fixture
+def fitted(monkeypatch: pytest.MonkeyPatch) -> list[tuple[str, ...]]:
+    """The effects of the models that are fitted, as no stored set is theirs."""
+    asked: list[tuple[str, ...]] = []
+
+    def noted(_: Warehouse, beside: ParameterSet, effects: tuple[str, ...], __: object) -> ParameterSet:
+        asked.append(effects)
+        return replace(beside, parameter_set_id="ps-fitted")
+
+    monkeypatch.setattr(rival_models, "_made", noted)
+    return asked
+
+
+def test_a_stored_set_with_the_other_effect_is_read(
+    drag: tuple[Warehouse, ParameterSet], fitted: list[tuple[str, ...]]
+) -> None:
+    warehouse, own = drag
+    cubed = of_model(("yaw_v3",))
+    parameter_sets.insert(warehouse, [cubed])
+    found = rival_models.rivals_of(warehouse, own)
+    assert [rival.parameter_set_id for rival in found.sets] == [cubed.parameter_set_id]
+    assert not fitted and not found.remarks
+
+
+@pytest.mark.parametrize(
+    "otherwise",
+    [{"current": "none"}, {"rudder_speed_exponent": 1.0}, {"code": "0lder"}],
+    ids=["current", "rudder", "code"],
+)
+def test_one_that_differs_in_more_is_no_rival(
+    drag: tuple[Warehouse, ParameterSet], fitted: list[tuple[str, ...]], otherwise: dict[str, Any]
+) -> None:
+    warehouse, own = drag
+    parameter_sets.insert(warehouse, [of_model(("yaw_v3",), **otherwise)])
+    found = rival_models.rivals_of(warehouse, own)
+    assert [rival.parameter_set_id for rival in found.sets] == ["ps-fitted"]
+    assert fitted == [("yaw_v3",)]
